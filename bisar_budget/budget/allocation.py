@@ -1,0 +1,111 @@
+"""Division of the budgets between transmitter, receiver and clock, and the gain of autofocus."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from bisar_budget.budget.combine import combine_phases
+from bisar_budget.budget.sources import ErrorSource
+from bisar_budget.mission.model import MetricSplits, Mission, Shares
+
+BALANCED_RANGE = (0.05, 0.95)  # neither platform is left without a budget
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Split:
+    """Shares of one budget; they sum to 1. Without a share of its own the clock is held to the receiver's."""
+
+    transmitter: float
+    receiver: float
+    clock: float | None = None
+    reserve: float = 0.0
+
+    def of(self, owner: str) -> float:
+        """Share of an owner; what belongs to nobody is held to the whole budget."""
+        if owner == "clock":
+            return self.receiver if self.clock is None else self.clock
+        if owner == "mission":
+            return 1.0
+        return self.transmitter if owner == "transmitter" else self.receiver
+
+    def includes(self, owner: str, of: str) -> bool:
+        """Whether an owner's errors count against the share of `of`."""
+        return owner == of or (owner == "clock" and of == "receiver" and self.clock is None)
+
+
+EQUAL = Split(transmitter=0.5, receiver=0.5)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Allocation:
+    """The budgets as divided. `qpe_total` and limits in [rad], before autofocus; PSLR and ISLR share power."""
+
+    qpe_total: float
+    qpe: Split
+    pslr: Split
+    islr: Split
+    n_pull: float | None
+
+    @property
+    def autofocus_gain(self) -> float:
+        """Factor on QPE limits: π·N_pull over the total, never below 1 (Section VI; 4·N_pull for π/4)."""
+        return 1.0 if self.n_pull is None else max(1.0, math.pi * self.n_pull / self.qpe_total)
+
+    def qpe_limit(self, owner: str) -> float:
+        """QPE that an owner may use, before autofocus. [rad]"""
+        return self.qpe.of(owner) * self.qpe_total
+
+    def n_pull_needed(self, qpe: float, owner: str) -> float:
+        """Smallest N_pull that makes a QPE pass, rounded up to hundredths."""
+        exact = qpe / (self.qpe.of(owner) * math.pi)
+        return math.ceil(exact * 100 * (1 - 1e-12)) / 100
+
+
+def allocate(mission: Mission, sources: Sequence[ErrorSource]) -> Allocation:
+    """Divide the budgets of a mission as its `allocation.split` says."""
+    split = mission.allocation.split
+    metrics = split if isinstance(split, MetricSplits) else None
+    return Allocation(
+        qpe_total=mission.requirements.quadratic_phase_error,
+        qpe=_divide(metrics.quadratic_phase_error if metrics else split, mission, sources),
+        pslr=_divide_power(metrics.pslr if metrics else split),
+        islr=_divide_power(metrics.islr if metrics else split),
+        n_pull=mission.autofocus.n_pull,
+    )
+
+
+def _divide_power(split: object) -> Split:
+    return _split(split) if isinstance(split, Shares) else EQUAL  # `balanced` weighs phase, not power
+
+
+def _divide(split: object, mission: Mission, sources: Sequence[ErrorSource]) -> Split:
+    if isinstance(split, Shares):
+        return _split(split)
+    if split != "balanced":
+        return EQUAL
+    weight = {}
+    for platform in ("transmitter", "receiver"):
+        rule = mission.allocation.combine
+        phases = [
+            source.qpe
+            for source in sources
+            if source.qpe is not None
+            and EQUAL.includes(source.owner, platform)
+            and (rule == "each" or source.is_independent)
+        ]
+        weight[platform] = combine_phases(phases, rule)
+    total = weight["transmitter"] + weight["receiver"]
+    if total == 0:
+        return EQUAL
+    low, high = BALANCED_RANGE
+    transmitter = min(high, max(low, weight["transmitter"] / total))
+    return Split(transmitter=transmitter, receiver=1 - transmitter)
+
+
+def _split(shares: Shares) -> Split:
+    return Split(
+        transmitter=shares.transmitter,
+        receiver=shares.receiver,
+        clock=shares.clock,
+        reserve=shares.reserve,
+    )

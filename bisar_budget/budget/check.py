@@ -1,0 +1,351 @@
+"""Hold a mission's declared errors to its allocated budget: one row for each, and what the rows add up to."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import date
+
+from bisar_budget import evaluators
+from bisar_budget.budget.allocation import Allocation, Split, allocate
+from bisar_budget.budget.combine import combine_displacements, combine_phases
+from bisar_budget.budget.findings import MissionFindings, Resolution, Row, Warning
+from bisar_budget.budget.sources import ErrorSource, error_sources, image_plane
+from bisar_budget.budget.waivers import apply_waivers
+from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
+from bisar_budget.errors import KeyPath
+from bisar_budget.geometry import GroundVector
+from bisar_budget.mission.model import Mission
+
+FULL_MODEL_NOTE = (
+    "allowable_full and qpe_full_rad are null: the full model is not part of this version, the published one "
+    "holds the range constant and leaves out what the displacement of the image adds"
+)
+
+
+NO_REQUIREMENT = "no requirement in the file: computed, not judged"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Line:
+    """A row before it is judged: what is declared against what is allowed."""
+
+    id: str
+    metric: str
+    unit: str
+    declared: float | None  # magnitude
+    allowable: float | None  # autofocus gain included
+    path: KeyPath
+    equation: str
+    owner: str = "mission"
+    gain: float = 1.0  # of autofocus, within `allowable`
+    no_limit: str = ""  # why there is no allowable
+    not_evaluated: str = ""  # why a declared value cannot be judged
+    info: str = ""  # why the row judges nothing
+    never_fails: bool = False
+    over: str = ""  # what to say when over the limit
+    qpe: float | None = None
+    displacement: GroundVector | None = None
+    evidence: str | None = None
+    notes: tuple[str, ...] = ()
+    is_declared: bool = True  # with `declared` None: something is declared, but its effect has no value
+
+
+def check_mission(mission: Mission, today: date) -> MissionFindings:
+    """Check one mission.
+
+    Parameters
+    ----------
+    mission : Mission
+        As loaded.
+    today : date
+        Day on which waivers are judged, UTC.
+
+    Returns
+    -------
+    MissionFindings
+        Rows in the order of the contract, declared or not.
+    """
+    sources = error_sources(mission)
+    allocation = allocate(mission, sources)
+    lines = [
+        *_error_lines(mission, allocation, sources),
+        *_vibration_lines(mission, allocation),
+        *_aggregate_lines(mission, allocation, sources),
+    ]
+    rows = [_judge(line, mission, allocation) for line in lines]
+    rows, warnings = apply_waivers(rows, mission, today)
+    return MissionFindings(
+        file=mission.file,
+        name=mission.name,
+        model=mission.allocation.model,
+        combine=mission.allocation.combine,
+        wavelength=mission.radar.wavelength,
+        geometry=mission.geometry,
+        resolution=Resolution(
+            range=mission.geometry.range_resolution(mission.radar.bandwidth, SPEED_OF_LIGHT),
+            cross_range=mission.geometry.cross_range_resolution(
+                mission.radar.wavelength, mission.collection.aperture_time
+            ),
+        ),
+        allocation=allocation,
+        rows=tuple(rows),
+        warnings=(*_unknown_requirement_ids(mission, rows), *warnings, *_nothing_declared(rows)),
+        notes=(FULL_MODEL_NOTE, *_unused_keys(mission)),
+    )
+
+
+def _error_lines(mission: Mission, allocation: Allocation, sources: Sequence[ErrorSource]) -> Iterator[_Line]:
+    plane = image_plane(mission)
+    combine = mission.allocation.combine
+    gain = allocation.autofocus_gain
+    for source in sources:
+        limit = allocation.qpe_limit(source.owner)
+        per_unit = abs(source.effect.qpe)
+        declared = None if source.declared is None else abs(source.declared)
+        qpe = None if declared is None else per_unit * declared
+        notes = list(source.notes)
+        displacement = None
+        if source.declared is not None and source.owner != "mission":
+            displacement = plane.displacement(source.effect, source.declared)
+            if displacement is None:
+                notes.append(plane.degeneracy)
+        over = ""
+        if qpe is not None:
+            needed = allocation.n_pull_needed(qpe, source.owner)
+            over = (
+                f"QPE {qpe:.3g} rad, {limit * gain:.3g} rad allowed ({source.equation}); "
+                f"passes with autofocus from n_pull {needed:g}"
+            )
+        yield _Line(
+            id=source.id,
+            metric="quadratic_phase_error",
+            unit=source.unit,
+            declared=declared,
+            allowable=limit * gain / per_unit if per_unit else None,
+            path=source.path,
+            equation=source.equation,
+            owner=source.owner,
+            gain=gain,
+            no_limit=source.no_limit,
+            info=f"combine is {combine}: the aggregate decides" if combine != "each" else "",
+            over=over,
+            qpe=qpe,
+            displacement=displacement,
+            evidence=source.evidence,
+            notes=tuple(notes),
+        )
+
+
+def _vibration_lines(mission: Mission, allocation: Allocation) -> Iterator[_Line]:
+    T = mission.collection.aperture_time
+    for name in ("transmitter", "receiver"):
+        error = getattr(mission.platforms, name).motion_error
+        path: KeyPath = ("platforms", name, "motion_error", "vibration")
+        allowable = _vibration_allowable(mission, mission.requirements.pslr, allocation.pslr, name)
+        missing = "" if mission.requirements.pslr is not None else "no requirements.pslr to hold it to"
+        for index, sinusoid in enumerate(error.vibration.sinusoidal or (None,)):
+            cycles = math.inf if sinusoid is None else sinusoid.frequency * T
+            slow = ""
+            if cycles < 1:
+                slow = (
+                    f"{cycles:.2g} cycles per aperture: slower than one, it acts as a quadratic and cubic phase "
+                    "error, not as paired echoes"
+                )
+            notes: tuple[str, ...] = ()
+            if 1 <= cycles < 3:
+                notes = (
+                    f"{cycles:.3g} cycles per aperture: below three it also acts as a quadratic phase error, "
+                    "which this row does not count",
+                )
+            yield _Line(
+                id=f"{name}.vibration.sinusoidal.{index}",
+                metric="pslr",
+                unit="m",
+                declared=None if sinusoid is None else sinusoid.amplitude,
+                allowable=allowable,
+                path=(*path, "sinusoidal", index, "amplitude"),
+                equation="Section V, sinusoidal",
+                owner=name,
+                no_limit=missing,
+                not_evaluated=missing or slow,
+                is_declared=sinusoid is not None,
+                over="paired echoes above the platform's share of PSLR (Section V)",
+                evidence=error.source,
+                notes=notes,
+            )
+        wideband = error.vibration.wideband
+        missing = "" if mission.requirements.islr is not None else "no requirements.islr to hold it to"
+        yield _Line(
+            id=f"{name}.vibration.wideband",
+            metric="islr",
+            unit="m",
+            declared=None if wideband is None else wideband.rms,
+            allowable=_vibration_allowable(mission, mission.requirements.islr, allocation.islr, name),
+            path=(*path, "wideband", "rms"),
+            equation="Section V, wideband",
+            owner=name,
+            no_limit=missing,
+            not_evaluated=missing,
+            is_declared=wideband is not None,
+            over="power spread above the platform's share of ISLR (Section V)",
+            evidence=error.source,
+        )
+
+
+def _vibration_allowable(mission: Mission, requirement_db: float | None, split: Split, name: str) -> float | None:
+    if requirement_db is None:
+        return None
+    power = 10 ** (requirement_db / 10)  # -30 dB is 10⁻³: PSLR and ISLR are power ratios
+    return evaluators.vibration_limit(mission.radar.wavelength, math.sqrt(power * split.of(name)))
+
+
+def _aggregate_lines(mission: Mission, allocation: Allocation, sources: Sequence[ErrorSource]) -> Iterator[_Line]:
+    combine = mission.allocation.combine
+    declared = [source for source in sources if source.declared is not None and source.is_independent]
+    if combine != "each":
+        yield from _qpe_aggregates(mission, allocation, declared)
+    # `each` looks at single rows, those along the scene's axes included.
+    single = [s for s in sources if s.declared is not None] if combine == "each" else declared
+    motion = [source for source in single if source.owner != "mission"]
+    yield _Line(
+        id="mission.cubic_phase_error",
+        metric="cubic_phase_error",
+        unit="rad",
+        declared=combine_phases([s.cubic or 0.0 for s in motion], combine) if motion else None,
+        allowable=mission.requirements.cubic_phase_error,
+        path=("requirements", "cubic_phase_error"),
+        equation="Table I, cubic column",
+        no_limit=NO_REQUIREMENT,
+        info="" if mission.requirements.cubic_phase_error is not None else NO_REQUIREMENT,
+        over="cubic phase at the aperture edge above the requirement (Table I); autofocus gain does not apply",
+    )
+    plane = image_plane(mission)
+    moves = [plane.displacement(s.effect, s.declared) for s in motion if s.declared is not None]
+    known = [move for move in moves if move is not None]
+    yield _Line(
+        id="mission.location_error",
+        metric="location_error",
+        unit="m",
+        declared=combine_displacements(known, combine) if motion and not plane.degeneracy else None,
+        allowable=mission.requirements.location_error,
+        path=("requirements", "location_error"),
+        equation="(25)",
+        no_limit=NO_REQUIREMENT,
+        not_evaluated=plane.degeneracy,
+        is_declared=bool(motion),
+        info="" if mission.requirements.location_error is not None else NO_REQUIREMENT,
+        over="displacement of the image above the requirement, by (25)",
+    )
+    if allocation.n_pull is not None:
+        yield _Line(
+            id="mission.autofocus_pull_in",
+            metric="quadratic_phase_error",
+            unit="rad",
+            declared=math.fsum(abs(s.qpe or 0.0) for s in declared) if declared else None,
+            allowable=math.pi * allocation.n_pull,
+            path=("autofocus", "n_pull"),
+            equation="Section VI",
+            never_fails=True,
+            over="the errors together exceed what autofocus corrects: it corrects one total, not each error its own",
+        )
+
+
+def _qpe_aggregates(mission: Mission, allocation: Allocation, declared: Sequence[ErrorSource]) -> Iterator[_Line]:
+    combine, gain = mission.allocation.combine, allocation.autofocus_gain
+    for owner in ("transmitter", "receiver", "mission"):
+        members = [s for s in declared if owner == "mission" or allocation.qpe.includes(s.owner, owner)]
+        qpe = combine_phases([s.qpe or 0.0 for s in members], combine) if members else None
+        limit = allocation.qpe_limit(owner) * gain
+        over = "" if qpe is None else f"passes with autofocus from n_pull {allocation.n_pull_needed(qpe, owner):g}"
+        yield _Line(
+            id=f"{owner}.quadratic_phase_error",
+            metric="quadratic_phase_error",
+            unit="rad",
+            declared=qpe,
+            allowable=limit,
+            path=("platforms", owner, "motion_error") if owner != "mission" else ("platforms",),
+            equation="sum of the rows" if combine == "sum" else "root-sum-square of the rows",
+            owner=owner,
+            gain=gain,
+            over=over,
+            qpe=qpe,
+        )
+
+
+def _judge(line: _Line, mission: Mission, allocation: Allocation) -> Row:
+    utilization = margin = None
+    if line.declared is not None:
+        utilization = line.declared / line.allowable if line.allowable else 0.0
+        if line.allowable is not None and line.declared > 0:
+            quotient = line.allowable / line.declared - 1
+            margin = quotient if math.isfinite(quotient) else None
+    status, reason = _status(line, utilization, mission)
+    notes = line.notes
+    if status == "pass_with_autofocus" and utilization is not None and utilization > mission.allocation.warn_above:
+        notes = (*notes, f"uses {100 * utilization:.3g} % of the limit with autofocus")
+    return Row(
+        id=line.id,
+        metric=line.metric,
+        unit=line.unit,
+        declared=line.declared,
+        allowable=line.allowable,
+        allowable_published=line.allowable,
+        allowable_full=None,
+        qpe_published_rad=line.qpe,
+        qpe_full_rad=None,
+        displacement_m=line.displacement,
+        utilization=utilization,
+        margin=margin,
+        status=status,
+        line=mission.line(*line.path),
+        reason=reason or (line.no_limit if line.allowable is None else "") or None,
+        notes=notes,
+        equation=line.equation,
+        requirement_id=mission.requirement_ids.get(line.id),
+        evidence=line.evidence,
+    )
+
+
+def _status(line: _Line, utilization: float | None, mission: Mission) -> tuple[str, str]:
+    """Return status and reason: the first that applies, in the order of the contract; waivers come after."""
+    if line.declared is None and not (line.is_declared and line.not_evaluated):
+        return "not_declared", ""
+    if line.info:
+        return "info", line.info
+    if line.not_evaluated or utilization is None:
+        return "not_evaluated", line.not_evaluated
+    if utilization > 1 + UTILIZATION_TOLERANCE:
+        return ("warn" if line.never_fails else "fail"), line.over
+    if utilization * line.gain > 1 + UTILIZATION_TOLERANCE:
+        return "pass_with_autofocus", "over the limit without autofocus"
+    if utilization > mission.allocation.warn_above:
+        return "warn", f"above {100 * mission.allocation.warn_above:g} % of the limit"
+    return "pass", ""
+
+
+def _unknown_requirement_ids(mission: Mission, rows: Sequence[Row]) -> Iterator[Warning]:
+    known = {row.id for row in rows}
+    for row_id in mission.requirement_ids:
+        if row_id not in known:
+            yield Warning(
+                line=mission.line("requirement_ids", row_id),
+                message=f"requirement_ids: {row_id} is the id of no row",
+            )
+
+
+def _nothing_declared(rows: Sequence[Row]) -> Iterator[Warning]:
+    if all(row.status == "not_declared" for row in rows):
+        yield Warning(line=None, message="no error is declared: nothing was judged")
+
+
+def _unused_keys(mission: Mission) -> Iterator[str]:
+    """Say which keys that the file gives have no part in this check."""
+    keys = {
+        "scene.radius": mission.scene.radius is not None,
+        "collection.pulses": mission.collection.pulses is not None,
+        "simulation": "simulation" in mission.model_fields_set,
+    }
+    given = [key for key, is_given in keys.items() if is_given]
+    if given:
+        yield f"{', '.join(given)}: no part in the published model's limits"
+

@@ -1,0 +1,129 @@
+"""What a check finds, as frozen data. Field names and order are those of the JSON contract."""
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from bisar_budget.budget.allocation import Allocation
+from bisar_budget.errors import Fault
+from bisar_budget.geometry import BistaticGeometry, GroundVector
+
+# Worst first. The status of a mission or a run is the worst one found; the last three gate nothing.
+GATING = ("error", "fail", "not_evaluated", "warn", "pass_with_autofocus", "pass")
+STATUSES = (*GATING, "waived", "info", "not_declared")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """One line of the budget. Numbers in SI and radians; None where a value does not exist."""
+
+    id: str
+    metric: str
+    unit: str
+    declared: float | None
+    allowable: float | None
+    allowable_published: float | None
+    allowable_full: float | None
+    qpe_published_rad: float | None
+    qpe_full_rad: float | None
+    displacement_m: GroundVector | None
+    utilization: float | None
+    margin: float | None
+    status: str
+    line: int | None
+    reason: str | None
+    notes: tuple[str, ...]
+    equation: str
+    requirement_id: str | None
+    evidence: str | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Warning:
+    """Something about the mission file that changes no verdict but should not go unsaid."""
+
+    line: int | None
+    message: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Resolution:
+    """Peak to first null on the ground. [m]"""
+
+    range: float
+    cross_range: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MissionFindings:
+    """What was found about one mission file that can be used."""
+
+    file: str
+    name: str
+    model: str
+    combine: str
+    wavelength: float
+    geometry: BistaticGeometry
+    resolution: Resolution
+    allocation: Allocation
+    rows: tuple[Row, ...]
+    warnings: tuple[Warning, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def status(self) -> str:
+        """Worst status of the rows."""
+        return worst(row.status for row in self.rows)
+
+    @property
+    def summary(self) -> dict[str, int]:
+        """Number of rows of each status that occurs."""
+        counts = Counter(row.status for row in self.rows)
+        return {status: counts[status] for status in STATUSES if counts[status]}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UnusableMission:
+    """A mission file that cannot be used, with its faults."""
+
+    file: str
+    faults: tuple[Fault, ...]
+    status: str = "error"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Report:
+    """The findings about every mission file of a run."""
+
+    version: str
+    missions: tuple[MissionFindings | UnusableMission, ...]
+
+    @property
+    def status(self) -> str:
+        """Worst status of the missions."""
+        return worst(mission.status for mission in self.missions)
+
+    def exit_code(self, strict: bool) -> int:
+        """Return 2 if a file is unusable, 1 if a requirement is broken, else 0; `strict` breaks on doubt too."""
+        failing = ("fail", "not_evaluated", "warn") if strict else ("fail",)
+        if any(mission.status == "error" for mission in self.missions):
+            return 2
+        broken = any(
+            row.status in failing
+            for mission in self.missions
+            if isinstance(mission, MissionFindings)
+            for row in mission.rows
+        )
+        return 1 if broken else 0
+
+
+def worst(statuses: Iterable[str]) -> str:
+    """Return the worst of the gating statuses; `pass` if there is none."""
+    found = set(statuses)
+    return next((status for status in GATING if status in found), "pass")
+
+
+def worst_first(rows: Sequence[Row]) -> list[Row]:
+    """Sort rows by status, then by utilization, the highest first; equals keep their order."""
+    rank = {status: index for index, status in enumerate(STATUSES)}
+    return sorted(rows, key=lambda row: (rank[row.status], -(row.utilization or 0.0)))

@@ -1,0 +1,248 @@
+"""Every error a mission can have, with what one unit of it does to the range history and the image.
+
+The list is complete: an error that the file does not declare is in it too, because a designer comes for its
+allowable. Effects are those of the published model (Rigling & Moses, Tables I and II).
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from bisar_budget import evaluators
+from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, ROUNDING, SPEED_OF_LIGHT
+from bisar_budget.errors import KeyPath
+from bisar_budget.geometry import FRAME_AXES, GroundVector, PlatformState, Vector, angle_between_lines
+from bisar_budget.mission.model import Mission, MotionError
+
+PLATFORMS = ("transmitter", "receiver")
+MOTION_UNITS = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2"}
+CLOCK_UNITS = {"constant": "s", "linear": "s/s", "quadratic": "1/s", "cubic": "1/s^2"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Effect:
+    """What one unit of an error does, signed like the range error.
+
+    Constant [m/unit] and linear [(m/s)/unit] term of the range error; quadratic and cubic phase at the
+    aperture edge [rad/unit].
+    """
+
+    constant: float
+    linear: float
+    qpe: float
+    cubic: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ErrorSource:
+    """One error: who owns it, how large it is declared, what one unit of it does.
+
+    `owner` is transmitter, receiver, clock or mission (nobody's). `declared` is signed and includes the
+    coverage factor; None where the file is silent. `is_independent` marks the errors as the file states
+    them: sums and root-sum-squares run over these alone, so that an error stated along the track is not
+    counted again by its components along the scene's axes.
+    """
+
+    id: str
+    owner: str
+    unit: str
+    declared: float | None
+    path: KeyPath
+    effect: Effect
+    equation: str
+    no_limit: str
+    evidence: str | None = None
+    is_independent: bool = True
+    notes: tuple[str, ...] = ()
+
+    @property
+    def qpe(self) -> float | None:
+        """Quadratic phase error of the declared error, signed. [rad]"""
+        return None if self.declared is None else self.effect.qpe * self.declared
+
+    @property
+    def cubic(self) -> float | None:
+        """Cubic phase of the declared error at the aperture edge, signed. [rad]"""
+        return None if self.declared is None else self.effect.cubic * self.declared
+
+
+@dataclass(frozen=True, slots=True)
+class ImagePlane:
+    """Q⁻¹ of (30): takes constant and linear range error to the displacement of the image."""
+
+    adjugate: tuple[tuple[float, ...], ...]
+    determinant: float
+    degeneracy: str
+
+    def displacement(self, effect: Effect, declared: float) -> GroundVector | None:
+        """Displacement (25) on the ground, (2,); None where Q has no inverse. [m]"""
+        if self.degeneracy:
+            return None
+        scale = declared / self.determinant
+        (a, b), (c, d) = self.adjugate
+        # Adding 0.0 turns -0.0, which reads as a claim about a sign, into 0.0.
+        return (
+            (a * effect.constant + b * effect.linear) * scale + 0.0,
+            (c * effect.constant + d * effect.linear) * scale + 0.0,
+        )
+
+
+def image_plane(mission: Mission) -> ImagePlane:
+    """Invert Q with the range held constant, (19) and (30).
+
+    That Q can be singular where the true gradients are not: its second row is v/R, theirs v⊥/R.
+    """
+    ground = []
+    for platform in (mission.geometry.transmitter, mission.geometry.receiver):
+        ground += [*platform.position[:2], *platform.velocity[:2], platform.slant_range]
+    first, second, (determinant,) = evaluators.published_ground_inverse(*ground)
+    # (30): the first column holds (-rate_y, rate_x), the second (s_y, -s_x).
+    range_gradient, doppler_gradient = (-second[1], first[1]), (second[0], -first[0])
+    degrees = math.degrees(angle_between_lines(range_gradient, doppler_gradient))
+    degeneracy = ""
+    if degrees < MIN_GRADIENT_ANGLE_DEG:
+        degeneracy = (
+            f"(25) has no displacement here: with the range held constant, range and Doppler gradients are "
+            f"{degrees:.2g} deg from parallel"
+        )
+    return ImagePlane((first, second), determinant, degeneracy)
+
+
+def error_sources(mission: Mission) -> list[ErrorSource]:
+    """List every position, velocity, acceleration, clock and other error, declared or not, in a fixed order."""
+    sources: list[ErrorSource] = []
+    for name, state in zip(PLATFORMS, (mission.geometry.transmitter, mission.geometry.receiver), strict=True):
+        sources += _motion(mission, name, state)
+    sources += _clock(mission)
+    sources += _other(mission)
+    return sources
+
+
+def _motion(mission: Mission, name: str, state: PlatformState) -> Iterator[ErrorSource]:
+    rows = evaluators.published_motion(
+        *state.position,
+        *state.velocity,
+        state.slant_range,
+        mission.radar.wavelength,
+        mission.collection.aperture_time,
+    )
+    error: MotionError = getattr(mission.platforms, name).motion_error
+    axes = state.frame(error.frame)
+    for kind_index, (kind, unit) in enumerate(MOTION_UNITS.items()):
+        effects = [Effect(constant=a, linear=b, qpe=c, cubic=d) for a, b, c, d in rows[3 * kind_index :][:3]]
+        values: Vector | None = getattr(error, kind)
+        factor = mission.allocation.coverage_factor
+        declared = None if values is None else tuple(value * factor for value in values)
+        path = ("platforms", name, "motion_error", kind)
+        in_scene = error.frame == "scene"
+        for axis, letter in enumerate("xyz"):
+            on_axis = None
+            if declared is not None:
+                on_axis = declared[axis] if in_scene else _along_scene_axis(declared, axes, axis, error.distribution)
+            yield ErrorSource(
+                id=f"{name}.{kind}.{letter}",
+                owner=name,
+                unit=unit,
+                declared=on_axis,
+                path=(*path, axis) if in_scene else path,
+                effect=effects[axis],
+                equation=_equation(kind, axis),
+                no_limit=_no_limit(kind, letter),
+                evidence=error.source,
+                is_independent=in_scene,
+            )
+        if in_scene or declared is None:
+            continue
+        for index, (axis_name, direction) in enumerate(zip(FRAME_AXES[error.frame], axes, strict=True)):
+            yield ErrorSource(
+                id=f"{name}.{kind}.{axis_name}",
+                owner=name,
+                unit=unit,
+                declared=declared[index],
+                path=(*path, index),
+                effect=_along(effects, direction),
+                equation=_equation(kind, None),
+                no_limit=_no_limit(kind, f"the {error.frame} frame's {axis_name} axis"),
+                evidence=error.source,
+            )
+
+
+def _along_scene_axis(
+    declared: tuple[float, ...], axes: tuple[Vector, Vector, Vector], axis: int, distribution: str
+) -> float:
+    """Size along one axis of the scene of errors stated along the axes of another frame.
+
+    The three are independent, so one-sigma values add as squares and bounds add as magnitudes: a signed
+    rotation would let them cancel. The sign is that of the signed rotation.
+    """
+    parts = [value * direction[axis] for value, direction in zip(declared, axes, strict=True)]
+    size = math.hypot(*parts) if distribution == "normal" else sum(abs(part) for part in parts)
+    return math.copysign(size, sum(parts))
+
+
+def _along(effects: list[Effect], direction: Vector) -> Effect:
+    """Effect of a unit error along a direction: the projection of the three scene effects."""
+
+    def project(x: float, y: float, z: float) -> float:
+        terms = (x * direction[0], y * direction[1], z * direction[2])
+        total = sum(terms)
+        # What is left of terms that cancel exactly is rounding, and would make a limit out of nothing.
+        return total if abs(total) > ROUNDING * sum(abs(term) for term in terms) else 0.0
+
+    x, y, z = effects
+    return Effect(
+        constant=project(x.constant, y.constant, z.constant),
+        linear=project(x.linear, y.linear, z.linear),
+        qpe=project(x.qpe, y.qpe, z.qpe),
+        cubic=project(x.cubic, y.cubic, z.cubic),
+    )
+
+
+def _equation(kind: str, axis: int | None) -> str:
+    if kind == "position":
+        return "Table I" if axis is None else f"Table I row {2 + 3 * axis}"
+    first = 1 if kind == "velocity" else 4
+    return f"Table II rows {first}-{first + 2}" if axis is None else f"Table II row {first + axis}"
+
+
+def _no_limit(kind: str, axis: str) -> str:
+    """Say why an error has no QPE limit, for the case that it has none."""
+    if kind == "position":
+        return "no quadratic term: a position error moves the image (Table I)"
+    cause = "velocity" if kind == "velocity" else "line of sight"
+    return f"no quadratic term: the platform's {cause} has no component along {axis}"
+
+
+def _clock(mission: Mission) -> Iterator[ErrorSource]:
+    rows = evaluators.published_clock(
+        SPEED_OF_LIGHT, mission.radar.wavelength, mission.collection.aperture_time
+    )
+    for (term, unit), (constant, linear, qpe, cubic) in zip(CLOCK_UNITS.items(), rows, strict=True):
+        value: float | None = getattr(mission.timing_error, term)
+        yield ErrorSource(
+            id=f"timing.{term}",
+            owner="clock",
+            unit=unit,
+            declared=None if value is None else value * mission.allocation.coverage_factor,
+            path=("timing_error", term),
+            effect=Effect(constant=constant, linear=linear, qpe=qpe, cubic=cubic),
+            equation="Table I row 1, step of Table II" if term == "quadratic" else "Table I row 1",
+            no_limit=f"no quadratic term: the clock's {term} term has another order (Table I row 1)",
+        )
+
+
+def _other(mission: Mission) -> Iterator[ErrorSource]:
+    for index, other in enumerate(mission.other_errors):
+        yield ErrorSource(
+            id=f"other.{other.name}",
+            owner="mission",
+            unit="rad",
+            declared=other.quadratic_phase_error,
+            path=("other_errors", index, "quadratic_phase_error"),
+            effect=Effect(constant=0.0, linear=0.0, qpe=1.0, cubic=0.0),
+            equation="as declared",
+            no_limit="",
+            evidence=other.source,
+            notes=("held to the total budget: it belongs to no platform",),
+        )
+

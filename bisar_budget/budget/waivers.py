@@ -1,0 +1,49 @@
+"""Waivers: rows that may fail until a date. What is waived, expired or useless is always said."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import date
+from fnmatch import fnmatchcase
+
+from bisar_budget.budget.findings import Row, Warning
+from bisar_budget.mission.model import Mission
+
+
+def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> tuple[list[Row], list[Warning]]:
+    """Waive failing rows that a valid waiver names.
+
+    Parameters
+    ----------
+    rows : sequence of Row
+        Judged rows.
+    mission : Mission
+        Holds the waivers.
+    today : date
+        UTC; a waiver holds through its last day.
+
+    Returns
+    -------
+    rows : list of Row
+        Failing rows with a valid waiver are `waived`; one with an expired waiver keeps its status, with a note.
+    warnings : list of Warning
+        Waivers that name no row, or none that fails.
+    """
+    result = list(rows)
+    warnings = []
+    for index, waiver in enumerate(mission.waivers):
+        line = mission.line("waivers", index, "id")
+        named = [position for position, row in enumerate(rows) if fnmatchcase(row.id, waiver.id)]
+        failing = [position for position in named if rows[position].status == "fail"]
+        expired = today > waiver.until
+        for position in failing:
+            row = result[position]
+            words = f"waiver of line {line}, until {waiver.until}: {waiver.reason}"
+            if expired:
+                result[position] = replace(row, notes=(*row.notes, f"expired {words}"))
+            elif row.status == "fail":
+                result[position] = replace(row, status="waived", notes=(*row.notes, words))
+        if not named:
+            warnings.append(Warning(line=line, message=f"waiver {waiver.id}: matches no row"))
+        elif not failing:
+            warnings.append(Warning(line=line, message=f"waiver {waiver.id}: unused, no row it names fails"))
+    return result, warnings

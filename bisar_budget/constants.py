@@ -1,0 +1,14 @@
+"""Physical constants and the fixed tolerances of the tool, each with its unit and origin."""
+
+SPEED_OF_LIGHT = 299_792_458.0  # m/s, exact (SI, CGPM 1983)
+STANDARD_GRAVITY = 9.80665  # m/s², exact (CGPM 1901); data sheets state accelerometer bias in g
+
+# A utilization this far above 1 still passes: an error set exactly at its limit is at the limit,
+# whatever the last bit of a division says.
+UTILIZATION_TOLERANCE = 1e-9
+
+# Components below this fraction of a vector's length are rounding (cos 90° is 6e-17), not geometry.
+ROUNDING = 1e-12
+
+MIN_GROUND_GRADIENT = 0.02  # |u_t + u_r| on the ground; below, range says nothing about the ground
+MIN_GRADIENT_ANGLE_DEG = 1.0  # between range and Doppler gradients on the ground

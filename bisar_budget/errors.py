@@ -1,0 +1,68 @@
+"""What goes wrong with input, said so that it can be mended: where, what, the value given, what is accepted."""
+
+from dataclasses import dataclass
+
+KeyPath = tuple[str | int, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Problem:
+    """Something wrong with a value, before anybody knows which file it stands in.
+
+    `at` is the path of the culprit relative to the value that was checked.
+    """
+
+    problem: str
+    accepted: str = ""
+    hint: str = ""
+    at: KeyPath = ()
+
+
+class InvalidValueError(ValueError):
+    """A value that does not say what its key asks for."""
+
+    def __init__(self, *problems: Problem) -> None:
+        super().__init__("; ".join(problem.problem for problem in problems))
+        self.problems = problems
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fault:
+    """One fault of a mission file. Line and column count from 1; None where the whole file is meant."""
+
+    line: int | None
+    column: int | None
+    key: str
+    problem: str
+    given: str = ""
+    accepted: str = ""
+    hint: str = ""
+
+    def __str__(self) -> str:
+        """Write `key: what is wrong (got value); what is accepted. Hint`."""
+        text = f"{self.key}: " if self.key else ""
+        text += self.problem
+        if self.given:
+            text += f" (got {self.given})"
+        if self.accepted:
+            text += f"; {self.accepted}"
+        if self.hint:
+            text += f". {self.hint}"
+        return text
+
+
+class MissionError(Exception):
+    """A mission file that cannot be used, with every fault found in it, in file order."""
+
+    def __init__(self, file: str, faults: tuple[Fault, ...]) -> None:
+        super().__init__(f"{file}: {len(faults)} fault(s)")
+        self.file = file
+        self.faults = faults
+
+    def lines(self) -> list[str]:
+        """Write one `file:line:column: fault` per fault."""
+        return [
+            ":".join(str(part) for part in (self.file, fault.line, fault.column) if part is not None)
+            + f": {fault}"
+            for fault in self.faults
+        ]

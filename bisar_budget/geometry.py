@@ -1,0 +1,209 @@
+"""Bistatic geometry at the aperture midpoint: look vectors, angles, ground gradients, frames.
+
+Frame: scene centre at the origin, ground plane z = 0, x east, y north, z up. SI units, radians.
+Vectors are plain tuples, so that a check needs no array library.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT, ROUNDING
+
+Vector = tuple[float, float, float]
+GroundVector = tuple[float, float]
+
+FRAME_AXES = {
+    "scene": ("x", "y", "z"),
+    "track": ("along", "cross", "up"),
+    "look": ("line_of_sight", "cross", "up"),
+}
+
+
+class UndefinedFrameError(ValueError):
+    """A frame that this platform does not have: a still one has no track, one overhead no cross direction."""
+
+
+def dot(a: Vector, b: Vector) -> float:
+    """Scalar product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """Vector product."""
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+def norm(a: Vector) -> float:
+    """Length."""
+    return math.hypot(*a)
+
+
+def unit(a: Vector) -> Vector:
+    """Direction of a vector that is not zero."""
+    length = norm(a)
+    return (a[0] / length, a[1] / length, a[2] / length)
+
+
+def without_rounding(a: Vector) -> Vector:
+    """Set components to zero that are rounding beside the vector's length: cos 90° is 6e-17."""
+    floor = ROUNDING * norm(a)
+    x, y, z = (component if abs(component) > floor else 0.0 for component in a)
+    return (x, y, z)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlatformState:
+    """Position [m] and velocity [m/s] of one platform at the aperture midpoint."""
+
+    position: Vector
+    velocity: Vector
+
+    @cached_property
+    def slant_range(self) -> float:
+        """Distance to the scene centre. [m]"""
+        return norm(self.position)
+
+    @cached_property
+    def look(self) -> Vector:
+        """Unit vector u from the scene centre to the platform. [-]"""
+        return unit(self.position)
+
+    @cached_property
+    def look_rate(self) -> Vector:
+        """Rate of u: v⊥/R with v⊥ = v − u(u·v). [1/s]"""
+        u, v, R = self.look, self.velocity, self.slant_range
+        radial = dot(u, v)
+        return (
+            (v[0] - u[0] * radial) / R,
+            (v[1] - u[1] * radial) / R,
+            (v[2] - u[2] * radial) / R,
+        )
+
+    @property
+    def azimuth(self) -> float:
+        """From east, counter-clockwise, φ of (6). [rad]"""
+        return math.atan2(self.position[1], self.position[0])
+
+    @property
+    def elevation(self) -> float:
+        """Above the ground plane as seen from the scene centre, θ of (6). [rad]"""
+        return math.atan2(self.position[2], math.hypot(self.position[0], self.position[1]))
+
+    @property
+    def squint(self) -> float | None:
+        """Angle of the line of sight from broadside, positive looking forward; None when still. [rad]"""
+        speed = norm(self.velocity)
+        if speed == 0:
+            return None
+        return math.asin(max(-1.0, min(1.0, -dot(self.look, self.velocity) / speed)))
+
+    def frame(self, name: str) -> tuple[Vector, Vector, Vector]:
+        """Axes of a frame as unit vectors of the scene, right-handed, in the order of `FRAME_AXES`.
+
+        `track`: along the velocity; cross is horizontal, to the left; up completes it (vertical in level
+        flight). `look`: line of sight from the scene centre to the platform; cross is horizontal; up
+        completes it.
+
+        Raises
+        ------
+        UndefinedFrameError
+            Track frame of a still platform, or a first axis that is vertical.
+        """
+        if name == "scene":
+            return ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+        first = self.velocity if name == "track" else self.position
+        if norm(first) == 0:
+            raise UndefinedFrameError("a still platform has no track frame")
+        first = unit(first)
+        horizontal = cross((0.0, 0.0, 1.0), first)
+        if norm(horizontal) < ROUNDING:
+            raise UndefinedFrameError(f"the first axis of its {name} frame is vertical, so cross has no direction")
+        second = unit(horizontal)
+        return (without_rounding(first), without_rounding(second), without_rounding(cross(first, second)))
+
+
+def state_from_angles(
+    *, slant_range: float, azimuth: float, elevation: float, speed: float, motion_azimuth: float, climb: float
+) -> PlatformState:
+    """Position and velocity from range and angles; `speed` is over ground, `climb` its vertical part."""
+    position = (
+        slant_range * math.cos(azimuth) * math.cos(elevation),
+        slant_range * math.sin(azimuth) * math.cos(elevation),
+        slant_range * math.sin(elevation),
+    )
+    velocity = (speed * math.cos(motion_azimuth), speed * math.sin(motion_azimuth), climb)
+    return PlatformState(position=without_rounding(position), velocity=without_rounding(velocity))
+
+
+@dataclass(frozen=True, kw_only=True)
+class BistaticGeometry:
+    """Both platforms together, and what range and Doppler say about the ground."""
+
+    transmitter: PlatformState
+    receiver: PlatformState
+
+    @cached_property
+    def range_gradient(self) -> GroundVector:
+        """Sum s of the look vectors on the ground, (2,): range changes by −s·x. [-]"""
+        t, r = self.transmitter.look, self.receiver.look
+        return (t[0] + r[0], t[1] + r[1])
+
+    @cached_property
+    def doppler_gradient(self) -> GroundVector:
+        """Rate of s on the ground, (2,). [1/s]"""
+        t, r = self.transmitter.look_rate, self.receiver.look_rate
+        return (t[0] + r[0], t[1] + r[1])
+
+    @property
+    def look_azimuth(self) -> float:
+        """Bistatic look direction φ_b of (11), by atan2. [rad]"""
+        return math.atan2(self.range_gradient[1], self.range_gradient[0])
+
+    @property
+    def bistatic_angle(self) -> float:
+        """Angle between the look vectors. [rad]"""
+        t, r = self.transmitter.look, self.receiver.look
+        return math.atan2(norm(cross(t, r)), dot(t, r))
+
+    @property
+    def gradient_angle(self) -> float:
+        """Angle between the lines of range and Doppler gradient on the ground, 0 to π/2. [rad]"""
+        return angle_between_lines(self.range_gradient, self.doppler_gradient)
+
+    def range_resolution(self, bandwidth_hz: float, speed_of_light: float) -> float:
+        """Peak to first null along φ_b on the ground, c/(B|s|). [m]"""
+        return speed_of_light / (bandwidth_hz * math.hypot(*self.range_gradient))
+
+    def cross_range_resolution(self, wavelength_m: float, aperture_time_s: float) -> float:
+        """Peak to first null across φ_b on the ground, along a line of constant range: λ/(T|ṡ⊥|). [m]"""
+        across = math.hypot(*self.doppler_gradient) * math.sin(self.gradient_angle)
+        return wavelength_m / (aperture_time_s * across)
+
+    def degeneracy(self) -> str:
+        """Say why no ground image can be formed; empty where one can.
+
+        Refused are |s| on the ground below 0.02 (forward scatter, or both platforms overhead) and range
+        and Doppler gradients within 1° of parallel (motion along the look direction only).
+        """
+        length = math.hypot(*self.range_gradient)
+        if length < MIN_GROUND_GRADIENT:
+            return (
+                f"range does not change over the ground: the look vectors cancel to {length:.2g} there, at least "
+                f"{MIN_GROUND_GRADIENT} is needed (bistatic angle {math.degrees(self.bistatic_angle):.1f} deg)"
+            )
+        turning = sum(norm(p.velocity) / p.slant_range for p in (self.transmitter, self.receiver))
+        if math.hypot(*self.doppler_gradient) <= 1e-9 * turning:
+            return "Doppler does not change over the ground: neither line of sight turns during the aperture"
+        degrees = math.degrees(self.gradient_angle)
+        if degrees < MIN_GRADIENT_ANGLE_DEG:
+            return (
+                f"range and Doppler gradients on the ground are {degrees:.2g} deg from parallel, at least "
+                f"{MIN_GRADIENT_ANGLE_DEG:g} deg is needed: no image plane"
+            )
+        return ""
+
+
+def angle_between_lines(a: GroundVector, b: GroundVector) -> float:
+    """Angle between two directions of the plane without regard to sign, 0 to π/2; 0 if one is zero. [rad]"""
+    return math.atan2(abs(a[0] * b[1] - a[1] * b[0]), abs(a[0] * b[0] + a[1] * b[1]))

@@ -1,0 +1,1 @@
+"""Derivation of the limits from the geometry, by SymPy. Nothing outside this package imports SymPy."""

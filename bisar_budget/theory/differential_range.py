@@ -1,0 +1,133 @@
+"""From the exact bistatic ranges to the polynomial in slow time: equations (1) to (31) of Rigling & Moses.
+
+Each function derives one numbered equation from the one before it. Frame, units: see `symbols`.
+"""
+
+from functools import cache
+
+from sympy import Expr, Function, Matrix, Poly, Symbol, atan2, cos, diff, expand, simplify, sin, sqrt
+
+from bisar_budget.theory.symbols import PLATFORMS, Platform, c, clock_coefficients, point, tau
+
+# Size of all errors together, for the expansion to first order.
+_EPSILON = Symbol("epsilon", real=True)
+
+
+def exact_range(platform: Platform, target: Matrix) -> Expr:
+    """Distance from a platform to a point, d(τ) of (1). [m]"""
+    return sqrt(sum((r - x) ** 2 for r, x in zip(platform.position, target, strict=True)))
+
+
+def exact_differential_range(platforms: tuple[Platform, ...] = PLATFORMS) -> Expr:
+    """Differential range of a scatterer without errors: (1) with r̃ = 0 and t̃ = 0. [m]"""
+    return sum(exact_range(platform, point) - platform.exact_slant_range() for platform in platforms)
+
+
+def far_field_differential_range(platforms: tuple[Platform, ...] = PLATFORMS) -> Expr:
+    """Return (5): the first-order Taylor expansion of (1) about the scene centre. [m]"""
+    exact = exact_differential_range(platforms)
+    at_origin = dict.fromkeys(point, 0)
+    return sum(x * diff(exact, x).subs(at_origin) for x in point)
+
+
+def in_angles(expression: Expr, platforms: tuple[Platform, ...] = PLATFORMS) -> Expr:
+    """Write positions by slant range, azimuth and elevation, as (6) does."""
+    for platform in platforms:
+        R, phi, theta = platform.slant_range, platform.azimuth, platform.elevation
+        spherical = (R * cos(phi) * cos(theta), R * sin(phi) * cos(theta), R * sin(theta))
+        expression = expression.subs(dict(zip(platform.position, spherical, strict=True)))
+    return simplify(expression)
+
+
+def hold_range_constant(expression: Expr, platforms: tuple[Platform, ...] = PLATFORMS) -> Expr:
+    """Put R_k for |r_k| and r_k + v_k·τ for r_k: the motion model of (17).
+
+    This is the paper's key approximation: numerators move, ranges do not. The full model drops it.
+    """
+    for platform in platforms:
+        expression = expression.subs(platform.exact_slant_range(), platform.slant_range)
+        moving = platform.position + platform.velocity * tau
+        expression = expression.subs(dict(zip(platform.position, moving, strict=True)))
+    return expand(expression)
+
+
+def linear_differential_range(platforms: tuple[Platform, ...] = PLATFORMS) -> tuple[Expr, Expr]:
+    """Return β₀, β₁ of (17). [m], [m/s]
+
+    The print lost the + and the τ between its two brackets.
+    """
+    beta_0, beta_1 = coefficients(hold_range_constant(far_field_differential_range(platforms), platforms))[:2]
+    return beta_0, beta_1
+
+
+def coefficients(expression: Expr, order: int = 3) -> tuple[Expr, ...]:
+    """Collect a polynomial in slow time: (order + 1) coefficients, constant first."""
+    polynomial = Poly(expand(expression), tau)
+    if polynomial.degree() > order:
+        raise ValueError(f"degree {polynomial.degree()} in slow time, at most {order} expected")
+    return tuple(expand(polynomial.coeff_monomial(tau**n)) for n in range(order + 1))
+
+
+def error_polynomial(platform: Platform) -> Matrix:
+    """Return r̃(τ) of (22), (3,): p̃ + ṽτ + ãτ²/2. [m]"""
+    return (
+        platform.position_error + platform.velocity_error * tau + platform.acceleration_error * tau**2 / 2
+    )
+
+
+def clock_polynomial() -> Expr:
+    """Timing error between transmitter and receiver, t̃(τ) of Section IV. [s]"""
+    return sum(coefficient * tau**n for n, coefficient in enumerate(clock_coefficients))
+
+
+@cache
+def range_error(platforms: tuple[Platform, ...] = PLATFORMS) -> Expr:
+    """Return (23) with (22) put in: error of the differential range, a cubic in slow time. [m]
+
+    The processor subtracts the measured distance |r + r̃| where the data hold |r|, so (1) leaves
+    |r| − |r + r̃| for each platform. First order in r̃, then the motion model of (17).
+    """
+    total = c * clock_polynomial()
+    for platform in platforms:
+        error = Matrix([Function(f"e_{axis}")(tau) for axis in range(3)])
+        measured = sqrt(sum((r + _EPSILON * e) ** 2 for r, e in zip(platform.position, error, strict=True)))
+        first_order = diff(platform.exact_slant_range() - measured, _EPSILON).subs(_EPSILON, 0)
+        linear = hold_range_constant(first_order, (platform,))
+        total += linear.subs(dict(zip(error, error_polynomial(platform), strict=True)))
+    return expand(total)
+
+
+def ground_matrix(platforms: tuple[Platform, ...] = PLATFORMS) -> Matrix:
+    """Q of (19), (2, 2): takes a ground point (x, y) to (β₀, β₁). [-], [1/s]"""
+    ground = Matrix(point[:2])
+    return Matrix(linear_differential_range(platforms)).subs(point[2], 0).jacobian(ground)
+
+
+def ground_inverse(platforms: tuple[Platform, ...] = PLATFORMS) -> tuple[Matrix, Expr]:
+    """Adjugate (2, 2) and determinant of Q, so that Q⁻¹ of (30) is their quotient."""
+    Q = ground_matrix(platforms)
+    return Q.adjugate(), Q[0, 0] * Q[1, 1] - Q[0, 1] * Q[1, 0]
+
+
+def displacement(beta_0: Expr, beta_1: Expr, platforms: tuple[Platform, ...] = PLATFORMS) -> Matrix:
+    """Return (x̃, ỹ) of (25), (2,): where constant and linear range errors move a response. [m]"""
+    adjugate, determinant = ground_inverse(platforms)
+    return adjugate * Matrix([beta_0, beta_1]) / determinant
+
+
+def look_vector(platforms: tuple[Platform, ...] = PLATFORMS) -> Matrix:
+    """Sum of the unit vectors to the platforms on the ground, (2,): (8) without f/2. [-]"""
+    far_field = in_angles(far_field_differential_range(platforms), platforms)
+    return Matrix([-diff(far_field, x) for x in point[:2]])
+
+
+def look_azimuth(platforms: tuple[Platform, ...] = PLATFORMS) -> Expr:
+    """Bistatic look angle φ_b of (11), by atan2: the printed arctan loses the quadrant. [rad]"""
+    s_x, s_y = look_vector(platforms)
+    return atan2(s_y, s_x)
+
+
+def smear_direction(platforms: tuple[Platform, ...] = PLATFORMS) -> Matrix:
+    """Return (31), (2,): direction of the second column of Q⁻¹, along which quadratic errors smear. [-]"""
+    adjugate, _ = ground_inverse(platforms)
+    return in_angles(adjugate[:, 1], platforms)

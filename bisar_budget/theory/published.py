@@ -1,0 +1,225 @@
+"""The limits of Rigling & Moses: Table I, Table II, vibration, pull-in, derived row by row in print order."""
+
+from dataclasses import dataclass
+
+from sympy import Abs, Eq, Expr, Function, Matrix, Rational, Symbol, diff, pi, simplify, solve
+
+from bisar_budget.theory import differential_range as dr
+from bisar_budget.theory.symbols import (
+    AXES,
+    PLATFORMS,
+    T,
+    Platform,
+    c,
+    center_frequency,
+    clock_coefficients,
+    islr,
+    n_pull,
+    positive,
+    pslr,
+    real,
+    share,
+    tau,
+    total_qpe,
+    wavelength,
+)
+
+KINDS = ("position", "velocity", "acceleration")
+TOTAL_QPE = pi / 4  # monostatic custom, Section V
+EQUAL_SHARE_QPE = pi / 8  # per platform, Section V
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row of a table: the error it is about and its cells, left to right."""
+
+    error: Symbol
+    label: Expr
+    cells: tuple[Expr, ...]
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table with the paper's number, its column heads and its rows in print order."""
+
+    number: str
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[Row, ...]
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Equation:
+    """A numbered equation."""
+
+    number: str
+    title: str
+    left: Expr
+    right: Expr
+
+
+def motion_errors(platform: Platform) -> tuple[Symbol, ...]:
+    """Return the nine error symbols of a platform in the order of Table I: x p v a, y p v a, z p v a."""
+    kinds = (platform.position_error, platform.velocity_error, platform.acceleration_error)
+    return tuple(kind[axis] for axis in range(3) for kind in kinds)
+
+
+def single_error(expression: Expr, error: Symbol, platforms: tuple[Platform, ...] = PLATFORMS) -> Expr:
+    """Keep what one error alone does: every other error is set to zero."""
+    every = [*clock_coefficients, *(e for platform in platforms for e in motion_errors(platform))]
+    return expression.subs({other: 0 for other in every if other != error})
+
+
+def table_1(platforms: tuple[Platform, ...] = PLATFORMS) -> Table:
+    """Table I: coefficients β̃₀ … β̃₃ of the range error, for the clock and each motion error alone."""
+    beta = dr.coefficients(dr.range_error(platforms))
+    motion_free = {e: 0 for platform in platforms for e in motion_errors(platform)}
+    rows = [
+        Row(
+            error=real("ttilde"),
+            label=Eq(Function("ttilde")(tau), dr.clock_polynomial(), evaluate=False),
+            cells=tuple(cell.subs(motion_free) for cell in beta),
+        )
+    ]
+    for platform in platforms:
+        polynomial = dr.error_polynomial(platform)
+        for index, error in enumerate(motion_errors(platform)):
+            axis = index // 3
+            track = Function(f"{AXES[axis]}tilde_{platform.subscript}")(tau)
+            rows.append(
+                Row(
+                    error=error,
+                    label=Eq(track, single_error(polynomial[axis], error, platforms), evaluate=False),
+                    cells=tuple(single_error(cell, error, platforms) for cell in beta),
+                )
+            )
+    return Table(
+        number="Table I",
+        title="Differential range errors induced by motion measurement errors",
+        columns=("Constant β̃₀", "Linear β̃₁", "Quadratic β̃₂", "Cubic β̃₃"),
+        rows=tuple(rows),
+        notes=("The paper prints the transmitter's rows; the receiver's follow by replacing t with r.",),
+    )
+
+
+def edge_phase(beta: Expr, order: int) -> Expr:
+    """Phase of one term of the range error at the aperture edge, (2π/λ)·β·(T/2)ⁿ. Signed like β. [rad]"""
+    return 2 * pi / wavelength * beta * (T / 2) ** order
+
+
+def limit(phase: Expr, error: Symbol, budget: Expr) -> Expr:
+    """Magnitude of an error at which a phase proportional to it reaches the budget."""
+    size = Symbol("size", positive=True)
+    (solution,) = solve(Eq(Abs(phase.subs(error, size)), budget), size)
+    return solution
+
+
+def table_2(platforms: tuple[Platform, ...] = PLATFORMS, budget: Expr = EQUAL_SHARE_QPE) -> Table:
+    """Table II: quadratic phase error and largest allowable error, with the bars that the print omits."""
+    beta_2 = dr.coefficients(dr.range_error(platforms))[2]
+    rows = []
+    for platform in platforms:
+        errors = [*platform.velocity_error, *platform.acceleration_error]
+        powers = [tau] * 3 + [tau**2 / 2] * 3
+        for index, (error, power) in enumerate(zip(errors, powers, strict=True)):
+            qpe = edge_phase(single_error(beta_2, error, platforms), 2)
+            allowable = limit(qpe, error, budget)
+            if error in list(platform.acceleration_error):
+                allowable = dr.in_angles(allowable, platforms)  # x/R is printed as cos φ̄ cos θ̄
+            track = Function(f"{AXES[index % 3]}tilde_{platform.subscript}")(tau)
+            rows.append(
+                Row(error=error, label=Eq(track, error * power, evaluate=False), cells=(Abs(qpe), allowable))
+            )
+    clock = clock_coefficients[2]
+    clock_qpe = edge_phase(single_error(beta_2, clock, platforms), 2).subs(wavelength, c / center_frequency)
+    rows.append(
+        Row(
+            error=clock,
+            label=Eq(Function("ttilde")(tau), clock * tau**2, evaluate=False),
+            cells=(Abs(clock_qpe), limit(clock_qpe, clock, budget)),
+            note="not in the paper: the same step for the clock's quadratic term",
+        )
+    )
+    return Table(
+        number="Table II",
+        title="Quadratic phase error and allowable error at π/8 per platform",
+        columns=("QPE [rad]", "Allowable, magnitude"),
+        rows=tuple(rows),
+        notes=("The paper omits the bars and prints the transmitter's rows only.",),
+    )
+
+
+def vibration() -> Table:
+    """Vibration limits of Section V, amplitude and rms along the line of sight, with a share of power.
+
+    A phase of peak φ makes paired echoes; the rule of Carrara et al., Table 5.12, that the paper quotes is
+    (2πA/λ)² ≤ PSLR and (2πσ/λ)² ≤ ISLR. Powers add, so a platform's share s multiplies the power.
+    """
+    amplitude, rms = positive("A"), positive("sigma")
+
+    def bound(motion: Symbol, ratio: Symbol) -> Row:
+        phase = 2 * pi * motion / wavelength
+        (allowable,) = solve(Eq(phase**2, ratio * share), motion)
+        return Row(
+            error=motion, label=motion, cells=(phase**2, allowable, allowable.subs(share, Rational(1, 2)))
+        )
+
+    return Table(
+        number="Vibration",
+        title="Allowable sinusoidal amplitude A (0 to peak) and wideband rms σ, line of sight",
+        columns=("Power of the phase", "Allowable at share s", "Allowable at s = 1/2"),
+        rows=(bound(amplitude, pslr), bound(rms, islr)),
+        notes=("PSLR and ISLR are power ratios: -30 dB is 10^-3.",),
+    )
+
+
+def pull_in_factor() -> Expr:
+    """Factor by which autofocus that corrects π·N_pull radians raises a limit: π·N_pull over the total QPE.
+
+    4·N_pull for the total of π/4, Section VI.
+    """
+    return pi * n_pull / total_qpe
+
+
+def equations() -> tuple[Equation, ...]:
+    """Return the numbered equations that lead to the tables, in the paper's order."""
+    beta_0, beta_1 = dr.linear_differential_range()
+    adjugate, determinant = dr.ground_inverse()
+    moved = Matrix([real("beta_0tilde"), real("beta_1tilde")])
+    delta_range = Function("DeltaR")(tau)
+    transmitter = PLATFORMS[0]
+    return (
+        Equation("(5)", "First-order differential range", delta_range, dr.far_field_differential_range()),
+        Equation("(6)", "The same in angles", delta_range, dr.in_angles(dr.far_field_differential_range())),
+        Equation("(11)", "Bistatic look angle", real("phi_b"), dr.look_azimuth()),
+        Equation("(17)", "Constant coefficient", real("beta_0"), beta_0),
+        Equation("(17)", "Linear coefficient", real("beta_1"), beta_1),
+        Equation("(19)", "Ground point to coefficients", Symbol("Q"), dr.ground_matrix()),
+        Equation("(30)", "Determinant of Q", Symbol("detQ"), simplify(determinant)),
+        Equation("(30)", "Inverse of Q, times its determinant", Symbol("adjQ"), adjugate),
+        Equation(
+            "(22)",
+            "Position error of a platform",
+            Symbol(f"rtilde_{transmitter.subscript}"),
+            dr.error_polynomial(transmitter),
+        ),
+        Equation("(23)", "Range error", Function("DeltaRtilde")(tau), dr.range_error()),
+        Equation(
+            "(25)",
+            "Displacement of the image, times the determinant of Q",
+            Symbol("detQ") * Matrix([real("xtilde"), real("ytilde")]),
+            adjugate * moved,
+        ),
+        Equation("(31)", "Smear direction", Symbol("v_defocus"), dr.smear_direction()),
+        Equation("Section VI", "Gain of the limits by autofocus", real("G"), pull_in_factor()),
+    )
+
+
+def sensitivity(expression: Expr, error: Symbol) -> Expr:
+    """Effect of one unit of an error on an expression linear in it."""
+    slope = diff(expression, error)
+    if slope.has(error):
+        raise ValueError(f"not linear in {error}")
+    return slope

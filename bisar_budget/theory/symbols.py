@@ -1,0 +1,88 @@
+"""The symbols of Rigling & Moses, named so that every printer can draw them.
+
+A name is `<letter>[tilde|bar|hat]_<subscript>`: `vtilde_xt` is the transmitter's velocity error along x.
+Frame: scene centre at the origin, ground plane z = 0, x east, y north, z up. SI units and radians.
+"""
+
+from dataclasses import dataclass
+
+from sympy import Expr, ImmutableMatrix, Matrix, Symbol, sqrt
+
+AXES = ("x", "y", "z")
+
+
+def real(name: str) -> Symbol:
+    """Return a real symbol."""
+    return Symbol(name, real=True)
+
+
+def positive(name: str) -> Symbol:
+    """Return a positive symbol."""
+    return Symbol(name, positive=True)
+
+
+tau = real("tau")  # slow time from the aperture midpoint [s]
+T = positive("T")  # aperture time [s]
+c = positive("c")  # speed of light [m/s]
+wavelength = positive("lambda")  # at the centre frequency [m]
+center_frequency = positive("f_0")  # [Hz]; the paper's f₀ is the band's lower edge
+point = Matrix([real(axis) for axis in AXES])  # a point of the scene [m]
+clock_coefficients = tuple(real(f"ttilde_{n}") for n in range(4))  # t̃ₙ [s, 1, 1/s, 1/s²]
+total_qpe = positive("q")  # total budget for the quadratic phase error [rad]
+share = positive("s")  # share of one platform in a budget [-]
+pslr = positive("PSLR")  # power ratio [-]
+islr = positive("ISLR")  # power ratio [-]
+n_pull = positive("N_pull")  # autofocus corrects π·N_pull radians
+
+
+@dataclass(frozen=True)
+class Platform:
+    """One platform at the aperture midpoint, with the error of its measured motion.
+
+    Vectors are (3,) east-north-up. [m], [m/s], [m/s²]
+    """
+
+    name: str
+    subscript: str
+    position: Matrix
+    velocity: Matrix
+    position_error: Matrix
+    velocity_error: Matrix
+    acceleration_error: Matrix
+    slant_range: Symbol
+    azimuth: Symbol
+    elevation: Symbol
+
+    def exact_slant_range(self) -> Expr:
+        """Return |r| in terms of the position's components. [m]"""
+        return _norm(self.position)
+
+
+def platform(name: str, subscript: str) -> Platform:
+    """Return the symbols of one platform, subscripted as in the paper."""
+
+    def vector(letter: str) -> Matrix:
+        return ImmutableMatrix([real(f"{letter}_{axis}{subscript}") for axis in AXES])
+
+    return Platform(
+        name=name,
+        subscript=subscript,
+        position=ImmutableMatrix([real(f"{axis}_{subscript}") for axis in AXES]),
+        velocity=vector("v"),
+        position_error=vector("ptilde"),
+        velocity_error=vector("vtilde"),
+        acceleration_error=vector("atilde"),
+        slant_range=positive(f"R_{subscript}"),
+        azimuth=real(f"phibar_{subscript}"),
+        elevation=real(f"thetabar_{subscript}"),
+    )
+
+
+def _norm(vector: Matrix) -> Expr:
+    # Matrix.norm() wraps real components in Abs, which only hides the square.
+    return sqrt(sum(component**2 for component in vector))
+
+
+TRANSMITTER = platform("transmitter", "t")
+RECEIVER = platform("receiver", "r")
+PLATFORMS = (TRANSMITTER, RECEIVER)

@@ -1,0 +1,181 @@
+"""Quantities as text: `9.6 GHz` to SI on the way in, SI to `9.60 GHz` on the way out.
+
+A small table of its own, because general unit libraries read `3 dBi` as three ampere.
+"""
+
+import math
+import re
+from dataclasses import dataclass
+
+from bisar_budget.constants import STANDARD_GRAVITY
+from bisar_budget.errors import InvalidValueError, Problem
+
+_NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?")
+_OCTAL_LOOK = re.compile(r"[+-]?0\d")
+_MAX_TEXT = 64  # characters; longer text is no quantity anybody wrote
+
+
+@dataclass(frozen=True, eq=False)
+class Dimension:
+    """A kind of quantity: its name with article, the unit of a bare number, every unit with its factor."""
+
+    name: str
+    si: str
+    units: dict[str, float]
+
+    @property
+    def accepted(self) -> str:
+        """Say which units may stand behind the number."""
+        units = ", ".join(unit for unit in self.units if unit)
+        return f"accepted: {self.name} in {units}; a bare number is {'in ' + self.si if self.si else 'a ratio'}"
+
+
+def _scaled(base: str, prefixes: str, power: int = 1) -> dict[str, float]:
+    factors = {"k": 1e3, "M": 1e6, "G": 1e9, "T": 1e12, "c": 1e-2, "m": 1e-3, "u": 1e-6, "n": 1e-9, "p": 1e-12}
+    return {base: 1.0} | {prefix + base: factors[prefix] ** power for prefix in prefixes}
+
+
+_LENGTHS = _scaled("m", "kcmun") | {"ft": 0.3048, "nmi": 1852.0}
+_G = STANDARD_GRAVITY
+
+FREQUENCY = Dimension("a frequency", "Hz", _scaled("Hz", "kMGT"))
+TIME = Dimension("a time", "s", _scaled("s", "munp") | {"min": 60.0})
+LENGTH = Dimension("a length", "m", _LENGTHS)
+SPEED = Dimension(
+    "a speed",
+    "m/s",
+    {f"{unit}/s": factor for unit, factor in _LENGTHS.items()} | {"km/h": 1 / 3.6, "kt": 1852 / 3600},
+)
+ACCELERATION = Dimension(
+    "an acceleration",
+    "m/s^2",
+    {f"{unit}/s^2": factor for unit, factor in _LENGTHS.items()} | {"g": _G, "mg": 1e-3 * _G, "ug": 1e-6 * _G},
+)
+ANGLE = Dimension("an angle", "rad", _scaled("rad", "mun") | {"deg": math.pi / 180, "°": math.pi / 180})
+RATIO = Dimension("a number", "", {"": 1.0, "%": 1e-2, "ppm": 1e-6, "ppb": 1e-9, "s/s": 1.0})
+RATE = Dimension("a rate", "1/s", {"1/s": 1.0, "s^-1": 1.0, "Hz": 1.0, "s/s^2": 1.0})
+RATE_SQUARED = Dimension("a rate per second", "1/s^2", {"1/s^2": 1.0, "s^-2": 1.0, "s/s^3": 1.0})
+POWER_RATIO = Dimension("a power ratio in decibel", "dB", {"dB": 1.0})
+MEMORY = Dimension("an amount of memory", "B", _scaled("B", "kMGT") | {"KB": 1e3, "MiB": 2.0**20, "GiB": 2.0**30})
+
+DIMENSIONS = (
+    FREQUENCY,
+    TIME,
+    LENGTH,
+    SPEED,
+    ACCELERATION,
+    ANGLE,
+    RATIO,
+    RATE,
+    RATE_SQUARED,
+    POWER_RATIO,
+    MEMORY,
+)
+
+
+def parse_quantity(value: object, dimension: Dimension) -> float:
+    """Read `31 km`, `9.6GHz`, `2 µrad`, `1e-12`; a bare number is SI, in decibels where the dimension is.
+
+    Parameters
+    ----------
+    value : str, int or float
+        What the mission file says.
+    dimension : Dimension
+        What it has to be.
+
+    Returns
+    -------
+    float
+        Finite. In SI; decibels stay decibels.
+
+    Raises
+    ------
+    InvalidValueError
+        Not a number, not finite, an unknown unit, or a unit of another dimension.
+    """
+    if isinstance(value, bool) or not isinstance(value, str | int | float):
+        raise _invalid(f"must be {dimension.name}", dimension)
+    if not isinstance(value, str):
+        return _finite(float(value), dimension)
+    text = value.strip()
+    match = _NUMBER.match(text) if len(text) <= _MAX_TEXT else None
+    if match is None:
+        is_nan_or_inf = text.lower().lstrip("+-.") in ("nan", "inf", "infinity")
+        raise _invalid("must be a finite number" if is_nan_or_inf else f"must be {dimension.name}", dimension)
+    if _OCTAL_LOOK.match(match[0]):
+        raise InvalidValueError(
+            Problem(problem="has a leading zero, which some YAML readers take for octal", accepted="write it without")
+        )
+    number, unit = float(match[0]), _normal(text[match.end() :])
+    if not unit or unit == dimension.si:
+        return _finite(number, dimension)
+    factor = dimension.units.get(unit)
+    if factor is None:
+        raise _wrong_unit(unit, dimension)
+    # Dividing by a whole inverse keeps decimals exact: 5 mm is 0.005, not 0.0050000000000000001.
+    inverse = round(1 / factor) if factor < 1 else 0
+    is_whole = inverse > 0 and abs(inverse * factor - 1) < 1e-12
+    return _finite(number / inverse if is_whole else number * factor, dimension)
+
+
+def format_quantity(value: float, unit: str, digits: int = 3, rounding: str = "nearest") -> str:
+    """Write an SI value with a prefix that keeps it readable: 0.005 m/s^2 is `5 mm/s²`.
+
+    `rounding` is `nearest` or `down`; a limit is rounded down so that copying it from the page still passes.
+    """
+    pretty = unit.replace("^2", "²").replace("^3", "³")
+    if value == 0:
+        return f"0 {pretty}".rstrip()
+    scale, prefix = 1.0, ""
+    if unit[:1] in ("m", "s", "H") or unit == "rad":
+        steps = [(1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n")]
+        if unit in ("m/s", "m/s^2"):  # nobody says kilometre per second squared
+            steps = steps[3:]
+        elif unit == "m":
+            steps = steps[2:]
+        elif unit in ("rad", "s"):
+            steps = steps[3:]
+        scale, prefix = next((step for step in steps if abs(value) >= step[0] * 0.9995), steps[-1])
+        if not 1e-3 <= abs(value) / scale < 1e6:
+            scale, prefix = 1.0, ""
+    return f"{_rounded(value / scale, digits, rounding)} {prefix}{pretty}".rstrip()
+
+
+def _rounded(value: float, digits: int, rounding: str) -> str:
+    if rounding == "down":
+        exponent = math.floor(math.log10(abs(value)))
+        step = digits - 1 - exponent
+        # One part in 10¹² keeps an exact 0.3 from becoming 0.299.
+        mantissa = math.floor(abs(value) * 10.0 ** (step) * (1 + 1e-12))
+        value = math.copysign(mantissa / 10.0**step if step <= 300 else abs(value), value)
+    text = f"{value:.{digits}g}"
+    return f"{value:.0f}" if "e+0" in text and abs(value) < 1e6 else text
+
+
+def _finite(number: float, dimension: Dimension) -> float:
+    if not math.isfinite(number):
+        raise _invalid("must be a finite number", dimension)
+    return number
+
+
+def _normal(unit: str) -> str:
+    unit = unit.strip().replace("µ", "u").replace("μ", "u").replace("²", "^2").replace("³", "^3")
+    unit = unit.replace(" ", "").replace("**", "^")
+    return unit.replace("s2", "s^2").replace("s3", "s^3")
+
+
+def _invalid(problem: str, dimension: Dimension, hint: str = "") -> InvalidValueError:
+    return InvalidValueError(Problem(problem=problem, accepted=dimension.accepted, hint=hint))
+
+
+def _wrong_unit(unit: str, dimension: Dimension) -> InvalidValueError:
+    from difflib import get_close_matches
+
+    others = [other for other in DIMENSIONS if unit in other.units]
+    if others:
+        return _invalid(f"must be {dimension.name}, but {unit!r} makes it {others[0].name}", dimension)
+    if unit.startswith(","):
+        return _invalid("has a decimal comma", dimension, "Write a point")
+    folded = {known.lower(): known for known in dimension.units if known}
+    near = folded.get(unit.lower()) or next(iter(get_close_matches(unit, dimension.units, 1, 0.5)), None)
+    return _invalid(f"has the unknown unit {unit!r}", dimension, f"Did you mean {near!r}?" if near else "")
