@@ -62,7 +62,6 @@ class MissionError(Exception):
     def lines(self) -> list[str]:
         """Write one `file:line:column: fault` per fault."""
         return [
-            ":".join(str(part) for part in (self.file, fault.line, fault.column) if part is not None)
-            + f": {fault}"
+            ":".join(str(part) for part in (self.file, fault.line, fault.column) if part is not None) + f": {fault}"
             for fault in self.faults
         ]

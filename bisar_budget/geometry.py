@@ -96,7 +96,8 @@ class PlatformState:
         speed = norm(self.velocity)
         if speed == 0:
             return None
-        return math.asin(max(-1.0, min(1.0, -dot(self.look, self.velocity) / speed)))
+        sine = -dot(self.look, self.velocity) / speed
+        return math.asin(max(-1.0, min(1.0, sine))) if abs(sine) > ROUNDING else 0.0
 
     def frame(self, name: str) -> tuple[Vector, Vector, Vector]:
         """Axes of a frame as unit vectors of the scene, right-handed, in the order of `FRAME_AXES`.

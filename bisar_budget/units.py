@@ -31,7 +31,17 @@ class Dimension:
 
 
 def _scaled(base: str, prefixes: str, power: int = 1) -> dict[str, float]:
-    factors = {"k": 1e3, "M": 1e6, "G": 1e9, "T": 1e12, "c": 1e-2, "m": 1e-3, "u": 1e-6, "n": 1e-9, "p": 1e-12}
+    factors = {
+        "k": 1e3,
+        "M": 1e6,
+        "G": 1e9,
+        "T": 1e12,
+        "c": 1e-2,
+        "m": 1e-3,
+        "u": 1e-6,
+        "n": 1e-9,
+        "p": 1e-12,
+    }
     return {base: 1.0} | {prefix + base: factors[prefix] ** power for prefix in prefixes}
 
 
@@ -104,7 +114,10 @@ def parse_quantity(value: object, dimension: Dimension) -> float:
         raise _invalid("must be a finite number" if is_nan_or_inf else f"must be {dimension.name}", dimension)
     if _OCTAL_LOOK.match(match[0]):
         raise InvalidValueError(
-            Problem(problem="has a leading zero, which some YAML readers take for octal", accepted="write it without")
+            Problem(
+                problem="has a leading zero, which some YAML readers take for octal",
+                accepted="write it without",
+            )
         )
     number, unit = float(match[0]), _normal(text[match.end() :])
     if not unit or unit == dimension.si:
@@ -124,25 +137,25 @@ def format_quantity(value: float, unit: str, digits: int = 3, rounding: str = "n
     `rounding` is `nearest` or `down`; a limit is rounded down so that copying it from the page still passes.
     """
     pretty = unit.replace("^2", "²").replace("^3", "³")
-    if value == 0:
-        return f"0 {pretty}".rstrip()
+    if pretty.startswith("1/"):
+        return f"{_rounded(value, digits, rounding)}{pretty[1:]}"
+    prefixes = _PREFIXES.get(unit, "")
     scale, prefix = 1.0, ""
-    if unit[:1] in ("m", "s", "H") or unit == "rad":
-        steps = [(1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n")]
-        if unit in ("m/s", "m/s^2"):  # nobody says kilometre per second squared
-            steps = steps[3:]
-        elif unit == "m":
-            steps = steps[2:]
-        elif unit in ("rad", "s"):
-            steps = steps[3:]
+    if prefixes and value != 0:
+        steps = [(_SCALES[letter], letter) for letter in prefixes]
         scale, prefix = next((step for step in steps if abs(value) >= step[0] * 0.9995), steps[-1])
         if not 1e-3 <= abs(value) / scale < 1e6:
             scale, prefix = 1.0, ""
-    return f"{_rounded(value / scale, digits, rounding)} {prefix}{pretty}".rstrip()
+    return f"{_rounded(value / scale, digits, rounding)} {prefix.strip()}{pretty}".rstrip()
+
+
+_SCALES = {"G": 1e9, "M": 1e6, "k": 1e3, " ": 1.0, "m": 1e-3, "µ": 1e-6, "n": 1e-9}
+# Nobody says kilometre per second squared, or megametre.
+_PREFIXES = {"Hz": "GMk ", "m": "k mµn", "s": " mµn", "rad": " mµn", "m/s": " mµn", "m/s^2": " mµn"}
 
 
 def _rounded(value: float, digits: int, rounding: str) -> str:
-    if rounding == "down":
+    if rounding == "down" and value != 0:
         exponent = math.floor(math.log10(abs(value)))
         step = digits - 1 - exponent
         # One part in 10¹² keeps an exact 0.3 from becoming 0.299.

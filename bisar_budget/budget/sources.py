@@ -214,9 +214,7 @@ def _no_limit(kind: str, axis: str) -> str:
 
 
 def _clock(mission: Mission) -> Iterator[ErrorSource]:
-    rows = evaluators.published_clock(
-        SPEED_OF_LIGHT, mission.radar.wavelength, mission.collection.aperture_time
-    )
+    rows = evaluators.published_clock(SPEED_OF_LIGHT, mission.radar.wavelength, mission.collection.aperture_time)
     for (term, unit), (constant, linear, qpe, cubic) in zip(CLOCK_UNITS.items(), rows, strict=True):
         value: float | None = getattr(mission.timing_error, term)
         yield ErrorSource(
@@ -245,4 +243,3 @@ def _other(mission: Mission) -> Iterator[ErrorSource]:
             evidence=other.source,
             notes=("held to the total budget: it belongs to no platform",),
         )
-

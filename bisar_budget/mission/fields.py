@@ -6,7 +6,13 @@ from dataclasses import dataclass
 from datetime import date
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BeforeValidator, GetCoreSchemaHandler, GetJsonSchemaHandler, WithJsonSchema
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    WithJsonSchema,
+)
 from pydantic_core import CoreSchema, core_schema
 
 from bisar_budget.errors import InvalidValueError, Problem
@@ -124,9 +130,7 @@ PositionVector = Annotated[tuple[Coordinate, Coordinate, Coordinate], BeforeVali
 VelocityVector = Annotated[tuple[Velocity, Velocity, Velocity], BeforeValidator(_three), _TRIPLE]
 PositionError = Annotated[tuple[Coordinate, Coordinate, Coordinate], _each(_COORDINATE), _ONE_OR_TRIPLE]
 VelocityError = Annotated[tuple[Velocity, Velocity, Velocity], _each(_VELOCITY), _ONE_OR_TRIPLE]
-AccelerationError = Annotated[
-    tuple[Acceleration, Acceleration, Acceleration], _each(_ACCELERATION), _ONE_OR_TRIPLE
-]
+AccelerationError = Annotated[tuple[Acceleration, Acceleration, Acceleration], _each(_ACCELERATION), _ONE_OR_TRIPLE]
 
 
 def _printable(text: str) -> str:

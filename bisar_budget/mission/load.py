@@ -89,7 +89,9 @@ def _decoded(data: bytes | str, file: str) -> str:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
-        fault = Fault(line=line, column=None, key="", problem="is not UTF-8 text", given=f"byte {data[error.start]:#x}")
+        fault = Fault(
+            line=line, column=None, key="", problem="is not UTF-8 text", given=f"byte {data[error.start]:#x}"
+        )
         raise MissionError(file, (fault,)) from None
 
 
@@ -105,9 +107,7 @@ class _Tree:
 
     def fault(self, mark: tuple[int, int], path: KeyPath, problem: str, **more: str) -> None:
         line, column = mark
-        self.faults.append(
-            Fault(line=line + 1, column=column + 1, key=_dotted(path), problem=problem, **more)
-        )
+        self.faults.append(Fault(line=line + 1, column=column + 1, key=_dotted(path), problem=problem, **more))
 
 
 def _read_tree(text: str, file: str) -> _Tree:
@@ -123,12 +123,12 @@ def _read_tree(text: str, file: str) -> _Tree:
         line = text.count("\n", 0, max(0, error.position)) + 1
         fault = Fault(line=line, column=None, key="", problem=f"is not a text file: {error.reason}")
         raise MissionError(file, (fault,)) from None
-    except _Unusable:
+    except _UnusableError:
         raise MissionError(file, tuple(tree.faults)) from None
     return tree
 
 
-class _Unusable(Exception):
+class _UnusableError(Exception):
     """Nothing after this point is worth reading; the fault is in the tree."""
 
 
@@ -160,7 +160,7 @@ def _build(tree: _Tree, events: Iterator[Any]) -> None:
                 skipping += 1
                 if len(stack) + skipping > MAX_DEPTH:
                     tree.fault(mark, (), f"is nested more than {MAX_DEPTH} deep")
-                    raise _Unusable
+                    raise _UnusableError
                 continue
         elif kind is yaml.MappingEndEvent or kind is yaml.SequenceEndEvent:
             if skipping:
@@ -172,7 +172,7 @@ def _build(tree: _Tree, events: Iterator[Any]) -> None:
             documents += 1
             if documents > 1:
                 tree.fault(mark, (), "has a second YAML document", accepted="one mission to a file")
-                raise _Unusable
+                raise _UnusableError
             continue
         else:
             continue
@@ -185,7 +185,7 @@ def _build(tree: _Tree, events: Iterator[Any]) -> None:
                 key = _SKIPPED
                 if kind is not yaml.ScalarEvent and kind is not yaml.AliasEvent:
                     tree.fault(mark, path, "has a key that is not plain text")
-                    raise _Unusable
+                    raise _UnusableError
             continue
         if type(container) is dict:
             here: KeyPath = (*path, key or "")
@@ -216,7 +216,7 @@ def _build(tree: _Tree, events: Iterator[Any]) -> None:
         if not tree.faults:
             problem = "is empty" if tree.root is None else "is not a mapping of keys to values"
             tree.faults.append(_file_fault(problem, "`bisar-budget init` writes a mission file to start from"))
-        raise _Unusable
+        raise _UnusableError
 
 
 _SKIPPED = "\0skipped"  # no text of a YAML file holds a NUL

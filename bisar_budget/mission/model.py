@@ -4,7 +4,16 @@ import math
 from functools import cached_property
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, PrivateAttr, Tag, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    PrivateAttr,
+    Tag,
+    model_validator,
+)
 
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.errors import InvalidValueError, KeyPath, Problem
@@ -303,9 +312,7 @@ def _available_model(value: object) -> object:
 class Allocation(Section):
     """How the budget is divided and which model gates."""
 
-    split: AnySplit = Field(
-        "equal", description="equal, balanced, shares that sum to 1, or one of these per metric."
-    )
+    split: AnySplit = Field("equal", description="equal, balanced, shares that sum to 1, or one of these per metric.")
     combine: Annotated[Literal["each", "sum", "rss"], _choice("each", "sum", "rss")] = Field(
         "each", description="each: every error alone; sum: worst case; rss: independent errors."
     )

@@ -37,7 +37,10 @@ def _draft_07(node: Any) -> Any:
         node.pop("anyOf", None)
         node = {**kept[0], **node} if len(kept) == 1 else {**node, "anyOf": kept}
     if "$ref" in node and len(node) > 1:  # draft-07 ignores what stands beside a $ref
-        node = {**{key: value for key, value in node.items() if key != "$ref"}, "allOf": [{"$ref": node["$ref"]}]}
+        node = {
+            **{key: value for key, value in node.items() if key != "$ref"},
+            "allOf": [{"$ref": node["$ref"]}],
+        }
     if "oneOf" in node:  # the forms of `split` exclude each other by their keys, not by a schema keyword
         node["anyOf"] = node.pop("oneOf")
     return {key: _draft_07(value) for key, value in node.items()}

@@ -70,9 +70,7 @@ def coefficients(expression: Expr, order: int = 3) -> tuple[Expr, ...]:
 
 def error_polynomial(platform: Platform) -> Matrix:
     """Return r̃(τ) of (22), (3,): p̃ + ṽτ + ãτ²/2. [m]"""
-    return (
-        platform.position_error + platform.velocity_error * tau + platform.acceleration_error * tau**2 / 2
-    )
+    return platform.position_error + platform.velocity_error * tau + platform.acceleration_error * tau**2 / 2
 
 
 def clock_polynomial() -> Expr:

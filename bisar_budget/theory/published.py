@@ -2,14 +2,14 @@
 
 from dataclasses import dataclass
 
-from sympy import Abs, Eq, Expr, Function, Matrix, Rational, Symbol, diff, pi, simplify, solve
+from sympy import Abs, Eq, Expr, Function, Matrix, Rational, Symbol, diff, pi, solve
 
 from bisar_budget.theory import differential_range as dr
 from bisar_budget.theory.symbols import (
     AXES,
     PLATFORMS,
-    T,
     Platform,
+    T,
     c,
     center_frequency,
     clock_coefficients,
@@ -31,8 +31,9 @@ EQUAL_SHARE_QPE = pi / 8  # per platform, Section V
 
 @dataclass(frozen=True)
 class Row:
-    """One row of a table: the error it is about and its cells, left to right."""
+    """One row of a table: its number in print, the error it is about, its cells left to right."""
 
+    number: int | None
     error: Symbol
     label: Expr
     cells: tuple[Expr, ...]
@@ -78,6 +79,7 @@ def table_1(platforms: tuple[Platform, ...] = PLATFORMS) -> Table:
     motion_free = {e: 0 for platform in platforms for e in motion_errors(platform)}
     rows = [
         Row(
+            number=1,
             error=real("ttilde"),
             label=Eq(Function("ttilde")(tau), dr.clock_polynomial(), evaluate=False),
             cells=tuple(cell.subs(motion_free) for cell in beta),
@@ -90,6 +92,7 @@ def table_1(platforms: tuple[Platform, ...] = PLATFORMS) -> Table:
             track = Function(f"{AXES[axis]}tilde_{platform.subscript}")(tau)
             rows.append(
                 Row(
+                    number=2 + index,
                     error=error,
                     label=Eq(track, single_error(polynomial[axis], error, platforms), evaluate=False),
                     cells=tuple(single_error(cell, error, platforms) for cell in beta),
@@ -100,7 +103,7 @@ def table_1(platforms: tuple[Platform, ...] = PLATFORMS) -> Table:
         title="Differential range errors induced by motion measurement errors",
         columns=("Constant β̃₀", "Linear β̃₁", "Quadratic β̃₂", "Cubic β̃₃"),
         rows=tuple(rows),
-        notes=("The paper prints the transmitter's rows; the receiver's follow by replacing t with r.",),
+        notes=("Rows are numbered as printed; the paper prints the transmitter's and has the receiver's by t to r.",),
     )
 
 
@@ -130,12 +133,18 @@ def table_2(platforms: tuple[Platform, ...] = PLATFORMS, budget: Expr = EQUAL_SH
                 allowable = dr.in_angles(allowable, platforms)  # x/R is printed as cos φ̄ cos θ̄
             track = Function(f"{AXES[index % 3]}tilde_{platform.subscript}")(tau)
             rows.append(
-                Row(error=error, label=Eq(track, error * power, evaluate=False), cells=(Abs(qpe), allowable))
+                Row(
+                    number=1 + index,
+                    error=error,
+                    label=Eq(track, error * power, evaluate=False),
+                    cells=(Abs(qpe), allowable),
+                )
             )
     clock = clock_coefficients[2]
     clock_qpe = edge_phase(single_error(beta_2, clock, platforms), 2).subs(wavelength, c / center_frequency)
     rows.append(
         Row(
+            number=None,
             error=clock,
             label=Eq(Function("ttilde")(tau), clock * tau**2, evaluate=False),
             cells=(Abs(clock_qpe), limit(clock_qpe, clock, budget)),
@@ -147,7 +156,7 @@ def table_2(platforms: tuple[Platform, ...] = PLATFORMS, budget: Expr = EQUAL_SH
         title="Quadratic phase error and allowable error at π/8 per platform",
         columns=("QPE [rad]", "Allowable, magnitude"),
         rows=tuple(rows),
-        notes=("The paper omits the bars and prints the transmitter's rows only.",),
+        notes=("Rows are numbered as printed, the receiver's by t to r. The paper omits the bars.",),
     )
 
 
@@ -163,7 +172,10 @@ def vibration() -> Table:
         phase = 2 * pi * motion / wavelength
         (allowable,) = solve(Eq(phase**2, ratio * share), motion)
         return Row(
-            error=motion, label=motion, cells=(phase**2, allowable, allowable.subs(share, Rational(1, 2)))
+            number=None,
+            error=motion,
+            label=motion,
+            cells=(phase**2, allowable, allowable.subs(share, Rational(1, 2))),
         )
 
     return Table(
@@ -197,7 +209,7 @@ def equations() -> tuple[Equation, ...]:
         Equation("(17)", "Constant coefficient", real("beta_0"), beta_0),
         Equation("(17)", "Linear coefficient", real("beta_1"), beta_1),
         Equation("(19)", "Ground point to coefficients", Symbol("Q"), dr.ground_matrix()),
-        Equation("(30)", "Determinant of Q", Symbol("detQ"), simplify(determinant)),
+        Equation("(30)", "Determinant of Q", Symbol("detQ"), determinant),
         Equation("(30)", "Inverse of Q, times its determinant", Symbol("adjQ"), adjugate),
         Equation(
             "(22)",

@@ -1,0 +1,343 @@
+"""The `bisar-budget` command. Everything that costs time to import is imported where it is used."""
+
+import os
+import sys
+from collections.abc import Iterable, Sequence
+from datetime import UTC, date, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import click
+
+from bisar_budget import __version__
+
+if TYPE_CHECKING:
+    from bisar_budget.budget.findings import MissionFindings, Report
+
+EXIT_BROKEN, EXIT_USAGE, EXIT_OUR_FAULT = 1, 2, 3
+
+
+class _Commands(click.Group):
+    """A group whose crashes exit with 3: 1 means a broken requirement and nothing else."""
+
+    def main(self, *args: Any, **kwargs: Any) -> Any:
+        try:
+            return super().main(*args, **kwargs)
+        except Exception as error:
+            if os.environ.get("BISAR_BUDGET_DEBUG"):
+                raise
+            click.echo(
+                f"bisar-budget {__version__}: a fault of the tool itself, nothing was judged "
+                f"({type(error).__name__}: {error}).\n"
+                "Please report it; BISAR_BUDGET_DEBUG=1 shows where it happened.",
+                err=True,
+            )
+            sys.exit(EXIT_OUR_FAULT)
+
+
+@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="bisar-budget")
+def cli() -> None:
+    """Motion-measurement error budgets for bistatic SAR.
+
+    How large may the motion errors of transmitter and receiver be before the image breaks its
+    requirements, and are the declared ones inside? After Rigling & Moses.
+    """
+
+
+@cli.command()
+@click.argument("missions", nargs=-1, required=True, metavar="MISSION...")
+@click.option(
+    "--format",
+    "format_name",
+    type=click.Choice(["text", "json", "csv"]),
+    default="text",
+    show_default=True,
+    help="Format of the report.",
+)
+@click.option("-o", "--output", metavar="FILE", help="Write the report to FILE instead of standard output.")
+@click.option(
+    "--report",
+    "reports",
+    multiple=True,
+    metavar="FILE",
+    help="Also write a report to FILE, in the format of its suffix: .txt, .json or .csv. Repeatable.",
+)
+@click.option("--strict", is_flag=True, help="Fail on warnings and on rows that could not be evaluated.")
+@click.option("--exit-zero", is_flag=True, help="Exit with 0 even if a requirement is broken.")
+@click.option(
+    "--model",
+    type=click.Choice(["published", "full", "strictest"]),
+    help="Model that gates, over the mission file's. This version has the published one.",
+)
+@click.option(
+    "--date",
+    "today",
+    type=click.DateTime(["%Y-%m-%d"]),
+    help="Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC).",
+)
+@click.option("-q", "--quiet", is_flag=True, help="One line per mission.")
+@click.option("-v", "--verbose", is_flag=True, help="Reason, equation, displacement and evidence of every row.")
+@click.option(
+    "--color",
+    type=click.Choice(["auto", "always", "never"]),
+    default="auto",
+    show_default=True,
+    help="Colour the text; auto: on a terminal, unless NO_COLOR is set.",
+)
+def check(
+    missions: Sequence[str],
+    format_name: str,
+    output: str | None,
+    reports: Sequence[str],
+    strict: bool,
+    exit_zero: bool,
+    model: str | None,
+    today: datetime | None,
+    quiet: bool,
+    verbose: bool,
+    color: str,
+) -> None:
+    """Check mission files against their requirements.
+
+    MISSION is a YAML file, a glob pattern, or - for standard input. Exit code: 0 all met,
+    1 a requirement is broken, 2 wrong usage or an unusable mission file, 3 a fault of the tool.
+    """
+    from bisar_budget.report import Style, render
+
+    if model in ("full", "strictest"):
+        raise click.UsageError(
+            f"--model {model}: not supported by this version of bisar-budget; it comes with the full model."
+        )
+    written = [(Path(name), _format_of(name)) for name in reports]
+    report = _checked(missions, today.date() if today else _today())
+    if format_name != "text" or output is not None or not _is_terminal():
+        _say_faults(report)
+    verbosity = -1 if quiet else 1 if verbose else 0
+    for path, its_format in written:
+        _write(path, render(its_format, report, Style(verbosity=verbosity)))
+    use_color = color == "always" or (color == "auto" and output is None and _wants_color())
+    text = render(format_name, report, Style(color=use_color, verbosity=verbosity))
+    if output is None:
+        _print(text)
+    else:
+        _write(Path(output), text)
+    code = report.exit_code(strict)
+    sys.exit(0 if exit_zero and code == EXIT_BROKEN else code)
+
+
+def _checked(patterns: Sequence[str], today: date) -> "Report":
+    from bisar_budget.budget.check import check_mission
+    from bisar_budget.budget.findings import Report, UnusableMission
+    from bisar_budget.errors import MissionError
+    from bisar_budget.mission.load import load_mission
+
+    missions: list[MissionFindings | UnusableMission] = []
+    for file in _expanded(patterns):
+        try:
+            missions.append(check_mission(load_mission(file), today))
+        except MissionError as error:
+            missions.append(UnusableMission(file=file, faults=error.faults))
+    return Report(version=__version__, missions=tuple(missions))
+
+
+def _expanded(patterns: Iterable[str]) -> list[str]:
+    """Expand the glob patterns that the shell left; a pattern without a match stays and fails to load."""
+    files: list[str] = []
+    for pattern in patterns:
+        if pattern != "-" and any(char in pattern for char in "*?[") and not os.path.exists(pattern):
+            from glob import glob
+
+            files += sorted(glob(pattern, recursive=True)) or [pattern]
+        else:
+            files.append(pattern)
+    return list(dict.fromkeys(files))
+
+
+def _today() -> date:
+    epoch = os.environ.get("SOURCE_DATE_EPOCH")
+    if not epoch:
+        return datetime.now(UTC).date()
+    try:
+        return datetime.fromtimestamp(int(epoch), UTC).date()
+    except (ValueError, OverflowError, OSError):
+        raise click.UsageError(f"SOURCE_DATE_EPOCH must be seconds since 1970 (got {epoch!r})") from None
+
+
+def _format_of(name: str) -> str:
+    from bisar_budget.report import SUFFIXES
+
+    suffix = Path(name).suffix.lower()
+    if suffix not in SUFFIXES:
+        raise click.UsageError(f"--report {name}: the suffix must be one of {', '.join(SUFFIXES)}")
+    return SUFFIXES[suffix]
+
+
+def _say_faults(report: "Report") -> None:
+    from bisar_budget.budget.findings import UnusableMission
+    from bisar_budget.errors import MissionError
+
+    for mission in report.missions:
+        if isinstance(mission, UnusableMission):
+            for line in MissionError(mission.file, mission.faults).lines():
+                click.echo(line, err=True)
+
+
+def _is_terminal() -> bool:
+    return sys.stdout.isatty() and sys.stderr.isatty()
+
+
+def _wants_color() -> bool:
+    return sys.stdout.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+
+
+def _print(text: str) -> None:
+    """Write to standard output; a reader that went away changes no exit code."""
+    if hasattr(sys.stdout, "reconfigure"):
+        sys.stdout.reconfigure(errors="replace")
+    try:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _write(path: Path, text: str) -> None:
+    """Replace a file whole: written beside it under another name, then renamed."""
+    import tempfile
+
+    temporary = None
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(
+            "w", encoding="utf-8", newline="\n", dir=path.parent, prefix=f".{path.name}.", delete=False
+        ) as file:
+            temporary = file.name
+            file.write(text)
+        mask = os.umask(0)
+        os.umask(mask)
+        os.chmod(temporary, 0o666 & ~mask)  # a temporary file is private, a report is not
+        os.replace(temporary, path)
+    except OSError as error:
+        if temporary is not None and os.path.exists(temporary):
+            os.unlink(temporary)
+        _fail(f"cannot write {path}: {error.strerror or error}")
+
+
+def _fail(message: str) -> NoReturn:
+    click.echo(f"Error: {message}", err=True)
+    sys.exit(EXIT_USAGE)
+
+
+@cli.command()
+@click.argument("file", default="mission.yaml")
+@click.option("--name", default="My bistatic mission", show_default=True, help="Name of the mission.")
+@click.option("--force", is_flag=True, help="Replace an existing file.")
+def init(file: str, name: str, force: bool) -> None:
+    """Write a commented mission file to start from.
+
+    FILE is mission.yaml by default, - for standard output.
+    """
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    from bisar_budget.resources import resource
+
+    environment = Environment(
+        loader=FileSystemLoader(resource("templates")), undefined=StrictUndefined, keep_trailing_newline=True
+    )
+    text = environment.get_template("mission.yaml.j2").render(name=name)
+    if file == "-":
+        _print(text)
+        return
+    path = Path(file)
+    if path.exists() and not force:
+        _fail(f"{file} exists; --force replaces it")
+    _write(path, text)
+    click.echo(f"Wrote {file}. Next: bisar-budget check {file}", err=True)
+    click.echo(
+        "For completion and checks in an editor: bisar-budget schema -o mission.schema.json beside it.",
+        err=True,
+    )
+
+
+@cli.command()
+@click.option("-o", "--output", metavar="FILE", help="Write to FILE instead of standard output.")
+def schema(output: str | None) -> None:
+    """Print the JSON Schema of the mission file, for editors."""
+    import json
+
+    from bisar_budget.mission.schema import mission_schema
+
+    text = json.dumps(mission_schema(), indent=2) + "\n"
+    if output is None:
+        _print(text)
+    else:
+        _write(Path(output), text)
+
+
+@cli.command()
+@click.option(
+    "--table",
+    type=click.Choice(["all", "equations", "I", "II", "vibration", "full"]),
+    default="all",
+    show_default=True,
+    help="What to derive.",
+)
+@click.option(
+    "--format",
+    "format_name",
+    type=click.Choice(["text", "latex", "markdown", "mathml"]),
+    default="text",
+    show_default=True,
+    help="How to write it.",
+)
+@click.option("--check", "check_only", is_flag=True, help="Fail if the evaluators are not what the derivation gives.")
+@click.option("--write", is_flag=True, help="Rewrite the evaluators from the derivation.")
+def derive(table: str, format_name: str, check_only: bool, write: bool) -> None:
+    """Derive the tables of Rigling & Moses from the geometry and print them.
+
+    Equation and table numbers are the paper's.
+    """
+    if check_only and write:
+        raise click.UsageError("--check and --write exclude each other.")
+    if check_only or write:
+        _generated(write)
+        return
+    if table == "full":
+        raise click.UsageError("--table full: not supported by this version of bisar-budget.")
+    from bisar_budget.theory import render
+
+    _print(render.derivation(table, format_name))
+
+
+def _generated(write: bool) -> None:
+    import difflib
+
+    from sympy import __version__ as sympy_version
+
+    from bisar_budget.theory import emit
+
+    today = emit.source()
+    if write:
+        _write(emit.TARGET, today)
+        click.echo(f"Wrote {emit.TARGET.name}, derived with SymPy {sympy_version}.")
+        return
+    committed = emit.TARGET.read_text(encoding="utf-8")
+    if committed == today:
+        click.echo(f"{emit.TARGET.name} is what the derivation gives (SymPy {sympy_version}).")
+        return
+    lines = difflib.unified_diff(committed.splitlines(), today.splitlines(), "committed", "derived", lineterm="", n=1)
+    _print("\n".join(lines) + "\n")
+    click.echo(
+        f"{emit.TARGET.name} differs from the derivation (SymPy {sympy_version}); "
+        "`bisar-budget derive --write` rewrites it.",
+        err=True,
+    )
+    sys.exit(EXIT_BROKEN)
+
+
+def main() -> None:
+    """Run the command."""
+    # Plugins of other packages have no say in what a mission file means; looking for them costs 15 ms.
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+    cli()

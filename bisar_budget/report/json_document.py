@@ -1,0 +1,102 @@
+"""The report as JSON, `bisar-budget/check/1`. Keys may be added, never changed or removed."""
+
+import json
+from dataclasses import fields
+from typing import Any
+
+from bisar_budget.budget.allocation import Split
+from bisar_budget.budget.findings import MissionFindings, Report, Row, UnusableMission
+from bisar_budget.geometry import PlatformState
+from bisar_budget.report import Style
+
+FORMAT = "bisar-budget/check/1"
+_ROW_KEYS = tuple(field.name for field in fields(Row))
+
+
+def render(report: Report, style: Style) -> str:
+    """Write the report as one JSON document; a number that is not finite is refused, never written."""
+    return json.dumps(document(report), indent=2, allow_nan=False) + "\n"
+
+
+def document(report: Report) -> dict[str, Any]:
+    """Return the report as plain dicts and lists."""
+    return {
+        "format": FORMAT,
+        "version": report.version,
+        "status": report.status,
+        "missions": [
+            _unusable(mission) if isinstance(mission, UnusableMission) else _mission(mission)
+            for mission in report.missions
+        ],
+    }
+
+
+def _unusable(mission: UnusableMission) -> dict[str, Any]:
+    return {
+        "file": mission.file,
+        "name": None,
+        "status": mission.status,
+        "errors": [
+            {
+                "line": fault.line,
+                "column": fault.column,
+                "key": fault.key,
+                "message": fault.problem,
+                "given": fault.given or None,
+                "accepted": fault.accepted or None,
+                "hint": fault.hint or None,
+            }
+            for fault in mission.faults
+        ],
+    }
+
+
+def _mission(mission: MissionFindings) -> dict[str, Any]:
+    allocation = mission.allocation
+    return {
+        "file": mission.file,
+        "name": mission.name,
+        "status": mission.status,
+        "model": mission.model,
+        "combine": mission.combine,
+        "geometry": {
+            "wavelength_m": mission.wavelength,
+            "bistatic_angle_rad": mission.geometry.bistatic_angle,
+            "look_azimuth_rad": mission.geometry.look_azimuth,
+            "gradient_angle_rad": mission.geometry.gradient_angle,
+            "range_resolution_m": mission.resolution.range,
+            "cross_range_resolution_m": mission.resolution.cross_range,
+            "transmitter": _platform(mission.geometry.transmitter),
+            "receiver": _platform(mission.geometry.receiver),
+        },
+        "budget": {
+            "qpe_rad": {
+                "total": allocation.qpe_total,
+                "transmitter": allocation.qpe_limit("transmitter"),
+                "receiver": allocation.qpe_limit("receiver"),
+                "clock": allocation.qpe_limit("clock"),
+                "reserve": allocation.qpe.reserve * allocation.qpe_total,
+            },
+            "autofocus_gain": allocation.autofocus_gain,
+            "pslr_share": _shares(allocation.pslr),
+            "islr_share": _shares(allocation.islr),
+        },
+        "summary": mission.summary,
+        "rows": [{key: getattr(row, key) for key in _ROW_KEYS} for row in mission.rows],
+        "warnings": [{"line": warning.line, "message": warning.message} for warning in mission.warnings],
+        "notes": mission.notes,
+        "errors": [],
+    }
+
+
+def _platform(state: PlatformState) -> dict[str, float | None]:
+    return {
+        "slant_range_m": state.slant_range,
+        "azimuth_rad": state.azimuth,
+        "elevation_rad": state.elevation,
+        "squint_rad": state.squint,
+    }
+
+
+def _shares(split: Split) -> dict[str, float]:
+    return {"transmitter": split.transmitter, "receiver": split.receiver}

@@ -1,0 +1,193 @@
+"""The report for a terminal: the geometry, the table with the worst row first, the reasons, one summary line."""
+
+import math
+import re
+import textwrap
+from collections.abc import Iterator
+
+from bisar_budget.budget.findings import MissionFindings, Report, Row, UnusableMission, worst_first
+from bisar_budget.geometry import PlatformState
+from bisar_budget.report import Style
+from bisar_budget.units import format_quantity
+
+WIDTH = 80
+WORDS = {
+    "error": "ERROR",
+    "fail": "FAIL",
+    "not_evaluated": "NOT EVAL",
+    "warn": "WARN",
+    "pass_with_autofocus": "pass AF",
+    "pass": "pass",
+    "waived": "waived",
+    "info": "info",
+    "not_declared": "not decl",
+}
+_ANSI = {
+    "error": "1;31",
+    "fail": "1;31",
+    "not_evaluated": "35",
+    "warn": "33",
+    "pass_with_autofocus": "32",
+    "pass": "32",
+    "waived": "36",
+    "info": "0",
+    "not_declared": "2",
+}
+_EXPLAINED = ("fail", "not_evaluated", "warn", "waived", "pass_with_autofocus")
+
+
+def render(report: Report, style: Style) -> str:
+    """Write the report for reading, at most 80 columns where the file's own names allow it."""
+    blocks = []
+    for mission in report.missions:
+        if isinstance(mission, UnusableMission):
+            blocks.append(_unusable(mission, style))
+        else:
+            blocks.append(_mission(mission, style))
+    text = ("\n" if style.verbosity < 0 else "\n\n").join("\n".join(block) for block in blocks)
+    if len(report.missions) > 1:
+        text += "\n\n" + _overall(report, style)
+    return text + "\n"
+
+
+def _unusable(mission: UnusableMission, style: Style) -> list[str]:
+    count = len(mission.faults)
+    summary = f"{_word('error', style)} {mission.file}: cannot be used, {count} fault{'s' if count != 1 else ''}"
+    if style.verbosity < 0:
+        return [summary]
+    places = [f"  {fault.line or '-'}:{fault.column or '-'}  {fault}" for fault in mission.faults]
+    return [*(line for place in places for line in _wrapped(place, "       ")), summary]
+
+
+def _mission(mission: MissionFindings, style: Style) -> list[str]:
+    if style.verbosity < 0:
+        return [_summary(mission, style)]
+    lines = [mission.name, ""]
+    lines += [line for key, text in _head(mission) for line in _wrapped(f"{key:<12} {text}", " " * 13)]
+    rows = worst_first(mission.rows)
+    lines += ["", _cells("status", "row", "declared", "allowable", "use", "from")]
+    lines += [line for row in rows for line in _row(row, style)]
+    explained = [row for row in rows if row.status in _EXPLAINED or style.verbosity > 0]
+    details = [line for row in explained for line in _details(row, mission, style)]
+    lines += ["", *details] if details else []
+    lines += [line for text in _asides(mission, style) for line in _wrapped(text, "  ")]
+    return [*lines, "", _summary(mission, style)]
+
+
+def _head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
+    geometry, allocation = mission.geometry, mission.allocation
+    yield "Transmitter", _platform(geometry.transmitter)
+    yield "Receiver", _platform(geometry.receiver)
+    yield (
+        "Geometry",
+        f"bistatic angle {_degrees(geometry.bistatic_angle)}, look azimuth {_degrees(geometry.look_azimuth)}, "
+        f"wavelength {format_quantity(mission.wavelength, 'm', 4)}",
+    )
+    yield (
+        "Resolution",
+        f"{format_quantity(mission.resolution.range, 'm')} in range, "
+        f"{format_quantity(mission.resolution.cross_range, 'm')} in cross range (peak to null, on the ground)",
+    )
+    split = allocation.qpe
+    shares = f"transmitter {split.transmitter:.3g}, receiver {split.receiver:.3g}"
+    shares += f", clock {split.clock:.3g}" if split.clock is not None else ""
+    shares += f", reserve {split.reserve:.3g}" if split.reserve else ""
+    gain = f"; autofocus allows {allocation.autofocus_gain:.3g} times that" if allocation.n_pull else ""
+    yield "QPE budget", f"{format_quantity(allocation.qpe_total, 'rad')}: {shares}{gain}"
+    rule = {"each": "each error alone", "sum": "worst-case sum", "rss": "root-sum-square"}[mission.combine]
+    yield "Model", f"{mission.model} (Rigling & Moses, Tables I and II), {rule}"
+
+
+def _platform(state: PlatformState) -> str:
+    squint = "still" if state.squint is None else f"squint {_degrees(state.squint)}"
+    return (
+        f"{format_quantity(state.slant_range, 'm', 4)} away, azimuth {_degrees(state.azimuth)}, "
+        f"elevation {_degrees(state.elevation)}, {squint}"
+    )
+
+
+def _degrees(angle: float) -> str:
+    return f"{math.degrees(angle) + 0.0:.1f} deg".replace("-0.0 deg", "0.0 deg")
+
+
+def _row(row: Row, style: Style) -> list[str]:
+    declared = "-" if row.declared is None else format_quantity(row.declared, row.unit)
+    # Rounded down, so that an allowable copied from the page into a file passes.
+    allowable = "no limit" if row.allowable is None else format_quantity(row.allowable, row.unit, rounding="down")
+    if row.allowable is None and row.status in ("not_evaluated", "info"):
+        allowable = "-"
+    use = "-" if row.utilization is None or row.allowable is None else percent(row.utilization)
+    cells = (declared, allowable, use, _short_reference(row.equation))
+    word = f"{WORDS[row.status]:<8}"
+    lines = [_cells(word, row.id, *cells)] if len(row.id) <= 34 else [f"{word} {row.id}", _cells("", "", *cells)]
+    lines[0] = _word(row.status, style, 8) + lines[0][8:]
+    return lines
+
+
+def _short_reference(equation: str) -> str:
+    """Shorten `Table II row 4` to `II.4`, `Section V, …` to `V`; what is not from the paper to nothing."""
+    match = re.match(r"Table (I+)(?: rows? (\d+))?|Section (V?I*)|(\(\d+\))", equation)
+    if match is None:
+        return ""
+    table, row, section, number = match.groups()
+    return f"{table}.{row}" if row else table or section or number
+
+
+def percent(ratio: float) -> str:
+    """Write a ratio in percent; near 100 % with the digits that tell which side it is on."""
+    value = 100 * ratio
+    if value == 0 or value >= 1e6:
+        return f"{value:.2g} %"
+    for digits in range(3 if value < 100 else len(f"{value:.0f}"), 13):
+        text = f"{value:.{digits}g}"
+        if (float(text) > 100) == (value > 100 * (1 + 1e-9)) or abs(value - 100) < 1e-7:
+            return f"{text} %"
+    return f"{value} %"
+
+
+def _cells(status: str, row: str, declared: str, allowable: str, use: str, reference: str) -> str:
+    return f"{status:<8} {row:<34} {declared:>11} {allowable:>11} {use:>7} {reference}".rstrip()
+
+
+def _details(row: Row, mission: MissionFindings, style: Style) -> list[str]:
+    place = f"{mission.file}:{row.line}" if row.line is not None else mission.file
+    own_id = f" [{row.requirement_id}]" if row.requirement_id else ""
+    head = f"{_word(row.status, style)} {row.id}{own_id} ({place})"
+    texts = [row.reason] if row.reason else []
+    texts += row.notes
+    if style.verbosity > 0:
+        texts.append(f"from {row.equation}")
+        if row.displacement_m is not None:
+            x, y = row.displacement_m
+            texts.append(f"moves the image by {format_quantity(x, 'm')} east, {format_quantity(y, 'm')} north")
+        if row.evidence:
+            texts.append(f"evidence: {row.evidence}")
+    return [head, *(line for text in texts for line in _wrapped(f"  {text}", "  "))]
+
+
+def _asides(mission: MissionFindings, style: Style) -> Iterator[str]:
+    for warning in mission.warnings:
+        place = f"{mission.file}:{warning.line}: " if warning.line is not None else ""
+        yield f"warning: {place}{warning.message}"
+    if style.verbosity > 0:
+        yield from (f"note: {note}" for note in mission.notes)
+
+
+def _summary(mission: MissionFindings, style: Style) -> str:
+    counts = ", ".join(f"{count} {status}" for status, count in mission.summary.items())
+    return f"{_word(mission.status, style)} {mission.file}: {counts}"
+
+
+def _overall(report: Report, style: Style) -> str:
+    statuses = [mission.status for mission in report.missions]
+    counts = ", ".join(f"{statuses.count(status)} {status}" for status in WORDS if status in statuses)
+    return f"{_word(report.status, style)} {len(statuses)} missions: {counts}"
+
+
+def _word(status: str, style: Style, width: int = 0) -> str:
+    word = f"{WORDS[status]:<{width}}"
+    return f"\x1b[{_ANSI[status]}m{word}\x1b[0m" if style.color else word
+
+
+def _wrapped(text: str, indent: str) -> list[str]:
+    return textwrap.wrap(text, WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)

@@ -1,0 +1,299 @@
+"""Write the derived equations and tables as text, LaTeX, Markdown or MathML, with the paper's numbers."""
+
+import re
+import textwrap
+import unicodedata
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from sympy import Basic, MatrixBase, Symbol
+from sympy.printing.latex import LatexPrinter
+from sympy.printing.mathml import MathMLPresentationPrinter
+from sympy.printing.str import StrPrinter
+
+from bisar_budget.theory import published
+from bisar_budget.theory.published import Equation, Table
+
+_NAME = re.compile(r"(?P<letter>[A-Za-z]+?)(?P<index>_\d)?(?P<accent>tilde|bar)?(?:_(?P<subscript>\w+))?")
+_GREEK = {"lambda": "λ", "tau": "τ", "phi": "φ", "theta": "θ", "beta": "β", "sigma": "σ"}
+_ACCENTS = {"tilde": "\u0303", "bar": "\u0304"}
+_COMMANDS = {
+    "Delta": r"\Delta{}",
+    "PSLR": r"\mathrm{PSLR}",
+    "ISLR": r"\mathrm{ISLR}",
+    "pull": r"\mathrm{pull}",
+    "defocus": r"\mathrm{defocus}",
+}
+
+
+@dataclass(frozen=True)
+class _Name:
+    """A symbol's name taken apart: `vtilde_xt` is v with a tilde and the subscript xt."""
+
+    letter: str
+    accent: str
+    subscript: str
+
+    @classmethod
+    def of(cls, symbol_name: str) -> "_Name":
+        match = _NAME.fullmatch(symbol_name)
+        if match is None:
+            return cls(symbol_name, "", "")
+        subscript = (match["index"] or "").lstrip("_") or match["subscript"] or ""
+        return cls(match["letter"], match["accent"] or "", subscript)
+
+    def text(self) -> str:
+        letter = self.letter.replace("Delta", "Δ").replace("det", "det ").replace("adj", "adj ")
+        head = unicodedata.normalize("NFC", _GREEK.get(letter, letter) + _ACCENTS.get(self.accent, ""))
+        return f"{head}_{self.subscript}" if self.subscript else head
+
+    def latex(self) -> str:
+        head = f"\\{self.letter}" if self.letter in _GREEK else _COMMANDS.get(self.letter, self.letter)
+        for operator in ("det", "adj"):
+            if head.startswith(operator):
+                head = rf"\operatorname{{{operator}}} {head.removeprefix(operator)}"
+        if head.startswith("Delta"):
+            head = r"\Delta " + head.removeprefix("Delta")
+        if self.accent:
+            # Only the last letter carries the accent: Δ R̃.
+            start, _, last = head.rpartition(" ")
+            head = f"{start} \\{self.accent}{{{last}}}".strip()
+        subscript = _COMMANDS.get(self.subscript, self.subscript)
+        return f"{head}_{{{subscript}}}" if subscript else head
+
+
+class _Text(StrPrinter):  # type: ignore[misc]
+    def _print_Symbol(self, expr: Symbol) -> str:
+        return _Name.of(expr.name).text()
+
+    def _print_Function(self, expr: Basic) -> str:
+        arguments = ", ".join(self._print(argument) for argument in expr.args)
+        return f"{_Name.of(expr.func.__name__).text()}({arguments})"
+
+    def _print_Abs(self, expr: Basic) -> str:
+        return f"|{self._print(expr.args[0])}|"
+
+    def _print_Pi(self, expr: Basic) -> str:
+        return "π"
+
+    def _print_Relational(self, expr: Basic) -> str:
+        return f"{self._print(expr.lhs)} = {self._print(expr.rhs)}"
+
+    def _print_MatrixBase(self, expr: MatrixBase) -> str:
+        rows = [", ".join(self._print(cell) for cell in expr.row(index)) for index in range(expr.rows)]
+        return "[" + "; ".join(rows) + "]"
+
+
+class _Latex(LatexPrinter):  # type: ignore[misc]
+    def _print_Symbol(self, expr: Symbol, style: str = "plain") -> str:
+        return _Name.of(expr.name).latex()
+
+    def _print_Function(self, expr: Basic, exp: str | None = None) -> str:
+        if expr.func.__module__ is not None:  # sin, cos: SymPy's own
+            return str(super()._print_Function(expr, exp))
+        arguments = ", ".join(self._print(argument) for argument in expr.args)
+        return rf"{_Name.of(expr.func.__name__).latex()}\left({arguments}\right)"
+
+    def _print_Abs(self, expr: Basic, exp: str | None = None) -> str:
+        # A bare | would end the cell of a Markdown table.
+        inner = rf"\left\lvert {self._print(expr.args[0])} \right\rvert"
+        return f"{inner}^{{{exp}}}" if exp else inner
+
+
+class _MathML(MathMLPresentationPrinter):  # type: ignore[misc]
+    def _print_Symbol(self, sym: Symbol, style: str = "plain") -> object:
+        return self._name(sym.name)
+
+    def _print_Function(self, expr: Basic) -> object:
+        if expr.func.__module__ is not None:
+            return super()._print_Function(expr)
+        row = self.dom.createElement("mrow")
+        row.appendChild(self._name(expr.func.__name__))
+        fence = self.dom.createElement("mrow")
+        fence.appendChild(self._leaf("mo", "("))
+        for argument in expr.args:
+            fence.appendChild(self._print(argument))
+        fence.appendChild(self._leaf("mo", ")"))
+        row.appendChild(fence)
+        return row
+
+    def _name(self, name: str) -> object:
+        parts = _Name.of(name)
+        letter = parts.letter.replace("Delta", "Δ")
+        head = self._leaf("mi", _GREEK.get(letter, letter))
+        if parts.accent:
+            over = self.dom.createElement("mover")
+            over.appendChild(head)
+            over.appendChild(self._leaf("mo", {"tilde": "~", "bar": "¯"}[parts.accent]))
+            head = over
+        if not parts.subscript:
+            return head
+        sub = self.dom.createElement("msub")
+        sub.appendChild(head)
+        sub.appendChild(self._leaf("mi", parts.subscript))
+        return sub
+
+    def _leaf(self, tag: str, text: str) -> object:
+        leaf = self.dom.createElement(tag)
+        leaf.appendChild(self.dom.createTextNode(text))
+        return leaf
+
+
+def as_text(expression: Basic) -> str:
+    """One line of plain text: `π*T^2*|v_xt*ṽ_xt|/(2*R_t*λ)`."""
+    return str(_Text().doprint(expression)).replace("**", "^")
+
+
+def as_latex(expression: Basic) -> str:
+    """LaTeX without delimiters."""
+    return str(_Latex().doprint(expression))
+
+
+def as_mathml(expression: Basic) -> str:
+    """Presentation MathML, one `math` element."""
+    printer = _MathML()
+    return f'<math xmlns="http://www.w3.org/1998/Math/MathML">{printer._print(expression).toxml()}</math>'
+
+
+def derivation(selection: str, format_name: str) -> str:
+    """Write what `bisar-budget derive` prints: `all`, `equations`, `I`, `II` or `vibration`."""
+    tables: dict[str, Callable[[], Table]] = {
+        "I": published.table_1,
+        "II": published.table_2,
+        "vibration": published.vibration,
+    }
+    blocks = []
+    if selection in ("all", "equations"):
+        blocks.append(_EQUATIONS[format_name](published.equations()))
+    for name, table in tables.items():
+        if selection in ("all", name):
+            blocks.append(_TABLES[format_name](table()))
+    return "\n".join(blocks)
+
+
+def _text_equations(equations: tuple[Equation, ...]) -> str:
+    lines = ["Equations of Rigling & Moses, derived", ""]
+    for equation in equations:
+        formula = f"    {as_text(equation.left)} = {as_text(equation.right)}"
+        lines.append(f"{equation.number} {equation.title}")
+        lines += textwrap.wrap(formula, 100, subsequent_indent=" " * 8, break_long_words=False)
+    return "\n".join(lines) + "\n"
+
+
+def _latex_equations(equations: tuple[Equation, ...]) -> str:
+    lines = []
+    for equation in equations:
+        lines += [
+            f"% {equation.number} {equation.title}",
+            rf"\[ {as_latex(equation.left)} = {as_latex(equation.right)} \tag*{{{equation.number}}} \]",
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def _markdown_equations(equations: tuple[Equation, ...]) -> str:
+    lines = ["## Equations of Rigling & Moses, derived", ""]
+    for equation in equations:
+        lines += [
+            f"{equation.number} {equation.title}",
+            "",
+            "```math",
+            f"{as_latex(equation.left)} = {as_latex(equation.right)}",
+            "```",
+            "",
+        ]
+    return "\n".join(lines)
+
+
+def _mathml_equations(equations: tuple[Equation, ...]) -> str:
+    lines = ["<dl>"]
+    for equation in equations:
+        lines.append(
+            f"<dt>{equation.number} {equation.title}</dt>"
+            f"<dd>{as_mathml(equation.left)} = {as_mathml(equation.right)}</dd>"
+        )
+    return "\n".join([*lines, "</dl>"]) + "\n"
+
+
+def _cells(table: Table, write: Callable[[Basic], str]) -> list[list[str]]:
+    rows = []
+    for row in table.rows:
+        cells = [write(cell) if cell != 0 else "-" for cell in row.cells]
+        rows.append([str(row.number or "-"), write(row.label), *cells])
+    return rows
+
+
+def _notes(table: Table) -> list[str]:
+    return [*table.notes, *(f"{as_text(row.error)}: {row.note}." for row in table.rows if row.note)]
+
+
+def _text_table(table: Table) -> str:
+    rows = [["Row", "Error", *table.columns], *_cells(table, as_text)]
+    widths = [max(_width(row[column]) for row in rows) for column in range(len(rows[0]))]
+    lines = [f"{table.number}. {table.title}", ""]
+    for row in rows:
+        cells = [cell + " " * (width - _width(cell)) for cell, width in zip(row, widths, strict=True)]
+        lines.append("  ".join(cells).rstrip())
+    return "\n".join([*lines, "", *_notes(table)]) + "\n"
+
+
+def _width(text: str) -> int:
+    return sum(not unicodedata.combining(character) for character in text)
+
+
+def _latex_table(table: Table) -> str:
+    heads = [column.replace("β̃", r"$\tilde{\beta}_").translate(_SUBSCRIPTS) for column in table.columns]
+    heads = [f"{head}$" if "$" in head else head for head in heads]
+    lines = [
+        f"% {table.number}. {table.title}",
+        rf"\begin{{tabular}}{{rl{'l' * len(table.columns)}}}",
+        " & ".join(["Row", "Error", *heads]) + r" \\ \hline",
+    ]
+    for number, label, *cells in _cells(table, as_latex):
+        math = [f"${cell}$" if cell != "-" else "--" for cell in (label, *cells)]
+        lines.append(" & ".join([number, *math]) + r" \\")
+    return "\n".join([*lines, r"\end{tabular}", *(f"% {note}" for note in _notes(table))]) + "\n"
+
+
+_SUBSCRIPTS = str.maketrans("₀₁₂₃", "0123")
+
+
+def _markdown_table(table: Table) -> str:
+    lines = [
+        f"## {table.number}. {table.title}",
+        "",
+        "| " + " | ".join(["Row", "Error", *table.columns]) + " |",
+    ]
+    lines.append("|" + " --- |" * (len(table.columns) + 2))
+    for number, label, *cells in _cells(table, as_latex):
+        math = [f"${cell}$" if cell != "-" else "–" for cell in (label, *cells)]
+        lines.append("| " + " | ".join([number, *math]) + " |")
+    return "\n".join([*lines, "", *_notes(table)]) + "\n"
+
+
+def _mathml_table(table: Table) -> str:
+    heads = "".join(f'<th scope="col">{head}</th>' for head in ("Row", "Error", *table.columns))
+    lines = [
+        "<table>",
+        f"<caption>{table.number}. {table.title}</caption>",
+        f"<thead><tr>{heads}</tr></thead>",
+        "<tbody>",
+    ]
+    for number, *cells in _cells(table, as_mathml):
+        row = "".join(f"<td>{cell}</td>" for cell in cells)
+        lines.append(f'<tr><th scope="row">{number}</th>{row}</tr>')
+    notes = "".join(f"<p>{note}</p>" for note in _notes(table))
+    return "\n".join([*lines, "</tbody>", "</table>", notes]) + "\n"
+
+
+_EQUATIONS: dict[str, Callable[[tuple[Equation, ...]], str]] = {
+    "text": _text_equations,
+    "latex": _latex_equations,
+    "markdown": _markdown_equations,
+    "mathml": _mathml_equations,
+}
+_TABLES: dict[str, Callable[[Table], str]] = {
+    "text": _text_table,
+    "latex": _latex_table,
+    "markdown": _markdown_table,
+    "mathml": _mathml_table,
+}
