@@ -252,18 +252,21 @@ def _aggregate_lines(mission: Mission, allocation: Allocation, sources: Sequence
 
 def _qpe_aggregates(mission: Mission, allocation: Allocation, declared: Sequence[ErrorSource]) -> Iterator[_Line]:
     combine, gain = mission.allocation.combine, allocation.autofocus_gain
-    for owner in ("transmitter", "receiver", "mission"):
+    owners = ["transmitter", "receiver", "mission"]
+    if allocation.qpe.clock is not None:
+        owners.insert(2, "clock")  # else it counts with the receiver
+    for owner in owners:
         members = [s for s in declared if owner == "mission" or allocation.qpe.includes(s.owner, owner)]
         qpe = combine_phases([s.qpe or 0.0 for s in members], combine) if members else None
         limit = allocation.qpe_limit(owner) * gain
         over = "" if qpe is None else f"passes with autofocus from n_pull {allocation.n_pull_needed(qpe, owner):g}"
         yield _Line(
-            id=f"{owner}.quadratic_phase_error",
+            id=f"{'timing' if owner == 'clock' else owner}.quadratic_phase_error",
             metric="quadratic_phase_error",
             unit="rad",
             declared=qpe,
             allowable=limit,
-            path=("platforms", owner, "motion_error") if owner != "mission" else ("platforms",),
+            path={"mission": ("platforms",), "clock": ("timing_error",)}.get(owner, ("platforms", owner, "motion_error")),
             equation="sum of the rows" if combine == "sum" else "root-sum-square of the rows",
             owner=owner,
             gain=gain,
@@ -280,6 +283,8 @@ def _judge(line: _Line, mission: Mission, allocation: Allocation) -> Row:
             quotient = line.allowable / line.declared - 1
             margin = quotient if math.isfinite(quotient) else None
     status, reason = _status(line, utilization, mission)
+    if status == "not_evaluated":
+        utilization = margin = None  # a number would look like a judgement
     notes = line.notes
     if status == "pass_with_autofocus" and utilization is not None and utilization > mission.allocation.warn_above:
         notes = (*notes, f"uses {100 * utilization:.3g} % of the limit with autofocus")
@@ -317,7 +322,7 @@ def _status(line: _Line, utilization: float | None, mission: Mission) -> tuple[s
     if utilization > 1 + UTILIZATION_TOLERANCE:
         return ("warn" if line.never_fails else "fail"), line.over
     if utilization * line.gain > 1 + UTILIZATION_TOLERANCE:
-        return "pass_with_autofocus", "over the limit without autofocus"
+        return "pass_with_autofocus", f"{utilization * line.gain:.3g} times the limit without autofocus"
     if utilization > mission.allocation.warn_above:
         return "warn", f"above {100 * mission.allocation.warn_above:g} % of the limit"
     return "pass", ""

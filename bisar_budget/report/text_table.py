@@ -107,14 +107,14 @@ def _platform(state: PlatformState) -> str:
 
 
 def _degrees(angle: float) -> str:
-    return f"{math.degrees(angle) + 0.0:.1f} deg".replace("-0.0 deg", "0.0 deg")
+    return f"{math.degrees(angle):.1f}°".replace("-0.0°", "0.0°")
 
 
 def _row(row: Row, style: Style) -> list[str]:
     declared = "-" if row.declared is None else format_quantity(row.declared, row.unit)
     # Rounded down, so that an allowable copied from the page into a file passes.
     allowable = "no limit" if row.allowable is None else format_quantity(row.allowable, row.unit, rounding="down")
-    if row.allowable is None and row.status in ("not_evaluated", "info"):
+    if row.allowable is None and (row.status in ("not_evaluated", "info") or row.metric in ("pslr", "islr")):
         allowable = "-"
     use = "-" if row.utilization is None or row.allowable is None else percent(row.utilization)
     cells = (declared, allowable, use, _short_reference(row.equation))
@@ -126,7 +126,7 @@ def _row(row: Row, style: Style) -> list[str]:
 
 def _short_reference(equation: str) -> str:
     """Shorten `Table II row 4` to `II.4`, `Section V, …` to `V`; what is not from the paper to nothing."""
-    match = re.match(r"Table (I+)(?: rows? (\d+))?|Section (V?I*)|(\(\d+\))", equation)
+    match = re.match(r"Table (I+)(?: rows? ([\d-]+))?|Section (V?I*)|(\(\d+\))", equation)
     if match is None:
         return ""
     table, row, section, number = match.groups()
@@ -138,6 +138,8 @@ def percent(ratio: float) -> str:
     value = 100 * ratio
     if value == 0 or value >= 1e6:
         return f"{value:.2g} %"
+    if value < 0.01:
+        return "<0.01 %"
     for digits in range(3 if value < 100 else len(f"{value:.0f}"), 13):
         text = f"{value:.{digits}g}"
         if (float(text) > 100) == (value > 100 * (1 + 1e-9)) or abs(value - 100) < 1e-7:

@@ -1,0 +1,64 @@
+"""Shared test helpers: missions built from a base by replacement, rows found by id."""
+
+import copy
+from collections.abc import Callable
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from click.testing import CliRunner, Result
+
+from bisar_budget.budget.check import check_mission
+from bisar_budget.budget.findings import MissionFindings, Row
+from bisar_budget.cli import cli
+from bisar_budget.mission.load import parse_mission
+
+ROOT = Path(__file__).resolve().parent.parent
+TODAY = date(2026, 11, 21)
+
+# Round numbers, both platforms at broadside, so that expectations can be written down by hand.
+BASE: dict[str, Any] = {
+    "schema_version": 1,
+    "name": "base",
+    "radar": {"center_frequency": "10 GHz", "bandwidth": "300 MHz"},
+    "collection": {"aperture_time": "6 s"},
+    "platforms": {
+        "transmitter": {"position": ["30 km", 0, "6 km"], "velocity": [0, "150 m/s", 0]},
+        "receiver": {"position": ["6 km", "6 km", "2 km"], "velocity": ["-40 m/s", "40 m/s", 0]},
+    },
+}
+
+
+def mission_text(**changes: Any) -> str:
+    """Return the base mission as YAML with `a__b=value` putting a value at the path a.b."""
+    tree = copy.deepcopy(BASE)
+    for path, value in changes.items():
+        *parents, last = path.split("__")
+        node = tree
+        for key in parents:
+            node = node.setdefault(key, {})
+        node[last] = value
+    return yaml.safe_dump(tree, sort_keys=False, allow_unicode=True)
+
+
+def findings(**changes: Any) -> MissionFindings:
+    """Check the base mission with changes."""
+    return check_mission(parse_mission(mission_text(**changes), "mission.yaml"), TODAY)
+
+
+def row(found: MissionFindings, row_id: str) -> Row:
+    """Find a row by id."""
+    (match,) = [row for row in found.rows if row.id == row_id]
+    return match
+
+
+@pytest.fixture
+def run() -> Callable[..., Result]:
+    """Run the command line in this process."""
+
+    def invoke(*args: str, **options: Any) -> Result:
+        return CliRunner().invoke(cli, [str(arg) for arg in args], **options)
+
+    return invoke

@@ -1,0 +1,100 @@
+"""The committed evaluators are what the derivation gives, are plain arithmetic, and are accurate to the last bits."""
+
+import ast
+import inspect
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from sympy import Float, Rational
+
+from bisar_budget import evaluators
+from bisar_budget.theory import emit
+
+ALLOWED = (
+    ast.Add | ast.Sub | ast.Mult | ast.Div | ast.Pow | ast.USub | ast.BinOp | ast.UnaryOp | ast.Constant
+    | ast.Name | ast.Load | ast.Store | ast.Assign | ast.Return | ast.Tuple | ast.Expr
+)
+
+
+def test_committed_file_is_current() -> None:
+    assert emit.TARGET.read_text(encoding="utf-8") == emit.source()
+
+
+def test_emission_is_deterministic_across_processes() -> None:
+    import os
+    import subprocess
+    import sys
+
+    code = "import hashlib; from bisar_budget.theory import emit; print(hashlib.sha256(emit.source().encode()).hexdigest())"
+    hashes = {
+        subprocess.run(
+            [sys.executable, "-c", code],
+            env={**os.environ, "PYTHONHASHSEED": seed},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for seed in ("1", "2")
+    }
+    assert len(hashes) == 1
+
+
+def test_evaluators_are_pure_arithmetic_without_imports() -> None:
+    module = ast.parse(inspect.getsource(evaluators))
+    for node in module.body:
+        assert isinstance(node, ast.FunctionDef) or isinstance(getattr(node, "value", None), ast.Constant)
+        if isinstance(node, ast.FunctionDef):
+            for statement in node.body:
+                for part in ast.walk(statement):
+                    assert isinstance(part, ALLOWED), ast.dump(part)
+
+
+def _terms(expression) -> list:
+    return list(expression.expand().as_ordered_terms())
+
+
+@pytest.mark.parametrize("evaluator", emit.evaluators(), ids=lambda e: e.name)
+def test_evaluator_equals_evalf_at_50_digits(evaluator: emit.Evaluator) -> None:
+    """Error below 1e-12 of the sum of absolute terms, over random geometries of 1 km to 1000 km."""
+    rng = np.random.default_rng(20261121)
+    function = getattr(evaluators, evaluator.name)
+    for _ in range(40):
+        values = {}
+        for symbol, name in evaluator.arguments:
+            size = 10.0 ** rng.uniform(-3, 6)
+            sign = 1.0 if symbol.is_positive else rng.choice([-1.0, 1.0])
+            values[name] = sign * size
+        result = function(**values)
+        rows = result if isinstance(result, tuple) else ((result,),)
+        exact = {symbol: Rational(Fraction(values[name])) for symbol, name in evaluator.arguments}
+        for row, got in zip(evaluator.rows, rows, strict=True):
+            for expression, number in zip(row, got, strict=True):
+                terms = [Float(term.subs(exact).evalf(50), 50) for term in _terms(expression)]
+                scale = sum(abs(term) for term in terms)
+                assert abs(Float(number, 50) - sum(terms)) <= 1e-12 * scale
+
+
+def test_evaluators_broadcast_over_arrays_like_floats() -> None:
+    rng = np.random.default_rng(3)
+    position, velocity = rng.uniform(-3e4, 3e4, (3, 5, 1)), rng.uniform(-200, 200, (3, 1, 7))
+    slant_range = np.sqrt((position**2).sum(axis=0))
+    arrays = evaluators.published_motion(*position, *velocity, slant_range, 0.03, 6.0)
+    for i, j in ((0, 0), (4, 6), (2, 3)):
+        scalars = evaluators.published_motion(
+            *position[:, i, 0], *velocity[:, 0, j], slant_range[i, 0], 0.03, 6.0
+        )
+        for array_row, scalar_row in zip(arrays, scalars, strict=True):
+            for array, scalar in zip(array_row, scalar_row, strict=True):
+                assert np.broadcast_to(array, (5, 7))[i, j] == scalar
+
+
+def test_a_wrong_evaluator_would_be_seen() -> None:
+    """The accuracy test can fail: one sign turned is far outside its tolerance."""
+    values = dict.fromkeys(("x", "y", "z", "v_x", "v_y", "v_z"), 2.0) | {
+        "slant_range": 4.0, "wavelength": 0.5, "aperture_time": 3.0,
+    }
+    right = evaluators.published_motion(**values)[6][2]
+    (_, _, qpe, _) = emit.evaluators()[0].rows[6]
+    exact = qpe.subs({s: Rational(values[n]) for s, n in emit.evaluators()[0].arguments}).evalf(50)
+    assert abs(exact - right) < 1e-12 * abs(exact) < abs(exact + right)

@@ -1,0 +1,133 @@
+"""Angles, frames and degenerate geometries, against figures written down by hand."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bisar_budget import geometry as g
+
+
+def state(position, velocity=(0.0, 100.0, 0.0)) -> g.PlatformState:
+    return g.PlatformState(position=position, velocity=velocity)
+
+
+def both(transmitter, receiver) -> g.BistaticGeometry:
+    return g.BistaticGeometry(transmitter=transmitter, receiver=receiver)
+
+
+def test_angles_of_a_platform() -> None:
+    platform = state((-3e3, 3e3, 3e3 * math.sqrt(2)))
+    assert platform.slant_range == pytest.approx(6e3)
+    assert math.degrees(platform.azimuth) == pytest.approx(135)
+    assert math.degrees(platform.elevation) == pytest.approx(45)
+
+
+@pytest.mark.parametrize(
+    ("velocity", "degrees"),
+    [((0, 90, 0), 0), ((-90, 0, 0), 90), ((90, 0, 0), -90), ((-50, 50, 0), 45), ((0, 0, 9), 0)],
+)
+def test_squint_is_positive_looking_forward(velocity, degrees: float) -> None:
+    assert math.degrees(state((5e3, 0, 0), velocity).squint) == pytest.approx(degrees, abs=1e-9)
+
+
+def test_a_still_platform_has_no_squint() -> None:
+    assert state((5e3, 0, 0), (0, 0, 0)).squint is None
+
+
+def test_cardinal_directions_have_no_rounding_left() -> None:
+    platform = g.state_from_angles(
+        slant_range=8e3, azimuth=math.pi / 2, elevation=0, speed=60, motion_azimuth=math.pi, climb=0
+    )
+    assert platform.position == (0, 8e3, 0)
+    assert platform.velocity == (-60, 0, 0)
+
+
+def test_speed_is_over_ground_and_climb_its_vertical_part() -> None:
+    platform = g.state_from_angles(
+        slant_range=8e3, azimuth=0, elevation=0.1, speed=60, motion_azimuth=math.pi / 2, climb=5
+    )
+    assert platform.velocity == (0, 60, 5)
+
+
+def test_bistatic_angle_and_look_azimuth() -> None:
+    pair = both(state((5e3, 0, 0)), state((0, 7e3, 0), (-90, 0, 0)))
+    assert math.degrees(pair.bistatic_angle) == pytest.approx(90)
+    assert math.degrees(pair.look_azimuth) == pytest.approx(45)
+
+
+def test_look_azimuth_keeps_its_quadrant() -> None:
+    pair = both(state((-5e3, -1e3, 0)), state((-5e3, -2e3, 0)))
+    assert math.degrees(pair.look_azimuth) < -90
+
+
+def test_resolution_of_a_monostatic_pair_is_the_textbook_one() -> None:
+    """c/2B over cos(grazing) and λR/2vT at broadside, for Tx = Rx."""
+    platform = state((8e3, 0, 6e3))
+    pair = both(platform, platform)
+    assert pair.range_resolution(300e6, 3e8) == pytest.approx(0.5 / 0.8)
+    assert pair.cross_range_resolution(0.03, 5) == pytest.approx(0.03 * 10e3 / (2 * 100 * 5))
+
+
+def test_track_frame_follows_the_velocity() -> None:
+    along, cross, up = state((5e3, 0, 0), (0, 100, 0)).frame("track")
+    assert (along, cross, up) == ((0, 1, 0), (-1, 0, 0), (0, 0, 1))
+
+
+def test_look_frame_points_from_the_scene_to_the_platform() -> None:
+    sight, cross, up = state((3e3, 0, 4e3)).frame("look")
+    assert sight == pytest.approx((0.6, 0, 0.8))
+    assert cross == pytest.approx((0, 1, 0))
+    assert up == pytest.approx((-0.8, 0, 0.6))
+
+
+coordinate = st.floats(-1e4, 1e4)
+
+
+@given(st.tuples(coordinate, coordinate, st.floats(10, 1e4)), st.tuples(coordinate, coordinate, coordinate))
+def test_every_frame_is_right_handed_and_orthonormal(position, velocity) -> None:
+    platform = state(position, velocity)
+    for name in ("scene", "track", "look"):
+        try:
+            a, b, c = platform.frame(name)
+        except g.UndefinedFrameError:
+            continue
+        assert g.cross(a, b) == pytest.approx(c, abs=1e-9)
+        for first, second, value in ((a, a, 1), (b, b, 1), (a, b, 0), (a, c, 0), (b, c, 0)):
+            assert g.dot(first, second) == pytest.approx(value, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("platform", "frame"),
+    [(state((5e3, 0, 1), (0, 0, 0)), "track"), (state((5e3, 0, 1), (0, 0, 5)), "track"), (state((0, 0, 5e3)), "look")],
+)
+def test_frames_that_do_not_exist(platform: g.PlatformState, frame: str) -> None:
+    with pytest.raises(g.UndefinedFrameError):
+        platform.frame(frame)
+
+
+@pytest.mark.parametrize(("degrees", "is_degenerate"), [(0.9, True), (1.1, False), (30, False)])
+def test_gradients_within_a_degree_of_parallel_are_refused(degrees: float, is_degenerate: bool) -> None:
+    """A receiver overhead leaves s = u_t; a transmitter at azimuth 0 turns s by its own cross motion only.
+
+    Range gradient along x from the transmitter; the Doppler gradient from a receiver straight above, whose
+    look vector turns along its velocity.
+    """
+    turn = math.radians(degrees)
+    receiver = state((0, 0, 4e3), (100 * math.cos(turn), 100 * math.sin(turn), 0))
+    pair = both(state((9e3, 0, 0), (0, 0, 0)), receiver)
+    assert math.degrees(pair.gradient_angle) == pytest.approx(degrees)
+    assert bool(pair.degeneracy()) == is_degenerate
+
+
+@pytest.mark.parametrize(("ground", "is_degenerate"), [(0.019, True), (0.021, False)])
+def test_a_short_range_gradient_is_refused(ground: float, is_degenerate: bool) -> None:
+    up = math.sqrt(1 - ground**2)
+    pair = both(state((1e4 * ground, 0, 1e4 * up), (0, 100, 0)), state((0, 0, 5e3), (0, 80, 0)))
+    assert bool(pair.degeneracy()) == is_degenerate
+
+
+def test_doppler_gradients_that_cancel_are_refused() -> None:
+    pair = both(state((5e3, 0, 0), (0, 100, 0)), state((5e3, 1e-9, 0), (0, -100, 0)))
+    assert "Doppler does not change" in pair.degeneracy()
