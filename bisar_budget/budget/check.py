@@ -121,7 +121,7 @@ def _error_lines(mission: Mission, allocation: Allocation, sources: Sequence[Err
             metric="quadratic_phase_error",
             unit=source.unit,
             declared=declared,
-            allowable=limit * gain / per_unit if per_unit else None,
+            allowable=_quotient(limit * gain, per_unit),
             path=source.path,
             equation=source.equation,
             owner=source.owner,
@@ -134,6 +134,12 @@ def _error_lines(mission: Mission, allocation: Allocation, sources: Sequence[Err
             evidence=source.evidence,
             notes=tuple(notes),
         )
+
+
+def _quotient(numerator: float, denominator: float) -> float | None:
+    """Divide; None where there is no finite quotient: a zero coefficient or a vanishing error."""
+    quotient = numerator / denominator if denominator else math.inf
+    return quotient if math.isfinite(quotient) else None
 
 
 def _vibration_lines(mission: Mission, allocation: Allocation) -> Iterator[_Line]:
@@ -278,10 +284,9 @@ def _qpe_aggregates(mission: Mission, allocation: Allocation, declared: Sequence
 def _judge(line: _Line, mission: Mission, allocation: Allocation) -> Row:
     utilization = margin = None
     if line.declared is not None:
-        utilization = line.declared / line.allowable if line.allowable else 0.0
-        if line.allowable is not None and line.declared > 0:
-            quotient = line.allowable / line.declared - 1
-            margin = quotient if math.isfinite(quotient) else None
+        utilization = 0.0 if line.allowable is None else line.declared / line.allowable
+        headroom = None if line.allowable is None else _quotient(line.allowable, line.declared)
+        margin = None if headroom is None else headroom - 1
     status, reason = _status(line, utilization, mission)
     if status == "not_evaluated":
         utilization = margin = None  # a number would look like a judgement
