@@ -140,9 +140,11 @@ def percent(ratio: float) -> str:
         return f"{value:.2g} %"
     if value < 0.01:
         return "<0.01 %"
-    for digits in range(3 if value < 100 else len(f"{value:.0f}"), 13):
+    side = 0 if abs(value - 100) < 1e-7 else math.copysign(1, value - 100)
+    for digits in range(max(3, len(f"{value:.0f}")), 13):
         text = f"{value:.{digits}g}"
-        if (float(text) > 100) == (value > 100 * (1 + 1e-9)) or abs(value - 100) < 1e-7:
+        shown = float(text) - 100
+        if (shown > 0) == (side > 0) and (shown < 0) == (side < 0):
             return f"{text} %"
     return f"{value} %"
 
@@ -176,13 +178,13 @@ def _asides(mission: MissionFindings, style: Style) -> Iterator[str]:
 
 
 def _summary(mission: MissionFindings, style: Style) -> str:
-    counts = ", ".join(f"{count} {status}" for status, count in mission.summary.items())
+    counts = ", ".join(f"{count} {WORDS[status]}" for status, count in mission.summary.items())
     return f"{_word(mission.status, style)} {mission.file}: {counts}"
 
 
 def _overall(report: Report, style: Style) -> str:
     statuses = [mission.status for mission in report.missions]
-    counts = ", ".join(f"{statuses.count(status)} {status}" for status in WORDS if status in statuses)
+    counts = ", ".join(f"{statuses.count(status)} {WORDS[status]}" for status in WORDS if status in statuses)
     return f"{_word(report.status, style)} {len(statuses)} missions: {counts}"
 
 

@@ -152,7 +152,10 @@ def as_latex(expression: Basic) -> str:
 def as_mathml(expression: Basic) -> str:
     """Presentation MathML, one `math` element."""
     printer = _MathML()
-    return f'<math xmlns="http://www.w3.org/1998/Math/MathML">{printer._print(expression).toxml()}</math>'
+    xml = str(printer._print(expression).toxml())
+    for name, character in (("InvisibleTimes", "\u2062"), ("pi", "π")):  # XML knows no HTML entities
+        xml = xml.replace(f"&{name};", character)
+    return f'<math xmlns="http://www.w3.org/1998/Math/MathML">{xml}</math>'
 
 
 def derivation(selection: str, format_name: str) -> str:

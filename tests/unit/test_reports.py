@@ -1,0 +1,191 @@
+"""The formats: the JSON contract to the letter, CSV for a spreadsheet, text within 80 columns."""
+
+import csv
+import io
+import json
+import math
+
+import pytest
+
+from bisar_budget.budget.findings import Report, UnusableMission, worst_first
+from bisar_budget.errors import Fault
+from bisar_budget.report import FORMATS, Style, render
+from bisar_budget.report.text_table import percent
+from tests.conftest import findings
+
+ROW_KEYS = [
+    "id", "metric", "unit", "declared", "allowable", "allowable_published", "allowable_full", "qpe_published_rad",
+    "qpe_full_rad", "displacement_m", "utilization", "margin", "status", "line", "reason", "notes",
+]  # fmt: skip
+
+FULL = {
+    "autofocus__n_pull": 2,
+    "requirements": {"pslr": -30, "islr": -20, "location_error": 5, "cubic_phase_error": 0.4},
+    "timing_error": {"constant": 1e-9, "quadratic": 1e-14},
+    "platforms__transmitter__motion_error": {
+        "position": 1,
+        "velocity": ["5 mm/s", "0.1 m/s", 0],
+        "vibration": {"sinusoidal": [{"amplitude": 1e-5, "frequency": 9}]},
+        "source": "data sheet",
+    },
+    "platforms__receiver__motion_error__velocity": "0.5 m/s",
+    "other_errors": [{"name": "troposphere", "quadratic_phase_error": "5 deg"}],
+}
+FAULT = Fault(line=3, column=7, key="radar.bandwidth", problem="is missing")
+
+
+def report(*missions) -> Report:
+    return Report(version="1.2.3", missions=missions or (findings(**FULL),))
+
+
+def as_json(*missions):
+    return json.loads(render("json", report(*missions), Style()))
+
+
+class TestJson:
+    def test_top(self) -> None:
+        document = as_json()
+        assert document["format"] == "bisar-budget/check/1"
+        assert document["version"] == "1.2.3"
+        assert document["status"] == "fail"
+
+    def test_mission_keys(self) -> None:
+        (mission,) = as_json()["missions"]
+        assert {"file", "name", "status", "model", "geometry", "budget", "rows"} <= mission.keys()
+        assert mission["model"] == "published"
+
+    def test_geometry(self) -> None:
+        geometry = as_json()["missions"][0]["geometry"]
+        assert geometry["wavelength_m"] == pytest.approx(0.0299792458)
+        u_t, u_r = (30 / math.hypot(30, 6), 0, 6 / math.hypot(30, 6)), [x / math.sqrt(76) for x in (6, 6, 2)]
+        angle = math.acos(sum(a * b for a, b in zip(u_t, u_r, strict=True)))
+        assert geometry["bistatic_angle_rad"] == pytest.approx(angle)
+        assert geometry["look_azimuth_rad"] == pytest.approx(math.atan2(u_r[1], u_t[0] + u_r[0]))
+        for name in ("transmitter", "receiver"):
+            assert geometry[name].keys() == {"slant_range_m", "azimuth_rad", "elevation_rad", "squint_rad"}
+            assert geometry[name]["squint_rad"] == 0
+
+    def test_a_still_platform_has_squint_null(self) -> None:
+        platforms = {
+            "transmitter": {"position": [30e3, 0, 6e3], "velocity": [0, 150, 0]},
+            "receiver": {"slant_range": 2e3, "azimuth": 0.5, "elevation": 0.1, "speed": 0},
+        }
+        geometry = as_json(findings(platforms=platforms))["missions"][0]["geometry"]
+        assert geometry["receiver"]["squint_rad"] is None
+
+    def test_budget(self) -> None:
+        budget = as_json()["missions"][0]["budget"]
+        assert budget["qpe_rad"]["total"] == pytest.approx(math.pi / 4)
+        assert budget["qpe_rad"]["transmitter"] == budget["qpe_rad"]["receiver"] == pytest.approx(math.pi / 8)
+        assert budget["autofocus_gain"] == pytest.approx(8)
+        assert budget["pslr_share"] == budget["islr_share"] == {"transmitter": 0.5, "receiver": 0.5}
+
+    def test_row_keys_and_types(self) -> None:
+        number = (int, float)
+        for row in as_json()["missions"][0]["rows"]:
+            assert list(row)[: len(ROW_KEYS)] == ROW_KEYS
+            assert row["allowable_full"] is None
+            assert row["qpe_full_rad"] is None
+            for key in ("declared", "allowable", "utilization", "margin", "qpe_published_rad"):
+                assert row[key] is None or isinstance(row[key], number)
+            assert row["displacement_m"] is None or len(row["displacement_m"]) == 2
+            assert isinstance(row["notes"], list)
+            assert row["reason"] is None or row["reason"]
+
+    def test_full_columns_are_null_with_a_reason(self) -> None:
+        assert any("allowable_full" in note for note in as_json()["missions"][0]["notes"])
+
+    def test_no_number_that_json_does_not_have(self) -> None:
+        text = render("json", report(), Style())
+        json.loads(text, parse_constant=lambda name: pytest.fail(name))
+
+    def test_unusable_mission(self) -> None:
+        document = as_json(UnusableMission(file="a.yaml", faults=(FAULT,)), findings())
+        assert document["status"] == "error"
+        bad, good = document["missions"]
+        assert (bad["status"], bad["errors"][0]["key"], bad["errors"][0]["line"]) == ("error", "radar.bandwidth", 3)
+        assert good["status"] == "pass"
+
+
+class TestCsv:
+    def rows(self, *missions):
+        return list(csv.DictReader(io.StringIO(render("csv", report(*missions), Style()))))
+
+    def test_a_line_per_row_with_the_numbers_of_the_json(self) -> None:
+        rows, contract = self.rows(), as_json()["missions"][0]["rows"]
+        assert [row["id"] for row in rows] == [row["id"] for row in contract]
+        for row, want in zip(rows, contract, strict=True):
+            for key in ("declared", "allowable", "utilization", "margin"):
+                assert row[key] == ("" if want[key] is None else repr(float(want[key])))
+
+    def test_text_that_looks_like_a_formula_is_text(self) -> None:
+        rows = self.rows(findings(name="=HYPERLINK(1)"))
+        assert rows[0]["mission"] == "'=HYPERLINK(1)"
+
+    def test_quotes_commas_and_line_ends(self) -> None:
+        assert self.rows(findings(name='a "b", c'))[0]["mission"] == 'a "b", c'
+
+    def test_faults(self) -> None:
+        (row,) = self.rows(UnusableMission(file="a.yaml", faults=(FAULT,)))
+        assert (row["status"], row["line"], row["id"]) == ("error", "3", "radar.bandwidth")
+
+
+class TestText:
+    @pytest.mark.parametrize("verbosity", [-1, 0, 1])
+    def test_80_columns(self, verbosity: int) -> None:
+        for line in render("text", report(), Style(verbosity=verbosity)).splitlines():
+            assert len(line) <= 80, line
+
+    def test_worst_row_first(self) -> None:
+        rows = worst_first(findings(**FULL).rows)
+        assert rows[0].status == "fail"
+        assert rows[-1].status == "not_declared"
+        fails = [row.utilization for row in rows if row.status == "fail"]
+        assert fails == sorted(fails, reverse=True)
+
+    def test_says_what_breaks_by_how_much_and_from_which_row(self) -> None:
+        text = render("text", report(), Style())
+        assert text.splitlines()[0] == "base"
+        (line,) = [line for line in text.splitlines() if line.startswith("FAIL     receiver.velocity.x")]
+        assert "500 mm/s" in line
+        assert line.endswith("II.1")
+        assert "(Table II row 1)" in text
+        assert "Resolution" in text
+
+    def test_one_summary_line_is_the_last(self) -> None:
+        last = render("text", report(), Style()).splitlines()[-1]
+        assert last.startswith("FAIL mission.yaml: 3 FAIL, 1 WARN, 1 pass AF, ")
+
+    def test_quiet_is_one_line_per_mission(self) -> None:
+        assert len(render("text", report(), Style(verbosity=-1)).splitlines()) == 1
+
+    def test_verbose_shows_the_evidence(self) -> None:
+        assert "evidence: data sheet" in render("text", report(), Style(verbosity=1))
+
+    def test_several_missions_have_an_overall_line(self) -> None:
+        text = render("text", report(findings(), UnusableMission(file="b.yaml", faults=(FAULT,))), Style())
+        assert text.splitlines()[-1] == "ERROR 2 missions: 1 ERROR, 1 pass"
+
+    def test_long_names_keep_their_numbers(self) -> None:
+        name = "a name that is much longer than the column has room for"
+        text = render("text", report(findings(other_errors=[{"name": name, "quadratic_phase_error": 0.1}])), Style())
+        index = next(i for i, line in enumerate(text.splitlines()) if f"other.{name}" in line)
+        assert "100 mrad" in text.splitlines()[index + 1]
+
+
+@pytest.mark.parametrize(
+    ("ratio", "text"),
+    [
+        (0.0, "0 %"), (0.236, "23.6 %"), (1.0, "100 %"), (11.78, "1178 %"), (1.00004, "100.004 %"),
+        (0.99999, "99.999 %"), (1e-9, "<0.01 %"), (1e7, "1e+09 %"), (0.9996, "99.96 %"), (1 + 1e-12, "100 %"),
+    ],
+)  # fmt: skip
+def test_percent_near_100_shows_the_side_it_is_on(ratio: float, text: str) -> None:
+    assert percent(ratio) == text
+
+
+def test_every_format_ends_with_one_newline() -> None:
+    for name in FORMATS:
+        text = render(name, report(), Style())
+        assert text.endswith("\n")
+        assert not text.endswith("\n\n")
