@@ -313,24 +313,22 @@ def derive(table: str, format_name: str, check_only: bool, write: bool) -> None:
 def _generated(write: bool) -> None:
     import difflib
 
-    from sympy import __version__ as sympy_version
-
     from bisar_budget.theory import emit
 
+    derived_with = f"(SymPy {emit.SYMPY_VERSION})"
     today = emit.source()
     if write:
         _write(emit.TARGET, today)
-        click.echo(f"Wrote {emit.TARGET.name}, derived with SymPy {sympy_version}.")
+        click.echo(f"Wrote {emit.TARGET.name} {derived_with}.")
         return
     committed = emit.TARGET.read_text(encoding="utf-8")
     if committed == today:
-        click.echo(f"{emit.TARGET.name} is what the derivation gives (SymPy {sympy_version}).")
+        click.echo(f"{emit.TARGET.name} is what the derivation gives {derived_with}.")
         return
     lines = difflib.unified_diff(committed.splitlines(), today.splitlines(), "committed", "derived", lineterm="", n=1)
     _print("\n".join(lines) + "\n")
     click.echo(
-        f"{emit.TARGET.name} differs from the derivation (SymPy {sympy_version}); "
-        "`bisar-budget derive --write` rewrites it.",
+        f"{emit.TARGET.name} differs from the derivation {derived_with}; `bisar-budget derive --write` rewrites it.",
         err=True,
     )
     sys.exit(EXIT_BROKEN)

@@ -272,7 +272,9 @@ def _qpe_aggregates(mission: Mission, allocation: Allocation, declared: Sequence
             unit="rad",
             declared=qpe,
             allowable=limit,
-            path={"mission": ("platforms",), "clock": ("timing_error",)}.get(owner, ("platforms", owner, "motion_error")),
+            path={"mission": ("platforms",), "clock": ("timing_error",)}.get(
+                owner, ("platforms", owner, "motion_error")
+            ),
             equation="sum of the rows" if combine == "sum" else "root-sum-square of the rows",
             owner=owner,
             gain=gain,

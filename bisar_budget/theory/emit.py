@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import sympy
 from sympy import Expr, Float, Rational, Symbol, cse, numbered_symbols, pi
 from sympy.printing.pycode import PythonCodePrinter
 
@@ -27,6 +28,7 @@ from bisar_budget.theory.symbols import (
     wavelength,
 )
 
+SYMPY_VERSION: str = sympy.__version__
 TARGET = Path(__file__).resolve().parent.parent / "evaluators.py"
 
 HEADER = '''\

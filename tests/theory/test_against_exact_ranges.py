@@ -41,7 +41,9 @@ def test_velocity_row_is_exact_at_broadside_along_the_track() -> None:
     unit = np.array([0.0, 1.0, 0.0])[:, None]
     exact = edge_phase_of_exact_error(position, velocity, lambda t: unit * size * t, 2)
     # Left over: (vT/2R)², the curvature of a path of 450 m to either side at 30 km.
-    assert size * published_row(position, velocity, "velocity", 1)[2] == pytest.approx(exact, rel=3 * (450 / 30e3) ** 2)
+    assert size * published_row(position, velocity, "velocity", 1)[2] == pytest.approx(
+        exact, rel=3 * (450 / 30e3) ** 2
+    )
 
 
 def test_constant_and_linear_terms_of_position_and_velocity_errors() -> None:

@@ -12,8 +12,22 @@ from bisar_budget import evaluators
 from bisar_budget.theory import emit
 
 ALLOWED = (
-    ast.Add | ast.Sub | ast.Mult | ast.Div | ast.Pow | ast.USub | ast.BinOp | ast.UnaryOp | ast.Constant
-    | ast.Name | ast.Load | ast.Store | ast.Assign | ast.Return | ast.Tuple | ast.Expr
+    ast.Add
+    | ast.Sub
+    | ast.Mult
+    | ast.Div
+    | ast.Pow
+    | ast.USub
+    | ast.BinOp
+    | ast.UnaryOp
+    | ast.Constant
+    | ast.Name
+    | ast.Load
+    | ast.Store
+    | ast.Assign
+    | ast.Return
+    | ast.Tuple
+    | ast.Expr
 )
 
 
@@ -81,9 +95,7 @@ def test_evaluators_broadcast_over_arrays_like_floats() -> None:
     slant_range = np.sqrt((position**2).sum(axis=0))
     arrays = evaluators.published_motion(*position, *velocity, slant_range, 0.03, 6.0)
     for i, j in ((0, 0), (4, 6), (2, 3)):
-        scalars = evaluators.published_motion(
-            *position[:, i, 0], *velocity[:, 0, j], slant_range[i, 0], 0.03, 6.0
-        )
+        scalars = evaluators.published_motion(*position[:, i, 0], *velocity[:, 0, j], slant_range[i, 0], 0.03, 6.0)
         for array_row, scalar_row in zip(arrays, scalars, strict=True):
             for array, scalar in zip(array_row, scalar_row, strict=True):
                 assert np.broadcast_to(array, (5, 7))[i, j] == scalar
@@ -92,7 +104,9 @@ def test_evaluators_broadcast_over_arrays_like_floats() -> None:
 def test_a_wrong_evaluator_would_be_seen() -> None:
     """The accuracy test can fail: one sign turned is far outside its tolerance."""
     values = dict.fromkeys(("x", "y", "z", "v_x", "v_y", "v_z"), 2.0) | {
-        "slant_range": 4.0, "wavelength": 0.5, "aperture_time": 3.0,
+        "slant_range": 4.0,
+        "wavelength": 0.5,
+        "aperture_time": 3.0,
     }
     right = evaluators.published_motion(**values)[6][2]
     (_, _, qpe, _) = emit.evaluators()[0].rows[6]

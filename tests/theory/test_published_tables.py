@@ -39,7 +39,7 @@ def as_printed(cell: dict[str, str], subscript: str) -> Expr:
     plain = {name: Symbol(name, positive=True) for name in names}
     expression = parse_expr(cell["expression"].replace("lambda", "lambda_"), local_dict=plain)
     renamed = {
-        symbol: Symbol(name.replace("lambda_", "lambda")[: -1] + subscript, positive=True)
+        symbol: Symbol(name.replace("lambda_", "lambda")[:-1] + subscript, positive=True)
         if name.endswith("t") and "_" in name
         else Symbol(name.replace("lambda_", "lambda"), positive=True)
         for name, symbol in plain.items()
@@ -65,7 +65,8 @@ def test_every_printed_cell_is_the_derived_one(table: str, platform) -> None:
         rows = [
             row
             for row in derived.rows
-            if row.number == int(cell["row"]) and (row.number == 1 and table == "table_1" or str(row.error)[-1] == subscript)
+            if row.number == int(cell["row"])
+            and ((row.number == 1 and table == "table_1") or str(row.error)[-1] == subscript)
         ]
         assert len(rows) == 1, cell
         got = rows[0].cells[COLUMNS[cell["column"]]]
@@ -187,12 +188,14 @@ def test_range_error_is_first_order_in_the_exact_ranges() -> None:
     numbers |= dict(zip(p.position_error, error, strict=True))
     numbers |= dict.fromkeys((*p.velocity_error, *p.acceleration_error), 0.0)
     value = dr.range_error((p,)).subs(numbers).subs(c, 0)
-    exact = math.dist((3.0e4, 2.0e3, 6.0e3), (0, 0, 0)) - math.dist((3.0e4 + 0.3, 2.0e3 - 0.2, 6.0e3 + 0.1), (0, 0, 0))
+    exact = math.dist((3.0e4, 2.0e3, 6.0e3), (0, 0, 0)) - math.dist(
+        (3.0e4 + 0.3, 2.0e3 - 0.2, 6.0e3 + 0.1), (0, 0, 0)
+    )
     assert float(value.subs(tau, 0)) == pytest.approx(exact, abs=0.3**2 / 3e4)  # second order: e²/R
 
 
 def test_equal_share_is_half_the_total() -> None:
-    assert published.EQUAL_SHARE_QPE == Rational(1, 2) * published.TOTAL_QPE
+    assert Rational(1, 2) * published.TOTAL_QPE == published.EQUAL_SHARE_QPE
 
 
 def test_labels_name_their_error() -> None:

@@ -187,7 +187,10 @@ class TestAutofocus:
 
     def test_does_not_relax_pslr_islr_cubic_or_location(self) -> None:
         requirements = {"pslr": -30, "islr": -20, "location_error": 10, "cubic_phase_error": 0.4}
-        with_it, without = findings(requirements=requirements, autofocus__n_pull=4), findings(requirements=requirements)
+        with_it, without = (
+            findings(requirements=requirements, autofocus__n_pull=4),
+            findings(requirements=requirements),
+        )
         for row_id in (
             "transmitter.vibration.sinusoidal.0",
             "receiver.vibration.wideband",
@@ -241,7 +244,10 @@ class TestAutofocus:
     def test_pull_in_never_fails_the_mission(self) -> None:
         found = findings(
             autofocus__n_pull=1,
-            **{f"{ERROR}__velocity": [0, 4 * TX_VELOCITY_Y, 0], f"{ERROR}__acceleration": [4 * TX_ACCELERATION_X, 0, 0]},
+            **{
+                f"{ERROR}__velocity": [0, 4 * TX_VELOCITY_Y, 0],
+                f"{ERROR}__acceleration": [4 * TX_ACCELERATION_X, 0, 0],
+            },
         )
         assert row(found, "mission.autofocus_pull_in").utilization == pytest.approx(1.0)
         found = findings(
@@ -257,9 +263,7 @@ class TestAutofocus:
 
 class TestVibration:
     def vibrating(self, **vibration):
-        return findings(
-            requirements={"pslr": "-30 dB", "islr": "-20 dB"}, **{f"{ERROR}__vibration": vibration}
-        )
+        return findings(requirements={"pslr": "-30 dB", "islr": "-20 dB"}, **{f"{ERROR}__vibration": vibration})
 
     def test_allowables_of_section_v(self) -> None:
         found = self.vibrating()
@@ -363,9 +367,7 @@ class TestAggregates:
         assert row(found, "transmitter.position.x").displacement_m == pytest.approx(position)
         assert row(found, "transmitter.velocity.x").displacement_m == pytest.approx(velocity)
         lengths = [math.hypot(*position), math.hypot(*velocity)]
-        both = max(
-            math.hypot(position[0] + s * velocity[0], position[1] + s * velocity[1]) for s in (1, -1)
-        )
+        both = max(math.hypot(position[0] + s * velocity[0], position[1] + s * velocity[1]) for s in (1, -1))
         want = {"each": max(lengths), "sum": both, "rss": math.hypot(*lengths)}[rule]
         assert row(found, "mission.location_error").declared == pytest.approx(want)
 

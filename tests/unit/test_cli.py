@@ -193,14 +193,20 @@ class TestColor:
         assert "\x1b" not in run("check", failing, "--color", "never").stdout
 
     @pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
-    @pytest.mark.parametrize(("environment", "colored"), [({}, True), ({"NO_COLOR": "1"}, False), ({"TERM": "dumb"}, False)])
+    @pytest.mark.parametrize(
+        ("environment", "colored"), [({}, True), ({"NO_COLOR": "1"}, False), ({"TERM": "dumb"}, False)]
+    )
     def test_on_a_terminal(self, failing, environment, colored) -> None:
         import pty
 
         leader, follower = pty.openpty()
         env = {k: v for k, v in os.environ.items() if k != "NO_COLOR"} | {"TERM": "xterm"} | environment
         subprocess.run(
-            [sys.executable, "-m", "bisar_budget", "check", str(failing)], stdout=follower, stderr=follower, env=env, check=False
+            [sys.executable, "-m", "bisar_budget", "check", str(failing)],
+            stdout=follower,
+            stderr=follower,
+            env=env,
+            check=False,
         )
         os.close(follower)
         output = b""
@@ -328,5 +334,7 @@ class TestDerive:
 
 
 def test_module_runs_like_the_command() -> None:
-    done = subprocess.run([sys.executable, "-m", "bisar_budget", "--version"], capture_output=True, text=True, cwd=ROOT, check=True)
+    done = subprocess.run(
+        [sys.executable, "-m", "bisar_budget", "--version"], capture_output=True, text=True, cwd=ROOT, check=True
+    )
     assert __version__ in done.stdout

@@ -29,8 +29,10 @@ whole = st.integers(-6, 6)
 def test_largest_signed_sum_is_the_brute_force_one(vectors) -> None:
     """Small whole numbers make parallel, opposite, equal and zero vectors likely."""
     best = max(
-        math.hypot(sum(s * v[0] for s, v in zip(signs, vectors, strict=True)),
-                   sum(s * v[1] for s, v in zip(signs, vectors, strict=True)))
+        math.hypot(
+            sum(s * v[0] for s, v in zip(signs, vectors, strict=True)),
+            sum(s * v[1] for s, v in zip(signs, vectors, strict=True)),
+        )
         for signs in itertools.product((1, -1), repeat=len(vectors))
     )
     assert largest_signed_sum(vectors) == pytest.approx(best)

@@ -100,7 +100,11 @@ def test_every_frame_is_right_handed_and_orthonormal(position, velocity) -> None
 
 @pytest.mark.parametrize(
     ("platform", "frame"),
-    [(state((5e3, 0, 1), (0, 0, 0)), "track"), (state((5e3, 0, 1), (0, 0, 5)), "track"), (state((0, 0, 5e3)), "look")],
+    [
+        (state((5e3, 0, 1), (0, 0, 0)), "track"),
+        (state((5e3, 0, 1), (0, 0, 5)), "track"),
+        (state((0, 0, 5e3)), "look"),
+    ],
 )
 def test_frames_that_do_not_exist(platform: g.PlatformState, frame: str) -> None:
     with pytest.raises(g.UndefinedFrameError):

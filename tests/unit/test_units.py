@@ -125,7 +125,11 @@ def test_a_limit_is_never_written_larger_than_it_is(value: float, unit: str) -> 
         read = float(number)
     else:
         dimension = {
-            "m": units.LENGTH, "m/s": units.SPEED, "m/s^2": units.ACCELERATION, "rad": units.ANGLE, "s": units.TIME,
+            "m": units.LENGTH,
+            "m/s": units.SPEED,
+            "m/s^2": units.ACCELERATION,
+            "rad": units.ANGLE,
+            "s": units.TIME,
         }[unit]
         read = parse_quantity(text, dimension)
     assert value * 0.98 < read <= value * (1 + 1e-9)

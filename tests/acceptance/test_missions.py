@@ -1,0 +1,158 @@
+"""Mission files found by folder: what a good, a bad and an example mission give through the command line."""
+
+import json
+import re
+from pathlib import Path
+
+import jsonschema
+import pytest
+import yaml
+
+from bisar_budget.mission.schema import mission_schema
+from tests.conftest import ROOT
+
+HERE = Path(__file__).parent
+GOOD = sorted((HERE / "good").glob("*.yaml"))
+BAD = sorted((HERE / "bad").glob("*.yaml"))
+EXAMPLES = sorted((ROOT / "specs" / "missions").glob("*.yaml"))
+
+
+def name(path: Path) -> str:
+    return path.stem
+
+
+def header(path: Path, key: str) -> list[str]:
+    return re.findall(rf"(?m)^# {key}: (.*)$", path.read_text(encoding="utf-8"))
+
+
+def check(run, path: Path):
+    result = run("check", path, "--format", "json", "--date", "2026-11-21")
+    return result, json.loads(result.stdout)["missions"][0]
+
+
+def test_the_folders_are_not_empty() -> None:
+    assert len(BAD) >= 40
+    assert len(GOOD) >= 5
+    assert len(EXAMPLES) >= 5
+
+
+@pytest.mark.parametrize("path", GOOD, ids=name)
+def test_good(run, path: Path) -> None:
+    result, mission = check(run, path)
+    (status,) = header(path, "status")
+    assert mission["status"] == status
+    assert result.exit_code == (1 if status == "fail" else 0)
+    assert result.stderr == ""
+
+
+@pytest.mark.parametrize("path", BAD, ids=name)
+def test_bad(run, path: Path) -> None:
+    """Every fault at its line and column, exit 2, no traceback, and a complete document."""
+    result, mission = check(run, path)
+    assert result.exit_code == 2
+    assert "Traceback" not in result.output
+    assert mission["status"] == "error"
+    got = [
+        f"{error['line'] or '-'}:{error['column'] or '-'} "
+        + (f"{error['key']}: " if error["key"] else "")
+        + error["message"]
+        for error in mission["errors"]
+    ]
+    (faults,) = header(path, "faults")
+    assert " | ".join(got) == faults
+    assert len(result.stderr.splitlines()) == len(got)
+    for line in result.stderr.splitlines():
+        assert line.startswith(str(path))
+
+
+@pytest.mark.parametrize("path", BAD, ids=name)
+def test_bad_faults_point_at_the_culprit(path: Path) -> None:
+    """The place named holds the key or the value: an independent look at what the header claims."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    for fault in header(path, "faults")[0].split(" | "):
+        match = re.match(r"(\d+):(\d+) (?:([\w.\[\] ]+): )?", fault)
+        if match is None or "YAML" in fault or "missing" in fault or "lacks" in fault or "has a key" in fault:
+            continue
+        line, column, key = int(match[1]), int(match[2]), match[3]
+        last = re.sub(r"\[\d+\]", "", key.split(".")[-1])
+        assert column <= len(lines[line - 1]) + 1
+        nearby = "\n".join(lines[max(0, line - 3) : line])
+        assert last in nearby, fault
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=name)
+def test_example_gives_what_its_comments_say(run, path: Path) -> None:
+    result, mission = check(run, path)
+    expectations = header(path, "expect")
+    assert len(expectations) >= 2
+    rows = {row["id"]: row for row in mission["rows"]}
+    for expectation in expectations:
+        subject, status, *figure = expectation.split()
+        if subject == "mission":
+            assert mission["status"] == status
+            assert result.exit_code == (1 if status == "fail" else 0)
+            continue
+        assert rows[subject]["status"] == status
+        if figure:
+            assert 100 * rows[subject]["utilization"] == pytest.approx(float(figure[0]), rel=5e-3)
+    assert result.stderr == ""
+    assert mission["warnings"] == []
+
+
+def test_section_v_numbers(run) -> None:
+    """4.63 rad = 1.47 pi at 10 GHz, from Table II row 4 by hand; 2.95 is the least N_pull."""
+    _, mission = check(run, ROOT / "specs/missions/rigling_moses_section_v.yaml")
+    row = next(row for row in mission["rows"] if row["id"] == "transmitter.acceleration.x")
+    assert row["qpe_published_rad"] == pytest.approx(4.63, abs=0.005)
+    assert "n_pull 2.95" in row["reason"]
+
+
+@pytest.mark.parametrize(("n_pull", "status", "use"), [(2.94, "fail", 1.002), (3, "pass_with_autofocus", 0.982)])
+def test_section_v_around_its_least_n_pull(run, tmp_path, n_pull, status, use) -> None:
+    text = (ROOT / "specs/missions/rigling_moses_section_v_autofocus.yaml").read_text(encoding="utf-8")
+    path = tmp_path / "m.yaml"
+    path.write_text(text.replace("n_pull: 4", f"n_pull: {n_pull}"), encoding="utf-8")
+    _, mission = check(run, path)
+    row = next(row for row in mission["rows"] if row["id"] == "transmitter.acceleration.x")
+    assert row["status"] == status
+    assert row["utilization"] == pytest.approx(use, abs=1e-3)
+
+
+class _Core(yaml.SafeLoader):
+    """YAML 1.2's numbers, as editors read them; dates stay text."""
+
+
+_Core.yaml_implicit_resolvers = {
+    first: [
+        (tag, pattern)
+        for tag, pattern in resolvers
+        if tag not in ("tag:yaml.org,2002:timestamp", "tag:yaml.org,2002:bool")
+    ]
+    for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+}
+
+
+SCHEMA_SEES = (
+    "unknown_key_near", "unknown_key_far", "unknown_nested_key", "missing_section", "missing_key", "two_components",
+    "section_is_text", "share_of_nobody", "split_misspelt", "combine_unknown", "model_full", "covariance",
+    "common_motion_error", "platform_acceleration", "height_error", "frame_unknown", "waiver_without_reason",
+    "schema_version", "no_schema_version", "pulses_fraction", "scalar_position",
+)  # fmt: skip
+
+
+class TestSchema:
+    validator = jsonschema.Draft7Validator(mission_schema())
+
+    def test_is_a_draft_7_schema(self) -> None:
+        jsonschema.Draft7Validator.check_schema(mission_schema())
+        assert "$defs" not in json.dumps(mission_schema())
+        assert "prefixItems" not in json.dumps(mission_schema())
+
+    @pytest.mark.parametrize("path", [*GOOD, *EXAMPLES], ids=name)
+    def test_accepts_what_the_tool_accepts(self, path: Path) -> None:
+        self.validator.validate(yaml.load(path.read_text(encoding="utf-8"), Loader=_Core))
+
+    @pytest.mark.parametrize("stem", SCHEMA_SEES)
+    def test_refuses_what_a_schema_can_see(self, stem: str) -> None:
+        document = yaml.load((HERE / "bad" / f"{stem}.yaml").read_text(encoding="utf-8"), Loader=_Core)
+        assert list(self.validator.iter_errors(document))

@@ -1,0 +1,108 @@
+"""The house rules of the code itself: floors, import cost, nothing of this machine."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import ROOT
+
+PACKAGE = ROOT / "bisar_budget"
+# An import goes to a lower floor, or stays inside its own room.
+FLOORS = [
+    {"", "constants", "errors", "units", "resources"},
+    {"geometry"},
+    {"theory", "evaluators"},
+    {"mission"},
+    {"budget"},
+    {"report"},
+    {"cli"},
+    {"__main__"},
+]
+MODULES = sorted(PACKAGE.rglob("*.py"))
+
+
+def room(module: str) -> str:
+    parts = module.split(".")
+    return parts[1] if len(parts) > 1 else ""
+
+
+def floor(name: str) -> int:
+    return next(index for index, rooms in enumerate(FLOORS) if name in rooms)
+
+
+def imports(path: Path) -> set[str]:
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            found |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return found
+
+
+def module_name(path: Path) -> str:
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+@pytest.mark.parametrize("path", MODULES, ids=module_name)
+def test_imports_go_down(path: Path) -> None:
+    here = room(module_name(path))
+    for imported in imports(path):
+        if imported.startswith("bisar_budget"):
+            there = room(imported)
+            there = there if any(there in rooms for rooms in FLOORS) else ""  # a name of the package itself
+            is_ground = floor(here) == floor(there) == 0
+            assert there == here or floor(there) < floor(here) or is_ground, f"{module_name(path)}: {imported}"
+
+
+@pytest.mark.parametrize("path", MODULES, ids=module_name)
+def test_only_theory_imports_sympy(path: Path) -> None:
+    if any(name.split(".")[0] == "sympy" for name in imports(path)):
+        assert room(module_name(path)) == "theory"
+
+
+@pytest.mark.parametrize("path", MODULES, ids=module_name)
+def test_only_the_command_prints(path: Path) -> None:
+    if room(module_name(path)) == "cli":
+        return
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        assert not (isinstance(node, ast.Call) and getattr(node.func, "id", "") == "print")
+
+
+HEAVY = ("sympy", "numpy", "numba", "matplotlib", "jinja2", "mpmath")
+
+
+def loaded_after(code: str) -> set[str]:
+    done = subprocess.run(
+        [sys.executable, "-c", f"{code}\nimport sys; print(*sys.modules)"],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        check=True,
+    )
+    return set(done.stdout.split())
+
+
+def test_importing_the_command_is_cheap() -> None:
+    loaded = loaded_after("import bisar_budget.cli")
+    assert not loaded & {*HEAVY, "pydantic", "yaml"}
+
+
+def test_a_check_loads_nothing_heavy() -> None:
+    mission = ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml"
+    code = f"""
+from bisar_budget.budget.check import check_mission
+from bisar_budget.mission.load import load_mission
+from bisar_budget.report import FORMATS, Style, render
+from bisar_budget.budget.findings import Report
+from datetime import date
+found = check_mission(load_mission({str(mission)!r}), date(2026, 1, 1))
+for name in FORMATS:
+    render(name, Report(version="", missions=(found,)), Style())
+"""
+    assert not loaded_after(code) & set(HEAVY)
