@@ -1,15 +1,14 @@
 """What goes wrong with input, said so that it can be mended: where, what, the value given, what is accepted."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 KeyPath = tuple[str | int, ...]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Problem:
+class Problem(NamedTuple):
     """Something wrong with a value, before anybody knows which file it stands in.
 
-    `at` is the path of the culprit relative to the value that was checked.
+    `at` is the path of the culprit below the value that was checked.
     """
 
     problem: str
@@ -21,13 +20,12 @@ class Problem:
 class InvalidValueError(ValueError):
     """A value that does not say what its key asks for."""
 
-    def __init__(self, *problems: Problem) -> None:
-        super().__init__("; ".join(problem.problem for problem in problems))
-        self.problems = problems
+    def __init__(self, problem: str, accepted: str = "", hint: str = "") -> None:
+        super().__init__(problem)
+        self.problem = Problem(problem, accepted, hint)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Fault:
+class Fault(NamedTuple):
     """One fault of a mission file. Line and column count from 1; None where the whole file is meant."""
 
     line: int | None

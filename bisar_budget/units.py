@@ -5,18 +5,17 @@ A small table of its own, because general unit libraries read `3 dBi` as three a
 
 import math
 import re
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from bisar_budget.constants import STANDARD_GRAVITY
-from bisar_budget.errors import InvalidValueError, Problem
+from bisar_budget.errors import InvalidValueError
 
 _NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?")
 _OCTAL_LOOK = re.compile(r"[+-]?0\d")
 _MAX_TEXT = 64  # characters; longer text is no quantity anybody wrote
 
 
-@dataclass(frozen=True, eq=False)
-class Dimension:
+class Dimension(NamedTuple):
     """A kind of quantity: its name with article, the unit of a bare number, every unit with its factor."""
 
     name: str
@@ -113,16 +112,14 @@ def parse_quantity(value: object, dimension: Dimension) -> float:
         is_nan_or_inf = text.lower().lstrip("+-.") in ("nan", "inf", "infinity")
         raise _invalid("must be a finite number" if is_nan_or_inf else f"must be {dimension.name}", dimension)
     if _OCTAL_LOOK.match(match[0]):
-        raise InvalidValueError(
-            Problem(
-                problem="has a leading zero, which some YAML readers take for octal",
-                accepted="write it without",
-            )
-        )
-    number, unit = float(match[0]), _normal(text[match.end() :])
+        raise InvalidValueError("has a leading zero, which some YAML readers take for octal", "write it without")
+    number, unit = float(match[0]), text[match.end() :].lstrip()
     if not unit or unit == dimension.si:
         return _finite(number, dimension)
     factor = dimension.units.get(unit)
+    if factor is None:
+        unit = _normal(unit)
+        factor = dimension.units.get(unit)
     if factor is None:
         raise _wrong_unit(unit, dimension)
     # Dividing by a whole inverse keeps decimals exact: 5 mm is 0.005, not 0.0050000000000000001.
@@ -178,7 +175,7 @@ def _normal(unit: str) -> str:
 
 
 def _invalid(problem: str, dimension: Dimension, hint: str = "") -> InvalidValueError:
-    return InvalidValueError(Problem(problem=problem, accepted=dimension.accepted, hint=hint))
+    return InvalidValueError(problem, dimension.accepted, hint)
 
 
 def _wrong_unit(unit: str, dimension: Dimension) -> InvalidValueError:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from bisar_budget.budget.combine import combine_phases
 from bisar_budget.budget.sources import ErrorSource
@@ -11,8 +11,7 @@ from bisar_budget.mission.model import MetricSplits, Mission, Shares
 BALANCED_RANGE = (0.05, 0.95)  # neither platform is left without a budget
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Split:
+class Split(NamedTuple):
     """Shares of one budget; they sum to 1. Without a share of its own the clock is held to the receiver's."""
 
     transmitter: float
@@ -36,8 +35,7 @@ class Split:
 EQUAL = Split(transmitter=0.5, receiver=0.5)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Allocation:
+class Allocation(NamedTuple):
     """The budgets as divided. `qpe_total` and limits in [rad], before autofocus; PSLR and ISLR share power."""
 
     qpe_total: float

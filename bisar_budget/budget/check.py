@@ -2,8 +2,8 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from datetime import date
+from typing import NamedTuple
 
 from bisar_budget import evaluators
 from bisar_budget.budget.allocation import Allocation, Split, allocate
@@ -25,8 +25,7 @@ FULL_MODEL_NOTE = (
 NO_REQUIREMENT = "no requirement in the file: computed, not judged"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Line:
+class _Line(NamedTuple):
     """A row before it is judged: what is declared against what is allowed."""
 
     id: str
@@ -355,7 +354,7 @@ def _unused_keys(mission: Mission) -> Iterator[str]:
     keys = {
         "scene.radius": mission.scene.radius is not None,
         "collection.pulses": mission.collection.pulses is not None,
-        "simulation": "simulation" in mission.model_fields_set,
+        "simulation": mission.simulation is not None,
     }
     given = [key for key, is_given in keys.items() if is_given]
     if given:

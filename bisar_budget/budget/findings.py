@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from bisar_budget.budget.allocation import Allocation
 from bisar_budget.errors import Fault
@@ -13,8 +13,7 @@ GATING = ("error", "fail", "not_evaluated", "warn", "pass_with_autofocus", "pass
 STATUSES = (*GATING, "waived", "info", "not_declared")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Row:
+class Row(NamedTuple):
     """One line of the budget. Numbers in SI and radians; None where a value does not exist."""
 
     id: str
@@ -38,24 +37,21 @@ class Row:
     evidence: str | None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Warning:
+class Warning(NamedTuple):
     """Something about the mission file that changes no verdict but should not go unsaid."""
 
     line: int | None
     message: str
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Resolution:
+class Resolution(NamedTuple):
     """Peak to first null on the ground. [m]"""
 
     range: float
     cross_range: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MissionFindings:
+class MissionFindings(NamedTuple):
     """What was found about one mission file that can be used."""
 
     file: str
@@ -82,8 +78,7 @@ class MissionFindings:
         return {status: counts[status] for status in STATUSES if counts[status]}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class UnusableMission:
+class UnusableMission(NamedTuple):
     """A mission file that cannot be used, with its faults."""
 
     file: str
@@ -91,8 +86,7 @@ class UnusableMission:
     status: str = "error"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Report:
+class Report(NamedTuple):
     """The findings about every mission file of a run."""
 
     version: str

@@ -6,7 +6,7 @@ allowable. Effects are those of the published model (Rigling & Moses, Tables I a
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from bisar_budget import evaluators
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, ROUNDING, SPEED_OF_LIGHT
@@ -19,8 +19,7 @@ MOTION_UNITS = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2"}
 CLOCK_UNITS = {"constant": "s", "linear": "s/s", "quadratic": "1/s", "cubic": "1/s^2"}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Effect:
+class Effect(NamedTuple):
     """What one unit of an error does, signed like the range error.
 
     Constant [m/unit] and linear [(m/s)/unit] term of the range error; quadratic and cubic phase at the
@@ -33,8 +32,7 @@ class Effect:
     cubic: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ErrorSource:
+class ErrorSource(NamedTuple):
     """One error: who owns it, how large it is declared, what one unit of it does.
 
     `owner` is transmitter, receiver, clock or mission (nobody's). `declared` is signed and includes the
@@ -66,8 +64,7 @@ class ErrorSource:
         return None if self.declared is None else self.effect.cubic * self.declared
 
 
-@dataclass(frozen=True, slots=True)
-class ImagePlane:
+class ImagePlane(NamedTuple):
     """Q⁻¹ of (30): takes constant and linear range error to the displacement of the image."""
 
     adjugate: tuple[tuple[float, ...], ...]

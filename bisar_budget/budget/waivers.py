@@ -1,7 +1,6 @@
 """Waivers: rows that may fail until a date. What is waived, expired or useless is always said."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from datetime import date
 from fnmatch import fnmatchcase
 
@@ -39,9 +38,9 @@ def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> tuple[l
             row = result[position]
             words = f"waiver of line {line}, until {waiver.until}: {waiver.reason}"
             if expired:
-                result[position] = replace(row, notes=(*row.notes, f"expired {words}"))
+                result[position] = row._replace(notes=(*row.notes, f"expired {words}"))
             elif row.status == "fail":
-                result[position] = replace(row, status="waived", notes=(*row.notes, words))
+                result[position] = row._replace(status="waived", notes=(*row.notes, words))
         if not named:
             warnings.append(Warning(line=line, message=f"waiver {waiver.id}: matches no row"))
         elif not failing:

@@ -1,65 +1,61 @@
 """Mission file, schema_version 1: every key, its type and its meaning. Values are SI and radians."""
 
 import math
-from functools import cached_property
-from typing import Annotated, Any, Literal
+from collections.abc import Iterator, Mapping
+from datetime import date
+from typing import Annotated, Any, NamedTuple
 
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Discriminator,
-    Field,
-    PrivateAttr,
-    Tag,
-    model_validator,
-)
-
+from bisar_budget import units
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.errors import InvalidValueError, KeyPath, Problem
-from bisar_budget.geometry import BistaticGeometry, PlatformState, UndefinedFrameError, state_from_angles
-from bisar_budget.mission import fields as f
+from bisar_budget.errors import KeyPath, Problem
+from bisar_budget.geometry import BistaticGeometry, PlatformState, UndefinedFrameError, Vector, state_from_angles
+from bisar_budget.mission.readers import (
+    Choice,
+    Day,
+    Key,
+    Later,
+    ListOf,
+    OneOf,
+    Quantity,
+    Reader,
+    Scalar,
+    Section,
+    Text,
+    TextMap,
+    Triple,
+    Version,
+    Whole,
+)
 
 FULL_MODEL = "it comes with the full model"
 
-
-class Section(BaseModel):
-    """A mapping of the mission file; a key it does not know is an error."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-def _choice(*names: str) -> Any:
-    def read(value: object) -> object:
-        if value not in names:
-            from difflib import get_close_matches
-
-            near = get_close_matches(str(value), names, 1)
-            raise InvalidValueError(
-                Problem(
-                    problem="is not a known choice",
-                    accepted=f"accepted: {', '.join(names)}",
-                    hint=f"Did you mean {near[0]!r}?" if near else "",
-                )
-            )
-        return value
-
-    return BeforeValidator(read)
+FREQUENCY = Quantity(units.FREQUENCY, gt=0, ge=1e3, le=1e13)
+VIBRATION_FREQUENCY = Quantity(units.FREQUENCY, gt=0, le=1e9)
+DURATION = Quantity(units.TIME, gt=0, ge=1e-6, le=1e6)
+COORDINATE = Quantity(units.LENGTH, ge=-1e9, le=1e9)
+RANGE = Quantity(units.LENGTH, gt=0, le=1e9)
+SIZE = Quantity(units.LENGTH, ge=0, le=1e9)
+VELOCITY = Quantity(units.SPEED, ge=-1e6, le=1e6)
+SPEED = Quantity(units.SPEED, ge=0, le=1e6)
+ACCELERATION = Quantity(units.ACCELERATION, ge=-1e6, le=1e6)
+DIRECTION = Quantity(units.ANGLE, ge=-1e3, le=1e3)
+ELEVATION = Quantity(units.ANGLE, ge=0, le=math.pi / 2)
+PHASE = Quantity(units.ANGLE, ge=-1e6, le=1e6)
+PHASE_REQUIREMENT = Quantity(units.ANGLE, gt=0, ge=1e-6, le=1e6)
+SIDELOBE_REQUIREMENT = Quantity(units.POWER_RATIO, lt=0, ge=-200)
+SHARE = Quantity(units.RATIO, gt=0, ge=1e-6, le=1)
 
 
-class Radar(Section):
+class Radar(NamedTuple):
     """The waveform."""
 
-    center_frequency: f.Frequency = Field(description="Centre of the band; every phase uses it.")
-    bandwidth: f.Frequency = Field(description="Width of the band, for the resolution.")
+    center_frequency: Annotated[float, Key(FREQUENCY, "Centre of the band; every phase uses it.")]
+    bandwidth: Annotated[float, Key(FREQUENCY, "Width of the band, for the resolution.")]
 
-    @model_validator(mode="after")
-    def _band_is_positive(self) -> "Radar":
+    def problems(self) -> Iterator[Problem]:
+        """Hold the band above 0 Hz."""
         if self.bandwidth >= 2 * self.center_frequency:
-            raise InvalidValueError(
-                Problem(problem="must be less than twice the centre frequency", at=("bandwidth",))
-            )
-        return self
+            yield Problem("must be less than twice the centre frequency", at=("bandwidth",))
 
     @property
     def wavelength(self) -> float:
@@ -67,147 +63,126 @@ class Radar(Section):
         return SPEED_OF_LIGHT / self.center_frequency
 
 
-class Collection(Section):
+class Collection(NamedTuple):
     """The data collection."""
 
-    aperture_time: f.Duration = Field(description="T; the aperture is -T/2 to T/2.")
-    pulses: f.PulseCount | None = Field(None, description="For the simulator; omitted: what the patch needs.")
+    aperture_time: Annotated[float, Key(DURATION, "T; the aperture is -T/2 to T/2.")]
+    pulses: Annotated[int | None, Key(Whole(2, 10_000_000), "For the simulator; omitted: what the patch needs.")] = (
+        None
+    )
 
 
-class Scene(Section):
+class Scene(NamedTuple):
     """The imaged ground."""
 
-    radius: f.Range | None = Field(None, description="Radius of the scene about its centre.")
-    height_error: Annotated[Any, f.Later(FULL_MODEL)] = None
+    radius: Annotated[float | None, Key(RANGE, "Radius of the scene about its centre.")] = None
+    height_error: Annotated[None, Key(Later(FULL_MODEL))] = None
 
 
-class Sinusoid(Section):
+class Sinusoid(NamedTuple):
     """One sinusoidal vibration along the line of sight."""
 
-    amplitude: Annotated[f.Size, BeforeValidator(lambda value: _scalar_amplitude(value))] = Field(
-        description="0 to peak, along the line of sight."
-    )
-    frequency: f.VibrationFrequency
+    amplitude: Annotated[float, Key(Scalar(SIZE, FULL_MODEL), "0 to peak, along the line of sight.")]
+    frequency: Annotated[float, Key(VIBRATION_FREQUENCY)]
 
 
-def _scalar_amplitude(value: object) -> object:
-    if isinstance(value, list):
-        raise InvalidValueError(
-            Problem(
-                problem=f"is not supported as a vector by this version of bisar-budget: {FULL_MODEL}",
-                accepted="accepted: one amplitude along the line of sight",
-            )
-        )
-    return value
-
-
-class Wideband(Section):
+class Wideband(NamedTuple):
     """Noise-like vibration along the line of sight."""
 
-    rms: f.Size = Field(description="Root mean square, along the line of sight.")
+    rms: Annotated[float, Key(SIZE, "Root mean square, along the line of sight.")]
 
 
-class Vibration(Section):
+class Vibration(NamedTuple):
     """High-frequency motion that the navigation does not measure."""
 
-    sinusoidal: tuple[Sinusoid, ...] = Field((), max_length=1000)
-    wideband: Wideband | None = None
+    sinusoidal: Annotated[tuple[Sinusoid, ...], Key(ListOf(Sinusoid), "One entry per line.")] = ()
+    wideband: Annotated[Wideband | None, Key(Section(Wideband))] = None
 
 
-class MotionError(Section):
+class MotionError(NamedTuple):
     """How wrong the measured motion of one platform may be. A scalar means each axis."""
 
-    frame: Annotated[Literal["scene", "track", "look"], _choice("scene", "track", "look")] = Field(
-        "scene",
-        description="scene: east, north, up; track: along, cross, up; look: line of sight, cross, up.",
-    )
-    position: f.PositionError | None = None
-    velocity: f.VelocityError | None = None
-    acceleration: f.AccelerationError | None = None
-    covariance: Annotated[Any, f.Later(FULL_MODEL)] = None
-    distribution: Annotated[Literal["normal", "uniform", "bound"], _choice("normal", "uniform", "bound")] = Field(
-        "normal", description="normal: the values are one sigma; uniform, bound: they are not exceeded."
-    )
-    vibration: Vibration = Vibration()
-    source: f.Text | None = Field(None, description="Where the values come from; shown as evidence.")
+    frame: Annotated[
+        str,
+        Key(
+            Choice("scene", "track", "look"),
+            "scene: east, north, up; track: along, cross, up; look: line of sight, cross, up.",
+        ),
+    ] = "scene"
+    position: Annotated[Vector | None, Key(Triple(COORDINATE, or_scalar=True), "At the midpoint.")] = None
+    velocity: Annotated[Vector | None, Key(Triple(VELOCITY, or_scalar=True), "Constant part.")] = None
+    acceleration: Annotated[Vector | None, Key(Triple(ACCELERATION, or_scalar=True), "Constant part.")] = None
+    covariance: Annotated[None, Key(Later(FULL_MODEL))] = None
+    distribution: Annotated[
+        str,
+        Key(
+            Choice("normal", "uniform", "bound"),
+            "normal: the values are one sigma; uniform, bound: they are not exceeded.",
+        ),
+    ] = "normal"
+    vibration: Annotated[Vibration, Key(Section(Vibration))] = Vibration()
+    source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
 
 
 CARTESIAN_KEYS = ("position", "velocity")
 POLAR_KEYS = ("slant_range", "azimuth", "elevation", "speed", "motion_azimuth", "climb")
+WAYS = (
+    "accepted: position and velocity, or slant_range, azimuth, elevation, speed, motion_azimuth (and climb); "
+    "a fixed platform has speed 0 and no motion_azimuth"
+)
 
 
-class Platform(Section):
+class Platform(NamedTuple):
     """Position and velocity at the aperture midpoint, in one of two ways, and the motion error."""
 
-    position: f.PositionVector | None = Field(None, description="East, north, up of the scene centre.")
-    velocity: f.VelocityVector | None = Field(None, description="East, north, up.")
-    acceleration: Annotated[Any, f.Later(FULL_MODEL)] = None
-    slant_range: f.Range | None = Field(None, description="Distance to the scene centre.")
-    azimuth: f.Direction | None = Field(None, description="From east, counter-clockwise.")
-    elevation: f.Elevation | None = Field(None, description="Seen from the scene centre, above the ground.")
-    speed: f.Speed | None = Field(None, description="Over ground; 0 is a fixed platform.")
-    motion_azimuth: f.Direction | None = Field(
-        None, description="Direction of motion, counted like azimuth (not a compass heading)."
-    )
-    climb: f.Velocity | None = Field(None, description="Vertical speed, up positive.")
-    motion_error: MotionError = MotionError()
+    position: Annotated[Vector | None, Key(Triple(COORDINATE), "East, north, up of the scene centre.")] = None
+    velocity: Annotated[Vector | None, Key(Triple(VELOCITY), "East, north, up.")] = None
+    acceleration: Annotated[None, Key(Later(FULL_MODEL))] = None
+    slant_range: Annotated[float | None, Key(RANGE, "Distance to the scene centre.")] = None
+    azimuth: Annotated[float | None, Key(DIRECTION, "From east, counter-clockwise.")] = None
+    elevation: Annotated[float | None, Key(ELEVATION, "Above the ground, seen from the scene centre.")] = None
+    speed: Annotated[float | None, Key(SPEED, "Over ground; 0 is a fixed platform.")] = None
+    motion_azimuth: Annotated[
+        float | None, Key(DIRECTION, "Direction of motion, counted like azimuth (not a compass heading).")
+    ] = None
+    climb: Annotated[float | None, Key(VELOCITY, "Vertical speed, up positive.")] = None
+    motion_error: Annotated[MotionError, Key(Section(MotionError))] = MotionError()
 
-    @model_validator(mode="after")
-    def _one_complete_geometry(self) -> "Platform":
+    def problems(self) -> Iterator[Problem]:
+        """Hold it to one complete geometry, above the ground, off the scene centre."""
+        unclear = self._unclear_geometry()
+        if unclear is not None:
+            yield unclear
+            return
+        state = self.state
+        where: KeyPath = ("position",) if self.position else ("slant_range",)
+        if state.position[2] < 0:
+            yield Problem("puts the platform below the ground, z < 0", at=(*where, 2))
+        if state.slant_range < 1:
+            yield Problem("puts the platform within 1 m of the scene centre", at=where)
+            return
+        try:
+            state.frame(self.motion_error.frame)
+        except UndefinedFrameError as error:
+            yield Problem(str(error), "accepted: scene", at=("motion_error", "frame"))
+
+    def _unclear_geometry(self) -> Problem | None:
         given = [key for key in (*CARTESIAN_KEYS, *POLAR_KEYS) if getattr(self, key) is not None]
         cartesian = [key for key in given if key in CARTESIAN_KEYS]
         polar = [key for key in given if key in POLAR_KEYS]
-        ways = (
-            "accepted: position and velocity, or slant_range, azimuth, elevation, speed, motion_azimuth "
-            "(and climb); a fixed platform has speed 0 and no motion_azimuth"
-        )
         if cartesian and polar:
-            raise InvalidValueError(
-                Problem(problem=f"mixes {cartesian[0]} with {polar[0]}", accepted=ways, at=(polar[0],))
-            )
+            return Problem(f"mixes {cartesian[0]} with {polar[0]}", WAYS, at=(polar[0],))
         if cartesian:
             missing = [key for key in CARTESIAN_KEYS if key not in given]
         else:
-            fixed = self.speed == 0
-            if fixed and self.motion_azimuth is not None:
-                raise InvalidValueError(
-                    Problem(problem="a platform with speed 0 has none", accepted=ways, at=("motion_azimuth",))
-                )
-            optional = {"climb", "motion_azimuth"} if fixed else {"climb"}
+            is_fixed = self.speed == 0
+            if is_fixed and self.motion_azimuth is not None:
+                return Problem("a platform with speed 0 has none", WAYS, at=("motion_azimuth",))
+            optional = ("climb", "motion_azimuth") if is_fixed else ("climb",)
             missing = [key for key in POLAR_KEYS if key not in given and key not in optional]
-        if missing:
-            raise InvalidValueError(Problem(problem=f"lacks {', '.join(missing)}", accepted=ways))
-        return self
+        return Problem(f"lacks {', '.join(missing)}", WAYS) if missing else None
 
-    @model_validator(mode="after")
-    def _above_ground_and_off_centre(self) -> "Platform":
-        # An incomplete geometry has been reported; after that error this one is not reached.
-        if self.state.position[2] < 0:
-            raise InvalidValueError(
-                Problem(problem="puts the platform below the ground, z < 0", at=self._place_key(2))
-            )
-        if self.state.slant_range < 1:
-            raise InvalidValueError(
-                Problem(problem="puts the platform within 1 m of the scene centre", at=self._place_key())
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _frame_exists(self) -> "Platform":
-        try:
-            self.state.frame(self.motion_error.frame)
-        except UndefinedFrameError as error:
-            raise InvalidValueError(
-                Problem(problem=str(error), accepted="accepted: scene", at=("motion_error", "frame"))
-            ) from None
-        return self
-
-    def _place_key(self, axis: int | None = None) -> KeyPath:
-        if self.position is None:
-            return ("slant_range",) if axis is None else ("elevation",)
-        return ("position",) if axis is None else ("position", axis)
-
-    @cached_property
+    @property
     def state(self) -> PlatformState:
         """Position and velocity in the frame of the scene."""
         if self.position is not None and self.velocity is not None:
@@ -222,206 +197,193 @@ class Platform(Section):
         )
 
 
-class Platforms(Section):
+class Platforms(NamedTuple):
     """The two of them."""
 
-    transmitter: Platform
-    receiver: Platform
+    transmitter: Annotated[Platform, Key(Section(Platform))]
+    receiver: Annotated[Platform, Key(Section(Platform))]
 
 
-class TimingError(Section):
-    """Clock error between the platforms, t̃(τ) = t̃₀ + t̃₁τ + t̃₂τ² + t̃₃τ³."""
+class TimingError(NamedTuple):
+    """Clock error between the platforms, constant + linear·τ + quadratic·τ² + cubic·τ³."""
 
-    constant: f.ClockConstant | None = None
-    linear: f.ClockLinear | None = None
-    quadratic: f.ClockQuadratic | None = None
-    cubic: f.ClockCubic | None = None
+    constant: Annotated[float | None, Key(Quantity(units.TIME, ge=-1e6, le=1e6))] = None
+    linear: Annotated[float | None, Key(Quantity(units.RATIO, ge=-1e6, le=1e6))] = None
+    quadratic: Annotated[float | None, Key(Quantity(units.RATE, ge=-1e6, le=1e6))] = None
+    cubic: Annotated[float | None, Key(Quantity(units.RATE_SQUARED, ge=-1e6, le=1e6))] = None
 
 
-class OtherError(Section):
+class OtherError(NamedTuple):
     """A quadratic phase error from elsewhere, at the aperture edge."""
 
-    name: f.Text
-    quadratic_phase_error: f.Phase
-    source: f.Text | None = None
+    name: Annotated[str, Key(Text(), "Becomes the row id other.NAME.")]
+    quadratic_phase_error: Annotated[float, Key(PHASE)]
+    source: Annotated[str | None, Key(Text())] = None
 
 
-class Requirements(Section):
+class Requirements(NamedTuple):
     """What the image has to hold."""
 
-    quadratic_phase_error: f.PhaseRequirement = Field(
-        math.pi / 4, description="Total for any one error, at the aperture edge; default π/4."
-    )
-    cubic_phase_error: f.PhaseRequirement | None = Field(None, description="At the aperture edge.")
-    pslr: f.SidelobeRequirement | None = Field(None, description="Bounds the echoes that vibration adds. [dB]")
-    islr: f.SidelobeRequirement | None = Field(None, description="Bounds the power that vibration adds. [dB]")
-    location_error: f.Requirement | None = Field(None, description="Displacement of the image on the ground.")
+    quadratic_phase_error: Annotated[
+        float, Key(PHASE_REQUIREMENT, "Total for any one error, at the aperture edge; default π/4.")
+    ] = math.pi / 4
+    cubic_phase_error: Annotated[float | None, Key(PHASE_REQUIREMENT, "At the aperture edge.")] = None
+    pslr: Annotated[float | None, Key(SIDELOBE_REQUIREMENT, "Bounds the echoes that vibration adds. [dB]")] = None
+    islr: Annotated[float | None, Key(SIDELOBE_REQUIREMENT, "Bounds the power that vibration adds. [dB]")] = None
+    location_error: Annotated[
+        float | None, Key(Quantity(units.LENGTH, gt=0, ge=1e-9, le=1e9), "Displacement of the image on the ground.")
+    ] = None
 
 
-class Shares(Section):
+class Shares(NamedTuple):
     """Parts of one budget; they sum to 1."""
 
-    transmitter: f.Share
-    receiver: f.Share
-    clock: f.Share | None = Field(None, description="Omitted: the clock is held to the receiver's share.")
-    reserve: f.Reserve = 0.0
+    transmitter: Annotated[float, Key(SHARE)]
+    receiver: Annotated[float, Key(SHARE)]
+    clock: Annotated[float | None, Key(SHARE, "Omitted: the clock is held to the receiver's share.")] = None
+    reserve: Annotated[float, Key(Quantity(units.RATIO, ge=0, lt=1))] = 0.0
 
-    @model_validator(mode="after")
-    def _sum_to_one(self) -> "Shares":
+    def problems(self) -> Iterator[Problem]:
+        """Hold the sum to 1."""
         total = self.transmitter + self.receiver + (self.clock or 0.0) + self.reserve
         if abs(total - 1) > 1e-6:
-            raise InvalidValueError(Problem(problem=f"shares must sum to 1, these sum to {total:.6g}"))
-        return self
+            yield Problem(f"shares must sum to 1, these sum to {total:.6g}")
 
 
-def _split_form(value: object) -> str:
-    if not isinstance(value, dict):
-        return "<rule>"
-    return "<metrics>" if not value.keys().isdisjoint(MetricSplits.model_fields) else "<shares>"
+RULE = Choice("equal", "balanced")
+SHARES = Section(Shares)
+SPLIT = OneOf(lambda value: SHARES if isinstance(value, dict) else RULE, (RULE, SHARES))
 
 
-Rule = Annotated[Literal["equal", "balanced"], _choice("equal", "balanced"), Tag("<rule>")]
-Split = Annotated[Rule | Annotated[Shares, Tag("<shares>")], Discriminator(_split_form)]
-
-
-class MetricSplits(Section):
+class MetricSplits(NamedTuple):
     """A split of its own for each metric."""
 
-    quadratic_phase_error: Split = "equal"
-    pslr: Split = "equal"
-    islr: Split = "equal"
+    quadratic_phase_error: Annotated[str | Shares, Key(SPLIT)] = "equal"
+    pslr: Annotated[str | Shares, Key(SPLIT)] = "equal"
+    islr: Annotated[str | Shares, Key(SPLIT)] = "equal"
 
 
-AnySplit = Annotated[
-    Rule | Annotated[Shares, Tag("<shares>")] | Annotated[MetricSplits, Tag("<metrics>")],
-    Discriminator(_split_form),
-]
+METRIC_SPLITS = Section(MetricSplits)
 
 
-def _available_model(value: object) -> object:
-    if value in ("full", "strictest"):
-        raise InvalidValueError(
-            Problem(
-                problem=f"is not supported by this version of bisar-budget: {FULL_MODEL}",
-                accepted="accepted: published",
-            )
-        )
-    return value
+def _form_of_split(value: Any) -> Reader:
+    if not isinstance(value, dict):
+        return RULE
+    return SHARES if value.keys().isdisjoint(METRIC_SPLITS.keys) else METRIC_SPLITS
 
 
-class Allocation(Section):
+class Allocation(NamedTuple):
     """How the budget is divided and which model gates."""
 
-    split: AnySplit = Field("equal", description="equal, balanced, shares that sum to 1, or one of these per metric.")
-    combine: Annotated[Literal["each", "sum", "rss"], _choice("each", "sum", "rss")] = Field(
-        "each", description="each: every error alone; sum: worst case; rss: independent errors."
-    )
-    model: Annotated[Literal["published"], _choice("published"), BeforeValidator(_available_model)] = "published"
-    coverage_factor: f.Factor = Field(
-        1.0, description="Multiplies position, velocity, acceleration and clock errors."
-    )
-    warn_above: f.Fraction = Field(0.8, description="Utilization above which a pass becomes a warning.")
+    split: Annotated[
+        str | Shares | MetricSplits,
+        Key(
+            OneOf(_form_of_split, (RULE, SHARES, METRIC_SPLITS)),
+            "equal, balanced, shares that sum to 1, or one of these per metric.",
+        ),
+    ] = "equal"
+    combine: Annotated[
+        str,
+        Key(Choice("each", "sum", "rss"), "each: every error alone; sum: worst case; rss: independent errors."),
+    ] = "each"
+    model: Annotated[
+        str, Key(Choice("published", later={"full": FULL_MODEL, "strictest": FULL_MODEL}), "The model that gates.")
+    ] = "published"
+    coverage_factor: Annotated[
+        float,
+        Key(
+            Quantity(units.RATIO, gt=0, ge=1e-3, le=1e3),
+            "Multiplies position, velocity, acceleration and clock errors.",
+        ),
+    ] = 1.0
+    warn_above: Annotated[
+        float, Key(Quantity(units.RATIO, gt=0, le=1), "Utilization above which a pass becomes a warning.")
+    ] = 0.8
 
 
-class Autofocus(Section):
+class Autofocus(NamedTuple):
     """What autofocus can correct."""
 
-    algorithm: Annotated[Literal["pga", "map_drift"], _choice("pga", "map_drift")] = "pga"
-    n_pull: f.PullIn | None = Field(None, description="Corrects n_pull·π radians; omitted: none.")
+    algorithm: Annotated[str, Key(Choice("pga", "map_drift"))] = "pga"
+    n_pull: Annotated[
+        float | None,
+        Key(Quantity(units.RATIO, gt=0, ge=1e-3, le=1e4), "Corrects n_pull·π radians; omitted: none."),
+    ] = None
 
 
-class Simulation(Section):
+class Simulation(NamedTuple):
     """Settings of the simulator."""
 
-    window: Annotated[Literal["uniform", "taylor"], _choice("uniform", "taylor")] = "uniform"
-    noise: f.Level | None = None
-    seed: f.Seed = 1
-    memory_limit: f.Memory = 500e6
+    window: Annotated[str, Key(Choice("uniform", "taylor"))] = "uniform"
+    noise: Annotated[float | None, Key(Quantity(units.POWER_RATIO, ge=-400, le=400))] = None
+    seed: Annotated[int, Key(Whole(0, 2**53))] = 1
+    memory_limit: Annotated[float, Key(Quantity(units.MEMORY, gt=0, ge=1e6, le=1e15))] = 500e6
 
 
-class Waiver(Section):
+class Waiver(NamedTuple):
     """A row that may fail until a date, for a reason."""
 
-    id: f.Text = Field(description="A row id or a glob of ids, such as receiver.*")
-    until: f.Date = Field(description="Last day on which it holds, UTC.")
-    reason: f.Text
+    id: Annotated[str, Key(Text(), "A row id or a glob of ids, such as receiver.*")]
+    until: Annotated[date, Key(Day(), "Last day on which it holds, UTC.")]
+    reason: Annotated[str, Key(Text())]
 
 
-class Mission(Section):
-    """A mission file that can be used."""
+class Mission(NamedTuple):
+    """A mission file that can be used. `file` and `lines` say where it stands: path of a key to its line."""
 
-    schema_version: f.SchemaVersion
-    name: f.Text
-    radar: Radar
-    collection: Collection
-    scene: Scene = Scene()
-    platforms: Platforms
-    common_motion_error: Annotated[Any, f.Later(FULL_MODEL)] = None
-    timing_error: TimingError = TimingError()
-    other_errors: tuple[OtherError, ...] = Field((), max_length=1000)
-    requirements: Requirements = Requirements()
-    requirement_ids: dict[str, f.Text] = Field({}, description="Row id to the project's own requirement id.")
-    allocation: Allocation = Allocation()
-    autofocus: Autofocus = Autofocus()
-    simulation: Simulation = Simulation()
-    waivers: tuple[Waiver, ...] = Field((), max_length=1000)
+    schema_version: Annotated[int, Key(Version())]
+    name: Annotated[str, Key(Text())]
+    radar: Annotated[Radar, Key(Section(Radar))]
+    collection: Annotated[Collection, Key(Section(Collection))]
+    platforms: Annotated[Platforms, Key(Section(Platforms))]
+    scene: Annotated[Scene, Key(Section(Scene))] = Scene()
+    common_motion_error: Annotated[None, Key(Later(FULL_MODEL))] = None
+    timing_error: Annotated[TimingError, Key(Section(TimingError))] = TimingError()
+    other_errors: Annotated[tuple[OtherError, ...], Key(ListOf(OtherError))] = ()
+    requirements: Annotated[Requirements, Key(Section(Requirements))] = Requirements()
+    requirement_ids: Annotated[Mapping[str, str], Key(TextMap(), "Row id to the project's own requirement id.")] = {}
+    allocation: Annotated[Allocation, Key(Section(Allocation))] = Allocation()
+    autofocus: Annotated[Autofocus, Key(Section(Autofocus))] = Autofocus()
+    simulation: Annotated[Simulation | None, Key(Section(Simulation))] = None
+    waivers: Annotated[tuple[Waiver, ...], Key(ListOf(Waiver))] = ()
+    file: str = ""
+    lines: Mapping[KeyPath, int] = {}
 
-    _file: str = PrivateAttr("")
-    _lines: dict[KeyPath, int] = PrivateAttr(default_factory=dict)
-
-    @model_validator(mode="after")
-    def _forms_an_image(self) -> "Mission":
-        if not any(any(p.velocity) for p in (self.geometry.transmitter, self.geometry.receiver)):
-            raise InvalidValueError(Problem(problem="both platforms are still: no aperture", at=("platforms",)))
-        degeneracy = self.geometry.degeneracy()
-        if degeneracy:
-            raise InvalidValueError(Problem(problem=degeneracy, at=("platforms",)))
-        return self
-
-    @model_validator(mode="after")
-    def _stays_above_ground(self) -> "Mission":
-        half = self.collection.aperture_time / 2
-        problems = []
-        for name in ("transmitter", "receiver"):
-            platform: Platform = getattr(self.platforms, name)
-            lowest = platform.state.position[2] - abs(platform.state.velocity[2]) * half
+    def problems(self) -> Iterator[Problem]:
+        """Hold it to a collection that forms an image, and to names that can be told apart."""
+        geometry = self.geometry
+        if not any(geometry.transmitter.velocity) and not any(geometry.receiver.velocity):
+            yield Problem("both platforms are still: no aperture", at=("platforms",))
+        elif degeneracy := geometry.degeneracy():
+            yield Problem(degeneracy, at=("platforms",))
+        for name, platform in self.platforms._asdict().items():
+            state = platform.state
+            lowest = state.position[2] - abs(state.velocity[2]) * self.collection.aperture_time / 2
             if lowest < 0:
                 key: KeyPath = ("climb",) if platform.velocity is None else ("velocity", 2)
-                problems.append(
-                    Problem(
-                        problem=f"takes the platform below the ground within the aperture, to z = {lowest:.4g} m",
-                        at=("platforms", name, *key),
-                    )
+                yield Problem(
+                    f"takes the platform below the ground within the aperture, to z = {lowest:.4g} m",
+                    at=("platforms", name, *key),
                 )
-        if problems:
-            raise InvalidValueError(*problems)
-        return self
-
-    @model_validator(mode="after")
-    def _names_are_unique(self) -> "Mission":
         seen: set[str] = set()
         for index, other in enumerate(self.other_errors):
             if other.name in seen:
-                raise InvalidValueError(
-                    Problem(problem="is the name of an earlier error", at=("other_errors", index, "name"))
-                )
+                yield Problem("is the name of an earlier error", at=("other_errors", index, "name"))
             seen.add(other.name)
-        return self
 
-    @cached_property
+    @property
     def geometry(self) -> BistaticGeometry:
         """Both platforms in the frame of the scene."""
         return BistaticGeometry(transmitter=self.platforms.transmitter.state, receiver=self.platforms.receiver.state)
 
-    @property
-    def file(self) -> str:
-        """Name of the file as the user gave it."""
-        return self._file
-
     def line(self, *path: str | int) -> int | None:
         """Line of a value in the mission file, else of the nearest key above it that exists."""
-        for length in range(len(path), 0, -1):
-            line = self._lines.get(path[:length])
+        while path:
+            line = self.lines.get(path)
             if line is not None:
                 return line
+            path = path[:-1]
         return None
+
+
+MISSION = Section(Mission)

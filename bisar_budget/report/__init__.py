@@ -1,7 +1,7 @@
 """Findings as text: one pure function `render(report, style) -> str` per format, found here by name."""
 
-from dataclasses import dataclass
 from importlib import import_module
+from typing import NamedTuple
 
 from bisar_budget.budget.findings import Report
 
@@ -14,8 +14,7 @@ FORMATS = {
 SUFFIXES = {".txt": "text", ".json": "json", ".csv": "csv"}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Style:
+class Style(NamedTuple):
     """How much to say, and whether in colour; formats for machines ignore it."""
 
     color: bool = False

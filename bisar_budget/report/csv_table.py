@@ -4,7 +4,7 @@ import csv
 import io
 from collections.abc import Iterator
 
-from bisar_budget.budget.findings import MissionFindings, Report, UnusableMission
+from bisar_budget.budget.findings import MissionFindings, Report, Row, UnusableMission
 from bisar_budget.report import Style
 
 COLUMNS = (
@@ -31,6 +31,8 @@ COLUMNS = (
     "notes",
     "evidence",
 )
+
+_ROW_COLUMNS = frozenset(COLUMNS) & frozenset(Row._fields)
 
 
 def render(report: Report, style: Style) -> str:
@@ -59,7 +61,7 @@ def _faults(mission: UnusableMission) -> Iterator[dict[str, object]]:
 def _rows(mission: MissionFindings) -> Iterator[dict[str, object]]:
     for row in mission.rows:
         record: dict[str, object] = {"file": mission.file, "mission": mission.name}
-        record |= {key: getattr(row, key) for key in COLUMNS if hasattr(row, key)}
+        record |= {key: value for key, value in row._asdict().items() if key in _ROW_COLUMNS}
         record["notes"] = "; ".join(row.notes)
         if row.displacement_m is not None:
             record["displacement_x_m"], record["displacement_y_m"] = row.displacement_m

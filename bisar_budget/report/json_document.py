@@ -1,16 +1,14 @@
 """The report as JSON, `bisar-budget/check/1`. Keys may be added, never changed or removed."""
 
 import json
-from dataclasses import fields
 from typing import Any
 
 from bisar_budget.budget.allocation import Split
-from bisar_budget.budget.findings import MissionFindings, Report, Row, UnusableMission
+from bisar_budget.budget.findings import MissionFindings, Report, UnusableMission
 from bisar_budget.geometry import PlatformState
 from bisar_budget.report import Style
 
 FORMAT = "bisar-budget/check/1"
-_ROW_KEYS = tuple(field.name for field in fields(Row))
 
 
 def render(report: Report, style: Style) -> str:
@@ -82,7 +80,7 @@ def _mission(mission: MissionFindings) -> dict[str, Any]:
             "islr_share": _shares(allocation.islr),
         },
         "summary": mission.summary,
-        "rows": [{key: getattr(row, key) for key in _ROW_KEYS} for row in mission.rows],
+        "rows": [row._asdict() for row in mission.rows],
         "warnings": [{"line": warning.line, "message": warning.message} for warning in mission.warnings],
         "notes": mission.notes,
         "errors": [],

@@ -79,13 +79,13 @@ def test_decimal_prefixes_add_no_rounding() -> None:
 def test_refuses(text: object, dimension: units.Dimension, says: str) -> None:
     with pytest.raises(InvalidValueError) as error:
         parse_quantity(text, dimension)
-    assert says in error.value.problems[0].problem
+    assert says in error.value.problem.problem
 
 
 def test_a_wrong_case_gets_a_hint() -> None:
     with pytest.raises(InvalidValueError) as error:
         parse_quantity("10 ghz", units.FREQUENCY)
-    assert error.value.problems[0].hint == "Did you mean 'GHz'?"
+    assert error.value.problem.hint == "Did you mean 'GHz'?"
 
 
 @given(st.text(max_size=20), st.sampled_from(units.DIMENSIONS))
@@ -93,7 +93,7 @@ def test_any_text_is_a_finite_number_or_an_invalid_value(text: str, dimension: u
     try:
         assert math.isfinite(parse_quantity(text, dimension))
     except InvalidValueError as error:
-        assert error.problems[0].problem
+        assert error.problem.problem
 
 
 @pytest.mark.parametrize(
