@@ -11,7 +11,6 @@ from bisar_budget.constants import STANDARD_GRAVITY
 from bisar_budget.errors import InvalidValueError
 
 _NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?")
-_OCTAL_LOOK = re.compile(r"[+-]?0\d")
 _MAX_TEXT = 64  # characters; longer text is no quantity anybody wrote
 
 
@@ -111,7 +110,8 @@ def parse_quantity(value: object, dimension: Dimension) -> float:
     if match is None:
         is_nan_or_inf = text.lower().lstrip("+-.") in ("nan", "inf", "infinity")
         raise _invalid("must be a finite number" if is_nan_or_inf else f"must be {dimension.name}", dimension)
-    if _OCTAL_LOOK.match(match[0]):
+    digits = match[0].lstrip("+-")
+    if digits[0] == "0" and digits[1:2].isdigit():
         raise InvalidValueError("has a leading zero, which some YAML readers take for octal", "write it without")
     number, unit = float(match[0]), text[match.end() :].lstrip()
     if not unit or unit == dimension.si:
@@ -136,19 +136,23 @@ def format_quantity(value: float, unit: str, digits: int = 3, rounding: str = "n
     pretty = unit.replace("^2", "²").replace("^3", "³")
     if pretty.startswith("1/"):
         return f"{_rounded(value, digits, rounding)}{pretty[1:]}"
-    prefixes = _PREFIXES.get(unit, "")
-    scale, prefix = 1.0, ""
-    if prefixes and value != 0:
-        steps = [(_SCALES[letter], letter) for letter in prefixes]
-        scale, prefix = next((step for step in steps if abs(value) >= step[0] * 0.9995), steps[-1])
-        if not 1e-3 <= abs(value) / scale < 1e6:
-            scale, prefix = 1.0, ""
-    return f"{_rounded(value / scale, digits, rounding)} {prefix.strip()}{pretty}".rstrip()
+    size = abs(value)
+    for scale, prefix in _STEPS.get(unit, ()):
+        if size >= scale * 0.9995 and size < scale * 1e6:
+            return f"{_rounded(value / scale, digits, rounding)} {prefix}{pretty}"
+    return f"{_rounded(value, digits, rounding)} {pretty}".rstrip()
 
 
-_SCALES = {"G": 1e9, "M": 1e6, "k": 1e3, " ": 1.0, "m": 1e-3, "µ": 1e-6, "n": 1e-9}
+_SMALL = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 # Nobody says kilometre per second squared, or megametre.
-_PREFIXES = {"Hz": "GMk ", "m": "k mµn", "s": " mµn", "rad": " mµn", "m/s": " mµn", "m/s^2": " mµn"}
+_STEPS = {
+    "Hz": ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, "")),
+    "m": ((1e3, "k"), *_SMALL),
+    "s": _SMALL,
+    "rad": _SMALL,
+    "m/s": _SMALL,
+    "m/s^2": _SMALL,
+}
 
 
 def _rounded(value: float, digits: int, rounding: str) -> str:

@@ -9,7 +9,7 @@ from bisar_budget import evaluators
 from bisar_budget.budget.allocation import Allocation, Split, allocate
 from bisar_budget.budget.combine import combine_displacements, combine_phases
 from bisar_budget.budget.findings import MissionFindings, Resolution, Row, Warning
-from bisar_budget.budget.sources import ErrorSource, error_sources, image_plane
+from bisar_budget.budget.sources import ErrorSource, ImagePlane, error_sources, image_plane
 from bisar_budget.budget.waivers import apply_waivers
 from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
 from bisar_budget.errors import KeyPath
@@ -64,12 +64,14 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
     MissionFindings
         Rows in the order of the contract, declared or not.
     """
-    sources = error_sources(mission)
+    geometry = mission.geometry
+    plane = image_plane(geometry)
+    sources = error_sources(mission, geometry)
     allocation = allocate(mission, sources)
     lines = [
-        *_error_lines(mission, allocation, sources),
+        *_error_lines(mission, allocation, sources, plane),
         *_vibration_lines(mission, allocation),
-        *_aggregate_lines(mission, allocation, sources),
+        *_aggregate_lines(mission, allocation, sources, plane),
     ]
     rows = [_judge(line, mission, allocation) for line in lines]
     rows, warnings = apply_waivers(rows, mission, today)
@@ -79,12 +81,10 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
         model=mission.allocation.model,
         combine=mission.allocation.combine,
         wavelength=mission.radar.wavelength,
-        geometry=mission.geometry,
+        geometry=geometry,
         resolution=Resolution(
-            range=mission.geometry.range_resolution(mission.radar.bandwidth, SPEED_OF_LIGHT),
-            cross_range=mission.geometry.cross_range_resolution(
-                mission.radar.wavelength, mission.collection.aperture_time
-            ),
+            range=geometry.range_resolution(mission.radar.bandwidth, SPEED_OF_LIGHT),
+            cross_range=geometry.cross_range_resolution(mission.radar.wavelength, mission.collection.aperture_time),
         ),
         allocation=allocation,
         rows=tuple(rows),
@@ -93,8 +93,9 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
     )
 
 
-def _error_lines(mission: Mission, allocation: Allocation, sources: Sequence[ErrorSource]) -> Iterator[_Line]:
-    plane = image_plane(mission)
+def _error_lines(
+    mission: Mission, allocation: Allocation, sources: Sequence[ErrorSource], plane: ImagePlane
+) -> Iterator[_Line]:
     combine = mission.allocation.combine
     gain = allocation.autofocus_gain
     for source in sources:
@@ -109,7 +110,7 @@ def _error_lines(mission: Mission, allocation: Allocation, sources: Sequence[Err
             if displacement is None:
                 notes.append(plane.degeneracy)
         over = ""
-        if qpe is not None:
+        if qpe is not None and qpe > limit * gain:
             needed = allocation.n_pull_needed(qpe, source.owner)
             over = (
                 f"QPE {qpe:.3g} rad, {limit * gain:.3g} rad allowed ({source.equation}); "
@@ -204,7 +205,9 @@ def _vibration_allowable(mission: Mission, requirement_db: float | None, split: 
     return evaluators.vibration_limit(mission.radar.wavelength, math.sqrt(power * split.of(name)))
 
 
-def _aggregate_lines(mission: Mission, allocation: Allocation, sources: Sequence[ErrorSource]) -> Iterator[_Line]:
+def _aggregate_lines(
+    mission: Mission, allocation: Allocation, sources: Sequence[ErrorSource], plane: ImagePlane
+) -> Iterator[_Line]:
     combine = mission.allocation.combine
     declared = [source for source in sources if source.declared is not None and source.is_independent]
     if combine != "each":
@@ -224,7 +227,6 @@ def _aggregate_lines(mission: Mission, allocation: Allocation, sources: Sequence
         info="" if mission.requirements.cubic_phase_error is not None else NO_REQUIREMENT,
         over="cubic phase at the aperture edge above the requirement (Table I); autofocus gain does not apply",
     )
-    plane = image_plane(mission)
     moves = [plane.displacement(s.effect, s.declared) for s in motion if s.declared is not None]
     known = [move for move in moves if move is not None]
     yield _Line(

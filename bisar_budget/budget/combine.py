@@ -25,25 +25,15 @@ def combine_displacements(displacements: Sequence[GroundVector], rule: str) -> f
 def largest_signed_sum(vectors: Sequence[GroundVector]) -> float:
     """Length of the longest of the sums ±v₁ ± v₂ … of plane vectors, exactly.
 
-    The longest sum is longest along its own direction, where every vector takes the sign of its projection.
-    Signs change only where a vector is perpendicular to that direction, so one candidate on either side of
-    each of these n directions covers all 2ⁿ sums.
+    All sums lie in a polygon with two sides along each vector, and the longest is one of its corners. With
+    every vector turned into the upper half plane and sorted by angle, flipping them one by one walks along
+    half of the outline; the other half is its mirror image.
     """
-    longest = 0.0
-    for pivot in vectors:
-        across = (-pivot[1], pivot[0])
-        x = y = 0.0
-        for vector in vectors:
-            projection = vector[0] * across[0] + vector[1] * across[1]
-            if abs(projection) <= 1e-15 * math.hypot(*vector) * math.hypot(*across):
-                continue  # parallel to the pivot: turns with it, below
-            sign = math.copysign(1.0, projection)
-            x, y = x + sign * vector[0], y + sign * vector[1]
-        along_x = along_y = 0.0
-        for vector in vectors:
-            projection = vector[0] * across[0] + vector[1] * across[1]
-            if abs(projection) <= 1e-15 * math.hypot(*vector) * math.hypot(*across):
-                sign = math.copysign(1.0, vector[0] * pivot[0] + vector[1] * pivot[1])
-                along_x, along_y = along_x + sign * vector[0], along_y + sign * vector[1]
-        longest = max(longest, math.hypot(x + along_x, y + along_y), math.hypot(x - along_x, y - along_y))
+    upper = [(x, y) if (y, x) > (0, 0) else (-x, -y) for x, y in vectors]
+    upper.sort(key=lambda vector: math.atan2(vector[1], vector[0]))
+    x, y = math.fsum(v[0] for v in upper), math.fsum(v[1] for v in upper)
+    longest = math.hypot(x, y)
+    for step_x, step_y in upper:
+        x, y = x - 2 * step_x, y - 2 * step_y
+        longest = max(longest, math.hypot(x, y))
     return longest

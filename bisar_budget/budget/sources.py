@@ -6,12 +6,20 @@ allowable. Effects are those of the published model (Rigling & Moses, Tables I a
 
 import math
 from collections.abc import Iterator
+from functools import cache
 from typing import NamedTuple
 
 from bisar_budget import evaluators
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, ROUNDING, SPEED_OF_LIGHT
 from bisar_budget.errors import KeyPath
-from bisar_budget.geometry import FRAME_AXES, GroundVector, PlatformState, Vector, angle_between_lines
+from bisar_budget.geometry import (
+    FRAME_AXES,
+    BistaticGeometry,
+    GroundVector,
+    PlatformState,
+    Vector,
+    angle_between_lines,
+)
 from bisar_budget.mission.model import Mission, MotionError
 
 PLATFORMS = ("transmitter", "receiver")
@@ -84,13 +92,13 @@ class ImagePlane(NamedTuple):
         )
 
 
-def image_plane(mission: Mission) -> ImagePlane:
+def image_plane(geometry: BistaticGeometry) -> ImagePlane:
     """Invert Q with the range held constant, (19) and (30).
 
     That Q can be singular where the true gradients are not: its second row is v/R, theirs v⊥/R.
     """
     ground = []
-    for platform in (mission.geometry.transmitter, mission.geometry.receiver):
+    for platform in (geometry.transmitter, geometry.receiver):
         ground += [*platform.position[:2], *platform.velocity[:2], platform.slant_range]
     first, second, (determinant,) = evaluators.published_ground_inverse(*ground)
     # (30): the first column holds (-rate_y, rate_x), the second (s_y, -s_x).
@@ -105,10 +113,10 @@ def image_plane(mission: Mission) -> ImagePlane:
     return ImagePlane((first, second), determinant, degeneracy)
 
 
-def error_sources(mission: Mission) -> list[ErrorSource]:
+def error_sources(mission: Mission, geometry: BistaticGeometry) -> list[ErrorSource]:
     """List every position, velocity, acceleration, clock and other error, declared or not, in a fixed order."""
     sources: list[ErrorSource] = []
-    for name, state in zip(PLATFORMS, (mission.geometry.transmitter, mission.geometry.receiver), strict=True):
+    for name, state in zip(PLATFORMS, (geometry.transmitter, geometry.receiver), strict=True):
         sources += _motion(mission, name, state)
     sources += _clock(mission)
     sources += _other(mission)
@@ -195,6 +203,7 @@ def _along(effects: list[Effect], direction: Vector) -> Effect:
     )
 
 
+@cache
 def _equation(kind: str, axis: int | None) -> str:
     if kind == "position":
         return "Table I" if axis is None else f"Table I row {2 + 3 * axis}"
@@ -202,6 +211,7 @@ def _equation(kind: str, axis: int | None) -> str:
     return f"Table II rows {first}-{first + 2}" if axis is None else f"Table II row {first + axis}"
 
 
+@cache
 def _no_limit(kind: str, axis: str) -> str:
     """Say why an error has no QPE limit, for the case that it has none."""
     if kind == "position":

@@ -4,7 +4,7 @@ import csv
 import io
 from collections.abc import Iterator
 
-from bisar_budget.budget.findings import MissionFindings, Report, Row, UnusableMission
+from bisar_budget.budget.findings import MissionFindings, Report, UnusableMission
 from bisar_budget.report import Style
 
 COLUMNS = (
@@ -32,44 +32,59 @@ COLUMNS = (
     "evidence",
 )
 
-_ROW_COLUMNS = frozenset(COLUMNS) & frozenset(Row._fields)
-
 
 def render(report: Report, style: Style) -> str:
     """Write every row of every mission; an unusable file gives one line per fault with the status `error`."""
     output = io.StringIO()
-    writer = csv.DictWriter(output, COLUMNS, restval="", lineterminator="\n")
-    writer.writeheader()
+    writer = csv.writer(output, lineterminator="\n")
+    writer.writerow(COLUMNS)
     for mission in report.missions:
-        records = _faults(mission) if isinstance(mission, UnusableMission) else _rows(mission)
-        for record in records:
-            writer.writerow({key: _cell(value) for key, value in record.items()})
+        writer.writerows(_faults(mission) if isinstance(mission, UnusableMission) else _rows(mission))
     return output.getvalue()
 
 
-def _faults(mission: UnusableMission) -> Iterator[dict[str, object]]:
+def _faults(mission: UnusableMission) -> Iterator[list[object]]:
     for fault in mission.faults:
-        yield {
-            "file": mission.file,
-            "id": fault.key,
+        cells: dict[str, object] = {
+            "file": _text(mission.file),
+            "id": _text(fault.key),
             "status": mission.status,
             "line": fault.line,
-            "reason": str(fault),
+            "reason": _text(str(fault)),
         }
+        yield [cells.get(column) for column in COLUMNS]
 
 
-def _rows(mission: MissionFindings) -> Iterator[dict[str, object]]:
+def _rows(mission: MissionFindings) -> Iterator[list[object]]:
+    file, name = _text(mission.file), _text(mission.name)
     for row in mission.rows:
-        record: dict[str, object] = {"file": mission.file, "mission": mission.name}
-        record |= {key: value for key, value in row._asdict().items() if key in _ROW_COLUMNS}
-        record["notes"] = "; ".join(row.notes)
-        if row.displacement_m is not None:
-            record["displacement_x_m"], record["displacement_y_m"] = row.displacement_m
-        yield record
+        x, y = row.displacement_m or (None, None)
+        yield [
+            file,
+            name,
+            _text(row.id),
+            row.status,
+            row.metric,
+            row.unit,
+            row.declared,
+            row.allowable,
+            row.utilization,
+            row.margin,
+            row.allowable_published,
+            row.allowable_full,
+            row.qpe_published_rad,
+            row.qpe_full_rad,
+            x,
+            y,
+            row.line,
+            row.equation,
+            _text(row.requirement_id),
+            row.reason,
+            "; ".join(row.notes),
+            _text(row.evidence),
+        ]
 
 
-def _cell(value: object) -> object:
-    # A spreadsheet runs text that starts like a formula; an apostrophe makes it text again.
-    if isinstance(value, str) and value[:1] in ("=", "+", "-", "@", "\t", "\r"):
-        return f"'{value}"
-    return value
+def _text(value: str | None) -> str | None:
+    """Keep text of the user's own from being run: a spreadsheet takes what starts like a formula for one."""
+    return f"'{value}" if value and value[0] in "=+-@\t\r" else value

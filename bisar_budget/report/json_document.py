@@ -12,8 +12,25 @@ FORMAT = "bisar-budget/check/1"
 
 
 def render(report: Report, style: Style) -> str:
-    """Write the report as one JSON document; a number that is not finite is refused, never written."""
-    return json.dumps(document(report), indent=2, allow_nan=False) + "\n"
+    """Write the report as one JSON document, a row to a line; a number that is not finite is never written."""
+    return _indented(document(report), _LEVELS) + "\n"
+
+
+_LEVELS = 4  # document, missions, mission, rows: what is inside a row stays on its line
+
+
+def _indented(value: Any, levels: int, margin: str = "") -> str:
+    # json.dumps(indent=…) runs in Python and costs as much as the check itself.
+    if levels == 0 or not value or not isinstance(value, dict | list | tuple):
+        return json.dumps(value, allow_nan=False)
+    inner = margin + "  "
+    if isinstance(value, dict):
+        items = [f"{json.dumps(key)}: {_indented(item, levels - 1, inner)}" for key, item in value.items()]
+        opening, closing = "{", "}"
+    else:
+        items = [_indented(item, levels - 1, inner) for item in value]
+        opening, closing = "[", "]"
+    return f"{opening}\n{inner}" + f",\n{inner}".join(items) + f"\n{margin}{closing}"
 
 
 def document(report: Report) -> dict[str, Any]:

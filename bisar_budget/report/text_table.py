@@ -4,6 +4,7 @@ import math
 import re
 import textwrap
 from collections.abc import Iterator
+from functools import cache
 
 from bisar_budget.budget.findings import MissionFindings, Report, Row, UnusableMission, worst_first
 from bisar_budget.geometry import PlatformState
@@ -124,6 +125,7 @@ def _row(row: Row, style: Style) -> list[str]:
     return lines
 
 
+@cache
 def _short_reference(equation: str) -> str:
     """Shorten `Table II row 4` to `II.4`, `Section V, …` to `V`; what is not from the paper to nothing."""
     match = re.match(r"Table (I+)(?: rows? ([\d-]+))?|Section (V?I*)|(\(\d+\))", equation)
@@ -194,4 +196,6 @@ def _word(status: str, style: Style, width: int = 0) -> str:
 
 
 def _wrapped(text: str, indent: str) -> list[str]:
+    if len(text) <= WIDTH:
+        return [text]
     return textwrap.wrap(text, WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
