@@ -1,5 +1,6 @@
 """The `bisar-budget` command. Everything that costs time to import is imported where it is used."""
 
+import gc
 import os
 import sys
 from collections.abc import Iterable, Sequence
@@ -131,6 +132,8 @@ def _checked(patterns: Sequence[str], today: date) -> "Report":
     from bisar_budget.errors import MissionError
     from bisar_budget.mission.load import load_mission
 
+    # The findings of a thousand missions are 10⁵ tuples without a cycle: nothing to collect.
+    gc.disable()
     missions: list[MissionFindings | UnusableMission] = []
     for file in _expanded(patterns):
         try:

@@ -35,7 +35,6 @@ class _Line(NamedTuple):
     allowable: float | None  # autofocus gain included
     path: KeyPath
     equation: str
-    owner: str = "mission"
     gain: float = 1.0  # of autofocus, within `allowable`
     no_limit: str = ""  # why there is no allowable
     not_evaluated: str = ""  # why a declared value cannot be judged
@@ -73,7 +72,7 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
         *_vibration_lines(mission, allocation),
         *_aggregate_lines(mission, allocation, sources, plane),
     ]
-    rows = [_judge(line, mission, allocation) for line in lines]
+    rows = [_judge(line, mission) for line in lines]
     rows, warnings = apply_waivers(rows, mission, today)
     return MissionFindings(
         file=mission.file,
@@ -97,18 +96,19 @@ def _error_lines(
     mission: Mission, allocation: Allocation, sources: Sequence[ErrorSource], plane: ImagePlane
 ) -> Iterator[_Line]:
     combine = mission.allocation.combine
+    info = f"combine is {combine}: the aggregate decides" if combine != "each" else ""
     gain = allocation.autofocus_gain
+    limits = {owner: allocation.qpe_limit(owner) for owner in ("transmitter", "receiver", "clock", "mission")}
     for source in sources:
-        limit = allocation.qpe_limit(source.owner)
+        limit = limits[source.owner]
         per_unit = abs(source.effect.qpe)
         declared = None if source.declared is None else abs(source.declared)
         qpe = None if declared is None else per_unit * declared
-        notes = list(source.notes)
-        displacement = None
+        notes, displacement = source.notes, None
         if source.declared is not None and source.owner != "mission":
             displacement = plane.displacement(source.effect, source.declared)
             if displacement is None:
-                notes.append(plane.degeneracy)
+                notes = (*notes, plane.degeneracy)
         over = ""
         if qpe is not None and qpe > limit * gain:
             needed = allocation.n_pull_needed(qpe, source.owner)
@@ -124,15 +124,14 @@ def _error_lines(
             allowable=_quotient(limit * gain, per_unit),
             path=source.path,
             equation=source.equation,
-            owner=source.owner,
             gain=gain,
             no_limit=source.no_limit,
-            info=f"combine is {combine}: the aggregate decides" if combine != "each" else "",
+            info=info,
             over=over,
             qpe=qpe,
             displacement=displacement,
             evidence=source.evidence,
-            notes=tuple(notes),
+            notes=notes,
         )
 
 
@@ -171,7 +170,6 @@ def _vibration_lines(mission: Mission, allocation: Allocation) -> Iterator[_Line
                 allowable=allowable,
                 path=(*path, "sinusoidal", index, "amplitude"),
                 equation="Section V, sinusoidal",
-                owner=name,
                 no_limit=missing,
                 not_evaluated=missing or slow,
                 is_declared=sinusoid is not None,
@@ -189,7 +187,6 @@ def _vibration_lines(mission: Mission, allocation: Allocation) -> Iterator[_Line
             allowable=_vibration_allowable(mission, mission.requirements.islr, allocation.islr, name),
             path=(*path, "wideband", "rms"),
             equation="Section V, wideband",
-            owner=name,
             no_limit=missing,
             not_evaluated=missing,
             is_declared=wideband is not None,
@@ -277,14 +274,13 @@ def _qpe_aggregates(mission: Mission, allocation: Allocation, declared: Sequence
                 owner, ("platforms", owner, "motion_error")
             ),
             equation="sum of the rows" if combine == "sum" else "root-sum-square of the rows",
-            owner=owner,
             gain=gain,
             over=over,
             qpe=qpe,
         )
 
 
-def _judge(line: _Line, mission: Mission, allocation: Allocation) -> Row:
+def _judge(line: _Line, mission: Mission) -> Row:
     utilization = margin = None
     if line.declared is not None:
         utilization = 0.0 if line.allowable is None else line.declared / line.allowable

@@ -273,7 +273,8 @@ class Section(Reader):
             for name, annotation in kind.__annotations__.items()
             if hasattr(annotation, "__metadata__")
         }
-        self.optional = kind._field_defaults
+        self.defaults: dict[str, Any] = kind._field_defaults
+        self.required = [name for name in self.keys if name not in self.defaults]
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
         """Read every key, report every fault."""
@@ -281,18 +282,19 @@ class Section(Reader):
             report(path, Problem("must be a mapping of keys to values"))
             return INVALID
         is_valid = True
-        for name in value:
-            if name not in self.keys:
+        values = {}
+        for name, item in value.items():
+            key = self.keys.get(name)
+            if key is None:
                 known = f"accepted: {', '.join(self.keys)}"
                 hint = did_you_mean(name, tuple(self.keys))
-                report(path, Problem("is not a known key", known, hint, at=(name,)))
+                report((*path, name), Problem("is not a known key", known, hint))
                 is_valid = False
-        values = {}
-        for name, key in self.keys.items():
-            if name in value:
-                values[name] = _read(key.reader, value[name], (*path, name), report)
-                is_valid = is_valid and values[name] is not INVALID
-            elif name not in self.optional:
+                continue
+            read = values[name] = item if item is INVALID else key.reader.read(item, (*path, name), report)
+            is_valid = is_valid and read is not INVALID
+        for name in self.required:
+            if name not in value:
                 report((*path, name), Problem("is missing"))
                 is_valid = False
         if not is_valid:
@@ -322,16 +324,15 @@ class Section(Reader):
                 # draft-07 ignores what stands beside a $ref.
                 accepted = {"allOf": [accepted]} if "$ref" in accepted else accepted
                 accepted = {"description": key.description, **accepted}
-            default = self.optional.get(name)
+            default = self.defaults.get(name)
             if isinstance(default, str | int | float):
                 accepted = {**accepted, "default": default}
             properties[name] = accepted
-        required = [name for name in self.keys if name not in self.optional]
         return {
             "description": (self.kind.__doc__ or "").partition("\n")[0],
             "type": "object",
             "properties": properties,
-            **({"required": required} if required else {}),
+            **({"required": self.required} if self.required else {}),
             "additionalProperties": False,
         }
 

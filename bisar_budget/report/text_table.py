@@ -121,7 +121,8 @@ def _row(row: Row, style: Style) -> list[str]:
     cells = (declared, allowable, use, _short_reference(row.equation))
     word = f"{WORDS[row.status]:<8}"
     lines = [_cells(word, row.id, *cells)] if len(row.id) <= 34 else [f"{word} {row.id}", _cells("", "", *cells)]
-    lines[0] = _word(row.status, style, 8) + lines[0][8:]
+    if style.color:
+        lines[0] = _word(row.status, style, 8) + lines[0][8:]
     return lines
 
 
