@@ -26,31 +26,27 @@ def published_motion(
     edge [rad/unit], signed like the range error; unit is m, m/s, m/s². Source: Rigling & Moses, Table I
     rows 2-10, Table II rows 1-6.
     """
-    shared_0 = 1/slant_range
-    shared_1 = shared_0*x
-    shared_2 = -shared_1
-    shared_3 = shared_0*v_x
-    shared_4 = shared_0*y
-    shared_5 = -shared_4
-    shared_6 = shared_0*v_y
-    shared_7 = shared_0*z
-    shared_8 = -shared_7
-    shared_9 = shared_0*v_z
-    shared_10 = 3.1415926535897932/wavelength
-    shared_11 = aperture_time**2*shared_10
-    shared_12 = 0.5*shared_11
-    shared_13 = 0.25*shared_11
-    shared_14 = 0.125*aperture_time**3*shared_10
+    constant_x = -x/slant_range
+    constant_y = -y/slant_range
+    constant_z = -z/slant_range
+    linear_x = -v_x/slant_range
+    linear_y = -v_y/slant_range
+    linear_z = -v_z/slant_range
+    shared_0 = 3.1415926535897932/wavelength
+    shared_1 = aperture_time**2*shared_0
+    shared_2 = 0.5*shared_1
+    shared_3 = 0.25*shared_1
+    shared_4 = 0.125*aperture_time**3*shared_0
     return (
-        (shared_2, -shared_3, 0.0, 0.0),  # position x
-        (shared_5, -shared_6, 0.0, 0.0),  # position y
-        (shared_8, -shared_9, 0.0, 0.0),  # position z
-        (0.0, shared_2, -shared_12*shared_3, 0.0),  # velocity x
-        (0.0, shared_5, -shared_12*shared_6, 0.0),  # velocity y
-        (0.0, shared_8, -shared_12*shared_9, 0.0),  # velocity z
-        (0.0, 0.0, -shared_1*shared_13, -shared_14*shared_3),  # acceleration x
-        (0.0, 0.0, -shared_13*shared_4, -shared_14*shared_6),  # acceleration y
-        (0.0, 0.0, -shared_13*shared_7, -shared_14*shared_9),  # acceleration z
+        (constant_x, linear_x, 0.0, 0.0),  # position x
+        (constant_y, linear_y, 0.0, 0.0),  # position y
+        (constant_z, linear_z, 0.0, 0.0),  # position z
+        (0.0, constant_x, linear_x*shared_2, 0.0),  # velocity x
+        (0.0, constant_y, linear_y*shared_2, 0.0),  # velocity y
+        (0.0, constant_z, linear_z*shared_2, 0.0),  # velocity z
+        (0.0, 0.0, constant_x*shared_3, linear_x*shared_4),  # acceleration x
+        (0.0, 0.0, constant_y*shared_3, linear_y*shared_4),  # acceleration y
+        (0.0, 0.0, constant_z*shared_3, linear_z*shared_4),  # acceleration z
     )
 
 

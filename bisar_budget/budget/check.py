@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator, Sequence
 from datetime import date
-from typing import NamedTuple
 
 from bisar_budget import evaluators
 from bisar_budget.budget.allocation import Allocation, Split, allocate
@@ -25,29 +24,6 @@ FULL_MODEL_NOTE = (
 NO_REQUIREMENT = "no requirement in the file: computed, not judged"
 
 
-class _Line(NamedTuple):
-    """A row before it is judged: what is declared against what is allowed."""
-
-    id: str
-    metric: str
-    unit: str
-    declared: float | None  # magnitude
-    allowable: float | None  # autofocus gain included
-    path: KeyPath
-    equation: str
-    gain: float = 1.0  # of autofocus, within `allowable`
-    no_limit: str = ""  # why there is no allowable
-    not_evaluated: str = ""  # why a declared value cannot be judged
-    info: str = ""  # why the row judges nothing
-    never_fails: bool = False
-    over: str = ""  # what to say when over the limit
-    qpe: float | None = None
-    displacement: GroundVector | None = None
-    evidence: str | None = None
-    notes: tuple[str, ...] = ()
-    is_declared: bool = True  # with `declared` None: something is declared, but its effect has no value
-
-
 def check_mission(mission: Mission, today: date) -> MissionFindings:
     """Check one mission.
 
@@ -67,13 +43,12 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
     plane = image_plane(geometry)
     sources = error_sources(mission, geometry)
     allocation = allocate(mission, sources)
-    lines = [
-        *_error_lines(mission, allocation, sources, plane),
-        *_vibration_lines(mission, allocation),
-        *_aggregate_lines(mission, allocation, sources, plane),
+    judged = [
+        *_error_rows(mission, allocation, sources, plane),
+        *_vibration_rows(mission, allocation),
+        *_aggregate_rows(mission, allocation, sources, plane),
     ]
-    rows = [_judge(line, mission) for line in lines]
-    rows, warnings = apply_waivers(rows, mission, today)
+    rows, warnings = apply_waivers(judged, mission, today)
     return MissionFindings(
         file=mission.file,
         name=mission.name,
@@ -92,9 +67,9 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
     )
 
 
-def _error_lines(
+def _error_rows(
     mission: Mission, allocation: Allocation, sources: Sequence[ErrorSource], plane: ImagePlane
-) -> Iterator[_Line]:
+) -> Iterator[Row]:
     combine = mission.allocation.combine
     info = f"combine is {combine}: the aggregate decides" if combine != "each" else ""
     gain = allocation.autofocus_gain
@@ -116,7 +91,8 @@ def _error_lines(
                 f"QPE {qpe:.3g} rad, {limit * gain:.3g} rad allowed ({source.equation}); "
                 f"passes with autofocus from n_pull {needed:g}"
             )
-        yield _Line(
+        yield _judged(
+            mission,
             id=source.id,
             metric="quadratic_phase_error",
             unit=source.unit,
@@ -141,7 +117,7 @@ def _quotient(numerator: float, denominator: float) -> float | None:
     return quotient if math.isfinite(quotient) else None
 
 
-def _vibration_lines(mission: Mission, allocation: Allocation) -> Iterator[_Line]:
+def _vibration_rows(mission: Mission, allocation: Allocation) -> Iterator[Row]:
     T = mission.collection.aperture_time
     for name in ("transmitter", "receiver"):
         error = getattr(mission.platforms, name).motion_error
@@ -162,7 +138,8 @@ def _vibration_lines(mission: Mission, allocation: Allocation) -> Iterator[_Line
                     f"{cycles:.3g} cycles per aperture: below three it also acts as a quadratic phase error, "
                     "which this row does not count",
                 )
-            yield _Line(
+            yield _judged(
+                mission,
                 id=f"{name}.vibration.sinusoidal.{index}",
                 metric="pslr",
                 unit="m",
@@ -179,7 +156,8 @@ def _vibration_lines(mission: Mission, allocation: Allocation) -> Iterator[_Line
             )
         wideband = error.vibration.wideband
         missing = "" if mission.requirements.islr is not None else "no requirements.islr to hold it to"
-        yield _Line(
+        yield _judged(
+            mission,
             id=f"{name}.vibration.wideband",
             metric="islr",
             unit="m",
@@ -202,9 +180,9 @@ def _vibration_allowable(mission: Mission, requirement_db: float | None, split: 
     return evaluators.vibration_limit(mission.radar.wavelength, math.sqrt(power * split.of(name)))
 
 
-def _aggregate_lines(
+def _aggregate_rows(
     mission: Mission, allocation: Allocation, sources: Sequence[ErrorSource], plane: ImagePlane
-) -> Iterator[_Line]:
+) -> Iterator[Row]:
     combine = mission.allocation.combine
     declared = [source for source in sources if source.declared is not None and source.is_independent]
     if combine != "each":
@@ -212,7 +190,8 @@ def _aggregate_lines(
     # `each` looks at single rows, those along the scene's axes included.
     single = [s for s in sources if s.declared is not None] if combine == "each" else declared
     motion = [source for source in single if source.owner != "mission"]
-    yield _Line(
+    yield _judged(
+        mission,
         id="mission.cubic_phase_error",
         metric="cubic_phase_error",
         unit="rad",
@@ -226,7 +205,8 @@ def _aggregate_lines(
     )
     moves = [plane.displacement(s.effect, s.declared) for s in motion if s.declared is not None]
     known = [move for move in moves if move is not None]
-    yield _Line(
+    yield _judged(
+        mission,
         id="mission.location_error",
         metric="location_error",
         unit="m",
@@ -241,7 +221,8 @@ def _aggregate_lines(
         over="displacement of the image above the requirement, by (25)",
     )
     if allocation.n_pull is not None:
-        yield _Line(
+        yield _judged(
+            mission,
             id="mission.autofocus_pull_in",
             metric="quadratic_phase_error",
             unit="rad",
@@ -254,7 +235,7 @@ def _aggregate_lines(
         )
 
 
-def _qpe_aggregates(mission: Mission, allocation: Allocation, declared: Sequence[ErrorSource]) -> Iterator[_Line]:
+def _qpe_aggregates(mission: Mission, allocation: Allocation, declared: Sequence[ErrorSource]) -> Iterator[Row]:
     combine, gain = mission.allocation.combine, allocation.autofocus_gain
     owners = ["transmitter", "receiver", "mission"]
     if allocation.qpe.clock is not None:
@@ -264,7 +245,8 @@ def _qpe_aggregates(mission: Mission, allocation: Allocation, declared: Sequence
         qpe = combine_phases([s.qpe or 0.0 for s in members], combine) if members else None
         limit = allocation.qpe_limit(owner) * gain
         over = "" if qpe is None else f"passes with autofocus from n_pull {allocation.n_pull_needed(qpe, owner):g}"
-        yield _Line(
+        yield _judged(
+            mission,
             id=f"{'timing' if owner == 'clock' else owner}.quadratic_phase_error",
             metric="quadratic_phase_error",
             unit="rad",
@@ -280,56 +262,77 @@ def _qpe_aggregates(mission: Mission, allocation: Allocation, declared: Sequence
         )
 
 
-def _judge(line: _Line, mission: Mission) -> Row:
+def _judged(
+    mission: Mission,
+    *,
+    id: str,
+    metric: str,
+    unit: str,
+    declared: float | None,  # magnitude
+    allowable: float | None,  # autofocus gain included
+    path: KeyPath,  # of the declared value in the mission file
+    equation: str,
+    gain: float = 1.0,  # of autofocus, within `allowable`
+    over: str = "",  # what to say when over the limit
+    no_limit: str = "",  # why there is no allowable
+    not_evaluated: str = "",  # why a declared value cannot be judged
+    info: str = "",  # why the row judges nothing
+    is_declared: bool = True,  # with `declared` None: something is declared, but its effect has no value
+    never_fails: bool = False,
+    qpe: float | None = None,
+    displacement: GroundVector | None = None,
+    evidence: str | None = None,
+    notes: tuple[str, ...] = (),
+) -> Row:
+    """Judge what is declared against what is allowed.
+
+    The status is the first that applies, in the order of the contract; waivers come after.
+    """
+    warn_above = mission.allocation.warn_above
     utilization = margin = None
-    if line.declared is not None:
-        utilization = 0.0 if line.allowable is None else line.declared / line.allowable
-        headroom = None if line.allowable is None else _quotient(line.allowable, line.declared)
+    reason = no_limit if allowable is None else ""
+    if declared is not None:
+        utilization = 0.0 if allowable is None else declared / allowable
+        headroom = None if allowable is None else _quotient(allowable, declared)
         margin = None if headroom is None else headroom - 1
-    status, reason = _status(line, utilization, mission)
-    if status == "not_evaluated":
+    if declared is None and not (is_declared and not_evaluated):
+        status = "not_declared"
+    elif info:
+        status, reason = "info", info
+    elif not_evaluated or utilization is None:
+        status, reason = "not_evaluated", not_evaluated
         utilization = margin = None  # a number would look like a judgement
-    notes = line.notes
-    if status == "pass_with_autofocus" and utilization is not None and utilization > mission.allocation.warn_above:
-        notes = (*notes, f"uses {100 * utilization:.3g} % of the limit with autofocus")
-    return Row(
-        id=line.id,
-        metric=line.metric,
-        unit=line.unit,
-        declared=line.declared,
-        allowable=line.allowable,
-        allowable_published=line.allowable,
-        allowable_full=None,
-        qpe_published_rad=line.qpe,
-        qpe_full_rad=None,
-        displacement_m=line.displacement,
-        utilization=utilization,
-        margin=margin,
-        status=status,
-        line=mission.line(*line.path),
-        reason=reason or (line.no_limit if line.allowable is None else "") or None,
-        notes=notes,
-        equation=line.equation,
-        requirement_id=mission.requirement_ids.get(line.id),
-        evidence=line.evidence,
+    elif utilization > 1 + UTILIZATION_TOLERANCE:
+        status, reason = ("warn" if never_fails else "fail"), over
+    elif utilization * gain > 1 + UTILIZATION_TOLERANCE:
+        status, reason = "pass_with_autofocus", f"{utilization * gain:.3g} times the limit without autofocus"
+        if utilization > warn_above:
+            notes = (*notes, f"uses {100 * utilization:.3g} % of the limit with autofocus")
+    elif utilization > warn_above:
+        status, reason = "warn", f"above {100 * warn_above:g} % of the limit"
+    else:
+        status = "pass"
+    return Row(  # in the order of its fields: keywords cost as much as the judgement
+        id,
+        metric,
+        unit,
+        declared,
+        allowable,
+        allowable,  # published
+        None,  # full
+        qpe,  # published
+        None,  # full
+        displacement,
+        utilization,
+        margin,
+        status,
+        mission.line(path),
+        reason or None,
+        notes,
+        equation,
+        mission.requirement_ids.get(id),
+        evidence,
     )
-
-
-def _status(line: _Line, utilization: float | None, mission: Mission) -> tuple[str, str]:
-    """Return status and reason: the first that applies, in the order of the contract; waivers come after."""
-    if line.declared is None and not (line.is_declared and line.not_evaluated):
-        return "not_declared", ""
-    if line.info:
-        return "info", line.info
-    if line.not_evaluated or utilization is None:
-        return "not_evaluated", line.not_evaluated
-    if utilization > 1 + UTILIZATION_TOLERANCE:
-        return ("warn" if line.never_fails else "fail"), line.over
-    if utilization * line.gain > 1 + UTILIZATION_TOLERANCE:
-        return "pass_with_autofocus", f"{utilization * line.gain:.3g} times the limit without autofocus"
-    if utilization > mission.allocation.warn_above:
-        return "warn", f"above {100 * mission.allocation.warn_above:g} % of the limit"
-    return "pass", ""
 
 
 def _unknown_requirement_ids(mission: Mission, rows: Sequence[Row]) -> Iterator[Warning]:
@@ -337,7 +340,7 @@ def _unknown_requirement_ids(mission: Mission, rows: Sequence[Row]) -> Iterator[
     for row_id in mission.requirement_ids:
         if row_id not in known:
             yield Warning(
-                line=mission.line("requirement_ids", row_id),
+                line=mission.line(("requirement_ids", row_id)),
                 message=f"requirement_ids: {row_id} is the id of no row",
             )
 

@@ -1,6 +1,5 @@
 """What a check finds, as frozen data. Field names and order are those of the JSON contract."""
 
-from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
@@ -74,8 +73,8 @@ class MissionFindings(NamedTuple):
     @property
     def summary(self) -> dict[str, int]:
         """Number of rows of each status that occurs."""
-        counts = Counter(row.status for row in self.rows)
-        return {status: counts[status] for status in STATUSES if counts[status]}
+        found = [row.status for row in self.rows]
+        return {status: found.count(status) for status in STATUSES if status in found}
 
 
 class UnusableMission(NamedTuple):

@@ -30,7 +30,7 @@ def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> tuple[l
     result = list(rows)
     warnings = []
     for index, waiver in enumerate(mission.waivers):
-        line = mission.line("waivers", index, "id")
+        line = mission.line(("waivers", index, "id"))
         named = [position for position, row in enumerate(rows) if fnmatchcase(row.id, waiver.id)]
         failing = [position for position in named if rows[position].status == "fail"]
         expired = today > waiver.until

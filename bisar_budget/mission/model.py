@@ -329,7 +329,10 @@ class Waiver(NamedTuple):
 
 
 class Mission(NamedTuple):
-    """A mission file that can be used. `file` and `lines` say where it stands: path of a key to its line."""
+    """A mission file that can be used.
+
+    `file` and `places` say where it stands: the path of each value to its 0-based line and column.
+    """
 
     schema_version: Annotated[int, Key(Version())]
     name: Annotated[str, Key(Text())]
@@ -347,7 +350,7 @@ class Mission(NamedTuple):
     simulation: Annotated[Simulation | None, Key(Section(Simulation))] = None
     waivers: Annotated[tuple[Waiver, ...], Key(ListOf(Waiver))] = ()
     file: str = ""
-    lines: Mapping[KeyPath, int] = {}
+    places: Mapping[KeyPath, tuple[int, int]] = {}
 
     def problems(self) -> Iterator[Problem]:
         """Hold it to a collection that forms an image, and to names that can be told apart."""
@@ -356,8 +359,10 @@ class Mission(NamedTuple):
             yield Problem("both platforms are still: no aperture", at=("platforms",))
         elif degeneracy := geometry.degeneracy():
             yield Problem(degeneracy, at=("platforms",))
-        for name, platform in self.platforms._asdict().items():
-            state = platform.state
+        for name, platform, state in (
+            ("transmitter", self.platforms.transmitter, geometry.transmitter),
+            ("receiver", self.platforms.receiver, geometry.receiver),
+        ):
             lowest = state.position[2] - abs(state.velocity[2]) * self.collection.aperture_time / 2
             if lowest < 0:
                 key: KeyPath = ("climb",) if platform.velocity is None else ("velocity", 2)
@@ -376,12 +381,12 @@ class Mission(NamedTuple):
         """Both platforms in the frame of the scene."""
         return BistaticGeometry(transmitter=self.platforms.transmitter.state, receiver=self.platforms.receiver.state)
 
-    def line(self, *path: str | int) -> int | None:
-        """Line of a value in the mission file, else of the nearest key above it that exists."""
+    def line(self, path: KeyPath) -> int | None:
+        """Line of a value in the mission file, from 1, else of the nearest key above it that exists."""
         while path:
-            line = self.lines.get(path)
-            if line is not None:
-                return line
+            place = self.places.get(path)
+            if place is not None:
+                return place[0] + 1
             path = path[:-1]
         return None
 

@@ -2,7 +2,6 @@
 
 import math
 import re
-import textwrap
 from collections.abc import Iterator
 from functools import cache
 
@@ -86,8 +85,8 @@ def _head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
     )
     yield (
         "Resolution",
-        f"{format_quantity(mission.resolution.range, 'm')} in range, "
-        f"{format_quantity(mission.resolution.cross_range, 'm')} in cross range (peak to null, on the ground)",
+        f"{format_quantity(mission.resolution.range, 'm')} range, "
+        f"{format_quantity(mission.resolution.cross_range, 'm')} cross range (peak to null, on ground)",
     )
     split = allocation.qpe
     shares = f"transmitter {split.transmitter:.3g}, receiver {split.receiver:.3g}"
@@ -197,6 +196,13 @@ def _word(status: str, style: Style, width: int = 0) -> str:
 
 
 def _wrapped(text: str, indent: str) -> list[str]:
-    if len(text) <= WIDTH:
-        return [text]
-    return textwrap.wrap(text, WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
+    """Break at spaces before 80 columns; a word that is longer stays whole, so that a path can be copied."""
+    first, *words = text.split(" ")
+    lines, line = [], first
+    for word in words:
+        if len(line) + 1 + len(word) > WIDTH and line.strip():
+            lines.append(line)
+            line = indent + word
+        else:
+            line += f" {word}"
+    return [*lines, line]

@@ -46,7 +46,11 @@ velocity at the aperture midpoint. A slant range, a wavelength and an aperture t
 
 @dataclass(frozen=True)
 class Evaluator:
-    """One function to emit: its arguments in order and its rows of results."""
+    """One function to emit: its arguments in order and its rows of results.
+
+    `quotients` names negated quotients -numerator/denominator to write the rest in. Where they are results
+    themselves, arrays are divided once and no intermediate array stays alive.
+    """
 
     name: str
     summary: str
@@ -54,6 +58,7 @@ class Evaluator:
     arguments: tuple[tuple[Symbol, str], ...]
     rows: tuple[tuple[Expr, ...], ...]
     row_names: tuple[str, ...]
+    quotients: tuple[tuple[str, Symbol, Symbol], ...] = ()
 
 
 class _Printer(PythonCodePrinter):  # type: ignore[misc]
@@ -117,6 +122,11 @@ def evaluators() -> tuple[Evaluator, ...]:
             arguments=(*platform_arguments(TRANSMITTER), *phase_arguments),
             rows=tuple(effects(beta, error) for error in motion),
             row_names=tuple(f"{kind} {axis}" for kind in published.KINDS for axis in "xyz"),
+            quotients=tuple(
+                (f"{name}_{axis}", component, TRANSMITTER.slant_range)
+                for name, vector in (("constant", TRANSMITTER.position), ("linear", TRANSMITTER.velocity))
+                for axis, component in zip("xyz", vector, strict=True)
+            ),
         ),
         Evaluator(
             name="published_clock",
@@ -164,7 +174,9 @@ def _function(evaluator: Evaluator) -> str:
     printer = _Printer({"fully_qualified_modules": False})
     flat = [cell for row in evaluator.rows for cell in row]
     names = dict(evaluator.arguments)
-    renamed = [cell.subs({symbol: Symbol(name) for symbol, name in names.items()}) for cell in flat]
+    quotient = {top: -Symbol(name) * bottom for name, top, bottom in evaluator.quotients}
+    argument = {symbol: Symbol(name) for symbol, name in names.items()}
+    renamed = [cell.subs(quotient).subs(argument) for cell in flat]
     shared, results = cse(renamed, symbols=numbered_symbols("shared_"), order="canonical", list=True)
     arguments = "".join(f"    {name}: float,\n" for name in names.values())
     scalar = len(flat) == 1
@@ -172,6 +184,7 @@ def _function(evaluator: Evaluator) -> str:
     lines = [f"\n\ndef {evaluator.name}(\n{arguments}) -> {result}:\n"]
     docstring = f'"""{evaluator.summary}\n\n{textwrap.fill(evaluator.details, 100)}\n"""'
     lines.append(textwrap.indent(docstring, "    ") + "\n")
+    lines += [f"    {name} = -{names[top]}/{names[bottom]}\n" for name, top, bottom in evaluator.quotients]
     lines += [f"    {symbol} = {printer.doprint(_decimal(value))}\n" for symbol, value in shared]
     if scalar:
         return "".join([*lines, f"    return {printer.doprint(_decimal(results[0]))}\n"])

@@ -24,16 +24,16 @@ def test_values_know_their_line() -> None:
     mission = parse_mission(mission_text(platforms__receiver__motion_error={"velocity": [1, 2, 3]}))
     lines = mission_text(platforms__receiver__motion_error={"velocity": [1, 2, 3]}).splitlines()
     path = ("platforms", "receiver", "motion_error", "velocity")
-    assert lines[mission.line(*path, 1) - 1].strip() == "- 2"
-    assert lines[mission.line(*path, 1) - 3].strip() == "velocity:"
+    assert lines[mission.line((*path, 1)) - 1].strip() == "- 2"
+    assert lines[mission.line((*path, 1)) - 3].strip() == "velocity:"
 
 
 def test_line_of_a_silent_key_is_that_of_the_nearest_that_exists() -> None:
     mission = parse_mission(mission_text())
-    assert mission.line("platforms", "receiver", "motion_error", "velocity", 0) == mission.line(
-        "platforms", "receiver"
+    assert mission.line(("platforms", "receiver", "motion_error", "velocity", 0)) == mission.line(
+        ("platforms", "receiver")
     )
-    assert mission.line("waivers") is None
+    assert mission.line(("waivers",)) is None
 
 
 def test_every_fault_at_once_in_file_order() -> None:
@@ -114,7 +114,7 @@ def test_binary(data: bytes, line: int | None) -> None:
 
 def test_byte_order_mark_and_windows_lines_are_fine() -> None:
     data = b"\xef\xbb\xbf" + mission_text().replace("\n", "\r\n").encode()
-    assert parse_mission(data).line("radar", "bandwidth") == 5
+    assert parse_mission(data).line(("radar", "bandwidth")) == 5
 
 
 def test_missing_file_directory_and_nul_in_the_name(tmp_path) -> None:
@@ -149,7 +149,7 @@ def test_pure_python_parser_reads_the_same(monkeypatch) -> None:
     monkeypatch.setattr(load, "_PARSER", yaml.SafeLoader)
     slow = parse_mission(text)
     assert slow == fast
-    assert slow.lines == fast.lines
+    assert slow.places == fast.places
     with pytest.raises(MissionError, match="fault"):
         parse_mission("radar:\nname: x\n")
 
