@@ -134,7 +134,7 @@ def _motion(mission: Mission, name: str, state: PlatformState) -> Iterator[Error
     error: MotionError = getattr(mission.platforms, name).motion_error
     axes = state.frame(error.frame)
     for kind_index, (kind, unit) in enumerate(MOTION_UNITS.items()):
-        effects = [Effect(constant=a, linear=b, qpe=c, cubic=d) for a, b, c, d in rows[3 * kind_index :][:3]]
+        effects = [Effect._make(row) for row in rows[3 * kind_index :][:3]]
         values: Vector | None = getattr(error, kind)
         factor = mission.allocation.coverage_factor
         declared = None if values is None else tuple(value * factor for value in values)
@@ -145,16 +145,16 @@ def _motion(mission: Mission, name: str, state: PlatformState) -> Iterator[Error
             if declared is not None:
                 on_axis = declared[axis] if in_scene else _along_scene_axis(declared, axes, axis, error.distribution)
             yield ErrorSource(
-                id=f"{name}.{kind}.{letter}",
-                owner=name,
-                unit=unit,
-                declared=on_axis,
-                path=(*path, axis) if in_scene else path,
-                effect=effects[axis],
-                equation=_equation(kind, axis),
-                no_limit=_no_limit(kind, letter),
-                evidence=error.source,
-                is_independent=in_scene,
+                f"{name}.{kind}.{letter}",
+                name,
+                unit,
+                on_axis,
+                (*path, axis) if in_scene else path,
+                effects[axis],
+                _equation(kind, axis),
+                _no_limit(kind, letter),
+                error.source,
+                in_scene,
             )
         if in_scene or declared is None:
             continue

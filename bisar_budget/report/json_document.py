@@ -16,16 +16,17 @@ def render(report: Report, style: Style) -> str:
     return _indented(document(report), _LEVELS) + "\n"
 
 
+_encode = json.JSONEncoder(allow_nan=False).encode
 _LEVELS = 4  # document, missions, mission, rows: what is inside a row stays on its line
 
 
 def _indented(value: Any, levels: int, margin: str = "") -> str:
     # json.dumps(indent=…) runs in Python and costs as much as the check itself.
     if levels == 0 or not value or not isinstance(value, dict | list | tuple):
-        return json.dumps(value, allow_nan=False)
+        return _encode(value)
     inner = margin + "  "
     if isinstance(value, dict):
-        items = [f"{json.dumps(key)}: {_indented(item, levels - 1, inner)}" for key, item in value.items()]
+        items = [f"{_encode(key)}: {_indented(item, levels - 1, inner)}" for key, item in value.items()]
         opening, closing = "{", "}"
     else:
         items = [_indented(item, levels - 1, inner) for item in value]

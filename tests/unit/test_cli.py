@@ -324,11 +324,11 @@ class TestDerive:
         from bisar_budget.theory import emit
 
         changed = tmp_path / "evaluators.py"
-        changed.write_text(emit.TARGET.read_text().replace("0.25*shared_11", "0.26*shared_11"))
+        changed.write_text(emit.TARGET.read_text().replace("0.25*shared_1", "0.26*shared_1"))
         monkeypatch.setattr(emit, "TARGET", changed)
         result = run("derive", "--check")
         assert result.exit_code == 1
-        assert "0.26*shared_11" in result.stdout
+        assert "0.26*shared_1" in result.stdout
         assert run("derive", "--write").exit_code == 0
         assert run("derive", "--check").exit_code == 0
 
