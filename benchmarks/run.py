@@ -75,7 +75,8 @@ def gate(runs: int) -> None:
     examples = sorted(MISSION.parent.glob("*.yaml"))
     every_key = ROOT / "tests" / "acceptance" / "good" / "every_key.yaml"
     print("1000 missions in one call ÷ parsing the same files with PyYAML's C loader, CPU (at most 3)")
-    for label, sources in (("the examples of specs/missions", examples), ("missions that use every key", [every_key])):
+    fleets = {"the examples of specs/missions": examples, "missions that use every key": [every_key]}
+    for label, sources in fleets.items():
         texts = [path.read_text(encoding="utf-8") for path in sources]
         with tempfile.TemporaryDirectory() as folder:
             files = []
