@@ -5,6 +5,7 @@ A small table of its own, because general unit libraries read `3 dBi` as three a
 
 import math
 import re
+from functools import cache
 from typing import NamedTuple
 
 from bisar_budget.constants import STANDARD_GRAVITY
@@ -114,18 +115,23 @@ def parse_quantity(value: object, dimension: Dimension) -> float:
     if digits[0] == "0" and digits[1:2].isdigit():
         raise InvalidValueError("has a leading zero, which some YAML readers take for octal", "write it without")
     number, unit = float(match[0]), text[match.end() :].lstrip()
-    if not unit or unit == dimension.si:
-        return _finite(number, dimension)
-    factor = dimension.units.get(unit)
+    factor = dimension.units.get(unit) if unit else 1.0
     if factor is None:
         unit = _normal(unit)
         factor = dimension.units.get(unit)
     if factor is None:
         raise _wrong_unit(unit, dimension)
-    # Dividing by a whole inverse keeps decimals exact: 5 mm is 0.005, not 0.0050000000000000001.
-    inverse = round(1 / factor) if factor < 1 else 0
-    is_whole = inverse > 0 and abs(inverse * factor - 1) < 1e-12
-    return _finite(number / inverse if is_whole else number * factor, dimension)
+    if factor != 1.0:
+        divisor = _whole_inverse(factor)
+        number = number / divisor if divisor else number * factor
+    return _finite(number, dimension)
+
+
+@cache
+def _whole_inverse(factor: float) -> int:
+    """1/factor where that is whole, else 0: dividing by it keeps decimals exact, 5 mm is 0.005 m to the bit."""
+    inverse = round(1 / factor)
+    return inverse if inverse and abs(inverse * factor - 1) < 1e-12 else 0
 
 
 def format_quantity(value: float, unit: str, digits: int = 3, rounding: str = "nearest") -> str:
