@@ -7,7 +7,7 @@ from datetime import date
 from bisar_budget import evaluators
 from bisar_budget.budget.allocation import Allocation, Split, allocate
 from bisar_budget.budget.combine import combine_displacements, combine_phases
-from bisar_budget.budget.findings import MissionFindings, Resolution, Row, Warning
+from bisar_budget.budget.findings import FileWarning, MissionFindings, Resolution, Row
 from bisar_budget.budget.sources import ErrorSource, ImagePlane, error_sources, image_plane
 from bisar_budget.budget.waivers import apply_waivers
 from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
@@ -19,8 +19,6 @@ FULL_MODEL_NOTE = (
     "allowable_full and qpe_full_rad are null: the full model is not part of this version, the published one "
     "holds the range constant and leaves out what the displacement of the image adds"
 )
-
-
 NO_REQUIREMENT = "no requirement in the file: computed, not judged"
 
 
@@ -335,19 +333,19 @@ def _judged(
     )
 
 
-def _unknown_requirement_ids(mission: Mission, rows: Sequence[Row]) -> Iterator[Warning]:
+def _unknown_requirement_ids(mission: Mission, rows: Sequence[Row]) -> Iterator[FileWarning]:
     known = {row.id for row in rows}
     for row_id in mission.requirement_ids:
         if row_id not in known:
-            yield Warning(
+            yield FileWarning(
                 line=mission.line(("requirement_ids", row_id)),
                 message=f"requirement_ids: {row_id} is the id of no row",
             )
 
 
-def _nothing_declared(rows: Sequence[Row]) -> Iterator[Warning]:
+def _nothing_declared(rows: Sequence[Row]) -> Iterator[FileWarning]:
     if all(row.status == "not_declared" for row in rows):
-        yield Warning(line=None, message="no error is declared: nothing was judged")
+        yield FileWarning(line=None, message="no error is declared: nothing was judged")
 
 
 def _unused_keys(mission: Mission) -> Iterator[str]:

@@ -36,7 +36,7 @@ class Row(NamedTuple):
     evidence: str | None
 
 
-class Warning(NamedTuple):
+class FileWarning(NamedTuple):
     """Something about the mission file that changes no verdict but should not go unsaid."""
 
     line: int | None
@@ -62,7 +62,7 @@ class MissionFindings(NamedTuple):
     resolution: Resolution
     allocation: Allocation
     rows: tuple[Row, ...]
-    warnings: tuple[Warning, ...]
+    warnings: tuple[FileWarning, ...]
     notes: tuple[str, ...]
 
     @property

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from datetime import date
 from fnmatch import fnmatchcase
 
-from bisar_budget.budget.findings import Row, Warning
+from bisar_budget.budget.findings import FileWarning, Row
 from bisar_budget.mission.model import Mission
 
 
-def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> tuple[list[Row], list[Warning]]:
+def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> tuple[list[Row], list[FileWarning]]:
     """Waive failing rows that a valid waiver names.
 
     Parameters
@@ -24,7 +24,7 @@ def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> tuple[l
     -------
     rows : list of Row
         Failing rows with a valid waiver are `waived`; one with an expired waiver keeps its status, with a note.
-    warnings : list of Warning
+    warnings : list of FileWarning
         Waivers that name no row, or none that fails.
     """
     result = list(rows)
@@ -42,7 +42,7 @@ def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> tuple[l
             elif row.status == "fail":
                 result[position] = row._replace(status="waived", notes=(*row.notes, words))
         if not named:
-            warnings.append(Warning(line=line, message=f"waiver {waiver.id}: matches no row"))
+            warnings.append(FileWarning(line=line, message=f"waiver {waiver.id}: matches no row"))
         elif not failing:
-            warnings.append(Warning(line=line, message=f"waiver {waiver.id}: unused, no row it names fails"))
+            warnings.append(FileWarning(line=line, message=f"waiver {waiver.id}: unused, no row it names fails"))
     return result, warnings
