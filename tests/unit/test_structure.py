@@ -17,6 +17,7 @@ FLOORS = [
     {"theory", "evaluators"},
     {"mission"},
     {"budget"},
+    {"simulate"},
     {"report"},
     {"cli"},
     {"__main__"},

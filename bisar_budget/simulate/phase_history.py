@@ -1,0 +1,177 @@
+"""Bistatic phase history of point scatterers, (1) to (3) of Rigling & Moses, from exact ranges.
+
+There is no Taylor series here: the simulator judges the expansions, so it must not share them.
+Frame: scene centre at the origin, x east, y north, z up. SI units.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.geometry import PlatformState
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sinusoid:
+    """One vibration along the line of sight: amplitude 0 to peak [m], frequency [Hz], phase at τ = 0 [rad]."""
+
+    amplitude: float
+    frequency: float
+    phase: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotionError:
+    """Measured minus actual position of one platform, r̃(τ): (22) and what is faster.
+
+    Position [m], velocity [m/s] and acceleration [m/s²] are east-north-up; vibration is along the line of
+    sight, positive away from the scene. `wideband_rms` [m] is white over the pulses and needs a generator.
+    """
+
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    acceleration: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    sinusoids: tuple[Sinusoid, ...] = ()
+    wideband_rms: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Path:
+    """Where a platform is at each pulse and where its navigation says it is, each (pulses, 3). [m]"""
+
+    actual: Floats
+    measured: Floats
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PhaseHistory:
+    """Received samples after motion compensation to the scene centre, and what the processor knows of them.
+
+    `samples` is (pulses, frequencies); `slow_time` [s] and `frequency` [Hz] are evenly spaced;
+    `transmitter` and `receiver` are the measured positions, (pulses, 3). [m]
+    """
+
+    samples: Complexes
+    slow_time: Floats
+    frequency: Floats
+    transmitter: Floats
+    receiver: Floats
+
+
+def cell_centres(length: float, count: int) -> Floats:
+    """Centres of `count` equal cells of an interval about zero: samples that stand for the whole of it."""
+    centres: Floats = np.linspace(-(length - length / count) / 2, (length - length / count) / 2, count)
+    return centres
+
+
+def path(
+    state: PlatformState,
+    slow_time: Floats,
+    error: MotionError | None = None,
+    rng: np.random.Generator | None = None,
+) -> Path:
+    """Fly one platform straight through its midpoint state, and measure it with an error.
+
+    Parameters
+    ----------
+    state : PlatformState
+        At τ = 0.
+    slow_time : (pulses,) ndarray
+        [s]
+    error : MotionError, optional
+        None: the navigation is perfect.
+    rng : numpy Generator, optional
+        Needed for wideband vibration only.
+
+    Raises
+    ------
+    ValueError
+        Wideband vibration without a generator.
+    """
+    tau = slow_time[:, None]
+    actual = np.asarray(state.position) + np.asarray(state.velocity) * tau
+    if error is None:
+        return Path(actual=actual, measured=actual)
+    # (22): p̃ + ṽτ + ãτ²/2
+    measured = actual + np.asarray(error.position) + np.asarray(error.velocity) * tau
+    measured = measured + np.asarray(error.acceleration) * tau**2 / 2
+    along = np.zeros_like(slow_time)
+    for sinusoid in error.sinusoids:
+        along += sinusoid.amplitude * np.sin(2 * math.pi * sinusoid.frequency * slow_time + sinusoid.phase)
+    if error.wideband_rms:
+        if rng is None:
+            raise ValueError("wideband vibration needs a random generator")
+        along += rng.normal(0.0, error.wideband_rms, slow_time.shape)
+    sight = actual / np.linalg.norm(actual, axis=1, keepdims=True)
+    return Path(actual=actual, measured=measured + sight * along[:, None])
+
+
+def phase_history(
+    scatterers: Floats,
+    amplitudes: Complexes,
+    *,
+    slow_time: Floats,
+    frequency: Floats,
+    transmitter: Path,
+    receiver: Path,
+    clock_error: Floats | float = 0.0,
+    noise_power: float = 0.0,
+    rng: np.random.Generator | None = None,
+) -> PhaseHistory:
+    """Return what the receiver records, motion compensated with the measured positions.
+
+    Parameters
+    ----------
+    scatterers : (scatterers, 3) ndarray
+        Positions. [m]
+    amplitudes : (scatterers,) ndarray
+        Complex reflection coefficients A_m of (3).
+    slow_time : (pulses,) ndarray
+        [s]
+    frequency : (frequencies,) ndarray
+        [Hz]
+    transmitter, receiver : Path
+        At the pulses.
+    clock_error : (pulses,) ndarray or float
+        t̃(τ) of (1). [s]
+    noise_power : float
+        Variance of the circular white Gaussian noise of a sample, relative to amplitude 1.
+    rng : numpy Generator, optional
+        Needed for noise only.
+
+    Returns
+    -------
+    PhaseHistory
+
+    Raises
+    ------
+    ValueError
+        Noise without a generator.
+    """
+    wavenumber = 2 * math.pi * frequency / SPEED_OF_LIGHT
+    reference = np.linalg.norm(transmitter.measured, axis=1) + np.linalg.norm(receiver.measured, axis=1)
+    clock = SPEED_OF_LIGHT * np.broadcast_to(np.asarray(clock_error, dtype=float), slow_time.shape)
+    samples = np.zeros((slow_time.size, frequency.size), dtype=complex)
+    for position, amplitude in zip(np.atleast_2d(scatterers), np.atleast_1d(amplitudes), strict=True):
+        actual = np.linalg.norm(transmitter.actual - position, axis=1)
+        actual += np.linalg.norm(receiver.actual - position, axis=1)
+        differential_range = actual - reference + clock  # (1)
+        samples += amplitude * np.exp(-1j * np.outer(differential_range, wavenumber))  # (2), (3)
+    if noise_power:
+        if rng is None:
+            raise ValueError("noise needs a random generator")
+        scale = math.sqrt(noise_power / 2)
+        samples += rng.normal(0.0, scale, samples.shape) + 1j * rng.normal(0.0, scale, samples.shape)
+    return PhaseHistory(
+        samples=samples,
+        slow_time=slow_time,
+        frequency=frequency,
+        transmitter=transmitter.measured,
+        receiver=receiver.measured,
+    )

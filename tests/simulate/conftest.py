@@ -1,0 +1,79 @@
+"""Geometries for the image tests: the paper's ranges at any squint."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.geometry import BistaticGeometry, PlatformState, state_from_angles
+from bisar_budget.simulate.phase_history import MotionError, PhaseHistory, cell_centres, path, phase_history
+
+
+@dataclass(frozen=True)
+class Collection:
+    """Section V at 10 GHz, both platforms turned by the same squint."""
+
+    geometry: BistaticGeometry
+    aperture_time: float = 6.0
+    pulses: int = 256
+    frequencies: int = 96
+    center_frequency: float = 10e9
+    bandwidth: float = 300e6
+
+    @property
+    def wavelength(self) -> float:
+        return SPEED_OF_LIGHT / self.center_frequency
+
+    @property
+    def slow_time(self):
+        return cell_centres(self.aperture_time, self.pulses)
+
+    @property
+    def cross_range_resolution(self) -> float:
+        return self.geometry.cross_range_resolution(self.wavelength, self.aperture_time)
+
+    def paths(self, **errors: MotionError):
+        return [
+            path(getattr(self.geometry, name), self.slow_time, errors.get(name))
+            for name in ("transmitter", "receiver")
+        ]
+
+    def record(self, scatterers, amplitudes=(1.0,), **errors: MotionError) -> PhaseHistory:
+        transmitter, receiver = self.paths(**errors)
+        return phase_history(
+            np.atleast_2d(np.asarray(scatterers, dtype=float)),
+            np.asarray(amplitudes, dtype=complex),
+            slow_time=self.slow_time,
+            frequency=self.center_frequency + cell_centres(self.bandwidth, self.frequencies),
+            transmitter=transmitter,
+            receiver=receiver,
+        )
+
+
+def platform(slant_range: float, height: float, azimuth: float, speed: float, squint: float) -> PlatformState:
+    return state_from_angles(
+        slant_range=slant_range,
+        azimuth=azimuth,
+        elevation=math.asin(height / slant_range),
+        speed=speed,
+        motion_azimuth=azimuth + math.pi / 2 + squint,
+        climb=0.0,
+    )
+
+
+def collection(squint_deg: float = 0.0, **options) -> Collection:
+    squint = math.radians(squint_deg)
+    return Collection(
+        BistaticGeometry(
+            transmitter=platform(31e3, 6e3, 0.0, 150.0, squint),
+            receiver=platform(8.5e3, 2e3, math.pi / 4, 60.0, squint),
+        ),
+        **options,
+    )
+
+
+@pytest.fixture
+def broadside() -> Collection:
+    return collection()
