@@ -233,6 +233,48 @@ def _fail(message: str) -> NoReturn:
 
 
 @cli.command()
+@click.argument("missions", nargs=-1, required=True, metavar="MISSION...")
+@click.option("--only", default="*", metavar="GLOB", help="Verify only the rows whose id matches.")
+@click.option(
+    "--format",
+    "format_name",
+    type=click.Choice(["text", "json"]),
+    default="text",
+    show_default=True,
+    help="Format of the verdicts.",
+)
+@click.option("-o", "--output", metavar="FILE", help="Write to FILE instead of standard output.")
+def verify(missions: Sequence[str], only: str, format_name: str, output: str | None) -> None:
+    """Form images with each error at its limit and measure whether the limit is true.
+
+    The data come from exact ranges, and the phase is measured in the image. A limit is confirmed if the
+    image shows its budget within 5 %, optimistic if it shows more, conservative if less. Limits are those
+    without autofocus. Exit code: 0, or 1 if a limit is optimistic, 2 for wrong usage or an unusable file.
+    """
+    from bisar_budget.errors import MissionError
+    from bisar_budget.mission.load import load_mission
+    from bisar_budget.report import Style, verification
+    from bisar_budget.simulate.verify import verify_mission
+
+    try:
+        loaded = [load_mission(file) for file in _expanded(missions)]
+    except MissionError as error:
+        for line in error.lines():
+            click.echo(line, err=True)
+        sys.exit(EXIT_USAGE)
+    verified = [verify_mission(mission, only) for mission in loaded]
+    if format_name == "json":
+        text = verification.as_json(__version__, verified)
+    else:
+        text = verification.as_text(verified, Style(color=output is None and _wants_color()))
+    if output is None:
+        _print(text)
+    else:
+        _write(output, text)
+    sys.exit(EXIT_BROKEN if any(mission.status == "fail" for mission in verified) else 0)
+
+
+@cli.command()
 @click.argument("file", default="mission.yaml")
 @click.option("--name", default="My bistatic mission", show_default=True, help="Name of the mission.")
 @click.option("--force", is_flag=True, help="Replace an existing file.")

@@ -10,6 +10,7 @@ from bisar_budget.simulate.phase_history import Floats, Path
 
 _ORDER = 6  # of the fit in slow time
 _ITERATIONS = 20
+_SETTLED_M = 1e-6  # a satellite's range in double precision gives no more
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,7 +52,7 @@ def exact_effect(
         slope = np.polynomial.polynomial.polyfit(place, gradient, _ORDER)
         step = np.linalg.solve(slope[:2], left[:2])
         point[:2] += step
-        if np.hypot(*step) < 1e-9:
+        if np.hypot(*step) < _SETTLED_M:
             scale = 2 * math.pi / wavelength_m
             return ExactEffect(
                 displacement=(float(point[0]), float(point[1])),

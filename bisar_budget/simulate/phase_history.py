@@ -6,6 +6,7 @@ Frame: scene centre at the origin, x east, y north, z up. SI units.
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +18,7 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Sinusoid:
+class Sinusoid(NamedTuple):
     """One vibration along the line of sight: amplitude 0 to peak [m], frequency [Hz], phase at τ = 0 [rad]."""
 
     amplitude: float
@@ -26,8 +26,7 @@ class Sinusoid:
     phase: float = 0.0
 
 
-@dataclass(frozen=True, kw_only=True)
-class MotionError:
+class MotionError(NamedTuple):
     """Measured minus actual position of one platform, r̃(τ): (22) and what is faster.
 
     Position [m], velocity [m/s] and acceleration [m/s²] are east-north-up; vibration is along the line of

@@ -151,7 +151,7 @@ def response(phase, window=None, count: int = 256, extent: int = 8):
 TABLE = [
     # QPE, uniform: width, peak, PSLR, ISLR; Taylor -35 dB n̄ 5: the same. Fixed mask, width and peak relative.
     (0, (1, 0, -13.26, -9.68), (1, 0, -35.2, -27.4)),
-    # The tapered PSLR sits on the edge of the mask, 0.25 dB for 1 % of it: direct quadrature at the null; so for its ISLR.
+    # The tapered PSLR sits on the edge of the mask, 0.25 dB for 1 % of it: direct quadrature at the null.
     (math.pi / 8, (1.003, -0.06, -12.94, -9.38), (1.005, -0.03, -28.90, -26.6)),
     (math.pi / 4, (1.013, -0.24, -12.04, -8.58), (1.019, -0.14, -22.79, -24.6)),
     (math.pi / 2, (1.061, -0.97, -9.04, -6.27), (1.082, -0.53, -16.46, -20.16)),

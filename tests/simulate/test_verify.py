@@ -1,0 +1,168 @@
+"""Verdicts: what images at the boundary must say, on both sides of it, and the command that says it."""
+
+import json
+import math
+
+import pytest
+
+from bisar_budget.mission.load import load_mission, parse_mission
+from bisar_budget.simulate.verify import verify_mission
+from tests.conftest import ROOT, mission_text
+
+SECTION_V = ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml"
+
+
+def verdicts(only: str = "*", **changes):
+    return {row.id: row for row in verify_mission(parse_mission(mission_text(**changes)), only).rows}
+
+
+def test_every_row_with_a_limit_has_a_verdict() -> None:
+    rows = {row.id: row for row in verify_mission(load_mission(str(SECTION_V))).rows}
+    assert set(rows) == {
+        "transmitter.velocity.y", "transmitter.acceleration.x", "transmitter.acceleration.z",
+        "receiver.velocity.x", "receiver.velocity.y",
+        "receiver.acceleration.x", "receiver.acceleration.y", "receiver.acceleration.z", "timing.quadratic",
+    }  # fmt: skip
+    for row in rows.values():
+        assert row.measured_qpe_rad == pytest.approx(row.predicted_qpe_rad, rel=0.01)
+        assert row.measured_inside_rad == pytest.approx(0.9 * row.measured_qpe_rad, rel=0.01)
+        assert row.measured_beyond_rad == pytest.approx(1.1 * row.measured_qpe_rad, rel=0.01)
+
+
+def test_acceleration_limits_are_true_and_the_receivers_velocity_limit_is_not() -> None:
+    """At broadside the displacement adds 6 % for the receiver along y, and takes as much along x."""
+    rows = {row.id: row for row in verify_mission(load_mission(str(SECTION_V)), "receiver.*").rows}
+    assert rows["receiver.acceleration.x"].verdict == "confirmed"
+    assert rows["receiver.velocity.y"].verdict == "optimistic"
+    assert rows["receiver.velocity.x"].verdict == "conservative"
+    assert rows["receiver.velocity.y"].measured_qpe_rad / (math.pi / 8) == pytest.approx(1.06, abs=0.01)
+
+
+def test_a_response_at_the_limit_is_hardly_wider() -> None:
+    """π/8: 0.3 % wider, 0.06 dB down, PSLR -12.94 dB, from the table of the impulse response."""
+    row = verdicts("timing.quadratic")["timing.quadratic"]
+    assert row.irw_ratio == pytest.approx(1.003, abs=0.001)
+    assert row.peak_loss_db == pytest.approx(0.06, abs=0.005)
+    assert row.pslr_db == pytest.approx(-12.94, abs=0.05)
+
+
+def test_at_a_squint_the_published_velocity_limits_are_untrue() -> None:
+    """30°, receiver along y: brute force found 2.11 rad where four limits promise 1.571, so 1.34 times the budget."""
+    from tests.simulate.conftest import collection
+
+    geometry = collection(30).geometry
+    platforms = {
+        name: {
+            "position": list(getattr(geometry, name).position),
+            "velocity": list(getattr(geometry, name).velocity),
+        }
+        for name in ("transmitter", "receiver")
+    }
+    row = verdicts("receiver.velocity.y", platforms=platforms)["receiver.velocity.y"]
+    assert row.verdict == "optimistic"
+    assert row.measured_qpe_rad / row.budget_rad == pytest.approx(2.11 / 1.571, rel=0.03)
+
+
+def test_a_response_close_to_the_receiver_is_cut_along_its_ellipse() -> None:
+    """1.5 km away a straight cut of 560 m leaves the range cell of 3.5 m and measured twice the phase."""
+    mission = load_mission(str(ROOT / "specs" / "missions" / "sentinel1_fixed_receiver.yaml"))
+    for row in verify_mission(mission).rows:
+        assert row.verdict == "confirmed", row.id
+
+
+@pytest.mark.parametrize("cycles", [4.3, 10, 37.2])
+def test_paired_echo_of_one_platform_at_the_published_limit(cycles: float) -> None:
+    """A phase of peak √(PSLR/2) makes echoes of half that: PSLR/8, 9 dB inside the requirement."""
+    vibration = {"sinusoidal": [{"amplitude": 1e-6, "frequency": cycles / 6}]}
+    row_id = "receiver.vibration.sinusoidal.0"
+    rows = verdicts(row_id, requirements__pslr=-30, platforms__receiver__motion_error={"vibration": vibration})
+    assert rows[row_id].measured_db == pytest.approx(-30 - 10 * math.log10(8), abs=0.4)
+    assert rows[row_id].verdict == "conservative"
+
+
+def test_wideband_power_of_one_platform_at_the_published_limit() -> None:
+    """A phase variance of ISLR/2 spreads that power: 3 dB inside, for one platform of two."""
+    row = verdicts("*.wideband", requirements__islr=-20)["transmitter.vibration.wideband"]
+    assert row.measured_db == pytest.approx(-20 - 10 * math.log10(2), abs=4 * row.measured_db_error)
+    assert row.measured_db_error < 0.15
+    assert row.verdict == "conservative"
+
+
+def test_both_platforms_at_the_wideband_limit_fill_the_requirement() -> None:
+    """One platform that owns nearly all of the power meets the requirement itself."""
+    split = {"islr": {"transmitter": 0.99, "receiver": 0.01}}
+    row = verdicts("transmitter.*.wideband", requirements__islr=-20, allocation__split=split)
+    assert row["transmitter.vibration.wideband"].verdict == "confirmed"
+
+
+@pytest.mark.parametrize("frequency", [0.3, 100.0])
+def test_vibrations_that_no_cut_shows_are_not_evaluated(frequency: float) -> None:
+    vibration = {"sinusoidal": [{"amplitude": 1e-6, "frequency": frequency}]}
+    row_id = "receiver.vibration.sinusoidal.0"
+    row = verdicts(row_id, requirements__pslr=-30, platforms__receiver__motion_error={"vibration": vibration})[row_id]
+    assert (row.verdict, row.measured_db) == ("not_evaluated", None)
+    assert "cycles per aperture" in row.reason
+
+
+def test_errors_along_a_frame_of_their_own_are_put_in_along_it() -> None:
+    error = {"frame": "look", "acceleration": [1e-4, 0, 0]}
+    row = verdicts("receiver.acceleration.*", platforms__receiver__motion_error=error)
+    sight = row["receiver.acceleration.line_of_sight"]
+    assert sight.verdict == "confirmed"
+    assert sight.boundary_error < row["receiver.acceleration.x"].boundary_error
+
+
+def test_an_error_that_moves_the_image_far_is_not_evaluated() -> None:
+    """A velocity limit of metres per second over half a second: the row beside it, with a sight-line part."""
+    platforms = {
+        "transmitter": {
+            "slant_range": "600 km",
+            "azimuth": 0,
+            "elevation": 0.9,
+            "speed": 7500,
+            "motion_azimuth": 1.2,
+        },
+        "receiver": {"slant_range": "2 km", "azimuth": 0.6, "elevation": 0.1, "speed": 0},
+    }
+    row = verdicts("transmitter.velocity.x", platforms=platforms, collection__aperture_time=0.5)
+    assert row["transmitter.velocity.x"].verdict == "not_evaluated"
+    assert "moves the image by" in row["transmitter.velocity.x"].reason
+
+
+class TestCommand:
+    KEYS = {
+        "id", "model", "boundary_error", "unit", "budget_rad", "predicted_qpe_rad", "measured_qpe_rad", "irw_ratio",
+        "peak_loss_db", "pslr_db", "islr_db", "displacement_m", "verdict",
+    }  # fmt: skip
+
+    def test_json_contract(self, run) -> None:
+        result = run("verify", SECTION_V, "--format", "json", "--only", "receiver.velocity.*")
+        document = json.loads(result.stdout)
+        assert document["format"] == "bisar-budget/verify/1"
+        (mission,) = document["missions"]
+        assert [row["id"] for row in mission["rows"]] == ["receiver.velocity.x", "receiver.velocity.y"]
+        assert all(row.keys() >= self.KEYS for row in mission["rows"])
+
+    def test_exit_1_if_a_limit_is_optimistic(self, run) -> None:
+        assert run("verify", SECTION_V, "--only", "receiver.velocity.y").exit_code == 1
+        assert run("verify", SECTION_V, "--only", "receiver.acceleration.*").exit_code == 0
+
+    def test_text_names_limit_budget_image_and_verdict(self, run) -> None:
+        line = next(
+            line
+            for line in run("verify", SECTION_V, "--only", "receiver.velocity.y").stdout.splitlines()
+            if line.startswith("receiver.velocity.y")
+        )
+        assert line.split()[1:] == ["41.7", "mm/s", "0.393", "rad", "0.417", "rad", "0.417", "rad", "optimistic"]
+
+    def test_unusable_mission_is_2(self, run, tmp_path) -> None:
+        result = run("verify", tmp_path / "none.yaml")
+        assert result.exit_code == 2
+        assert "cannot be read" in result.stderr
+
+    def test_a_glob_without_rows_says_so(self, run) -> None:
+        assert "no row" in run("verify", SECTION_V, "--only", "nothing").stdout
+
+    def test_output_file(self, run, tmp_path) -> None:
+        run("verify", SECTION_V, "--only", "timing.*", "--format", "json", "-o", tmp_path / "v.json")
+        assert json.loads((tmp_path / "v.json").read_text())["missions"]
