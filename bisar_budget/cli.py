@@ -4,33 +4,41 @@ import gc
 import os
 import sys
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from datetime import UTC, date, datetime
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
 from bisar_budget import __version__
+from bisar_budget.errors import printable
 
 if TYPE_CHECKING:
     from bisar_budget.budget.findings import MissionFindings, Report
 
-EXIT_BROKEN, EXIT_USAGE, EXIT_OUR_FAULT = 1, 2, 3
+EXIT_BROKEN, EXIT_USAGE, EXIT_OUR_FAULT, EXIT_INTERRUPTED = 1, 2, 3, 130
 
 
 class _Commands(click.Group):
     """A group whose crashes exit with 3: 1 means a broken requirement and nothing else."""
 
     def main(self, *args: Any, **kwargs: Any) -> Any:
+        kwargs["standalone_mode"] = False  # click would exit with 1 on an interrupt or a broken pipe
         try:
-            return super().main(*args, **kwargs)
+            sys.exit(super().main(*args, **kwargs))
+        except click.ClickException as error:
+            with suppress(OSError):  # standard error may be closed; the exit code still says it
+                error.show()
+            sys.exit(error.exit_code)
+        except (click.Abort, KeyboardInterrupt):
+            sys.exit(EXIT_INTERRUPTED)
         except Exception as error:
             if os.environ.get("BISAR_BUDGET_DEBUG"):
                 raise
-            click.echo(
+            _complain(
                 f"bisar-budget {__version__}: a fault of the tool itself, nothing was judged "
-                f"({type(error).__name__}: {error}).\n"
-                "Please report it; BISAR_BUDGET_DEBUG=1 shows where it happened.",
-                err=True,
+                f"({type(error).__name__}: {printable(str(error))}).\n"
+                "Please report it; BISAR_BUDGET_DEBUG=1 shows where it happened."
             )
             sys.exit(EXIT_OUR_FAULT)
 
@@ -110,8 +118,10 @@ def check(
             f"--model {model}: not supported by this version of bisar-budget; it comes with the full model."
         )
     written = [(name, _format_of(name)) for name in reports]
-    report = _checked(missions, today.date() if today else _today())
-    if format_name != "text" or output is not None or not _is_terminal():
+    files = _expanded(missions)
+    _spare(files, [output, *reports])
+    report = _checked(files, today.date() if today else _today(), model)
+    if format_name != "text" or output is not None or quiet or not _is_terminal():
         _say_faults(report)
     verbosity = -1 if quiet else 1 if verbose else 0
     for path, its_format in written:
@@ -126,7 +136,7 @@ def check(
     sys.exit(0 if exit_zero and code == EXIT_BROKEN else code)
 
 
-def _checked(patterns: Sequence[str], today: date) -> "Report":
+def _checked(files: Sequence[str], today: date, model: str | None) -> "Report":
     from bisar_budget.budget.check import check_mission
     from bisar_budget.budget.findings import Report, UnusableMission
     from bisar_budget.errors import MissionError
@@ -135,9 +145,9 @@ def _checked(patterns: Sequence[str], today: date) -> "Report":
     # The findings of a thousand missions are 10⁵ tuples without a cycle: nothing to collect.
     gc.disable()
     missions: list[MissionFindings | UnusableMission] = []
-    for file in _expanded(patterns):
+    for file in files:
         try:
-            missions.append(check_mission(load_mission(file), today))
+            missions.append(check_mission(load_mission(file, model), today))
         except MissionError as error:
             missions.append(UnusableMission(file=file, faults=error.faults))
     return Report(version=__version__, missions=tuple(missions))
@@ -182,53 +192,93 @@ def _say_faults(report: "Report") -> None:
     for mission in report.missions:
         if isinstance(mission, UnusableMission):
             for line in MissionError(mission.file, mission.faults).lines():
-                click.echo(line, err=True)
+                _complain(line)
+
+
+def _complain(message: str) -> None:
+    """Say something on standard error; that nobody listens changes no exit code."""
+    with suppress(OSError):
+        click.echo(message, err=True)
+
+
+def _spare(files: Sequence[str], targets: Iterable[str | None]) -> None:
+    """Refuse to write a report over a mission."""
+    missions = {os.path.realpath(file) for file in files if file != "-"}
+    for target in targets:
+        if target is not None and os.path.realpath(target) in missions:
+            _fail(f"{target} is a mission file; a report would replace it")
 
 
 def _is_terminal() -> bool:
-    return sys.stdout.isatty() and sys.stderr.isatty()
+    return all(stream is not None and stream.isatty() for stream in (sys.stdout, sys.stderr))
 
 
 def _wants_color() -> bool:
-    return sys.stdout.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+    return (
+        sys.stdout is not None
+        and sys.stdout.isatty()
+        and not os.environ.get("NO_COLOR")
+        and os.environ.get("TERM") != "dumb"
+    )
 
 
 def _print(text: str) -> None:
     """Write to standard output; a reader that went away changes no exit code."""
+    if sys.stdout is None:
+        _fail("cannot write: standard output is closed")
     if hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(errors="replace")
     try:
         sys.stdout.write(text)
         sys.stdout.flush()
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except OSError as error:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # else Python complains again at exit
+        if not isinstance(error, BrokenPipeError):
+            _fail(f"cannot write standard output: {error.strerror}")
 
 
 def _write(path: str, text: str) -> None:
-    """Replace a file whole: written beside it under another name, then renamed."""
+    """Replace a file whole: written beside it under another name, then renamed. `-` is standard output.
+
+    A link keeps pointing where it does; what is no file, a device or a pipe, is written to as it is.
+    """
     import tempfile
 
-    folder, name = os.path.split(os.path.abspath(path))
+    if path == "-":
+        _print(text)
+        return
+    target = os.path.realpath(path)
+    folder, name = os.path.split(target)
     temporary = None
     try:
+        if os.path.exists(target) and not os.path.isfile(target):
+            with open(target, "w", encoding="utf-8", errors="backslashreplace") as special:
+                special.write(text)
+            return
         os.makedirs(folder, exist_ok=True)
         with tempfile.NamedTemporaryFile(
-            "w", encoding="utf-8", newline="\n", dir=folder, prefix=f".{name}.", delete=False
+            "w",
+            encoding="utf-8",
+            errors="backslashreplace",
+            newline="\n",
+            dir=folder,
+            prefix=f".{name}.",
+            delete=False,
         ) as file:
             temporary = file.name
             file.write(text)
         mask = os.umask(0)
         os.umask(mask)
         os.chmod(temporary, 0o666 & ~mask)  # a temporary file is private, a report is not
-        os.replace(temporary, path)
-    except OSError as error:
+        os.replace(temporary, target)
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         if temporary is not None and os.path.exists(temporary):
             os.unlink(temporary)
-        _fail(f"cannot write {path}: {error.strerror or error}")
+        _fail(f"cannot write {path}: {getattr(error, 'strerror', None) or error}")
 
 
 def _fail(message: str) -> NoReturn:
-    click.echo(f"Error: {message}", err=True)
+    _complain(f"Error: {printable(message)}")
     sys.exit(EXIT_USAGE)
 
 
@@ -260,7 +310,7 @@ def verify(missions: Sequence[str], only: str, format_name: str, output: str | N
         loaded = [load_mission(file) for file in _expanded(missions)]
     except MissionError as error:
         for line in error.lines():
-            click.echo(line, err=True)
+            _complain(line)
         sys.exit(EXIT_USAGE)
     verified = [verify_mission(mission, only) for mission in loaded]
     if format_name == "json":
@@ -283,25 +333,30 @@ def init(file: str, name: str, force: bool) -> None:
 
     FILE is mission.yaml by default, - for standard output.
     """
+    import json
+
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+    from bisar_budget.errors import InvalidValueError
+    from bisar_budget.mission.readers import Text
     from bisar_budget.resources import resource
 
+    try:
+        Text().leaf(name)
+    except InvalidValueError as error:
+        raise click.UsageError(f"--name {error}") from None
     environment = Environment(
         loader=FileSystemLoader(resource("templates")), undefined=StrictUndefined, keep_trailing_newline=True
     )
-    text = environment.get_template("mission.yaml.j2").render(name=name)
+    text = environment.get_template("mission.yaml.j2").render(name=json.dumps(name, ensure_ascii=False))
     if file == "-":
         _print(text)
         return
     if os.path.exists(file) and not force:
         _fail(f"{file} exists; --force replaces it")
     _write(file, text)
-    click.echo(f"Wrote {file}. Next: bisar-budget check {file}", err=True)
-    click.echo(
-        "For completion and checks in an editor: bisar-budget schema -o mission.schema.json beside it.",
-        err=True,
-    )
+    _complain(f"Wrote {file}. Next: bisar-budget check {file}")
+    _complain("For completion and checks in an editor: bisar-budget schema -o mission.schema.json beside it.")
 
 
 @cli.command()

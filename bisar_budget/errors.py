@@ -5,6 +5,13 @@ from typing import NamedTuple
 KeyPath = tuple[str | int, ...]
 
 
+def printable(text: str) -> str:
+    """Write text of a user's own so that it stays on its line and does nothing to a terminal."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
+
+
 class Problem(NamedTuple):
     """Something wrong with a value, before anybody knows which file it stands in.
 
@@ -60,6 +67,7 @@ class MissionError(Exception):
     def lines(self) -> list[str]:
         """Write one `file:line:column: fault` per fault."""
         return [
-            ":".join(str(part) for part in (self.file, fault.line, fault.column) if part is not None) + f": {fault}"
+            ":".join(str(part) for part in (printable(self.file), fault.line, fault.column) if part is not None)
+            + f": {fault}"
             for fault in self.faults
         ]

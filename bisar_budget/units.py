@@ -11,7 +11,7 @@ from typing import NamedTuple
 from bisar_budget.constants import STANDARD_GRAVITY
 from bisar_budget.errors import InvalidValueError
 
-_NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?")
+_NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _MAX_TEXT = 64  # characters; longer text is no quantity anybody wrote
 
 
@@ -180,7 +180,7 @@ def _finite(number: float, dimension: Dimension) -> float:
 
 def _normal(unit: str) -> str:
     unit = unit.strip().replace("µ", "u").replace("μ", "u").replace("²", "^2").replace("³", "^3")
-    unit = unit.replace(" ", "").replace("**", "^")
+    unit = re.sub(r"\s*([/^])\s*", r"\1", unit.replace("**", "^"))
     return unit.replace("s2", "s^2").replace("s3", "s^3")
 
 

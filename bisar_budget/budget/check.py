@@ -52,6 +52,7 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
         name=mission.name,
         model=mission.allocation.model,
         combine=mission.allocation.combine,
+        coverage_factor=mission.allocation.coverage_factor,
         wavelength=mission.radar.wavelength,
         geometry=geometry,
         resolution=Resolution(
@@ -105,6 +106,7 @@ def _error_rows(
             qpe=qpe,
             displacement=displacement,
             evidence=source.evidence,
+            is_independent=source.is_independent,
             notes=notes,
         )
 
@@ -280,6 +282,7 @@ def _judged(
     qpe: float | None = None,
     displacement: GroundVector | None = None,
     evidence: str | None = None,
+    is_independent: bool = True,
     notes: tuple[str, ...] = (),
 ) -> Row:
     """Judge what is declared against what is allowed.
@@ -296,10 +299,9 @@ def _judged(
     if declared is None and not (is_declared and not_evaluated):
         status = "not_declared"
     elif info:
-        status, reason = "info", info
+        status, reason = "info", reason or info
     elif not_evaluated or utilization is None:
         status, reason = "not_evaluated", not_evaluated
-        utilization = margin = None  # a number would look like a judgement
     elif utilization > 1 + UTILIZATION_TOLERANCE:
         status, reason = ("warn" if never_fails else "fail"), over
     elif utilization * gain > 1 + UTILIZATION_TOLERANCE:
@@ -330,6 +332,7 @@ def _judged(
         equation,
         mission.requirement_ids.get(id),
         evidence,
+        is_independent,
     )
 
 

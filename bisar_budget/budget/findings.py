@@ -13,7 +13,11 @@ STATUSES = (*GATING, "waived", "info", "not_declared")
 
 
 class Row(NamedTuple):
-    """One line of the budget. Numbers in SI and radians; None where a value does not exist."""
+    """One line of the budget. Numbers in SI and radians; None where a value does not exist.
+
+    `is_independent` marks the rows that sums run over: errors as the file states them. Along the scene's
+    axes an error stated in another frame is shown again, but not counted again.
+    """
 
     id: str
     metric: str
@@ -34,6 +38,7 @@ class Row(NamedTuple):
     equation: str
     requirement_id: str | None
     evidence: str | None
+    is_independent: bool
 
 
 class FileWarning(NamedTuple):
@@ -57,6 +62,7 @@ class MissionFindings(NamedTuple):
     name: str
     model: str
     combine: str
+    coverage_factor: float
     wavelength: float
     geometry: BistaticGeometry
     resolution: Resolution

@@ -31,7 +31,7 @@ def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> tuple[l
     warnings = []
     for index, waiver in enumerate(mission.waivers):
         line = mission.line(("waivers", index, "id"))
-        named = [position for position, row in enumerate(rows) if fnmatchcase(row.id, waiver.id)]
+        named = [position for position, row in enumerate(rows) if _names(waiver.id, row.id)]
         failing = [position for position in named if rows[position].status == "fail"]
         expired = today > waiver.until
         for position in failing:
@@ -46,3 +46,11 @@ def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> tuple[l
         elif not failing:
             warnings.append(FileWarning(line=line, message=f"waiver {waiver.id}: unused, no row it names fails"))
     return result, warnings
+
+
+def _names(pattern: str, row_id: str) -> bool:
+    return pattern == row_id or fnmatchcase(row_id, pattern)  # an id may hold a bracket of its own
+
+
+def _names(pattern: str, row_id: str) -> bool:
+    return pattern == row_id or fnmatchcase(row_id, pattern)  # an id may hold a bracket of its own

@@ -11,7 +11,7 @@ from typing import Any, BinaryIO, cast
 
 import yaml
 
-from bisar_budget.errors import Fault, KeyPath, MissionError, Problem
+from bisar_budget.errors import Fault, KeyPath, MissionError, Problem, printable
 from bisar_budget.mission.model import MISSION, Mission
 from bisar_budget.mission.readers import INVALID
 
@@ -22,8 +22,8 @@ _PARSER = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
 _NULLS = ("", "~", "null", "Null", "NULL")
 
 
-def load_mission(path: str) -> Mission:
-    """Read the mission file at `path`; `-` is standard input.
+def load_mission(path: str, model: str | None = None) -> Mission:
+    """Read the mission file at `path`; `-` is standard input. `model` stands in for the file's own.
 
     Raises
     ------
@@ -32,6 +32,8 @@ def load_mission(path: str) -> Mission:
     """
     try:
         if path == "-":
+            if sys.stdin is None:
+                raise ValueError("standard input is closed")
             data = _bounded(sys.stdin.buffer)
         else:
             with open(path, "rb") as file:
@@ -39,7 +41,7 @@ def load_mission(path: str) -> Mission:
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         reason = getattr(error, "strerror", None) or str(error)
         raise MissionError(path, (_file_fault(f"cannot be read: {reason}"),)) from None
-    return parse_mission(data, path)
+    return parse_mission(data, path, model)
 
 
 def _bounded(file: BinaryIO) -> bytes:
@@ -48,7 +50,7 @@ def _bounded(file: BinaryIO) -> bytes:
     return data + file.read(MAX_BYTES + 1 - len(data)) if len(data) == 1 << 14 else data
 
 
-def parse_mission(data: bytes | str, file: str = "-") -> Mission:
+def parse_mission(data: bytes | str, file: str = "-", model: str | None = None) -> Mission:
     """Turn the content of a mission file into a `Mission`.
 
     Parameters
@@ -57,6 +59,8 @@ def parse_mission(data: bytes | str, file: str = "-") -> Mission:
         The file's content; bytes are UTF-8.
     file : str
         Name to say in messages.
+    model : str, optional
+        Gating model in place of `allocation.model`.
 
     Raises
     ------
@@ -64,6 +68,8 @@ def parse_mission(data: bytes | str, file: str = "-") -> Mission:
         Not a usable mission; carries every fault.
     """
     tree = _read_tree(_decoded(data, file), file)
+    if model is not None and isinstance(tree.root.get("allocation"), dict):
+        tree.root["allocation"]["model"] = model
     mission = MISSION.read(tree.root, (), tree.report)
     if tree.faults:
         ordered = sorted(dict.fromkeys(tree.faults), key=lambda fault: (fault.line or 0, fault.column or 0))
@@ -151,7 +157,7 @@ class _Tree:
         if kind is yaml.ScalarEvent:
             value: Any = str(event.value)
             if not event.style and value in _NULLS:  # plain: "" from libyaml, None from pure Python
-                self.fault(mark, path, "has no value", hint="Remove the key to get its default")
+                self.fault(mark, path, "has no value", hint="Give it one, or remove the key")
                 value = INVALID
         elif len(path) >= MAX_DEPTH:
             self.fault(mark, (), f"is nested more than {MAX_DEPTH} deep")
@@ -180,9 +186,7 @@ class _Tree:
                 first = self.keys[here][0] + 1
                 problem = f"is a duplicate key; the first is in line {first}"
                 self.fault(mark, here, problem, accepted="each key once")
-                first_place = self.values[here]
-                self._node(next_event, next_event(), here)
-                self.values[here] = first_place
+                self._node(next_event, next_event(), (*path, f"{key} (again)"))
                 continue
             self.keys[here] = mark
             mapping[key] = self._node(next_event, next_event(), here)
@@ -221,10 +225,10 @@ def _dotted(path: KeyPath) -> str:
     text = ""
     for part in path:
         text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
-    return text if text.isprintable() and len(text) <= 200 else _shown(text)
+    return printable(text) if len(text) <= 200 else _shown(text)
 
 
 def _shown(text: str) -> str:
     """Say a value from the file so that it cannot do anything to a terminal."""
-    text = text if text.isprintable() else ascii(text)[1:-1]
+    text = printable(text)
     return text if len(text) <= 60 else text[:57] + "..."

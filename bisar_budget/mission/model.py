@@ -8,7 +8,14 @@ from typing import Annotated, Any, NamedTuple
 from bisar_budget import units
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.errors import KeyPath, Problem
-from bisar_budget.geometry import BistaticGeometry, PlatformState, UndefinedFrameError, Vector, state_from_angles
+from bisar_budget.geometry import (
+    BistaticGeometry,
+    PlatformState,
+    UndefinedFrameError,
+    Vector,
+    norm,
+    state_from_angles,
+)
 from bisar_budget.mission.readers import (
     Choice,
     Day,
@@ -27,6 +34,7 @@ from bisar_budget.mission.readers import (
     Whole,
 )
 
+STILL = 1e-6  # m/s; slower than this no platform flies an aperture
 FULL_MODEL = "it comes with the full model"
 
 FREQUENCY = Quantity(units.FREQUENCY, gt=0, ge=1e3, le=1e13)
@@ -52,9 +60,13 @@ class Radar(NamedTuple):
     center_frequency: Annotated[float, Key(FREQUENCY, "Centre of the band; every phase uses it.")]
     bandwidth: Annotated[float, Key(FREQUENCY, "Width of the band, for the resolution.")]
 
-    def problems(self) -> Iterator[Problem]:
+    @staticmethod
+    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
         """Hold the band above 0 Hz."""
-        if self.bandwidth >= 2 * self.center_frequency:
+        if (
+            values.keys() >= {"bandwidth", "center_frequency"}
+            and values["bandwidth"] >= 2 * values["center_frequency"]
+        ):
             yield Problem("must be less than twice the centre frequency", at=("bandwidth",))
 
     @property
@@ -148,23 +160,28 @@ class Platform(NamedTuple):
     climb: Annotated[float | None, Key(VELOCITY, "Vertical speed, up positive.")] = None
     motion_error: Annotated[MotionError, Key(Section(MotionError))] = MotionError()
 
-    def problems(self) -> Iterator[Problem]:
+    @staticmethod
+    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
         """Hold it to one complete geometry, above the ground, off the scene centre."""
-        unclear = self._unclear_geometry()
+        if not values.keys() >= {*CARTESIAN_KEYS, *POLAR_KEYS}:
+            return  # one of them is wrong by itself
+        platform = Platform(**{key: values[key] for key in (*CARTESIAN_KEYS, *POLAR_KEYS)})
+        unclear = platform._unclear_geometry()
         if unclear is not None:
             yield unclear
+        if platform.position is not None and platform.position[2] < 0:
+            yield Problem("puts the platform below the ground, z < 0", at=("position", 2))
+        if unclear is not None:
             return
-        state = self.state
-        where: KeyPath = ("position",) if self.position else ("slant_range",)
-        if state.position[2] < 0:
-            yield Problem("puts the platform below the ground, z < 0", at=(*where, 2))
+        state = platform.state
         if state.slant_range < 1:
-            yield Problem("puts the platform within 1 m of the scene centre", at=where)
-            return
-        try:
-            state.frame(self.motion_error.frame)
-        except UndefinedFrameError as error:
-            yield Problem(str(error), "accepted: scene", at=("motion_error", "frame"))
+            where = "position" if platform.position else "slant_range"
+            yield Problem("puts the platform within 1 m of the scene centre", at=(where,))
+        elif "motion_error" in values:
+            try:
+                state.frame(values["motion_error"].frame)
+            except UndefinedFrameError as error:
+                yield Problem(str(error), "accepted: scene", at=("motion_error", "frame"))
 
     def _unclear_geometry(self) -> Problem | None:
         given = [key for key in (*CARTESIAN_KEYS, *POLAR_KEYS) if getattr(self, key) is not None]
@@ -243,9 +260,12 @@ class Shares(NamedTuple):
     clock: Annotated[float | None, Key(SHARE, "Omitted: the clock is held to the receiver's share.")] = None
     reserve: Annotated[float, Key(Quantity(units.RATIO, ge=0, lt=1))] = 0.0
 
-    def problems(self) -> Iterator[Problem]:
+    @staticmethod
+    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
         """Hold the sum to 1."""
-        total = self.transmitter + self.receiver + (self.clock or 0.0) + self.reserve
+        if not values.keys() >= set(Shares._fields):
+            return
+        total = sum(values[name] or 0.0 for name in Shares._fields)
         if abs(total - 1) > 1e-6:
             yield Problem(f"shares must sum to 1, these sum to {total:.6g}")
 
@@ -352,26 +372,17 @@ class Mission(NamedTuple):
     file: str = ""
     places: Mapping[KeyPath, tuple[int, int]] = {}
 
-    def problems(self) -> Iterator[Problem]:
+    @staticmethod
+    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
         """Hold it to a collection that forms an image, and to names that can be told apart."""
-        geometry = self.geometry
-        if not any(geometry.transmitter.velocity) and not any(geometry.receiver.velocity):
-            yield Problem("both platforms are still: no aperture", at=("platforms",))
-        elif degeneracy := geometry.degeneracy():
-            yield Problem(degeneracy, at=("platforms",))
-        for name, platform, state in (
-            ("transmitter", self.platforms.transmitter, geometry.transmitter),
-            ("receiver", self.platforms.receiver, geometry.receiver),
-        ):
-            lowest = state.position[2] - abs(state.velocity[2]) * self.collection.aperture_time / 2
-            if lowest < 0:
-                key: KeyPath = ("climb",) if platform.velocity is None else ("velocity", 2)
-                yield Problem(
-                    f"takes the platform below the ground within the aperture, to z = {lowest:.4g} m",
-                    at=("platforms", name, *key),
-                )
+        platforms: Platforms | None = values.get("platforms")
+        collection: Collection | None = values.get("collection")
+        if platforms is not None:
+            yield from _no_image(_geometry(platforms))
+        if platforms is not None and collection is not None:
+            yield from _dives(platforms, collection.aperture_time)
         seen: set[str] = set()
-        for index, other in enumerate(self.other_errors):
+        for index, other in enumerate(values.get("other_errors", ())):
             if other.name in seen:
                 yield Problem("is the name of an earlier error", at=("other_errors", index, "name"))
             seen.add(other.name)
@@ -379,16 +390,40 @@ class Mission(NamedTuple):
     @property
     def geometry(self) -> BistaticGeometry:
         """Both platforms in the frame of the scene."""
-        return BistaticGeometry(transmitter=self.platforms.transmitter.state, receiver=self.platforms.receiver.state)
+        return _geometry(self.platforms)
 
     def line(self, path: KeyPath) -> int | None:
-        """Line of a value in the mission file, from 1, else of the nearest key above it that exists."""
-        while path:
-            place = self.places.get(path)
-            if place is not None:
-                return place[0] + 1
+        """Line of a value in the mission file, from 1, else of the nearest key above it that exists.
+
+        At last that is the file's first key; None for a mission that came from no file.
+        """
+        while path and path not in self.places:
             path = path[:-1]
-        return None
+        place = self.places.get(path)
+        return None if place is None else place[0] + 1
+
+
+def _geometry(platforms: Platforms) -> BistaticGeometry:
+    return BistaticGeometry(transmitter=platforms.transmitter.state, receiver=platforms.receiver.state)
+
+
+def _no_image(geometry: BistaticGeometry) -> Iterator[Problem]:
+    if all(norm(platform.velocity) < STILL for platform in (geometry.transmitter, geometry.receiver)):
+        yield Problem("both platforms are still: no aperture", at=("platforms",))
+    elif degeneracy := geometry.degeneracy():
+        yield Problem(degeneracy, at=("platforms",))
+
+
+def _dives(platforms: Platforms, aperture_time: float) -> Iterator[Problem]:
+    for name, platform in (("transmitter", platforms.transmitter), ("receiver", platforms.receiver)):
+        state = platform.state
+        lowest = state.position[2] - abs(state.velocity[2]) * aperture_time / 2
+        if lowest < 0 <= state.position[2]:
+            key: KeyPath = ("climb",) if platform.velocity is None else ("velocity", 2)
+            yield Problem(
+                f"takes the platform below the ground within the aperture, to z = {lowest:.4g} m",
+                at=("platforms", name, *key),
+            )
 
 
 MISSION = Section(Mission)

@@ -263,7 +263,8 @@ class TextMap(Reader):
 class Section(Reader):
     """A mapping with known keys, read into a `NamedTuple`; an unknown key is an error.
 
-    A section's own `problems()` says what is wrong between its values, once each of them is right.
+    A section's own `problems(values)` says what is wrong between its values. It is given those that are right,
+    defaults included, so that a fault in one place does not hide one between two others.
     """
 
     def __init__(self, kind: type[Any]) -> None:
@@ -297,15 +298,13 @@ class Section(Reader):
             if name not in value:
                 report((*path, name), Problem("is missing"))
                 is_valid = False
-        if not is_valid:
-            return INVALID
-        section = self.kind(**values)
-        problems = getattr(section, "problems", None)
+        problems = getattr(self.kind, "problems", None)
         if problems is not None:
-            for problem in problems():
+            right = {name: item for name, item in (self.defaults | values).items() if item is not INVALID}
+            for problem in problems(right):
                 report(path, problem)
                 is_valid = False
-        return section if is_valid else INVALID
+        return self.kind(**values) if is_valid else INVALID
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Reference to a definition, made on first use."""

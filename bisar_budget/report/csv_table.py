@@ -87,4 +87,4 @@ def _rows(mission: MissionFindings) -> Iterator[list[object]]:
 
 def _text(value: str | None) -> str | None:
     """Keep text of the user's own from being run: a spreadsheet takes what starts like a formula for one."""
-    return f"'{value}" if value and value[0] in "=+-@\t\r" else value
+    return f"'{value}" if value and value != "-" and value[0] in "=+-@\t\r" else value

@@ -75,6 +75,7 @@ def _mission(mission: MissionFindings) -> dict[str, Any]:
         "status": mission.status,
         "model": mission.model,
         "combine": mission.combine,
+        "coverage_factor": mission.coverage_factor,
         "geometry": {
             "wavelength_m": mission.wavelength,
             "bistatic_angle_rad": mission.geometry.bistatic_angle,

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from functools import cache
 
 from bisar_budget.budget.findings import MissionFindings, Report, Row, UnusableMission, worst_first
+from bisar_budget.errors import printable
 from bisar_budget.geometry import PlatformState
 from bisar_budget.report import Style
 from bisar_budget.units import format_quantity
@@ -52,7 +53,9 @@ def render(report: Report, style: Style) -> str:
 
 def _unusable(mission: UnusableMission, style: Style) -> list[str]:
     count = len(mission.faults)
-    summary = f"{_word('error', style)} {mission.file}: cannot be used, {count} fault{'s' if count != 1 else ''}"
+    summary = (
+        f"{_word('error', style)} {printable(mission.file)}: cannot be used, {count} fault{'s' if count != 1 else ''}"
+    )
     if style.verbosity < 0:
         return [summary]
     places = [f"  {fault.line or '-'}:{fault.column or '-'}  {fault}" for fault in mission.faults]
@@ -96,6 +99,8 @@ def _head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
     yield "QPE budget", f"{format_quantity(allocation.qpe_total, 'rad')}: {shares}{gain}"
     rule = {"each": "each error alone", "sum": "worst-case sum", "rss": "root-sum-square"}[mission.combine]
     yield "Model", f"{mission.model} (Rigling & Moses, Tables I and II), {rule}"
+    if mission.coverage_factor != 1:
+        yield "Coverage", f"navigation and clock: declared is {mission.coverage_factor:g} times the file's value"
 
 
 def _platform(state: PlatformState) -> str:
@@ -116,7 +121,8 @@ def _row(row: Row, style: Style) -> list[str]:
     allowable = "no limit" if row.allowable is None else format_quantity(row.allowable, row.unit, rounding="down")
     if row.allowable is None and (row.status in ("not_evaluated", "info") or row.metric in ("pslr", "islr")):
         allowable = "-"
-    use = "-" if row.utilization is None or row.allowable is None else percent(row.utilization)
+    is_judged = row.utilization is not None and row.allowable is not None and row.status != "not_evaluated"
+    use = percent(row.utilization or 0.0) if is_judged else "-"
     cells = (declared, allowable, use, _short_reference(row.equation))
     word = f"{WORDS[row.status]:<8}"
     lines = [_cells(word, row.id, *cells)] if len(row.id) <= 34 else [f"{word} {row.id}", _cells("", "", *cells)]
@@ -132,14 +138,16 @@ def _short_reference(equation: str) -> str:
     if match is None:
         return ""
     table, row, section, number = match.groups()
-    return f"{table}.{row}" if row else table or section or number
+    return f"{table}.{row}" if row and row.isdigit() else table or section or number
 
 
 def percent(ratio: float) -> str:
     """Write a ratio in percent; near 100 % with the digits that tell which side it is on."""
     value = 100 * ratio
-    if value == 0 or value >= 1e6:
-        return f"{value:.2g} %"
+    if value == 0:
+        return "0 %"
+    if value >= 99999.5:
+        return ">1e5 %"
     if value < 0.01:
         return "<0.01 %"
     side = 0 if abs(value - 100) < 1e-7 else math.copysign(1, value - 100)
@@ -156,7 +164,8 @@ def _cells(status: str, row: str, declared: str, allowable: str, use: str, refer
 
 
 def _details(row: Row, mission: MissionFindings, style: Style) -> list[str]:
-    place = f"{mission.file}:{row.line}" if row.line is not None else mission.file
+    file = printable(mission.file)
+    place = f"{file}:{row.line}" if row.line is not None else file
     own_id = f" [{row.requirement_id}]" if row.requirement_id else ""
     head = f"{_word(row.status, style)} {row.id}{own_id} ({place})"
     texts = [row.reason] if row.reason else []
@@ -173,7 +182,7 @@ def _details(row: Row, mission: MissionFindings, style: Style) -> list[str]:
 
 def _asides(mission: MissionFindings, style: Style) -> Iterator[str]:
     for warning in mission.warnings:
-        place = f"{mission.file}:{warning.line}: " if warning.line is not None else ""
+        place = f"{printable(mission.file)}:{warning.line}: " if warning.line is not None else ""
         yield f"warning: {place}{warning.message}"
     if style.verbosity > 0:
         yield from (f"note: {note}" for note in mission.notes)
@@ -181,7 +190,7 @@ def _asides(mission: MissionFindings, style: Style) -> Iterator[str]:
 
 def _summary(mission: MissionFindings, style: Style) -> str:
     counts = ", ".join(f"{count} {WORDS[status]}" for status, count in mission.summary.items())
-    return f"{_word(mission.status, style)} {mission.file}: {counts}"
+    return f"{_word(mission.status, style)} {printable(mission.file)}: {counts}"
 
 
 def _overall(report: Report, style: Style) -> str:

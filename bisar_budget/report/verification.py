@@ -3,6 +3,7 @@
 import json
 from collections.abc import Sequence
 
+from bisar_budget.errors import printable
 from bisar_budget.report import Style
 from bisar_budget.simulate.verify import Verdict, VerifiedMission
 from bisar_budget.units import format_quantity
@@ -44,7 +45,7 @@ def _mission(mission: VerifiedMission, style: Style) -> list[str]:
     lines += ["", *reasons] if reasons else []
     found = [row.verdict for row in mission.rows]
     counts = ", ".join(f"{found.count(verdict)} {verdict}" for verdict in _ANSI if verdict in found)
-    return [*lines, "", f"{mission.file}: {counts or 'no row has a limit here'}"]
+    return [*lines, "", f"{printable(mission.file)}: {counts or 'no row has a limit here'}"]
 
 
 def _numbers(row: Verdict) -> tuple[str, str, str]:

@@ -33,7 +33,7 @@ def test_line_of_a_silent_key_is_that_of_the_nearest_that_exists() -> None:
     assert mission.line(("platforms", "receiver", "motion_error", "velocity", 0)) == mission.line(
         ("platforms", "receiver")
     )
-    assert mission.line(("waivers",)) is None
+    assert mission.line(("waivers", 0)) == 1  # nothing of it is there: the file itself
 
 
 def test_every_fault_at_once_in_file_order() -> None:
