@@ -50,7 +50,3 @@ def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> tuple[l
 
 def _names(pattern: str, row_id: str) -> bool:
     return pattern == row_id or fnmatchcase(row_id, pattern)  # an id may hold a bracket of its own
-
-
-def _names(pattern: str, row_id: str) -> bool:
-    return pattern == row_id or fnmatchcase(row_id, pattern)  # an id may hold a bracket of its own

@@ -5,7 +5,7 @@ import math
 from pathlib import Path
 
 import pytest
-from sympy import Abs, Eq, Expr, Matrix, Rational, Symbol, atan2, cos, parse_expr, pi, simplify, sin, sqrt, symbols
+from sympy import Abs, Expr, Matrix, Rational, Symbol, atan2, cos, parse_expr, pi, simplify, sin, sqrt, symbols
 
 from bisar_budget.resources import resource
 from bisar_budget.theory import differential_range as dr
@@ -196,9 +196,3 @@ def test_range_error_is_first_order_in_the_exact_ranges() -> None:
 
 def test_equal_share_is_half_the_total() -> None:
     assert Rational(1, 2) * published.TOTAL_QPE == published.EQUAL_SHARE_QPE
-
-
-def test_labels_name_their_error() -> None:
-    for table in (published.table_1(), published.table_2()):
-        for row in table.rows:
-            assert isinstance(row.label, Eq)
