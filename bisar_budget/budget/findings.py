@@ -10,6 +10,7 @@ from bisar_budget.geometry import BistaticGeometry, GroundVector
 # Worst first. The status of a mission or a run is the worst one found; the last three gate nothing.
 GATING = ("error", "fail", "not_evaluated", "warn", "pass_with_autofocus", "pass")
 STATUSES = (*GATING, "waived", "info", "not_declared")
+_RANK = {status: index for index, status in enumerate(STATUSES)}
 
 
 class Row(NamedTuple):
@@ -124,5 +125,4 @@ def worst(statuses: Iterable[str]) -> str:
 
 def worst_first(rows: Sequence[Row]) -> list[Row]:
     """Sort rows by status, then by utilization, the highest first; equals keep their order."""
-    rank = {status: index for index, status in enumerate(STATUSES)}
-    return sorted(rows, key=lambda row: (rank[row.status], -(row.utilization or 0.0)))
+    return sorted(rows, key=lambda row: (_RANK[row.status], -(row.utilization or 0.0)))

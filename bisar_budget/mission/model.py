@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping
 from datetime import date
+from functools import lru_cache
 from typing import Annotated, Any, NamedTuple
 
 from bisar_budget import units
@@ -138,6 +139,7 @@ class MotionError(NamedTuple):
 
 CARTESIAN_KEYS = ("position", "velocity")
 POLAR_KEYS = ("slant_range", "azimuth", "elevation", "speed", "motion_azimuth", "climb")
+GEOMETRY_KEYS = frozenset((*CARTESIAN_KEYS, *POLAR_KEYS))
 WAYS = (
     "accepted: position and velocity, or slant_range, azimuth, elevation, speed, motion_azimuth (and climb); "
     "a fixed platform has speed 0 and no motion_azimuth"
@@ -163,9 +165,9 @@ class Platform(NamedTuple):
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
         """Hold it to one complete geometry, above the ground, off the scene centre."""
-        if not values.keys() >= {*CARTESIAN_KEYS, *POLAR_KEYS}:
+        if not values.keys() >= GEOMETRY_KEYS:
             return  # one of them is wrong by itself
-        platform = Platform(**{key: values[key] for key in (*CARTESIAN_KEYS, *POLAR_KEYS)})
+        platform = Platform(**{key: values[key] for key in GEOMETRY_KEYS})
         unclear = platform._unclear_geometry()
         if unclear is not None:
             yield unclear
@@ -403,6 +405,7 @@ class Mission(NamedTuple):
         return None if place is None else place[0] + 1
 
 
+@lru_cache(maxsize=4)  # asked for when a mission is read and again when it is checked
 def _geometry(platforms: Platforms) -> BistaticGeometry:
     return BistaticGeometry(transmitter=platforms.transmitter.state, receiver=platforms.receiver.state)
 

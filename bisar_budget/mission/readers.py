@@ -300,7 +300,9 @@ class Section(Reader):
                 is_valid = False
         problems = getattr(self.kind, "problems", None)
         if problems is not None:
-            right = {name: item for name, item in (self.defaults | values).items() if item is not INVALID}
+            right = self.defaults | values
+            if not is_valid:
+                right = {name: item for name, item in right.items() if item is not INVALID}
             for problem in problems(right):
                 report(path, problem)
                 is_valid = False

@@ -206,6 +206,8 @@ def _word(status: str, style: Style, width: int = 0) -> str:
 
 def _wrapped(text: str, indent: str) -> list[str]:
     """Break at spaces before 80 columns; a word that is longer stays whole, so that a path can be copied."""
+    if len(text) <= WIDTH:
+        return [text]
     first, *words = text.split(" ")
     lines, line = [], first
     for word in words:
