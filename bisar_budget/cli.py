@@ -325,6 +325,46 @@ def verify(missions: Sequence[str], only: str, format_name: str, output: str | N
 
 
 @cli.command()
+@click.argument("mission")
+@click.option("--plot", metavar="FILE", help="Draw Figures 3 to 7 of the paper for this mission: .png, .svg or .pdf.")
+@click.option("-o", "--output", metavar="FILE.npz", help="Save the images and what explains them for NumPy.")
+def simulate(mission: str, plot: str | None, output: str | None) -> None:
+    """Form the image of a point with the declared errors, before and after autofocus.
+
+    The data come from exact ranges; the image is formed where the errors move the point, in the scene's
+    axes and rotated so that the smear lies in cross range, and focused by phase gradient autofocus.
+    """
+    from bisar_budget.errors import MissionError
+    from bisar_budget.mission.load import load_mission
+
+    for name, suffixes in ((plot, (".png", ".svg", ".pdf")), (output, (".npz",))):
+        if name is not None and os.path.splitext(name)[1].lower() not in suffixes:
+            raise click.UsageError(f"{name}: the suffix must be one of {', '.join(suffixes)}")
+    _spare([mission], [plot, output])
+    try:
+        loaded = load_mission(mission)
+    except MissionError as error:
+        for line in error.lines():
+            _complain(line)
+        sys.exit(EXIT_USAGE)
+    from bisar_budget.report import point_plot
+    from bisar_budget.simulate.point import SimulationError, simulate_point
+
+    try:
+        images = simulate_point(loaded)
+    except (SimulationError, ValueError) as error:
+        _fail(f"{mission}: {error}")
+    try:
+        if output is not None:
+            point_plot.save(images, output)
+        if plot is not None:
+            point_plot.draw(images, loaded.name, plot)
+    except OSError as error:
+        _fail(f"cannot write {error.filename}: {error.strerror}")
+    _print(point_plot.summary(images, loaded.name))
+
+
+@cli.command()
 @click.argument("file", default="mission.yaml")
 @click.option("--name", default="My bistatic mission", show_default=True, help="Name of the mission.")
 @click.option("--force", is_flag=True, help="Replace an existing file.")

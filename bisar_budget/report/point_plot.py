@@ -1,0 +1,114 @@
+"""Figures 3 to 7 of Rigling & Moses for a mission of one's own: range error, points, images, autofocus."""
+
+from typing import Any
+
+import numpy as np
+
+from bisar_budget.simulate.point import PointImages
+
+_FLOOR_DB = -35.0
+_SHOWN = 0.6  # of the patch; the rest holds sidelobes
+
+
+def draw(images: PointImages, title: str, path: str) -> None:
+    """Draw the five figures on one sheet; the suffix of `path` says PNG, SVG or PDF."""
+    import matplotlib
+
+    matplotlib.use("agg")
+    import matplotlib.pyplot as plt
+
+    figure, panels = plt.subplots(2, 3, figsize=(12, 7.6), layout="constrained")
+    _range_error(panels[0, 0], images)
+    _points(panels[0, 1], images)
+    _image(panels[0, 2], images, images.in_scene, "Fig. 5: image in (x, y)", ("x [m]", "y [m]"))
+    _image(panels[1, 0], images, images.rotated, "Fig. 6: rotated to (x′, y′)", ("x′ [m]", "y′ [m]"))
+    _image(panels[1, 1], images, images.focused, "Fig. 7: after autofocus", ("x′ [m]", "y′ [m]"))
+    _cuts(panels[1, 2], images)
+    figure.suptitle(title)
+    figure.savefig(path, dpi=110, metadata={"Software": None} if path.lower().endswith("png") else None)
+    plt.close(figure)
+
+
+def save(images: PointImages, path: str) -> None:
+    """Save the images, complex, and what explains them, as an NPZ archive."""
+    np.savez_compressed(
+        path,
+        in_scene=images.in_scene,
+        rotated=images.rotated,
+        focused=images.focused,
+        error_free=images.error_free,
+        spacing_m=images.spacing,
+        look_azimuth_rad=images.look_azimuth,
+        displacement_m=images.effect.displacement,
+        slow_time_s=images.slow_time,
+        range_error_m=images.range_error,
+        points_m=images.points,
+    )
+
+
+def summary(images: PointImages, title: str) -> str:
+    """Say in a few lines what the errors do to the point and what autofocus brings back."""
+    clean = images.clean_response
+    east, north = (round(float(moved), 3) for moved in images.effect.displacement)
+    lines = [
+        title,
+        "",
+        f"displacement   {east + 0.0:.3f} m east, {north + 0.0:.3f} m north",
+        f"phase          quadratic {abs(images.effect.quadratic):.2f} rad, cubic {abs(images.effect.cubic):.2f} rad",
+        "",
+        f"{'':<14} {'peak':>9} {'width':>8} {'PSLR':>9} {'ISLR':>9}",
+    ]
+    for label, response in (
+        ("without error", clean),
+        ("with errors", images.response),
+        ("autofocused", images.focused_response),
+    ):
+        peak = 20 * np.log10(response.peak / clean.peak)
+        ratios = f"{response.pslr_db:>6.1f} dB {response.islr_db:>6.1f} dB"
+        lines.append(f"{label:<14} {peak:>+6.2f} dB {response.irw_m:>6.3f} m {ratios}")
+    return "\n".join(lines) + "\n"
+
+
+def _range_error(panel: Any, images: PointImages) -> None:
+    panel.plot(images.slow_time, 1e3 * images.range_error, color="black", label="left at the displaced point")
+    third = (images.segment_times[-1] - images.segment_times[0]) / 4
+    for time, (value, slope) in zip(images.segment_times, images.segments, strict=True):
+        ends = np.array([time - third, time + third])
+        panel.plot(ends, 1e3 * (value + slope * (ends - time)), "--", color="#c1502e")
+    panel.set(title="Fig. 3: range error, three segments", xlabel="slow time [s]", ylabel="range error [mm]")
+
+
+def _points(panel: Any, images: PointImages) -> None:
+    panel.plot(*images.points.T, "o-", color="#c1502e")
+    panel.set(title="Fig. 4: points of the segments, (29)", xlabel="x [m]", ylabel="y [m]")
+    shown = _SHOWN * images.in_scene.shape[0] / 2 * images.spacing
+    panel.set(xlim=(-shown, shown), ylim=(-shown, shown), aspect="equal")
+    panel.grid(color="#dddddd", lw=0.5)
+
+
+def _image(panel: Any, images: PointImages, image: np.ndarray, title: str, labels: tuple[str, str]) -> None:
+    half = image.shape[0] / 2 * images.spacing
+    peak = np.abs(images.error_free).max()
+    with np.errstate(divide="ignore"):
+        level = 20 * np.log10(np.abs(image) / peak)
+    extent = (-half, half, -half, half)
+    shown = panel.imshow(level.T, origin="lower", extent=extent, vmin=_FLOOR_DB, vmax=0, cmap="magma")
+    zoom = (-_SHOWN * half, _SHOWN * half)
+    panel.set(title=title, xlabel=labels[0], ylabel=labels[1], xlim=zoom, ylim=zoom)
+    panel.figure.colorbar(shown, ax=panel, label="dB to the error-free peak", shrink=0.8)
+
+
+def _cuts(panel: Any, images: PointImages) -> None:
+    count = images.error_free.shape[1]
+    place = (np.arange(count) - count // 2) * images.spacing
+    peak = np.abs(images.error_free).max()
+    for image, label, style in (
+        (images.error_free, "without error", {"color": "#888888", "lw": 3}),
+        (images.rotated, "with the declared errors", {"color": "#c1502e"}),
+        (images.focused, "after autofocus", {"color": "#1f5fa8", "ls": "--"}),
+    ):
+        row = np.unravel_index(np.argmax(np.abs(image)), image.shape)[0]
+        panel.plot(place, 20 * np.log10(np.abs(image[row]) / peak + 1e-6), label=label, **style)
+    panel.set(title="Cross-range cuts", xlabel="y′ [m]", ylabel="dB", ylim=(-40, 2))
+    panel.set(xlim=(-_SHOWN * count / 2 * images.spacing, _SHOWN * count / 2 * images.spacing))
+    panel.legend(fontsize=7, loc="upper right")

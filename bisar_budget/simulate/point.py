@@ -1,0 +1,249 @@
+"""The image of a point with a mission's declared errors: Section V and VI of Rigling & Moses, Figures 3 to 7."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vector
+from bisar_budget.mission.model import Mission
+from bisar_budget.mission.model import MotionError as DeclaredError
+from bisar_budget.simulate.autofocus import phase_gradient_autofocus
+from bisar_budget.simulate.exact import ExactEffect, exact_effect
+from bisar_budget.simulate.image_formation import backprojection, ground_grid, taylor_window
+from bisar_budget.simulate.impulse_response import ImpulseResponse, impulse_response
+from bisar_budget.simulate.phase_history import (
+    Complexes,
+    Floats,
+    MotionError,
+    Path,
+    Sinusoid,
+    cell_centres,
+    path,
+    phase_history,
+)
+
+_MARGIN_CELLS = 16  # of the patch beyond the smear, each way
+_SAMPLES_PER_CELL = 2
+_MIN_PULSES = 256
+_MAX_BEND = 0.5  # range cells
+_BYTES_PER_PIXEL = 16 * 8  # the images kept, and what their formation holds at once
+
+
+class SimulationError(Exception):
+    """An image that cannot be formed as asked; the message says what to change."""
+
+
+class PointImages(NamedTuple):
+    """Images of a point scatterer at the scene centre, and what explains them.
+
+    `in_scene` is on a grid along (x, y), the others along (x′, y′): (nx, ny) complex, all centred where the
+    errors move the point. `range_error` is its quadratic and higher part over `slow_time`; `segments` are the
+    slopes and `points` the ground points of (26)-(29), relative to the displaced point.
+    """
+
+    slow_time: Floats
+    range_error: Floats
+    segment_times: Floats
+    segments: Floats
+    points: Floats
+    effect: ExactEffect
+    spacing: float
+    look_azimuth: float
+    in_scene: Complexes
+    rotated: Complexes
+    focused: Complexes
+    error_free: Complexes
+    response: ImpulseResponse
+    focused_response: ImpulseResponse
+    clean_response: ImpulseResponse
+
+
+def simulate_point(mission: Mission) -> PointImages:
+    """Form the image of a point at the scene centre with the declared errors, before and after autofocus.
+
+    Signs and coverage factor of the file are used. Vibration along the line of sight is in the data, wideband
+    by the file's seed.
+
+    Raises
+    ------
+    SimulationError
+        Too few pulses for the patch, or an image beyond `simulation.memory_limit`.
+    """
+    geometry, settings = mission.geometry, mission.simulation
+    T, wavelength = mission.collection.aperture_time, mission.radar.wavelength
+    cross_range = geometry.cross_range_resolution(wavelength, T)
+    in_range = geometry.range_resolution(mission.radar.bandwidth, SPEED_OF_LIGHT)
+    fine = cell_centres(T, 2048)
+    smooth = _paths(mission, geometry, fine, vibrating=False)
+    effect = exact_effect(fine, *smooth, _clock(mission, fine), wavelength, T)
+    left = _left_over(smooth, effect) + SPEED_OF_LIGHT * _clock(mission, fine)
+    slope = np.gradient(left, fine)
+    reach = float(np.abs(slope).max()) * T / wavelength  # cycles over the aperture are cells of cross range
+    cells = 2 * math.ceil(reach + _MARGIN_CELLS)
+    pulses = _pulses(mission, cells)
+    spacing = min(cross_range, in_range) / _SAMPLES_PER_CELL
+    extent = cells * max(cross_range, in_range)
+    count = 2 * math.ceil(extent / spacing / 2)
+    limit = settings.memory_limit if settings else 500e6
+    if count**2 * _BYTES_PER_PIXEL > limit:
+        raise SimulationError(
+            f"an image of {count} x {count} pixels needs about {count**2 * _BYTES_PER_PIXEL / 1e6:.0f} MB, "
+            f"simulation.memory_limit is {limit / 1e6:.0f} MB"
+        )
+    nearest = min(geometry.transmitter.slant_range, geometry.receiver.slant_range)
+    bend = (extent / 2) ** 2 / (2 * nearest) / in_range
+    if bend > _MAX_BEND:
+        raise SimulationError(
+            f"lines of equal range bend by {bend:.2g} range cells within the patch of {extent:.0f} m, a platform "
+            f"being {nearest:.4g} m away: beyond {_MAX_BEND:g} the image is not separable and autofocus means nothing"
+        )
+    slow_time = cell_centres(T, pulses)
+    step = SPEED_OF_LIGHT / (4 * extent)  # half of what keeps a profile from repeating within the patch
+    frequency = mission.radar.center_frequency + cell_centres(
+        mission.radar.bandwidth, max(64, math.ceil(mission.radar.bandwidth / step))
+    )
+    rng = np.random.default_rng(settings.seed if settings else 1)
+
+    def image(paths: tuple[Path, Path], clock: Floats, azimuth: float, scatterer: GroundVector) -> Complexes:
+        history = phase_history(
+            np.array([[*scatterer, 0.0]]),
+            np.ones(1, dtype=complex),
+            slow_time=slow_time,
+            frequency=frequency,
+            transmitter=paths[0],
+            receiver=paths[1],
+            clock_error=clock,
+            noise_power=10 ** (settings.noise / 10) if settings and settings.noise is not None else 0.0,
+            rng=rng,
+        )
+        if settings and settings.window == "taylor":
+            history.samples[:] *= np.outer(taylor_window(pulses), taylor_window(frequency.size))
+        grid = ground_grid(effect.displacement, azimuth, (extent, extent), (count, count))
+        return backprojection(history, grid) * _baseband(geometry, grid, wavelength)
+
+    look = geometry.look_azimuth
+    flown = _paths(mission, geometry, slow_time, vibrating=True, rng=rng)
+    clock = _clock(mission, slow_time)
+    rotated = image(flown, clock, look, (0.0, 0.0))
+    still = (path(geometry.transmitter, slow_time), path(geometry.receiver, slow_time))
+    error_free = image(still, 0 * slow_time, look, effect.displacement)
+    focused = phase_gradient_autofocus(rotated).image
+    clean = _measured(error_free, extent / count, None)
+    times = np.array([-T / 3, 0.0, T / 3])  # centres of three sub-apertures
+    values, slopes = np.interp(times, fine, left), np.interp(times, fine, slope)
+    return PointImages(
+        slow_time=fine,
+        range_error=left,
+        segment_times=times,
+        segments=np.stack((values, slopes), axis=1),
+        points=np.array([_indicated(geometry, *args) for args in zip(times, values, slopes, strict=True)]),
+        effect=effect,
+        spacing=extent / count,
+        look_azimuth=look,
+        in_scene=image(flown, clock, 0.0, (0.0, 0.0)),
+        rotated=rotated,
+        focused=focused,
+        error_free=error_free,
+        response=_measured(rotated, extent / count, clean.mask_m),
+        focused_response=_measured(focused, extent / count, clean.mask_m),
+        clean_response=clean,
+    )
+
+
+def _baseband(geometry: BistaticGeometry, grid: Floats, wavelength: float) -> Complexes:
+    """Phase that takes the range history at the midpoint out of an image.
+
+    What stays is the aperture's own spectrum. A backprojected image carries the phase of the range to each
+    pixel, which close to a platform is a chirp across the patch and hides the aperture from autofocus.
+    """
+    total: Floats = np.zeros(grid.shape[:-1])
+    for state in (geometry.transmitter, geometry.receiver):
+        total += np.linalg.norm(grid - np.asarray(state.position), axis=-1) - state.slant_range
+    baseband: Complexes = np.exp(-2j * math.pi / wavelength * total)
+    return baseband
+
+
+def _pulses(mission: Mission, cells: int) -> int:
+    given = mission.collection.pulses
+    if given is None:
+        return max(_MIN_PULSES, 1 << (2 * cells - 1).bit_length())
+    if given < 2 * cells:
+        raise SimulationError(
+            f"collection.pulses is {given}, but the patch is {cells} resolution cells wide and aliases below "
+            f"{2 * cells} pulses; omit the key to get what it takes"
+        )
+    return given
+
+
+def _vector(declared: Vector | None, axes: tuple[Vector, Vector, Vector], factor: float) -> Vector:
+    """Turn an error stated along a frame's axes into the scene's, with its signs."""
+    if declared is None:
+        return (0.0, 0.0, 0.0)
+    x, y, z = (factor * sum(d * axis[i] for d, axis in zip(declared, axes, strict=True)) for i in range(3))
+    return (x, y, z)
+
+
+def _paths(
+    mission: Mission,
+    geometry: BistaticGeometry,
+    slow_time: Floats,
+    *,
+    vibrating: bool,
+    rng: np.random.Generator | None = None,
+) -> tuple[Path, Path]:
+    factor = mission.allocation.coverage_factor
+    flown = []
+    for name in ("transmitter", "receiver"):
+        declared: DeclaredError = getattr(mission.platforms, name).motion_error
+        state = getattr(geometry, name)
+        axes = state.frame(declared.frame)
+        error = MotionError(
+            position=_vector(declared.position, axes, factor),
+            velocity=_vector(declared.velocity, axes, factor),
+            acceleration=_vector(declared.acceleration, axes, factor),
+        )
+        if vibrating:
+            wideband = declared.vibration.wideband
+            error = error._replace(
+                sinusoids=tuple(Sinusoid(s.amplitude, s.frequency) for s in declared.vibration.sinusoidal),
+                wideband_rms=wideband.rms if wideband else 0.0,
+            )
+        flown.append(path(state, slow_time, error, rng))
+    return flown[0], flown[1]
+
+
+def _clock(mission: Mission, slow_time: Floats) -> Floats:
+    error = mission.timing_error
+    terms = (error.constant or 0.0, error.linear or 0.0, error.quadratic or 0.0, error.cubic or 0.0)
+    polynomial = np.polynomial.polynomial.polyval(slow_time, terms)
+    clock: Floats = np.asarray(mission.allocation.coverage_factor * polynomial, dtype=float)
+    return clock
+
+
+def _left_over(paths: tuple[Path, Path], effect: ExactEffect) -> Floats:
+    """Range error left at the displaced point, clock excluded. [m]"""
+    point = np.array([*effect.displacement, 0.0])
+    legs = [np.linalg.norm(p.actual, axis=1) - np.linalg.norm(p.measured - point, axis=1) for p in paths]
+    total: Floats = np.sum(legs, axis=0)
+    return total
+
+
+def _indicated(geometry: BistaticGeometry, time: float, value: float, slope: float) -> Floats:
+    """Ground point that a piece of range error indicates, (29), with Q at the piece's own time."""
+    look, rate = np.zeros(2), np.zeros(2)
+    for state in (geometry.transmitter, geometry.receiver):
+        x, y, z = (p + v * time for p, v in zip(state.position, state.velocity, strict=True))
+        moved = PlatformState(position=(x, y, z), velocity=state.velocity)
+        look = look + np.array(moved.look[:2])
+        rate = rate + np.array(moved.look_rate[:2])
+    indicated: Floats = np.asarray(np.linalg.solve(-np.stack((look, rate)), np.array([value, slope])), dtype=float)
+    return indicated
+
+
+def _measured(image: Complexes, spacing: float, mask_m: float | None) -> ImpulseResponse:
+    """Measure the cross-range cut through the brightest pixel, moved to the middle."""
+    row, column = np.unravel_index(np.argmax(np.abs(image)), image.shape)
+    cut = np.roll(image[row], image.shape[1] // 2 - int(column))
+    return impulse_response(cut, spacing, mask_m)
