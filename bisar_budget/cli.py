@@ -15,6 +15,7 @@ from bisar_budget.errors import printable
 
 if TYPE_CHECKING:
     from bisar_budget.budget.findings import MissionFindings, Report
+    from bisar_budget.mission.model import Mission
 
 EXIT_BROKEN, EXIT_USAGE, EXIT_OUR_FAULT, EXIT_INTERRUPTED = 1, 2, 3, 130
 
@@ -151,6 +152,24 @@ def _checked(files: Sequence[str], today: date, model: str | None) -> "Report":
         except MissionError as error:
             missions.append(UnusableMission(file=file, faults=error.faults))
     return Report(version=__version__, missions=tuple(missions))
+
+
+def _loaded(files: Sequence[str]) -> "list[Mission]":
+    """Load every mission, or say every fault of every file and exit."""
+    from bisar_budget.errors import MissionError
+    from bisar_budget.mission.load import load_mission
+
+    loaded, is_usable = [], True
+    for file in files:
+        try:
+            loaded.append(load_mission(file))
+        except MissionError as error:
+            is_usable = False
+            for line in error.lines():
+                _complain(line)
+    if not is_usable:
+        sys.exit(EXIT_USAGE)
+    return loaded
 
 
 def _expanded(patterns: Iterable[str]) -> list[str]:
@@ -301,18 +320,10 @@ def verify(missions: Sequence[str], only: str, format_name: str, output: str | N
     image shows its budget within 5 %, optimistic if it shows more, conservative if less. Limits are those
     without autofocus. Exit code: 0, or 1 if a limit is optimistic, 2 for wrong usage or an unusable file.
     """
-    from bisar_budget.errors import MissionError
-    from bisar_budget.mission.load import load_mission
     from bisar_budget.report import Style, verification
     from bisar_budget.simulate.verify import verify_mission
 
-    try:
-        loaded = [load_mission(file) for file in _expanded(missions)]
-    except MissionError as error:
-        for line in error.lines():
-            _complain(line)
-        sys.exit(EXIT_USAGE)
-    verified = [verify_mission(mission, only) for mission in loaded]
+    verified = [verify_mission(mission, only) for mission in _loaded(_expanded(missions))]
     if format_name == "json":
         text = verification.as_json(__version__, verified)
     else:
@@ -334,19 +345,11 @@ def simulate(mission: str, plot: str | None, output: str | None) -> None:
     The data come from exact ranges; the image is formed where the errors move the point, in the scene's
     axes and rotated so that the smear lies in cross range, and focused by phase gradient autofocus.
     """
-    from bisar_budget.errors import MissionError
-    from bisar_budget.mission.load import load_mission
-
     for name, suffixes in ((plot, (".png", ".svg", ".pdf")), (output, (".npz",))):
         if name is not None and os.path.splitext(name)[1].lower() not in suffixes:
             raise click.UsageError(f"{name}: the suffix must be one of {', '.join(suffixes)}")
     _spare([mission], [plot, output])
-    try:
-        loaded = load_mission(mission)
-    except MissionError as error:
-        for line in error.lines():
-            _complain(line)
-        sys.exit(EXIT_USAGE)
+    (loaded,) = _loaded([mission])
     from bisar_budget.report import point_plot
     from bisar_budget.simulate.point import SimulationError, simulate_point
 

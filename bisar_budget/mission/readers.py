@@ -8,7 +8,7 @@ library would, in a fifth of the import time: `check` starts in every commit of 
 
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from bisar_budget.errors import InvalidValueError, KeyPath, Problem
@@ -389,16 +389,3 @@ def did_you_mean(given: object, known: tuple[str, ...]) -> str:
 
     near = get_close_matches(str(given)[:_MAX_TEXT], known, 1)
     return f"Did you mean {near[0]!r}?" if near else ""
-
-
-def sections(reader: Reader) -> Iterator[Section]:
-    """Every section that a reader can lead to, itself included."""
-    if isinstance(reader, ListOf):
-        reader = reader.section
-    if isinstance(reader, OneOf):
-        for form in reader.forms:
-            yield from sections(form)
-    if isinstance(reader, Section):
-        yield reader
-        for key in reader.keys.values():
-            yield from sections(key.reader)

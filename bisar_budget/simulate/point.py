@@ -69,8 +69,11 @@ def simulate_point(mission: Mission) -> PointImages:
     Raises
     ------
     SimulationError
-        Too few pulses for the patch, or an image beyond `simulation.memory_limit`.
+        Autofocus other than by phase gradient, too few pulses for the patch, lines of equal range that bend
+        through cells, or an image beyond `simulation.memory_limit`.
     """
+    if mission.autofocus.algorithm != "pga":
+        raise SimulationError(f"autofocus.algorithm {mission.autofocus.algorithm}: this version focuses by pga only")
     geometry, settings = mission.geometry, mission.simulation
     T, wavelength = mission.collection.aperture_time, mission.radar.wavelength
     cross_range = geometry.cross_range_resolution(wavelength, T)

@@ -224,15 +224,20 @@ def _quadratic(scope: _Scope, allocation: Allocation, source: ErrorSource) -> Ve
     except (ValueError, np.linalg.LinAlgError) as error:
         return _verdict(source.id, source.unit, boundary, budget_rad=budget, reason=f"no image: {error}")
     displaced = math.hypot(*effect.displacement)
-    reason = None
     if displaced > MAX_DISPLACEMENT_M:
-        verdict = "not_evaluated"
-        reason = (
-            f"the error at the limit moves the image by {displaced:.3g} m: beyond {MAX_DISPLACEMENT_M:g} m the "
-            "second order of the range error matters, which no limit accounts for"
+        return _verdict(
+            source.id,
+            source.unit,
+            boundary,
+            budget_rad=budget,
+            predicted_qpe_rad=abs(effect.quadratic),
+            predicted_cubic_rad=abs(effect.cubic),
+            displacement_m=effect.displacement,
+            reason=(
+                f"the error at the limit moves the image by {displaced:.3g} m: beyond {MAX_DISPLACEMENT_M:g} m the "
+                "second order of the range error matters, which no limit accounts for"
+            ),
         )
-    else:
-        verdict = _compare(abs(quadratic) / budget - 1, TOLERANCE)
     return _verdict(
         source.id,
         source.unit,
@@ -248,8 +253,7 @@ def _quadratic(scope: _Scope, allocation: Allocation, source: ErrorSource) -> Ve
         pslr_db=response.pslr_db,
         islr_db=response.islr_db,
         displacement_m=effect.displacement,
-        verdict=verdict,
-        reason=reason,
+        verdict=_compare(abs(quadratic) / budget - 1, TOLERANCE),
     )
 
 

@@ -116,6 +116,10 @@ class TestRefusals:
         with pytest.raises(SimulationError, match="aliases below"):
             simulate_point(parse_mission(mission_text(collection__pulses=16)))
 
+    def test_map_drift_is_not_replaced_in_silence(self) -> None:
+        with pytest.raises(SimulationError, match="map_drift"):
+            simulate_point(parse_mission(mission_text(autofocus={"algorithm": "map_drift"})))
+
     def test_memory_limit(self) -> None:
         smeared = {"platforms__transmitter__motion_error__acceleration": [0.02, 0, 0]}
         with pytest.raises(SimulationError, match="memory_limit is 1 MB"):

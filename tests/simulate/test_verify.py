@@ -139,6 +139,7 @@ def test_an_error_that_moves_the_image_far_is_not_evaluated() -> None:
     row = verdicts("transmitter.velocity.x", platforms=platforms, collection__aperture_time=0.5)
     assert row["transmitter.velocity.x"].verdict == "not_evaluated"
     assert "moves the image by" in row["transmitter.velocity.x"].reason
+    assert row["transmitter.velocity.x"].measured_qpe_rad is None
 
 
 class TestCommand:
