@@ -29,7 +29,7 @@ from bisar_budget.simulate.phase_history import (
 
 TOLERANCE = 0.05  # of the budget: nearer than this a limit is confirmed
 VIBRATION_TOLERANCE_DB = 0.5
-MAX_DISPLACEMENT_M = 30.0  # beyond, the second order of the range error is no longer small beside a budget
+FIRST_ORDER_M = 30.0  # beyond, the second order of the range error is no longer small beside a budget
 INSIDE, BEYOND = 0.9, 1.1  # of the limit: the phase on both sides shows that the limit is the limit
 
 _CELLS = 40  # resolution cells of a cut
@@ -223,8 +223,8 @@ def _quadratic(scope: _Scope, allocation: Allocation, source: ErrorSource) -> Ve
         response = impulse_response(cut, scope.spacing, mask_m=clean.mask_m)
     except (ValueError, np.linalg.LinAlgError) as error:
         return _verdict(source.id, source.unit, boundary, budget_rad=budget, reason=f"no image: {error}")
-    displaced = math.hypot(*effect.displacement)
-    if displaced > MAX_DISPLACEMENT_M:
+    far = max(math.hypot(*effect.displacement), _reach(source, boundary, scope.aperture_time))
+    if far > FIRST_ORDER_M:
         return _verdict(
             source.id,
             source.unit,
@@ -234,7 +234,7 @@ def _quadratic(scope: _Scope, allocation: Allocation, source: ErrorSource) -> Ve
             predicted_cubic_rad=abs(effect.cubic),
             displacement_m=effect.displacement,
             reason=(
-                f"the error at the limit moves the image by {displaced:.3g} m: beyond {MAX_DISPLACEMENT_M:g} m the "
+                f"the error at the limit moves platform or image by {far:.3g} m: beyond {FIRST_ORDER_M:g} m the "
                 "second order of the range error matters, which no limit accounts for"
             ),
         )
@@ -255,6 +255,11 @@ def _quadratic(scope: _Scope, allocation: Allocation, source: ErrorSource) -> Ve
         displacement_m=effect.displacement,
         verdict=_compare(abs(quadratic) / budget - 1, TOLERANCE),
     )
+
+
+def _reach(source: ErrorSource, size: float, aperture_time: float) -> float:
+    """Largest position error of a platform within the aperture. [m]"""
+    return size * {"m": 1.0, "m/s": aperture_time / 2, "m/s^2": aperture_time**2 / 8}.get(source.unit, 0.0)
 
 
 def _compare(excess: float, tolerance: float) -> str:
