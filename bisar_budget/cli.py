@@ -222,10 +222,10 @@ def _complain(message: str) -> None:
 
 def _spare(files: Sequence[str], targets: Iterable[str | None]) -> None:
     """Refuse to write a report over a mission."""
-    missions = {os.path.realpath(file) for file in files if file != "-"}
-    for target in targets:
-        if target is not None and os.path.realpath(target) in missions:
-            _fail(f"{target} is a mission file; a report would replace it")
+    written = {os.path.realpath(target): target for target in targets if target is not None}
+    for file in files if written else ():
+        if file != "-" and os.path.realpath(file) in written:
+            _fail(f"{written[os.path.realpath(file)]} is a mission file; a report would replace it")
 
 
 def _is_terminal() -> bool:
