@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Any, BinaryIO, cast
 
 import yaml
+from yaml import AliasEvent, MappingEndEvent, ScalarEvent
 
 from bisar_budget.errors import Fault, KeyPath, MissionError, Problem, printable
 from bisar_budget.mission.model import MISSION, Mission
@@ -151,14 +152,14 @@ class _Tree:
         """Read one value; the depth of the recursion is bounded by `MAX_DEPTH`."""
         mark = self.values[path] = _mark(event)
         kind = type(event)
-        if kind is yaml.AliasEvent:
-            self.fault(mark, path, "is an alias (*)", accepted="write the value out")
-            return INVALID
-        if kind is yaml.ScalarEvent:
-            value: Any = str(event.value)
+        if kind is ScalarEvent:
+            value: Any = event.value
             if not event.style and value in _NULLS:  # plain: "" from libyaml, None from pure Python
                 self.fault(mark, path, "has no value", hint="Give it one, or remove the key")
                 value = INVALID
+        elif kind is AliasEvent:
+            self.fault(mark, path, "is an alias (*)", accepted="write the value out")
+            return INVALID
         elif len(path) >= MAX_DEPTH:
             self.fault(mark, (), f"is nested more than {MAX_DEPTH} deep")
             raise _UnusableError
@@ -175,12 +176,12 @@ class _Tree:
 
     def _mapping(self, next_event: Callable[[], Any], path: KeyPath) -> dict[str, Any]:
         mapping: dict[str, Any] = {}
-        while type(event := next_event()) is not yaml.MappingEndEvent:
+        while type(event := next_event()) is not MappingEndEvent:
             mark = _mark(event)
-            if type(event) is not yaml.ScalarEvent:
+            if type(event) is not ScalarEvent:
                 self.fault(mark, path, "has a key that is not plain text")
                 raise _UnusableError
-            key = str(event.value)
+            key = event.value
             here = (*path, key)
             if key in mapping:
                 first = self.keys[here][0] + 1
