@@ -12,6 +12,10 @@ from bisar_budget.constants import STANDARD_GRAVITY
 from bisar_budget.errors import InvalidValueError
 
 _NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+# What nearly every quantity looks like; all else is looked at closely.
+_QUANTITY = re.compile(
+    r"([+-]?(?:0|[1-9]\d{0,20})(?:\.\d{0,20})?(?:[eE][+-]?\d{1,3})?) ?([^\s\d]\S{0,20})?", re.ASCII
+)
 _MAX_TEXT = 64  # characters; longer text is no quantity anybody wrote
 
 
@@ -102,6 +106,17 @@ def parse_quantity(value: object, dimension: Dimension) -> float:
     InvalidValueError
         Not a number, not finite, an unknown unit, or a unit of another dimension.
     """
+    plain = _QUANTITY.fullmatch(value) if type(value) is str else None
+    if plain is not None:
+        digits, unit = plain.groups("")
+        factor = dimension.units.get(unit) if unit else 1.0
+        if factor is not None:
+            return _finite(_scaled_number(float(digits), factor), dimension)
+    return _parse_closely(value, dimension)
+
+
+def _parse_closely(value: object, dimension: Dimension) -> float:
+    """Read every accepted way to write a quantity, and say what is wrong with the others."""
     if isinstance(value, bool) or not isinstance(value, str | int | float):
         raise _invalid(f"must be {dimension.name}", dimension)
     if not isinstance(value, str):
@@ -121,10 +136,14 @@ def parse_quantity(value: object, dimension: Dimension) -> float:
         factor = dimension.units.get(unit)
     if factor is None:
         raise _wrong_unit(unit, dimension)
-    if factor != 1.0:
-        divisor = _whole_inverse(factor)
-        number = number / divisor if divisor else number * factor
-    return _finite(number, dimension)
+    return _finite(_scaled_number(number, factor), dimension)
+
+
+def _scaled_number(number: float, factor: float) -> float:
+    if factor == 1.0:
+        return number
+    divisor = _whole_inverse(factor)
+    return number / divisor if divisor else number * factor
 
 
 @cache
@@ -139,14 +158,11 @@ def format_quantity(value: float, unit: str, digits: int = 3, rounding: str = "n
 
     `rounding` is `nearest` or `down`; a limit is rounded down so that copying it from the page still passes.
     """
-    pretty = unit.replace("^2", "²").replace("^3", "³")
-    if pretty.startswith("1/"):
-        return f"{_rounded(value, digits, rounding)}{pretty[1:]}"
     size = abs(value)
-    for scale, prefix in _STEPS.get(unit, ()):
-        if size >= scale * 0.9995 and size < scale * 1e6:
-            return f"{_rounded(value / scale, digits, rounding)} {prefix}{pretty}"
-    return f"{_rounded(value, digits, rounding)} {pretty}".rstrip()
+    for scale, smallest, largest, suffix in _steps(unit):
+        if smallest <= size < largest:
+            return _rounded(value / scale, digits, rounding) + suffix
+    return _rounded(value, digits, rounding) + _steps(unit)[-1][3]
 
 
 _SMALL = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
@@ -161,14 +177,25 @@ _STEPS = {
 }
 
 
+@cache
+def _steps(unit: str) -> tuple[tuple[float, float, float, str], ...]:
+    """Scale, range of sizes written in it and what stands behind the number, for each prefix; last, the bare unit."""
+    pretty = unit.replace("^2", "²").replace("^3", "³")
+    if pretty.startswith("1/"):
+        return ((1.0, 0.0, math.inf, pretty[1:]),)
+    steps = ((scale, scale * 0.9995, scale * 1e6, f" {prefix}{pretty}") for scale, prefix in _STEPS.get(unit, ()))
+    return (*steps, (1.0, 0.0, math.inf, f" {pretty}".rstrip()))
+
+
 def _rounded(value: float, digits: int, rounding: str) -> str:
-    if rounding == "down" and value != 0:
+    text = f"{value:.{digits}g}"
+    if rounding == "down" and ("e" in text or abs(float(text)) > abs(value)):
         exponent = math.floor(math.log10(abs(value)))
         step = digits - 1 - exponent
         # One part in 10¹² keeps an exact 0.3 from becoming 0.299.
         mantissa = math.floor(abs(value) * 10.0 ** (step) * (1 + 1e-12))
         value = math.copysign(mantissa / 10.0**step if step <= 300 else abs(value), value)
-    text = f"{value:.{digits}g}"
+        text = f"{value:.{digits}g}"
     return f"{value:.0f}" if "e+0" in text and abs(value) < 1e6 else text
 
 

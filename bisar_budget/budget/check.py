@@ -72,22 +72,27 @@ def _error_rows(
     combine = mission.allocation.combine
     info = f"combine is {combine}: the aggregate decides" if combine != "each" else ""
     gain = allocation.autofocus_gain
-    limits = {owner: allocation.qpe_limit(owner) for owner in ("transmitter", "receiver", "clock", "mission")}
+    owners = ("transmitter", "receiver", "clock", "mission")
+    limits = {owner: allocation.qpe_limit(owner) * gain for owner in owners}
     for source in sources:
         limit = limits[source.owner]
         per_unit = abs(source.effect.qpe)
-        declared = None if source.declared is None else abs(source.declared)
-        qpe = None if declared is None else per_unit * declared
+        allowable = _quotient(limit, per_unit)
+        if source.declared is None:
+            yield _undeclared(mission, source, allowable)
+            continue
+        declared = abs(source.declared)
+        qpe = per_unit * declared
         notes, displacement = source.notes, None
-        if source.declared is not None and source.owner != "mission":
+        if source.owner != "mission":
             displacement = plane.displacement(source.effect, source.declared)
             if displacement is None:
                 notes = (*notes, plane.degeneracy)
         over = ""
-        if qpe is not None and qpe > limit * gain:
+        if qpe > limit:
             needed = allocation.n_pull_needed(qpe, source.owner)
             over = (
-                f"QPE {qpe:.3g} rad, {limit * gain:.3g} rad allowed ({source.equation}); "
+                f"QPE {qpe:.3g} rad, {limit:.3g} rad allowed ({source.equation}); "
                 f"passes with autofocus from n_pull {needed:g}"
             )
         yield _judged(
@@ -96,7 +101,7 @@ def _error_rows(
             metric="quadratic_phase_error",
             unit=source.unit,
             declared=declared,
-            allowable=_quotient(limit * gain, per_unit),
+            allowable=allowable,
             path=source.path,
             equation=source.equation,
             gain=gain,
@@ -109,6 +114,32 @@ def _error_rows(
             is_independent=source.is_independent,
             notes=notes,
         )
+
+
+def _undeclared(mission: Mission, source: ErrorSource, allowable: float | None) -> Row:
+    """Row of an error that the file does not declare, as `_judged` would make it: half of all rows are such."""
+    return Row(
+        source.id,
+        "quadratic_phase_error",
+        source.unit,
+        None,
+        allowable,
+        allowable,  # published
+        None,
+        None,
+        None,
+        None,
+        None,
+        None,
+        "not_declared",
+        mission.line(source.path),
+        source.no_limit if allowable is None else None,
+        source.notes,
+        source.equation,
+        mission.requirement_ids.get(source.id),
+        source.evidence,
+        source.is_independent,
+    )
 
 
 def _quotient(numerator: float, denominator: float) -> float | None:

@@ -132,27 +132,27 @@ def _motion(mission: Mission, name: str, state: PlatformState) -> Iterator[Error
         mission.collection.aperture_time,
     )
     error: MotionError = getattr(mission.platforms, name).motion_error
+    factor = mission.allocation.coverage_factor
+    in_scene = error.frame == "scene"
     axes = state.frame(error.frame)
     for kind_index, (kind, unit) in enumerate(MOTION_UNITS.items()):
         effects = [Effect._make(row) for row in rows[3 * kind_index :][:3]]
         values: Vector | None = getattr(error, kind)
-        factor = mission.allocation.coverage_factor
-        declared = None if values is None else tuple(value * factor for value in values)
+        declared = None if values is None else tuple([value * factor for value in values])
         path = ("platforms", name, "motion_error", kind)
-        in_scene = error.frame == "scene"
-        for axis, letter in enumerate("xyz"):
+        for axis, (row_id, own_path, equation, no_limit) in enumerate(_scene_axes(name, kind)):
             on_axis = None
             if declared is not None:
                 on_axis = declared[axis] if in_scene else _along_scene_axis(declared, axes, axis, error.distribution)
             yield ErrorSource(
-                f"{name}.{kind}.{letter}",
+                row_id,
                 name,
                 unit,
                 on_axis,
-                (*path, axis) if in_scene else path,
+                own_path if in_scene else path,
                 effects[axis],
-                _equation(kind, axis),
-                _no_limit(kind, letter),
+                equation,
+                no_limit,
                 error.source,
                 in_scene,
             )
@@ -170,6 +170,20 @@ def _motion(mission: Mission, name: str, state: PlatformState) -> Iterator[Error
                 no_limit=_no_limit(kind, f"the {error.frame} frame's {axis_name} axis"),
                 evidence=error.source,
             )
+
+
+@cache
+def _scene_axes(name: str, kind: str) -> tuple[tuple[str, KeyPath, str, str], ...]:
+    """Row id, path in the file, equation and reason for no limit, along each axis of the scene."""
+    return tuple(
+        (
+            f"{name}.{kind}.{letter}",
+            ("platforms", name, "motion_error", kind, axis),
+            _equation(kind, axis),
+            _no_limit(kind, letter),
+        )
+        for axis, letter in enumerate("xyz")
+    )
 
 
 def _along_scene_axis(
@@ -203,7 +217,6 @@ def _along(effects: list[Effect], direction: Vector) -> Effect:
     )
 
 
-@cache
 def _equation(kind: str, axis: int | None) -> str:
     if kind == "position":
         return "Table I" if axis is None else f"Table I row {2 + 3 * axis}"
@@ -211,7 +224,6 @@ def _equation(kind: str, axis: int | None) -> str:
     return f"Table II rows {first}-{first + 2}" if axis is None else f"Table II row {first + axis}"
 
 
-@cache
 def _no_limit(kind: str, axis: str) -> str:
     """Say why an error has no QPE limit, for the case that it has none."""
     if kind == "position":

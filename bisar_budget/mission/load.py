@@ -102,21 +102,21 @@ class _UnusableError(Exception):
 
 
 class _Tree:
-    """What the file says: nested dict, list and str, with the 0-based (line, column) of every key and value.
+    """What the file says: nested dict, list and str, with the parser's mark of every key and value.
 
     What cannot be read is reported and stands in the tree as `INVALID`.
     """
 
     def __init__(self) -> None:
         self.root: Any = INVALID
-        self.keys: dict[KeyPath, tuple[int, int]] = {}
-        self.values: dict[KeyPath, tuple[int, int]] = {}
+        self.keys: dict[KeyPath, Any] = {}
+        self.values: dict[KeyPath, Any] = {}
         self.faults: list[Fault] = []
 
-    def fault(self, mark: tuple[int, int], path: KeyPath, problem: str, **more: str) -> None:
-        """Note a fault at a place of the file."""
-        line, column = mark
-        self.faults.append(Fault(line=line + 1, column=column + 1, key=_dotted(path), problem=problem, **more))
+    def fault(self, mark: Any, path: KeyPath, problem: str, **more: str) -> None:
+        """Note a fault at a place of the file; without a mark, at its start."""
+        line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
+        self.faults.append(Fault(line=line, column=column, key=_dotted(path), problem=problem, **more))
 
     def report(self, path: KeyPath, problem: Problem) -> None:
         """Note what a reader found wrong, at the value's place, else at the nearest key's above it."""
@@ -135,7 +135,7 @@ class _Tree:
                 break
             mark = self.keys.get(path[:length]) or self.values.get(path[:length])
         given = _shown(value) if isinstance(value, str) and not is_key else ""
-        self.fault(mark or (0, 0), path, problem.problem, given=given, accepted=problem.accepted, hint=problem.hint)
+        self.fault(mark, path, problem.problem, given=given, accepted=problem.accepted, hint=problem.hint)
 
     def read_document(self, next_event: Callable[[], Any]) -> None:
         """Read the one document of a file."""
@@ -145,12 +145,12 @@ class _Tree:
         self.root = self._node(next_event, next_event(), ())
         while type(event := next_event()) is not yaml.StreamEndEvent:
             if type(event) is yaml.DocumentStartEvent:
-                self.fault(_mark(event), (), "has a second YAML document", accepted="one mission to a file")
+                self.fault(event.start_mark, (), "has a second YAML document", accepted="one mission to a file")
                 raise _UnusableError
 
     def _node(self, next_event: Callable[[], Any], event: Any, path: KeyPath) -> Any:
         """Read one value; the depth of the recursion is bounded by `MAX_DEPTH`."""
-        mark = self.values[path] = _mark(event)
+        mark = self.values[path] = event.start_mark
         kind = type(event)
         if kind is ScalarEvent:
             value: Any = event.value
@@ -177,25 +177,26 @@ class _Tree:
     def _mapping(self, next_event: Callable[[], Any], path: KeyPath) -> dict[str, Any]:
         mapping: dict[str, Any] = {}
         while type(event := next_event()) is not MappingEndEvent:
-            mark = _mark(event)
+            mark = event.start_mark
             if type(event) is not ScalarEvent:
                 self.fault(mark, path, "has a key that is not plain text")
                 raise _UnusableError
             key = event.value
             here = (*path, key)
             if key in mapping:
-                first = self.keys[here][0] + 1
+                first = self.keys[here].line + 1
                 problem = f"is a duplicate key; the first is in line {first}"
                 self.fault(mark, here, problem, accepted="each key once")
                 self._node(next_event, next_event(), (*path, f"{key} (again)"))
                 continue
             self.keys[here] = mark
-            mapping[key] = self._node(next_event, next_event(), here)
+            event = next_event()
+            if type(event) is ScalarEvent and event.tag is None and event.value not in _NULLS:
+                self.values[here] = event.start_mark  # as `_node` would: most values are such
+                mapping[key] = event.value
+            else:
+                mapping[key] = self._node(next_event, event, here)
         return mapping
-
-
-def _mark(event: Any) -> tuple[int, int]:
-    return (event.start_mark.line, event.start_mark.column)
 
 
 def _read_tree(text: str, file: str) -> _Tree:
@@ -209,7 +210,7 @@ def _read_tree(text: str, file: str) -> _Tree:
     except yaml.MarkedYAMLError as error:
         place = error.problem_mark or error.context_mark
         problem = f"is not valid YAML: {' '.join(filter(None, (error.context, error.problem)))}"
-        tree.fault((place.line, place.column) if place else (0, 0), (), problem)
+        tree.fault(place, (), problem)
         raise MissionError(file, tuple(tree.faults)) from None
     except yaml.reader.ReaderError as error:
         line = text.count("\n", 0, max(0, error.position)) + 1

@@ -353,7 +353,7 @@ class Waiver(NamedTuple):
 class Mission(NamedTuple):
     """A mission file that can be used.
 
-    `file` and `places` say where it stands: the path of each value to its 0-based line and column.
+    `file` and `places` say where it stands: the path of each value to the parser's mark.
     """
 
     schema_version: Annotated[int, Key(Version())]
@@ -372,7 +372,7 @@ class Mission(NamedTuple):
     simulation: Annotated[Simulation | None, Key(Section(Simulation))] = None
     waivers: Annotated[tuple[Waiver, ...], Key(ListOf(Waiver))] = ()
     file: str = ""
-    places: Mapping[KeyPath, tuple[int, int]] = {}
+    places: Mapping[KeyPath, Any] = {}
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
@@ -399,10 +399,11 @@ class Mission(NamedTuple):
 
         At last that is the file's first key; None for a mission that came from no file.
         """
-        while path and path not in self.places:
+        places = self.places
+        while path and path not in places:
             path = path[:-1]
-        place = self.places.get(path)
-        return None if place is None else place[0] + 1
+        place = places.get(path)
+        return None if place is None else int(place.line) + 1
 
 
 @lru_cache(maxsize=4)  # asked for when a mission is read and again when it is checked

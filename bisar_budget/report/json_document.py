@@ -1,6 +1,8 @@
 """The report as JSON, `bisar-budget/check/1`. Keys may be added, never changed or removed."""
 
 import json
+from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 from bisar_budget.budget.allocation import Split
@@ -16,22 +18,35 @@ def render(report: Report, style: Style) -> str:
     return _indented(document(report), _LEVELS) + "\n"
 
 
-_encode = json.JSONEncoder(allow_nan=False).encode
 _LEVELS = 4  # document, missions, mission, rows: what is inside a row stays on its line
 
 
+@cache
+def _encoder(separator: str) -> Callable[[Any], str]:
+    return json.JSONEncoder(allow_nan=False, separators=(separator, ": ")).encode
+
+
 def _indented(value: Any, levels: int, margin: str = "") -> str:
-    # json.dumps(indent=…) runs in Python and costs as much as the check itself.
+    """Indent the upper levels. json.dumps(indent=…) runs in Python and costs as much as the check itself."""
     if levels == 0 or not value or not isinstance(value, dict | list | tuple):
-        return _encode(value)
+        return _encoder(", ")(value)
     inner = margin + "  "
+    between = f",\n{inner}"
     if isinstance(value, dict):
-        items = [f"{_encode(key)}: {_indented(item, levels - 1, inner)}" for key, item in value.items()]
         opening, closing = "{", "}"
+        if any(isinstance(item, dict | list | tuple) for item in value.values()):
+            items = [f'"{key}": {_indented(item, levels - 1, inner)}' for key, item in value.items()]
+            content = between.join(items)
+        else:
+            content = _encoder(between)(value)[1:-1]
     else:
-        items = [_indented(item, levels - 1, inner) for item in value]
         opening, closing = "[", "]"
-    return f"{opening}\n{inner}" + f",\n{inner}".join(items) + f"\n{margin}{closing}"
+        if levels == 1:
+            # Within a string the quote before `id` would stand behind a backslash: this cuts between rows only.
+            content = _encoder(", ")(value)[1:-1].replace('}, {"id": ', f'}}{between}{{"id": ')
+        else:
+            content = between.join([_indented(item, levels - 1, inner) for item in value])
+    return f"{opening}\n{inner}{content}\n{margin}{closing}"
 
 
 def document(report: Report) -> dict[str, Any]:

@@ -116,18 +116,24 @@ def _degrees(angle: float) -> str:
 
 
 def _row(row: Row, style: Style) -> list[str]:
-    declared = "-" if row.declared is None else format_quantity(row.declared, row.unit)
-    # Rounded down, so that an allowable copied from the page into a file passes.
-    allowable = "no limit" if row.allowable is None else format_quantity(row.allowable, row.unit, rounding="down")
-    if row.allowable is None and (row.status in ("not_evaluated", "info") or row.metric in ("pslr", "islr")):
-        allowable = "-"
-    is_judged = row.utilization is not None and row.allowable is not None and row.status != "not_evaluated"
-    use = percent(row.utilization or 0.0) if is_judged else "-"
-    cells = (declared, allowable, use, _short_reference(row.equation))
-    word = f"{WORDS[row.status]:<8}"
-    lines = [_cells(word, row.id, *cells)] if len(row.id) <= 34 else [f"{word} {row.id}", _cells("", "", *cells)]
+    status, limit, unit = row.status, row.allowable, row.unit
+    declared = "-" if row.declared is None else format_quantity(row.declared, unit)
+    use = "-"
+    if limit is None:
+        is_open = status == "not_evaluated" or status == "info" or row.metric == "pslr" or row.metric == "islr"
+        allowable = "-" if is_open else "no limit"
+    else:
+        # Rounded down, so that an allowable copied from the page into a file passes.
+        allowable = format_quantity(limit, unit, 3, "down")
+        if row.utilization is not None and status != "not_evaluated":
+            use = percent(row.utilization)
+    reference = _short_reference(row.equation)
+    if len(row.id) <= 34:
+        lines = [_cells(WORDS[status], row.id, declared, allowable, use, reference)]
+    else:
+        lines = [f"{WORDS[status]:<8} {row.id}", _cells("", "", declared, allowable, use, reference)]
     if style.color:
-        lines[0] = _word(row.status, style, 8) + lines[0][8:]
+        lines[0] = _word(status, style, 8) + lines[0][8:]
     return lines
 
 
@@ -150,6 +156,8 @@ def percent(ratio: float) -> str:
         return ">1e5 %"
     if value < 0.01:
         return "<0.01 %"
+    if value < 99:
+        return f"{value:.3g} %"
     side = 0 if abs(value - 100) < 1e-7 else math.copysign(1, value - 100)
     for digits in range(max(3, len(f"{value:.0f}")), 13):
         text = f"{value:.{digits}g}"

@@ -148,8 +148,8 @@ def test_pure_python_parser_reads_the_same(monkeypatch) -> None:
     fast = parse_mission(text)
     monkeypatch.setattr(load, "_PARSER", yaml.SafeLoader)
     slow = parse_mission(text)
-    assert slow == fast
-    assert slow.places == fast.places
+    assert slow._replace(places={}) == fast._replace(places={})
+    assert {path: slow.line(path) for path in slow.places} == {path: fast.line(path) for path in fast.places}
     with pytest.raises(MissionError, match="fault"):
         parse_mission("radar:\nname: x\n")
 
