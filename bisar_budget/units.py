@@ -111,7 +111,8 @@ def parse_quantity(value: object, dimension: Dimension) -> float:
         digits, unit = plain.groups("")
         factor = dimension.units.get(unit) if unit else 1.0
         if factor is not None:
-            return _finite(_scaled_number(float(digits), factor), dimension)
+            number = float(digits) if factor == 1.0 else _scaled_number(float(digits), factor)
+            return _finite(number, dimension)
     return _parse_closely(value, dimension)
 
 
@@ -140,8 +141,6 @@ def _parse_closely(value: object, dimension: Dimension) -> float:
 
 
 def _scaled_number(number: float, factor: float) -> float:
-    if factor == 1.0:
-        return number
     divisor = _whole_inverse(factor)
     return number / divisor if divisor else number * factor
 

@@ -107,8 +107,8 @@ class Triple(Reader):
             given = f", {len(value)} given" if isinstance(value, list) else ""
             report(path, Problem(f"must be three components{given}", "accepted: [a, b, c]"))
             return INVALID
-        parts = tuple(_read(self.component, part, (*path, index), report) for index, part in enumerate(value))
-        return INVALID if any(part is INVALID for part in parts) else parts
+        parts = tuple([_read(self.component, part, (*path, index), report) for index, part in enumerate(value)])
+        return INVALID if INVALID in parts else parts
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Array of three, or also a single value."""
@@ -276,6 +276,7 @@ class Section(Reader):
         }
         self.defaults: dict[str, Any] = kind._field_defaults
         self.required = [name for name in self.keys if name not in self.defaults]
+        self.problems = getattr(kind, "problems", None)
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
         """Read every key, report every fault."""
@@ -292,18 +293,18 @@ class Section(Reader):
                 report((*path, name), Problem("is not a known key", known, hint))
                 is_valid = False
                 continue
-            read = values[name] = item if item is INVALID else key.reader.read(item, (*path, name), report)
-            is_valid = is_valid and read is not INVALID
+            values[name] = item if item is INVALID else key.reader.read(item, (*path, name), report)
+        if INVALID in values.values():
+            is_valid = False
         for name in self.required:
             if name not in value:
                 report((*path, name), Problem("is missing"))
                 is_valid = False
-        problems = getattr(self.kind, "problems", None)
-        if problems is not None:
+        if self.problems is not None:
             right = self.defaults | values
             if not is_valid:
                 right = {name: item for name, item in right.items() if item is not INVALID}
-            for problem in problems(right):
+            for problem in self.problems(right):
                 report(path, problem)
                 is_valid = False
         return self.kind(**values) if is_valid else INVALID
@@ -352,8 +353,8 @@ class ListOf(Reader):
         if len(value) > _MAX_ENTRIES:
             report(path, Problem(f"must have at most {_MAX_ENTRIES} entries, has {len(value)}"))
             return INVALID
-        entries = tuple(_read(self.section, entry, (*path, index), report) for index, entry in enumerate(value))
-        return INVALID if any(entry is INVALID for entry in entries) else entries
+        entries = tuple([_read(self.section, entry, (*path, index), report) for index, entry in enumerate(value)])
+        return INVALID if INVALID in entries else entries
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Array of the section."""
