@@ -59,21 +59,21 @@ def _unusable(mission: UnusableMission, style: Style) -> list[str]:
     if style.verbosity < 0:
         return [summary]
     places = [f"  {fault.line or '-'}:{fault.column or '-'}  {fault}" for fault in mission.faults]
-    return [*(line for place in places for line in _wrapped(place, "       ")), summary]
+    return [*(line for place in places for line in wrapped(place, "       ")), summary]
 
 
 def _mission(mission: MissionFindings, style: Style) -> list[str]:
     if style.verbosity < 0:
         return [_summary(mission, style)]
     lines = [mission.name, ""]
-    lines += [line for key, text in _head(mission) for line in _wrapped(f"{key:<12} {text}", " " * 13)]
+    lines += [line for key, text in _head(mission) for line in wrapped(f"{key:<12} {text}", " " * 13)]
     rows = worst_first(mission.rows)
     lines += ["", _cells("status", "row", "declared", "allowable", "use", "from")]
     lines += [line for row in rows for line in _row(row, style)]
     explained = [row for row in rows if row.status in _EXPLAINED or style.verbosity > 0]
     details = [line for row in explained for line in _details(row, mission, style)]
     lines += ["", *details] if details else []
-    lines += [line for text in _asides(mission, style) for line in _wrapped(text, "  ")]
+    lines += [line for text in _asides(mission, style) for line in wrapped(text, "  ")]
     return [*lines, "", _summary(mission, style)]
 
 
@@ -185,7 +185,7 @@ def _details(row: Row, mission: MissionFindings, style: Style) -> list[str]:
             texts.append(f"moves the image by {format_quantity(x, 'm')} east, {format_quantity(y, 'm')} north")
         if row.evidence:
             texts.append(f"evidence: {row.evidence}")
-    return [head, *(line for text in texts for line in _wrapped(f"  {text}", "  "))]
+    return [head, *(line for text in texts for line in wrapped(f"  {text}", "  "))]
 
 
 def _asides(mission: MissionFindings, style: Style) -> Iterator[str]:
@@ -212,7 +212,7 @@ def _word(status: str, style: Style, width: int = 0) -> str:
     return f"\x1b[{_ANSI[status]}m{word}\x1b[0m" if style.color else word
 
 
-def _wrapped(text: str, indent: str) -> list[str]:
+def wrapped(text: str, indent: str) -> list[str]:
     """Break at spaces before 80 columns; a word that is longer stays whole, so that a path can be copied."""
     if len(text) <= WIDTH:
         return [text]

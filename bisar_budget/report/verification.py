@@ -1,11 +1,13 @@
 """Verdicts of the images on the limits: text for reading, JSON `bisar-budget/verify/1`."""
 
 import json
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 
+from bisar_budget.budget.verdicts import Verdict, VerifiedMission
 from bisar_budget.errors import printable
 from bisar_budget.report import Style
-from bisar_budget.simulate.verify import Verdict, VerifiedMission
+from bisar_budget.report.text_table import wrapped
 from bisar_budget.units import format_quantity
 
 FORMAT = "bisar-budget/verify/1"
@@ -37,25 +39,83 @@ def as_text(missions: Sequence[VerifiedMission], style: Style) -> str:
 
 
 def _mission(mission: VerifiedMission, style: Style) -> list[str]:
-    lines = [mission.name, "", _cells("row", "limit", "budget", "exact", "image", "verdict")]
-    for row in mission.rows:
-        verdict = f"\x1b[{_ANSI[row.verdict]}m{row.verdict}\x1b[0m" if style.color else row.verdict
-        lines.append(_cells(row.id, format_quantity(row.boundary_error, row.unit), *_numbers(row), verdict))
-    reasons = [f"  {row.id}: {row.reason}" for row in mission.rows if row.reason]
-    lines += ["", *reasons] if reasons else []
+    width = max((len(row.id) for row in mission.rows), default=0)
+    lines = [mission.name, ""]
+    lines += [f"{'row':<{width}}      limit    budget     exact     image verdict"]
+    lines += [
+        f"{row.id:<{width}} {_limit(row):>11} {' '.join(f'{cell:>9}' for cell in _numbers(row))} "
+        + _word(row.verdict, style)
+        for row in mission.rows
+    ]
+    refocused = [row for row in mission.rows if row.verdict_autofocus]
+    if refocused:
+        lines += ["", "At the limit with autofocus, refocused:", ""]
+        lines += [f"{'row':<{width}}      limit    budget  residual      loss verdict"]
+        lines += [
+            f"{row.id:<{width}} {_quantity(row.boundary_autofocus, row.unit):>11} {_phase(row.budget_rad):>9} "
+            f"{_phase(row.measured_residual_qpe_rad):>9} {_decibel(row.refocused_loss_db):>9} "
+            + _word(row.verdict_autofocus or "", style)
+            for row in refocused
+        ]
+    reasons = [
+        f"{row.id}: {reason}" for row in mission.rows for reason in (row.reason, row.reason_autofocus) if reason
+    ]
+    asides = [line for text in (*_geometry(mission), *reasons) for line in wrapped(f"  {text}", "    ")]
+    lines += ["", *asides] if asides else []
     found = [row.verdict for row in mission.rows]
     counts = ", ".join(f"{found.count(verdict)} {verdict}" for verdict in _ANSI if verdict in found)
     return [*lines, "", f"{printable(mission.file)}: {counts or 'no row has a limit here'}"]
 
 
+def _geometry(mission: VerifiedMission) -> Iterator[str]:
+    """Say how far displacement and smear of the images are from (25) and (31), at worst."""
+    apart = [
+        (math.dist(row.measured_displacement_m, row.displacement_published_m), row.id)
+        for row in mission.rows
+        if row.measured_displacement_m and row.displacement_published_m
+    ]
+    if apart:
+        distance, row_id = max(apart)
+        yield f"displacement of the images: within {format_quantity(distance, 'm', 2)} of (25), farthest {row_id}"
+    turned = [
+        (abs((measured - line + math.pi / 2) % math.pi - math.pi / 2), row.id)
+        for row in mission.rows
+        if (measured := row.measured_smear_azimuth_rad) is not None
+        and (line := row.smear_azimuth_published_rad) is not None
+    ]
+    if turned:
+        angle, row_id = max(turned)
+        yield f"smear of the images: within {math.degrees(angle):.2g} deg of (31), farthest {row_id}"
+
+
+def _limit(row: Verdict) -> str:
+    return format_quantity(row.boundary_error, row.unit)
+
+
 def _numbers(row: Verdict) -> tuple[str, str, str]:
+    """Budget, what exact ranges predict, what the image shows."""
     if row.requirement_db is not None:
-        image = "-" if row.measured_db is None else f"{row.measured_db:.1f} dB"
-        return f"{row.requirement_db:.3g} dB", "-", image
-    phases = (row.budget_rad, row.predicted_qpe_rad, row.measured_qpe_rad)
-    budget, exact, image = ("-" if phase is None else f"{phase:.3f} rad" for phase in phases)
-    return budget, exact, image
+        return _decibel(row.requirement_db), "-", _decibel(row.measured_db)
+    if row.unit == "m" and row.budget_rad is None:
+        moves = (row.displacement_m, row.measured_displacement_m)
+        exact, image = ("-" if move is None else format_quantity(math.hypot(*move), "m") for move in moves)
+        return _limit(row), exact, image
+    if row.measured_cubic_rad is not None:
+        return _phase(row.budget_rad), _phase(row.predicted_cubic_rad), _phase(row.measured_cubic_rad)
+    return _phase(row.budget_rad), _phase(row.predicted_qpe_rad), _phase(row.measured_qpe_rad)
 
 
-def _cells(row: str, limit: str, budget: str, exact: str, image: str, verdict: str) -> str:
-    return f"{row:<34} {limit:>11} {budget:>9} {exact:>9} {image:>9} {verdict}".rstrip()
+def _quantity(value: float | None, unit: str) -> str:
+    return "-" if value is None else format_quantity(value, unit)
+
+
+def _phase(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3f} rad"
+
+
+def _decibel(value: float | None) -> str:
+    return "-" if value is None else f"{value:.1f} dB" if abs(value) >= 1 else f"{value:.2f} dB"
+
+
+def _word(verdict: str, style: Style) -> str:
+    return f"\x1b[{_ANSI[verdict]}m{verdict}\x1b[0m" if style.color else verdict

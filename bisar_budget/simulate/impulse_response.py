@@ -119,22 +119,24 @@ def _vertex(magnitude: Floats, top: int) -> float:
 
 
 def quadratic_phase_error(
-    cut: Complexes, reference: Complexes, spacing_m: float, aperture_cycles_per_m: float
+    cut: Complexes, reference: Complexes, spacing_m: float, slow_time: Floats, spatial_frequency: Floats
 ) -> tuple[float, float]:
     """Measure quadratic and cubic phase of a response against an error-free one at the same place.
 
-    Both cuts go back to the aperture by FFT. The phase of their product is fitted over the inner 90 % of
-    the band: the reference takes out the ripple of the band's edges and the curvature that a displaced
-    point has of its own.
+    Both cuts go back to the aperture by FFT, tapered to their ends, where a finite image cuts sidelobes off.
+    The phase of their product is fitted over the inner 90 % of the aperture: the reference takes out the
+    ripple of the band's edges and the curvature that a displaced point has of its own.
 
     Parameters
     ----------
     cut, reference : (samples,) ndarray
-        The same line of the image with and without error.
+        The same line of the image with and without error, the range at the aperture midpoint taken out.
     spacing_m : float
         Between samples.
-    aperture_cycles_per_m : float
-        Width of the aperture in spatial frequency, T|ṡ⊥|/λ.
+    slow_time : (times,) ndarray
+        -1 to 1, the ends of the aperture.
+    spatial_frequency : (times,) ndarray
+        Along the cut, at those times; monotonic, as it is where an image can be formed. [cycles/m]
 
     Returns
     -------
@@ -142,17 +144,15 @@ def quadratic_phase_error(
         Phase at the aperture edge, signed like the range error. [rad]
     """
     count = cut.size
-    product = np.fft.fft(cut) * np.conj(np.fft.fft(reference))
+    taper = np.cos(math.pi * (np.arange(count) - count // 2) / count) ** 2
+    product = np.fft.fft(cut * taper) * np.conj(np.fft.fft(reference * taper))
     frequency = np.fft.fftfreq(count, spacing_m)
-    # The error-free spectrum says where the aperture lies on the circle of frequencies.
-    power = np.abs(np.fft.fft(reference)) ** 2
-    centre = float(np.angle(power @ np.exp(2j * math.pi * frequency * spacing_m))) / (2 * math.pi * spacing_m)
-    around = 1 / spacing_m
-    place = ((frequency - centre + around / 2) % around - around / 2) / (aperture_cycles_per_m / 2)
-    order = np.argsort(place)
-    inner = order[np.abs(place[order]) < _INNER_BAND]
+    order = np.argsort(spatial_frequency)
+    place = np.interp(frequency, spatial_frequency[order], slow_time[order], left=np.inf, right=np.inf)
+    inner = np.nonzero(np.abs(place) < _INNER_BAND)[0]
+    inner = inner[np.argsort(place[inner])]
     phase = np.unwrap(np.angle(product[inner]))
     weights = np.sqrt(np.abs(product[inner]))
     fit = np.polynomial.polynomial.polyfit(place[inner], phase, 4, w=weights)
-    # The image's phase is −2π/λ times the range error; its cross-range frequency runs against slow time.
-    return -float(fit[2]), float(fit[3])
+    # The image's phase is −2π/λ times the range error.
+    return -float(fit[2]), -float(fit[3])

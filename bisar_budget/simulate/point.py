@@ -10,6 +10,7 @@ from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState,
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.model import MotionError as DeclaredError
 from bisar_budget.simulate.autofocus import phase_gradient_autofocus
+from bisar_budget.simulate.collection import baseband
 from bisar_budget.simulate.exact import ExactEffect, exact_effect
 from bisar_budget.simulate.image_formation import backprojection, ground_grid, taylor_window
 from bisar_budget.simulate.impulse_response import ImpulseResponse, impulse_response
@@ -124,7 +125,7 @@ def simulate_point(mission: Mission) -> PointImages:
         if settings and settings.window == "taylor":
             history.samples[:] *= np.outer(taylor_window(pulses), taylor_window(frequency.size))
         grid = ground_grid(effect.displacement, azimuth, (extent, extent), (count, count))
-        return backprojection(history, grid) * _baseband(geometry, grid, wavelength)
+        return backprojection(history, grid) * baseband(geometry, grid, wavelength)
 
     look = geometry.look_azimuth
     flown = _paths(mission, geometry, slow_time, vibrating=True, rng=rng)
@@ -153,19 +154,6 @@ def simulate_point(mission: Mission) -> PointImages:
         focused_response=_measured(focused, extent / count, clean.mask_m),
         clean_response=clean,
     )
-
-
-def _baseband(geometry: BistaticGeometry, grid: Floats, wavelength: float) -> Complexes:
-    """Phase that takes the range history at the midpoint out of an image.
-
-    What stays is the aperture's own spectrum. A backprojected image carries the phase of the range to each
-    pixel, which close to a platform is a chirp across the patch and hides the aperture from autofocus.
-    """
-    total: Floats = np.zeros(grid.shape[:-1])
-    for state in (geometry.transmitter, geometry.receiver):
-        total += np.linalg.norm(grid - np.asarray(state.position), axis=-1) - state.slant_range
-    baseband: Complexes = np.exp(-2j * math.pi / wavelength * total)
-    return baseband
 
 
 def _pulses(mission: Mission, cells: int) -> int:

@@ -1,0 +1,156 @@
+"""Verdicts on the vibration limits of Section V: one platform alone, and both together.
+
+What comes out by first principles, for equal shares: a sinusoid of one platform makes echoes 9 dB inside the
+requirement, both in phase 3 dB inside; noise-like vibration of both, independent, fills the requirement.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+from functools import partial
+
+import numpy as np
+
+from bisar_budget import evaluators
+from bisar_budget.budget.allocation import Allocation, Split
+from bisar_budget.budget.sources import PLATFORMS
+from bisar_budget.budget.verdicts import Verdict
+from bisar_budget.mission.model import Mission
+from bisar_budget.simulate.collection import CELLS, Errors, PointCollection
+from bisar_budget.simulate.impulse_response import upsampled
+from bisar_budget.simulate.phase_history import MotionError, Sinusoid, cell_centres
+
+TOLERANCE_DB = 0.5
+
+_FINE = 8  # interpolation of a cut before its peak is read
+_WIDEBAND_RUNS = 32
+_UNDECLARED_CYCLES = 10  # of a vibration per aperture, where the file gives no frequency
+
+Case = Callable[[], Verdict]
+
+
+def cases(mission: Mission, allocation: Allocation, collection: PointCollection) -> Iterator[tuple[str, Case]]:
+    """Give the id of each vibration limit and the call that verifies it.
+
+    Parameters
+    ----------
+    mission : Mission
+        Gives the requirements, and the frequencies that are looked at.
+    allocation : Allocation
+        Shares of power.
+    collection : PointCollection
+        Forms the images.
+    """
+    pslr, islr = mission.requirements.pslr, mission.requirements.islr
+    amplitude = _limits(pslr, allocation.pslr, collection.wavelength)
+    rms = _limits(islr, allocation.islr, collection.wavelength)
+    seed = mission.simulation.seed if mission.simulation else 1
+    lines = {name: getattr(mission.platforms, name).motion_error.vibration.sinusoidal for name in PLATFORMS}
+    assumed = _UNDECLARED_CYCLES / collection.aperture_time
+    for name in PLATFORMS:
+        for index, frequency in enumerate([line.frequency for line in lines[name]] or [assumed]):
+            if pslr is not None:
+                row_id = f"{name}.vibration.sinusoidal.{index}"
+                yield row_id, partial(_sinusoidal, collection, row_id, {name: amplitude[name]}, frequency, pslr)
+        if islr is not None:
+            row_id = f"{name}.vibration.wideband"
+            yield row_id, partial(_wideband, collection, row_id, {name: rms[name]}, islr, seed)
+    if pslr is not None:
+        frequency = next((line.frequency for name in PLATFORMS for line in lines[name]), assumed)
+        row_id = "mission.vibration.sinusoidal"
+        yield row_id, partial(_sinusoidal, collection, row_id, amplitude, frequency, pslr)
+    if islr is not None:
+        row_id = "mission.vibration.wideband"
+        yield row_id, partial(_wideband, collection, row_id, rms, islr, seed)
+
+
+def _limits(requirement_db: float | None, split: Split, wavelength: float) -> dict[str, float]:
+    power = 10 ** (requirement_db / 10) if requirement_db is not None else 0.0
+    return {name: evaluators.vibration_limit(wavelength, math.sqrt(power * split.of(name))) for name in PLATFORMS}
+
+
+def _blank(row_id: str, limits: dict[str, float], requirement_db: float) -> Verdict:
+    # Both together: the larger of two limits stands for the row.
+    return Verdict(
+        id=row_id, model="published", boundary_error=max(limits.values()), unit="m", requirement_db=requirement_db
+    )
+
+
+def _sinusoidal(
+    collection: PointCollection, row_id: str, limits: dict[str, float], frequency: float, requirement_db: float
+) -> Verdict:
+    """Measure the paired echo on the difference from the error-free image, which its sidelobes would bury."""
+    blank = _blank(row_id, limits, requirement_db)
+    cycles = frequency * collection.aperture_time
+    if cycles < 3:
+        return blank._replace(reason=f"{cycles:.3g} cycles per aperture: below three the echoes lie on the mainlobe")
+    if cycles > 400:
+        reason = f"{cycles:.3g} cycles per aperture: the echoes lie outside the patch that is imaged"
+        return blank._replace(reason=reason)
+    cells = 2 * math.ceil(cycles) + CELLS
+    errors = Errors()
+    for name, amplitude in limits.items():
+        errors = errors.of(name, MotionError(sinusoids=(Sinusoid(amplitude=amplitude, frequency=frequency),)))
+    clean = collection.chip((0.0, 0.0), Errors(), cells=cells).cut
+    echo = collection.chip((0.0, 0.0), errors, cells=cells).cut - clean
+    # An echo keeps its range while a scatterer at its place would walk by one wavelength per cycle.
+    walk = cycles * collection.radar.bandwidth / collection.radar.center_frequency
+    smeared = f", smeared over {walk:.2g} range cells" if walk > 0.3 else ""
+    peaks = [float(np.abs(upsampled(cut, _FINE)).max()) for cut in (echo, clean)]
+    level = 20 * math.log10(peaks[0] / peaks[1])
+    who = "one platform alone" if len(limits) == 1 else "both platforms in phase"
+    return blank._replace(
+        measured_db=level,
+        verdict=_compare(level - requirement_db),
+        reason=f"echoes of {who}, at {cycles:.3g} cells from the peak{smeared}",
+    )
+
+
+def _wideband(
+    collection: PointCollection, row_id: str, limits: dict[str, float], requirement_db: float, seed: int
+) -> Verdict:
+    """Measure the power that white vibration spreads, over all of the repeat interval, on a seeded ensemble.
+
+    By Parseval the power beside the coherent response is the variance of the aperture's phasor, so that the
+    sum over the image, range walk included, is taken in the aperture.
+    """
+    rng = np.random.default_rng(seed)
+    slow_time = cell_centres(collection.aperture_time, 256)
+    clean = collection.paths(Errors(), slow_time)
+    errors = Errors()
+    for name, rms in limits.items():
+        errors = errors.of(name, MotionError(wideband_rms=rms))
+
+    def added(*, is_common: bool) -> tuple[float, float]:
+        """Mean of the added ISLR over the ensemble, and its standard error."""
+        ratios = []
+        for _ in range(_WIDEBAND_RUNS):
+            flown = collection.paths(errors, slow_time, rng)
+            shifts = [
+                np.linalg.norm(now.measured, axis=1) - np.linalg.norm(before.measured, axis=1)
+                for now, before in zip(flown, clean, strict=True)
+            ]
+            if is_common:  # the second platform makes the first one's motion, at its own limit
+                first, second = limits.values()
+                shifts[1] = shifts[0] * second / first
+            coherent = abs(np.exp(2j * math.pi / collection.wavelength * (shifts[0] + shifts[1])).mean()) ** 2
+            ratios.append((1 - coherent) / coherent)
+        return float(np.mean(ratios)), float(np.std(ratios, ddof=1) / math.sqrt(_WIDEBAND_RUNS))
+
+    mean, spread = added(is_common=False)
+    reason = "power added by one platform alone"
+    if len(limits) == 2:
+        common = 10 * math.log10(added(is_common=True)[0])
+        reason = f"power added by both platforms, independent; the same motion of both adds {common:.1f} dB"
+    level = 10 * math.log10(mean)
+    return _blank(row_id, limits, requirement_db)._replace(
+        measured_db=level,
+        measured_db_error=10 / math.log(10) * spread / mean,
+        verdict=_compare(level - requirement_db),
+        reason=reason,
+    )
+
+
+def _compare(excess_db: float) -> str:
+    if abs(excess_db) <= TOLERANCE_DB:
+        return "confirmed"
+    return "optimistic" if excess_db > 0 else "conservative"

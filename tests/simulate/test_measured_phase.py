@@ -1,0 +1,177 @@
+"""What a chip of the image says about phase, displacement and smear, against exact ranges and brute force."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from bisar_budget.mission.load import parse_mission
+from bisar_budget.simulate.collection import Errors, PointCollection, superposed
+from bisar_budget.simulate.impulse_response import quadratic_phase_error
+from bisar_budget.simulate.phase_history import MotionError, cell_centres
+from bisar_budget.simulate.shift import measured_shift
+from tests.conftest import mission_text
+from tests.simulate.conftest import collection
+
+
+def point_collection(squint_deg: float, receiver_squint_deg: float | None = None, **changes) -> PointCollection:
+    """Section V, each platform turned by a squint."""
+    turned = {
+        "transmitter": collection(squint_deg).geometry.transmitter,
+        "receiver": collection(squint_deg if receiver_squint_deg is None else receiver_squint_deg).geometry.receiver,
+    }
+    platforms = {
+        name: {"position": list(state.position), "velocity": list(state.velocity)} for name, state in turned.items()
+    }
+    mission = parse_mission(mission_text(platforms=platforms, **changes))
+    return PointCollection(mission, mission.geometry)
+
+
+def chips(c: PointCollection, errors: Errors, **size):
+    effect = c.effect(errors)
+    reference = c.chip(effect.displacement, Errors(), scatterer=effect.displacement, **size)
+    return effect, c.chip(effect.displacement, errors, **size), reference
+
+
+def phases(c: PointCollection, errors: Errors):
+    effect, chip, reference = chips(c, errors)
+    history = c.spatial_frequency(effect.displacement)
+    return effect, quadratic_phase_error(chip.cut, reference.cut, c.spacing[1], *history)
+
+
+@pytest.mark.parametrize(
+    ("squint", "platform", "axis", "image"),
+    [(0, "receiver", 1, 1.69), (30, "receiver", 1, 2.11), (30, "transmitter", 0, 1.73), (45, "transmitter", 0, 1.82)],
+)
+def test_image_of_four_times_the_published_limit(squint: float, platform: str, axis: int, image: float) -> None:
+    """Independent brute force measured these, by (4), for limits that promise π/2; images and ranges must agree."""
+    c = point_collection(squint)
+    state = getattr(c.geometry, platform)
+    limit = c.wavelength * state.slant_range / (4 * abs(state.velocity[axis]) * 36)
+    velocity = [0.0, 0.0, 0.0]
+    velocity[axis] = 4 * limit
+    effect, (quadratic, _) = phases(c, Errors().of(platform, MotionError(velocity=tuple(velocity))))
+    assert abs(quadratic) == pytest.approx(image, rel=0.02)  # two digits behind the point, another fit
+    assert quadratic == pytest.approx(effect.quadratic, rel=0.01)
+
+
+component = st.floats(-1, 1)
+triple = st.tuples(component, component, component)
+
+
+@given(
+    squint=st.floats(-45, 45),
+    receiver_squint=st.floats(-45, 45),
+    velocity=triple,
+    acceleration=triple,
+    clock=component,
+    who=st.sampled_from(["transmitter", "receiver"]),
+)
+@settings(max_examples=15, deadline=None)
+def test_measured_phases_are_those_of_exact_ranges(
+    squint, receiver_squint, velocity, acceleration, clock, who
+) -> None:
+    c = point_collection(squint, receiver_squint)
+    assume(math.degrees(c.geometry.gradient_angle) > 15)
+    error = MotionError(
+        velocity=tuple(0.03 * v for v in velocity), acceleration=tuple(5e-4 * a for a in acceleration)
+    )
+    errors = Errors(clock=(0.0, 0.0, 1e-12 * clock, 0.0)).of(who, error)
+    effect, (quadratic, cubic) = phases(c, errors)
+    assert quadratic == pytest.approx(effect.quadratic, rel=0.01, abs=0.005)
+    assert cubic == pytest.approx(effect.cubic, rel=0.02, abs=0.005)
+
+
+def test_a_long_aperture_bends_frequency_over_time() -> None:
+    """±0.3 rad of turn: read over spatial frequency, 0.393 rad look like 0.411 and grow a cubic of 0.01."""
+    platforms = {
+        "transmitter": {"position": [180, 0, 87], "velocity": [0, 5, 0]},
+        "receiver": {"position": [130, 60, 45], "velocity": [0, 5, 0]},
+    }
+    radar = {"center_frequency": "1.65 GHz", "bandwidth": "80 MHz"}
+    mission = parse_mission(mission_text(platforms=platforms, radar=radar, collection={"aperture_time": 20}))
+    c = PointCollection(mission, mission.geometry)
+    # Quadratic alone: 2π f₀ t̃₂ (T/2)² = π/8.
+    clock = Errors(clock=(0.0, 0.0, 1 / (16 * 1.65e9 * 100), 0.0))
+    _, (quadratic, cubic) = phases(c, clock)
+    assert quadratic == pytest.approx(math.pi / 8, rel=0.01)
+    assert cubic == pytest.approx(0.0, abs=0.002)
+
+
+@pytest.mark.parametrize("order", [0, 1, 2, 3])
+def test_clock_terms_have_the_sign_of_the_range_error(order: int) -> None:
+    """Each scaled to 1 rad at the aperture edge; constant and linear ones only displace."""
+    c = point_collection(20)
+    size = 1 / (2 * math.pi * c.radar.center_frequency * (c.aperture_time / 2) ** order)
+    clock = tuple(size if index == order else 0.0 for index in range(4))
+    _, (quadratic, cubic) = phases(c, Errors(clock=clock))
+    assert quadratic == pytest.approx(1.0 if order == 2 else 0.0, abs=0.005)
+    assert cubic == pytest.approx(1.0 if order == 3 else 0.0, abs=0.01)
+
+
+class TestShift:
+    def test_displacement_is_that_of_exact_ranges(self) -> None:
+        """The chip is put elsewhere on purpose: what it shows plus where it lies is where the point went."""
+        c = point_collection(15)
+        errors = Errors().of("receiver", MotionError(position=(1.0, -2.0, 0.5), velocity=(0.02, 0.01, 0.0)))
+        effect = c.effect(errors)
+        beside = (effect.displacement[0] + 0.6, effect.displacement[1] - 0.4)
+        chip = c.chip(beside, errors, range_cells=12)
+        shift = measured_shift(chip, c.chip(beside, Errors(), scatterer=beside, range_cells=12))
+        assert shift.displacement == pytest.approx((-0.6, 0.4), abs=0.01)  # 2 % of a cell
+
+    @pytest.mark.parametrize(("squint", "receiver_squint"), [(0, 0), (30, 30), (-20, 40)])
+    def test_smear_lies_along_31(self, squint: float, receiver_squint: float) -> None:
+        c = point_collection(squint, receiver_squint)
+        errors = Errors().of("receiver", MotionError(acceleration=(0.0, 6e-4, 0.0)))
+        _, chip, reference = chips(c, errors, range_cells=12)
+        want = (c.geometry.look_azimuth + math.pi / 2) % math.pi
+        assert math.degrees(measured_shift(chip, reference).smear_azimuth - want) == pytest.approx(0, abs=0.5)
+
+    def test_smear_is_where_the_outline_of_a_large_one_lies(self) -> None:
+        """At 3π the -6 dB outline shows the line itself: second moments of a magnitude image, no spectrum."""
+        c = point_collection(0)
+        errors = Errors().of("receiver", MotionError(acceleration=(0.0145, 0.0, 0.0)))
+        effect, chip, reference = chips(c, errors, range_cells=12, cells=80)
+        assert abs(effect.quadratic) > 2.9 * math.pi
+        magnitude = np.abs(chip.image)
+        places = chip.grid[magnitude > magnitude.max() / 2][:, :2]
+        east, north = np.linalg.eigh(np.cov(places.T))[1][:, -1]
+        outline = math.degrees(math.atan2(north, east)) % 180
+        assert math.degrees(measured_shift(chip, reference).smear_azimuth) == pytest.approx(outline, abs=1)
+
+    def test_an_image_without_the_response_is_refused(self) -> None:
+        c = point_collection(0)
+        chip = c.chip((0.0, 0.0), Errors(), range_cells=12)
+        empty = chip._replace(image=np.zeros_like(chip.image))
+        with pytest.raises(ValueError, match="not in the image"):
+            measured_shift(chip, empty)
+
+
+def test_superposed_errors_add_along_the_whole_path() -> None:
+    tau = cell_centres(6.0, 16)
+    c = point_collection(10)
+    a = Errors(clock=(1e-9, 0.0, 0.0, 0.0)).of("receiver", MotionError(position=(1.0, 2.0, 3.0)))
+    b = Errors(clock=(0.0, 1e-12, 0.0, 0.0)).of("receiver", MotionError(velocity=(0.1, 0.2, 0.3)))
+    both = superposed([a, b])
+    errors = [path.measured - path.actual for one in (a, b, both) for path in c.paths(one, tau)]
+    assert np.allclose(errors[5], errors[1] + errors[3])
+    assert np.allclose(c.clock(both, tau), 1e-9 + 1e-12 * tau)
+
+
+def test_a_taylor_window_is_honoured() -> None:
+    """-35 dB sidelobes, mainlobe wider by the window's own factor, and the same quadratic phase."""
+    from bisar_budget.simulate.impulse_response import impulse_response
+
+    tapered = point_collection(0, simulation={"window": "taylor"})
+    uniform = point_collection(0)
+    widths = {}
+    for name, c in (("taylor", tapered), ("uniform", uniform)):
+        widths[name] = impulse_response(c.chip((0.0, 0.0), Errors()).cut, c.spacing[1])
+    assert widths["taylor"].pslr_db == pytest.approx(-35.2, abs=0.5)
+    assert widths["taylor"].irw_m / widths["uniform"].irw_m == pytest.approx(1.19 / 0.886, rel=0.02)
+    errors = Errors().of("receiver", MotionError(acceleration=(6e-4, 0.0, 0.0)))
+    effect, (quadratic, _) = phases(tapered, errors)
+    assert quadratic == pytest.approx(effect.quadratic, rel=0.01)
