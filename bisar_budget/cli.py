@@ -86,6 +86,7 @@ def cli() -> None:
     type=click.DateTime(["%Y-%m-%d"]),
     help="Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC).",
 )
+@click.option("--verify", "verifying", is_flag=True, help="Form images at the limits too and add their verdicts.")
 @click.option("-q", "--quiet", is_flag=True, help="One line per mission.")
 @click.option("-v", "--verbose", is_flag=True, help="Reason, equation, displacement and evidence of every row.")
 @click.option(
@@ -104,6 +105,7 @@ def check(
     exit_zero: bool,
     model: str | None,
     today: datetime | None,
+    verifying: bool,
     quiet: bool,
     verbose: bool,
     color: str,
@@ -122,7 +124,7 @@ def check(
     written = [(name, _format_of(name)) for name in reports]
     files = _expanded(missions)
     _spare(files, [output, *reports])
-    report = _checked(files, today.date() if today else _today(), model)
+    report = _checked(files, today.date() if today else _today(), model, verifying)
     if format_name != "text" or output is not None or quiet or not _is_terminal():
         _say_faults(report)
     verbosity = -1 if quiet else 1 if verbose else 0
@@ -138,7 +140,7 @@ def check(
     sys.exit(0 if exit_zero and code == EXIT_BROKEN else code)
 
 
-def _checked(files: Sequence[str], today: date, model: str | None) -> "Report":
+def _checked(files: Sequence[str], today: date, model: str | None, verifying: bool) -> "Report":
     from bisar_budget.budget.check import check_mission
     from bisar_budget.budget.findings import Report, UnusableMission
     from bisar_budget.errors import MissionError
@@ -147,11 +149,23 @@ def _checked(files: Sequence[str], today: date, model: str | None) -> "Report":
     # The findings of a thousand missions are 10⁵ tuples without a cycle: nothing to collect.
     gc.disable()
     missions: list[MissionFindings | UnusableMission] = []
-    for file in files:
+    usable: dict[int, Mission] = {}
+    for index, file in enumerate(files):
         try:
-            missions.append(check_mission(load_mission(file, model), today))
+            mission = load_mission(file, model)
+            missions.append(check_mission(mission, today))
+            if verifying:
+                usable[index] = mission
         except MissionError as error:
             missions.append(UnusableMission(file=file, faults=error.faults))
+    if usable:
+        from bisar_budget.budget.verdicts import with_verdicts
+
+        gc.enable()  # images are large
+        for index, verified in zip(usable, _verified(list(usable.values()), "*", None), strict=True):
+            found = missions[index]
+            if not isinstance(found, UnusableMission):
+                missions[index] = with_verdicts(found, verified.rows)
     return Report(version=__version__, missions=tuple(missions))
 
 

@@ -1,11 +1,14 @@
 """What a check finds, as frozen data. Field names and order are those of the JSON contract."""
 
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from bisar_budget.budget.allocation import Allocation
 from bisar_budget.errors import Fault
 from bisar_budget.geometry import BistaticGeometry, GroundVector
+
+if TYPE_CHECKING:
+    from bisar_budget.budget.verdicts import Verdict
 
 # Worst first. The status of a mission or a run is the worst one found; the last three gate nothing.
 GATING = ("error", "fail", "not_evaluated", "warn", "pass_with_autofocus", "pass")
@@ -71,6 +74,7 @@ class MissionFindings(NamedTuple):
     rows: tuple[Row, ...]
     warnings: tuple[FileWarning, ...]
     notes: tuple[str, ...]
+    verdicts: "tuple[Verdict, ...] | None" = None  # of images, if any were formed
 
     @property
     def status(self) -> str:

@@ -1,7 +1,9 @@
-"""What images say of the limits, as frozen data. Field names are those of the JSON contract of `verify`."""
+"""What images say of the limits, and what follows for the rows. Field names are the JSON contract's of `verify`."""
 
 from typing import NamedTuple
 
+from bisar_budget.budget.findings import FileWarning, MissionFindings, Row
+from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.geometry import GroundVector
 
 
@@ -59,3 +61,54 @@ class VerifiedMission(NamedTuple):
         """`fail` if a limit of the gating model is optimistic, with or without autofocus, else `pass`."""
         verdicts = {row.verdict for row in self.rows} | {row.verdict_autofocus for row in self.rows}
         return "fail" if "optimistic" in verdicts else "pass"
+
+
+def with_verdicts(findings: MissionFindings, rows: tuple[Verdict, ...]) -> MissionFindings:
+    """Add verdicts to findings: a limit that the image shows to be optimistic is said at its row.
+
+    A row that passes a limit it would fail as measured becomes a warning: the model that gates says pass, but
+    a gate must not be silent about what it knows.
+    """
+    by_id = {verdict.id: verdict for verdict in rows}
+    judged = tuple(_with_verdict(row, by_id[row.id]) if row.id in by_id else row for row in findings.rows)
+    known = {row.id for row in findings.rows}
+    warnings = tuple(
+        FileWarning(line=None, message=f"{verdict.id}: optimistic limit: {_shown(verdict)}")
+        for verdict in rows
+        if verdict.id not in known and verdict.verdict == "optimistic"
+    )
+    return findings._replace(rows=judged, warnings=(*findings.warnings, *warnings), verdicts=rows)
+
+
+def _with_verdict(row: Row, verdict: Verdict) -> Row:
+    notes = row.notes
+    if verdict.verdict == "optimistic":
+        notes = (*notes, f"optimistic limit: {_shown(verdict)}")
+    if verdict.verdict_autofocus == "optimistic":
+        notes = (*notes, f"optimistic limit with autofocus: {verdict.reason_autofocus}")
+    excess = _excess(verdict)
+    if (
+        row.status in ("pass", "pass_with_autofocus")
+        and (row.utilization or 0.0) * excess > 1 + UTILIZATION_TOLERANCE
+    ):
+        reason = f"inside the limit, but {(row.utilization or 0.0) * excess:.3g} times what the image allows"
+        return row._replace(status="warn", reason=reason, notes=notes)
+    return row._replace(notes=notes)
+
+
+def _excess(verdict: Verdict) -> float:
+    """What the image shows at the limit, over what the limit promises; 1 where it promises no less."""
+    if verdict.verdict != "optimistic":
+        return 1.0
+    if verdict.measured_db is not None and verdict.requirement_db is not None:
+        return 10 ** ((verdict.measured_db - verdict.requirement_db) / 20)
+    measured = verdict.measured_cubic_rad if verdict.measured_cubic_rad is not None else verdict.measured_qpe_rad
+    return measured / verdict.budget_rad if measured is not None and verdict.budget_rad else 1.0
+
+
+def _shown(verdict: Verdict) -> str:
+    if verdict.measured_db is not None:
+        return f"the image shows {verdict.measured_db:.1f} dB at it"
+    if verdict.measured_qpe_rad is not None and verdict.budget_rad is not None:
+        return f"the image shows {verdict.measured_qpe_rad:.3g} rad at it, the budget is {verdict.budget_rad:.3g} rad"
+    return verdict.reason or "the image shows more than it promises"

@@ -30,6 +30,7 @@ COLUMNS = (
     "reason",
     "notes",
     "evidence",
+    "verdict",
 )
 
 
@@ -57,6 +58,7 @@ def _faults(mission: UnusableMission) -> Iterator[list[object]]:
 
 def _rows(mission: MissionFindings) -> Iterator[list[object]]:
     file, name = _text(mission.file), _text(mission.name)
+    verdicts = {verdict.id: verdict.verdict for verdict in mission.verdicts or ()}
     for row in mission.rows:
         x, y = row.displacement_m or (None, None)
         yield [
@@ -82,6 +84,7 @@ def _rows(mission: MissionFindings) -> Iterator[list[object]]:
             row.reason,
             "; ".join(row.notes),
             _text(row.evidence),
+            verdicts.get(row.id),
         ]
 
 

@@ -118,6 +118,7 @@ def _mission(mission: MissionFindings) -> dict[str, Any]:
         "warnings": [{"line": warning.line, "message": warning.message} for warning in mission.warnings],
         "notes": mission.notes,
         "errors": [],
+        "verification": None if mission.verdicts is None else [verdict._asdict() for verdict in mission.verdicts],
     }
 
 

@@ -9,9 +9,9 @@ from bisar_budget.budget.findings import MissionFindings, Report, Row, UnusableM
 from bisar_budget.errors import printable
 from bisar_budget.geometry import PlatformState
 from bisar_budget.report import Style
+from bisar_budget.report.layout import wrapped
 from bisar_budget.units import format_quantity
 
-WIDTH = 80
 WORDS = {
     "error": "ERROR",
     "fail": "FAIL",
@@ -74,6 +74,10 @@ def _mission(mission: MissionFindings, style: Style) -> list[str]:
     details = [line for row in explained for line in _details(row, mission, style)]
     lines += ["", *details] if details else []
     lines += [line for text in _asides(mission, style) for line in wrapped(text, "  ")]
+    if mission.verdicts is not None:
+        from bisar_budget.report.verification import evidence
+
+        lines += ["", "Images with each error at its limit", "", *evidence(mission.verdicts, style)]
     return [*lines, "", _summary(mission, style)]
 
 
@@ -210,18 +214,3 @@ def _overall(report: Report, style: Style) -> str:
 def _word(status: str, style: Style, width: int = 0) -> str:
     word = f"{WORDS[status]:<{width}}"
     return f"\x1b[{_ANSI[status]}m{word}\x1b[0m" if style.color else word
-
-
-def wrapped(text: str, indent: str) -> list[str]:
-    """Break at spaces before 80 columns; a word that is longer stays whole, so that a path can be copied."""
-    if len(text) <= WIDTH:
-        return [text]
-    first, *words = text.split(" ")
-    lines, line = [], first
-    for word in words:
-        if len(line) + 1 + len(word) > WIDTH and line.strip():
-            lines.append(line)
-            line = indent + word
-        else:
-            line += f" {word}"
-    return [*lines, line]

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from bisar_budget.budget.verdicts import Verdict, VerifiedMission
 from bisar_budget.errors import printable
 from bisar_budget.report import Style
-from bisar_budget.report.text_table import wrapped
+from bisar_budget.report.layout import wrapped
 from bisar_budget.units import format_quantity
 
 FORMAT = "bisar-budget/verify/1"
@@ -39,15 +39,22 @@ def as_text(missions: Sequence[VerifiedMission], style: Style) -> str:
 
 
 def _mission(mission: VerifiedMission, style: Style) -> list[str]:
-    width = max((len(row.id) for row in mission.rows), default=0)
-    lines = [mission.name, ""]
-    lines += [f"{'row':<{width}}      limit    budget     exact     image verdict"]
+    found = [row.verdict for row in mission.rows]
+    counts = ", ".join(f"{found.count(verdict)} {verdict}" for verdict in _ANSI if verdict in found)
+    summary = f"{printable(mission.file)}: {counts or 'no row has a limit here'}"
+    return [mission.name, "", *evidence(mission.rows, style), "", summary]
+
+
+def evidence(rows: Sequence[Verdict], style: Style) -> list[str]:
+    """Table of the verdicts, with autofocus a second one, and what there is to say about them."""
+    width = max((len(row.id) for row in rows), default=0)
+    lines = [f"{'row':<{width}}      limit    budget     exact     image verdict"]
     lines += [
         f"{row.id:<{width}} {_limit(row):>11} {' '.join(f'{cell:>9}' for cell in _numbers(row))} "
         + _word(row.verdict, style)
-        for row in mission.rows
+        for row in rows
     ]
-    refocused = [row for row in mission.rows if row.verdict_autofocus]
+    refocused = [row for row in rows if row.verdict_autofocus]
     if refocused:
         lines += ["", "At the limit with autofocus, refocused:", ""]
         lines += [f"{'row':<{width}}      limit    budget  residual      loss verdict"]
@@ -57,21 +64,16 @@ def _mission(mission: VerifiedMission, style: Style) -> list[str]:
             + _word(row.verdict_autofocus or "", style)
             for row in refocused
         ]
-    reasons = [
-        f"{row.id}: {reason}" for row in mission.rows for reason in (row.reason, row.reason_autofocus) if reason
-    ]
-    asides = [line for text in (*_geometry(mission), *reasons) for line in wrapped(f"  {text}", "    ")]
-    lines += ["", *asides] if asides else []
-    found = [row.verdict for row in mission.rows]
-    counts = ", ".join(f"{found.count(verdict)} {verdict}" for verdict in _ANSI if verdict in found)
-    return [*lines, "", f"{printable(mission.file)}: {counts or 'no row has a limit here'}"]
+    reasons = [f"{row.id}: {reason}" for row in rows for reason in (row.reason, row.reason_autofocus) if reason]
+    asides = [line for text in (*_geometry(rows), *reasons) for line in wrapped(f"  {text}", "    ")]
+    return [*lines, "", *asides] if asides else lines
 
 
-def _geometry(mission: VerifiedMission) -> Iterator[str]:
+def _geometry(rows: Sequence[Verdict]) -> Iterator[str]:
     """Say how far displacement and smear of the images are from (25) and (31), at worst."""
     apart = [
         (math.dist(row.measured_displacement_m, row.displacement_published_m), row.id)
-        for row in mission.rows
+        for row in rows
         if row.measured_displacement_m and row.displacement_published_m
     ]
     if apart:
@@ -79,7 +81,7 @@ def _geometry(mission: VerifiedMission) -> Iterator[str]:
         yield f"displacement of the images: within {format_quantity(distance, 'm', 2)} of (25), farthest {row_id}"
     turned = [
         (abs((measured - line + math.pi / 2) % math.pi - math.pi / 2), row.id)
-        for row in mission.rows
+        for row in rows
         if (measured := row.measured_smear_azimuth_rad) is not None
         and (line := row.smear_azimuth_published_rad) is not None
     ]

@@ -2,12 +2,15 @@
 
 import json
 import math
+import re
+from datetime import date
 
 import numpy as np
 import pytest
 
+from bisar_budget.budget.check import check_mission
 from bisar_budget.mission.load import load_mission, parse_mission
-from bisar_budget.simulate.verify import verify_mission
+from bisar_budget.simulate.verify import rows_to_verify, verify_mission
 from tests.conftest import ROOT, mission_text
 
 SECTION_V = ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml"
@@ -17,7 +20,14 @@ def verdicts(only: str = "*", **changes):
     return {row.id: row for row in verify_mission(parse_mission(mission_text(**changes)), only).rows}
 
 
-def test_every_row_with_a_limit_has_a_verdict() -> None:
+@pytest.mark.parametrize("path", sorted(SECTION_V.parent.glob("*.yaml")), ids=lambda path: path.stem)
+def test_every_row_with_a_limit_has_a_verdict_or_a_reason(path) -> None:
+    mission = load_mission(str(path))
+    limited = [row.id for row in check_mission(mission, date(2026, 1, 1)).rows if row.allowable is not None]
+    assert [row_id for row_id in rows_to_verify(mission) if not row_id.startswith("mission.vibration")] == limited
+
+
+def test_acceleration_and_clock_limits_of_section_v() -> None:
     rows = {row.id: row for row in verify_mission(load_mission(str(SECTION_V))).rows}
     assert set(rows) == {
         "transmitter.velocity.y", "transmitter.acceleration.x", "transmitter.acceleration.z",
@@ -100,7 +110,22 @@ def test_wideband_power_of_one_platform_at_the_published_limit() -> None:
     assert row.verdict == "conservative"
 
 
-def test_both_platforms_at_the_wideband_limit_fill_the_requirement() -> None:
+def test_both_platforms_in_phase_leave_3_db() -> None:
+    """Amplitudes of √(PSLR/2)·λ/(2π) each add to a phase of 2·√(PSLR/2), echoes of √(PSLR/2)."""
+    row = verdicts("mission.vibration.sinusoidal", requirements__pslr=-30)["mission.vibration.sinusoidal"]
+    assert row.measured_db == pytest.approx(-33.01, abs=0.3)
+    assert row.verdict == "conservative"
+
+
+def test_both_platforms_of_independent_noise_fill_the_requirement_and_the_same_motion_exceeds_it() -> None:
+    row = verdicts("mission.vibration.wideband", requirements__islr=-20)["mission.vibration.wideband"]
+    assert row.verdict == "confirmed"
+    assert row.measured_db == pytest.approx(-20, abs=4 * row.measured_db_error)
+    common = float(re.search(r"the same motion of both adds (-[\d.]+) dB", row.reason)[1])
+    assert common == pytest.approx(-16.99, abs=0.3)  # 3 dB more
+
+
+def test_one_platform_that_owns_all_of_the_power_fills_the_requirement() -> None:
     """One platform that owns nearly all of the power meets the requirement itself."""
     split = {"islr": {"transmitter": 0.99, "receiver": 0.01}}
     row = verdicts("transmitter.*.wideband", requirements__islr=-20, allocation__split=split)
@@ -162,6 +187,133 @@ def test_an_error_of_tens_of_metres_is_not_evaluated_although_the_image_stays() 
     assert math.hypot(*row.displacement_m) < 1
     assert (row.verdict, row.measured_qpe_rad) == ("not_evaluated", None)
     assert "moves platform or image by 36.1 m" in row.reason
+
+
+ERRORS = {
+    "platforms__receiver__motion_error": {"position": [0.5, 0.2, 0], "acceleration": ["0.2 mm/s^2", 0, 0]},
+    "platforms__transmitter__motion_error": {"velocity": [0, "-5 mm/s", 0]},
+}
+
+
+class TestTogether:
+    """Declared errors scaled together to a limit of the whole mission."""
+
+    def test_location(self) -> None:
+        row = verdicts("mission.location_error", requirements__location_error=2, **ERRORS)["mission.location_error"]
+        assert row.verdict == "confirmed"
+        assert math.hypot(*row.displacement_published_m) == pytest.approx(2.0)
+        assert row.measured_displacement_m == pytest.approx(row.displacement_m, abs=0.02)  # 4 % of a cell
+
+    def test_location_of_errors_that_defocus_is_not_read(self) -> None:
+        rows = verdicts("mission.location_error", requirements__location_error=15, **ERRORS)
+        assert rows["mission.location_error"].verdict == "not_evaluated"
+        assert "also defocus" in rows["mission.location_error"].reason
+
+    def test_location_without_errors_says_so(self) -> None:
+        row = verdicts("mission.location_error", requirements__location_error=2)["mission.location_error"]
+        assert (row.verdict, row.measured_displacement_m) == ("not_evaluated", None)
+        assert "move nothing" in row.reason
+
+    def test_cubic(self) -> None:
+        """Exact ranges and the image agree; Table I holds the range constant and is held to the image."""
+        errors = {"platforms__receiver__motion_error": {"acceleration": ["0.2 mm/s^2", "-0.2 mm/s^2", 0]}}
+        row = verdicts("mission.cubic_phase_error", requirements__cubic_phase_error=0.1, **errors)
+        cubic = row["mission.cubic_phase_error"]
+        assert cubic.measured_cubic_rad == pytest.approx(cubic.predicted_cubic_rad, rel=0.05, abs=0.005)
+        assert cubic.verdict in ("confirmed", "conservative", "optimistic")
+
+    def test_cubic_without_errors_says_so(self) -> None:
+        row = verdicts("mission.cubic_phase_error", requirements__cubic_phase_error=0.1)
+        assert "no declared error has a cubic phase" in row["mission.cubic_phase_error"].reason
+
+    def test_worst_case_sums_reach_their_budgets(self) -> None:
+        rows = verdicts("*.quadratic_phase_error", allocation__combine="sum", **ERRORS)
+        assert {row.id for row in rows.values()} >= {
+            "transmitter.quadratic_phase_error",
+            "receiver.quadratic_phase_error",
+            "mission.quadratic_phase_error",
+        }
+        for row in rows.values():
+            assert row.measured_qpe_rad == pytest.approx(row.predicted_qpe_rad, rel=0.01)
+
+    def test_root_sum_squares_are_no_image(self) -> None:
+        rows = verdicts("mission.quadratic_phase_error", allocation__combine="rss", **ERRORS)
+        assert "many flights" in rows["mission.quadratic_phase_error"].reason
+
+
+class TestAutofocus:
+    def test_every_limit_with_autofocus_refocuses_inside_the_plain_budget(self) -> None:
+        rows = verdicts("receiver.acceleration.*", autofocus={"algorithm": "pga", "n_pull": 4})
+        assert len(rows) == 3
+        for row in rows.values():
+            assert row.boundary_autofocus == pytest.approx(16 * row.boundary_error)
+            assert row.measured_residual_qpe_rad < 0.1
+            assert row.verdict_autofocus == "confirmed"
+            assert abs(row.refocused_loss_db) < 0.1
+
+    def test_without_autofocus_there_is_no_verdict_on_it(self) -> None:
+        row = verdicts("receiver.acceleration.x")["receiver.acceleration.x"]
+        assert (row.boundary_autofocus, row.verdict_autofocus) == (None, None)
+
+    def test_an_error_beyond_first_order_at_the_scaled_limit_says_so(self) -> None:
+        path = SECTION_V.with_name("rigling_moses_section_v_autofocus.yaml")
+        (row,) = verify_mission(load_mission(str(path)), "receiver.velocity.y").rows
+        assert row.verdict == "optimistic"
+        assert row.verdict_autofocus == "not_evaluated"
+        assert "moves platform or image" in row.reason_autofocus
+
+    @pytest.mark.parametrize(("n_pull", "verdict"), [(8, "confirmed"), (14, "optimistic")])
+    def test_range_walk_bounds_the_pull_in(self, n_pull: float, verdict: str) -> None:
+        """1 GHz at 10 GHz: half a cell of walk at n_pull 10."""
+        row = verdicts(
+            "mission.autofocus_pull_in", radar__bandwidth="1 GHz", autofocus={"algorithm": "pga", "n_pull": n_pull}
+        )["mission.autofocus_pull_in"]
+        assert row.verdict == verdict
+        assert "up to n_pull 10, f0/B" in row.reason
+
+
+def test_verdicts_do_not_depend_on_the_number_of_processes() -> None:
+    mission = load_mission(str(SECTION_V))
+    seen: list[str] = []
+    both = verify_mission(mission, "receiver.*", 2, seen.append)
+    assert both == verify_mission(mission, "receiver.*")
+    assert seen == [row.id for row in both.rows]
+
+
+class TestCheckWithImages:
+    def test_json_carries_the_verdicts_and_a_row_says_when_its_limit_is_optimistic(self, run) -> None:
+        result = run("check", SECTION_V, "--verify", "--format", "json")
+        (mission,) = json.loads(result.stdout)["missions"]
+        verdict = {row["id"]: row["verdict"] for row in mission["verification"]}
+        assert verdict["receiver.velocity.y"] == "optimistic"
+        row = next(row for row in mission["rows"] if row["id"] == "receiver.velocity.y")
+        assert row["status"] == "not_declared"
+        assert any("0.417 rad at it, the budget is 0.393 rad" in note for note in row["notes"])
+
+    @pytest.mark.parametrize(("declared", "status"), [(0.0390, "pass"), (0.0405, "warn")])
+    def test_a_pass_that_the_image_contradicts_is_a_warning(self, run, tmp_path, declared, status) -> None:
+        """The published limit is 41.7 mm/s, the true one 6 % less: 39.3 mm/s."""
+        error = f"    motion_azimuth: 135 deg\n    motion_error: {{velocity: [0, {declared}, 0]}}\n"
+        text = SECTION_V.read_text(encoding="utf-8").replace("    motion_azimuth: 135 deg\n", error)
+        text += "allocation: {warn_above: 1}\n"
+        path = tmp_path / "mission.yaml"
+        path.write_text(text, encoding="utf-8")
+        plain, verified = (
+            {row["id"]: row["status"] for row in json.loads(run("check", path, *more, "--format", "json").stdout)[
+                "missions"][0]["rows"]}
+            for more in ((), ("--verify",))
+        )  # fmt: skip
+        assert plain["receiver.velocity.y"] == "pass"
+        assert verified["receiver.velocity.y"] == status
+
+    def test_text_and_csv_show_them(self, run) -> None:
+        assert "Images with each error at its limit" in run("check", SECTION_V, "--verify").stdout
+        lines = run("check", SECTION_V, "--verify", "--format", "csv").stdout.splitlines()
+        assert next(line for line in lines if ",receiver.velocity.y," in line).endswith(",optimistic")
+
+    def test_without_it_there_are_none(self, run) -> None:
+        (mission,) = json.loads(run("check", SECTION_V, "--format", "json").stdout)["missions"]
+        assert mission["verification"] is None
 
 
 class TestCommand:
