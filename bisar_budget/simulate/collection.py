@@ -8,7 +8,7 @@ import numpy as np
 
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import BistaticGeometry, GroundVector
-from bisar_budget.mission.model import Mission
+from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.simulate.exact import ExactEffect, exact_effect
 from bisar_budget.simulate.image_formation import backprojection, ground_grid, taylor_window
 from bisar_budget.simulate.phase_history import (
@@ -25,6 +25,9 @@ OVERSAMPLING = 2.5  # samples of an image per resolution cell
 CELLS = 48  # resolution cells of a cross-range cut; fewer blur the aperture by over 1 % of a phase under a taper
 RANGE_CELLS = 12  # of a chip
 _FREQUENCIES = 64  # a chip stays within a few range cells
+_MAX_CELLS = 1024
+_BYTES_PER_PIXEL = 16 * 8  # the image, its grid, and what forming it holds at once
+_BYTES_PER_PULSE = 16 * 6 * _FREQUENCIES  # samples and oversampled range profile
 _PULSES_PER_CELL = 4  # a response repeats after as many cells as there are pulses
 
 
@@ -90,6 +93,8 @@ class PointCollection:
         self.radar, self.geometry = mission.radar, geometry
         self.wavelength = mission.radar.wavelength
         self.aperture_time = mission.collection.aperture_time
+        self.pulses = mission.collection.pulses
+        self.memory_limit = (mission.simulation or Simulation()).memory_limit
         self.is_tapered = mission.simulation is not None and mission.simulation.window == "taylor"
         self.resolution = (
             geometry.range_resolution(mission.radar.bandwidth, SPEED_OF_LIGHT),
@@ -147,7 +152,13 @@ class PointCollection:
             East, north. [m]
         cells, range_cells : int
             Extent in resolution cells along y′ and x′; no range cells give the single line through the centre.
+
+        Raises
+        ------
+        ValueError
+            The patch aliases with the mission's pulses, or is too large to be formed.
         """
+        self._require_room(cells, range_cells)
         slow_time = cell_centres(self.aperture_time, _PULSES_PER_CELL * cells)
         transmitter, receiver = self.paths(errors, slow_time)
         history = phase_history(
@@ -163,6 +174,21 @@ class PointCollection:
             history.samples[:] *= np.outer(taylor_window(slow_time.size), taylor_window(_FREQUENCIES))
         grid = self._grid(centre, range_cells, cells)
         return Chip(backprojection(history, grid) * baseband(self.geometry, grid, self.wavelength), grid)
+
+    def _require_room(self, cells: int, range_cells: int) -> None:
+        """Refuse a patch that aliases or is too large. More pulses than it takes would change nothing."""
+        if cells > _MAX_CELLS:
+            raise ValueError(f"a patch of {cells} resolution cells, at most {_MAX_CELLS} are formed")
+        if self.pulses is not None and self.pulses < 2 * cells:
+            raise ValueError(
+                f"collection.pulses is {self.pulses}, but the patch with its echoes is {cells} resolution cells wide "
+                f"and aliases below {2 * cells} pulses; omit the key to get what it takes"
+            )
+        pixels = max(1, range_cells * OVERSAMPLING) * cells * OVERSAMPLING
+        needed = pixels * _BYTES_PER_PIXEL + _PULSES_PER_CELL * cells * _BYTES_PER_PULSE
+        if needed > self.memory_limit:
+            limit = f"simulation.memory_limit is {self.memory_limit / 1e6:.0f} MB"
+            raise ValueError(f"the image needs about {needed / 1e6:.0f} MB, {limit}")
 
     def _grid(self, centre: GroundVector, range_cells: int, cells: int) -> Floats:
         """Pixels along y′ at the range sum of the middle one.

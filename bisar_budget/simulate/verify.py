@@ -203,7 +203,7 @@ class _Study:
         reach = (
             2 * abs(effect.quadratic) + 3 * abs(effect.cubic)
         ) / math.pi  # cells, from slope at the aperture edge
-        cells = CELLS + 2 * math.ceil(reach)
+        cells = CELLS + 2 * math.ceil(min(reach, 1e6))
         form = partial(self.collection.chip, effect.displacement, cells=cells, range_cells=RANGE_CELLS)
         return form(errors), form(Errors(), scatterer=effect.displacement)
 

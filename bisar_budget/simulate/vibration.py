@@ -83,15 +83,15 @@ def _sinusoidal(
     cycles = frequency * collection.aperture_time
     if cycles < 3:
         return blank._replace(reason=f"{cycles:.3g} cycles per aperture: below three the echoes lie on the mainlobe")
-    if cycles > 400:
-        reason = f"{cycles:.3g} cycles per aperture: the echoes lie outside the patch that is imaged"
-        return blank._replace(reason=reason)
-    cells = 2 * math.ceil(cycles) + CELLS
+    cells = 2 * math.ceil(min(cycles, 1e6)) + CELLS
     errors = Errors()
     for name, amplitude in limits.items():
         errors = errors.of(name, MotionError(sinusoids=(Sinusoid(amplitude=amplitude, frequency=frequency),)))
-    clean = collection.chip((0.0, 0.0), Errors(), cells=cells).cut
-    echo = collection.chip((0.0, 0.0), errors, cells=cells).cut - clean
+    try:
+        clean = collection.chip((0.0, 0.0), Errors(), cells=cells).cut
+        echo = collection.chip((0.0, 0.0), errors, cells=cells).cut - clean
+    except ValueError as error:
+        return blank._replace(reason=f"{cycles:.3g} cycles per aperture: {error}")
     # An echo keeps its range while a scatterer at its place would walk by one wavelength per cycle.
     walk = cycles * collection.radar.bandwidth / collection.radar.center_frequency
     smeared = f", smeared over {walk:.2g} range cells" if walk > 0.3 else ""

@@ -175,3 +175,20 @@ def test_a_taylor_window_is_honoured() -> None:
     errors = Errors().of("receiver", MotionError(acceleration=(6e-4, 0.0, 0.0)))
     effect, (quadratic, _) = phases(tapered, errors)
     assert quadratic == pytest.approx(effect.quadratic, rel=0.01)
+
+
+class TestRoom:
+    def test_too_few_pulses_alias(self) -> None:
+        c = point_collection(0, collection__pulses=95)
+        with pytest.raises(ValueError, match="aliases below 96 pulses"):
+            c.chip((0.0, 0.0), Errors())
+        point_collection(0, collection__pulses=96).chip((0.0, 0.0), Errors())
+
+    def test_memory_limit_names_what_is_needed(self) -> None:
+        c = point_collection(0, simulation={"memory_limit": "1 MB"})
+        with pytest.raises(ValueError, match=r"needs about \d+ MB, simulation.memory_limit is 1 MB"):
+            c.chip((0.0, 0.0), Errors())
+
+    def test_a_patch_of_a_thousand_cells_is_the_largest(self) -> None:
+        with pytest.raises(ValueError, match="at most 1024 are formed"):
+            point_collection(0).chip((0.0, 0.0), Errors(), cells=1025)
