@@ -30,7 +30,8 @@ class MotionError(NamedTuple):
     """Measured minus actual position of one platform, r̃(τ): (22) and what is faster.
 
     Position [m], velocity [m/s] and acceleration [m/s²] are east-north-up; vibration is along the line of
-    sight, positive away from the scene. `wideband_rms` [m] is white over the pulses and needs a generator.
+    sight, positive away from the scene. `wideband_rms` [m] is noise of the pulses, white or within
+    `wideband_band` (low, high) [Hz], and needs a generator.
     """
 
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -38,6 +39,7 @@ class MotionError(NamedTuple):
     acceleration: tuple[float, float, float] = (0.0, 0.0, 0.0)
     sinusoids: tuple[Sinusoid, ...] = ()
     wideband_rms: float = 0.0
+    wideband_band: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -91,7 +93,7 @@ def path(
     Raises
     ------
     ValueError
-        Wideband vibration without a generator.
+        Wideband vibration without a generator, or in a band that holds no frequency of the pulses.
     """
     tau = slow_time[:, None]
     actual = np.asarray(state.position) + np.asarray(state.velocity) * tau
@@ -106,9 +108,31 @@ def path(
     if error.wideband_rms:
         if rng is None:
             raise ValueError("wideband vibration needs a random generator")
-        along += rng.normal(0.0, error.wideband_rms, slow_time.shape)
+        along += error.wideband_rms * _noise(slow_time, error.wideband_band, rng)
     sight = actual / np.linalg.norm(actual, axis=1, keepdims=True)
     return Path(actual=actual, measured=measured + sight * along[:, None])
+
+
+def _noise(slow_time: Floats, band: tuple[float, float] | None, rng: np.random.Generator) -> Floats:
+    """Gaussian noise of unit variance over the pulses, white or within a band [Hz]."""
+    white: Floats = rng.normal(0.0, 1.0, slow_time.shape)
+    if band is None:
+        return white
+    step = float(slow_time[1] - slow_time[0])
+    frequency = np.fft.rfftfreq(slow_time.size, step)
+    inside = (frequency >= band[0]) & (frequency <= band[1])
+    # Every frequency stands for two of the full spectrum, but zero and, of an even number, the highest.
+    stands_for = np.full(frequency.size, 2.0)
+    stands_for[0] = 1.0
+    stands_for[-1] = 2.0 if slow_time.size % 2 else 1.0
+    weight = stands_for @ inside
+    if not weight:
+        raise ValueError(
+            f"the band from {band[0]:g} to {band[1]:g} Hz holds no frequency of the pulses: they are "
+            f"{frequency[1]:.3g} Hz apart, up to {frequency[-1]:.4g} Hz"
+        )
+    noise: Floats = np.fft.irfft(np.fft.rfft(white) * inside, slow_time.size)
+    return noise * math.sqrt(slow_time.size / float(weight))
 
 
 def phase_history(

@@ -74,6 +74,30 @@ class TestPhaseHistory:
         with pytest.raises(ValueError, match="generator"):
             path(broadside.geometry.receiver, broadside.slow_time, MotionError(wideband_rms=1e-3))
 
+    @pytest.mark.parametrize("pulses", [255, 256])
+    @pytest.mark.parametrize("band", [None, (0.0, 100.0), (3.0, 8.0), (20.0, 21.4)])
+    def test_wideband_vibration_has_its_rms_within_its_band(self, band, pulses: int) -> None:
+        """Frequencies are 1/6 Hz apart, up to 21.3 Hz; 200 draws know a variance to 1 % at the least."""
+        c = collection(pulses=pulses)
+        rng = np.random.default_rng(5)
+        error = MotionError(wideband_rms=1e-3, wideband_band=band)
+        power = np.zeros(pulses // 2 + 1)
+        for _ in range(200):
+            flown = path(c.geometry.receiver, c.slow_time, error, rng)
+            along = np.linalg.norm(flown.measured, axis=1) - np.linalg.norm(flown.actual, axis=1)
+            spectrum = np.abs(np.fft.fft(along)[: power.size]) ** 2
+            power += spectrum * np.where(np.arange(power.size) % (pulses / 2) == 0, 1, 2) / (200 * pulses**2)
+        assert math.sqrt(power.sum()) == pytest.approx(1e-3, rel=0.05)
+        frequency = np.arange(power.size) / 6
+        low, high = band or (0.0, 100.0)
+        outside = power[(frequency < low) | (frequency > high)]
+        assert outside.sum() < 1e-9 * power.sum()
+
+    def test_a_band_between_the_frequencies_of_the_pulses_is_refused(self, broadside: Collection) -> None:
+        error = MotionError(wideband_rms=1e-3, wideband_band=(50.0, 60.0))
+        with pytest.raises(ValueError, match="holds no frequency of the pulses"):
+            path(broadside.geometry.receiver, broadside.slow_time, error, np.random.default_rng(1))
+
     def test_cells_stand_for_the_whole_interval(self) -> None:
         assert cell_centres(6.0, 4) == pytest.approx([-2.25, -0.75, 0.75, 2.25])
 
