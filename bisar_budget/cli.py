@@ -474,8 +474,6 @@ def derive(table: str, format_name: str, check_only: bool, write: bool) -> None:
     if check_only or write:
         _generated(write)
         return
-    if table == "full":
-        raise click.UsageError("--table full: not supported by this version of bisar-budget.")
     from bisar_budget.theory import render
 
     _print(render.derivation(table, format_name))

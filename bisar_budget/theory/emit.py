@@ -14,7 +14,7 @@ from sympy import Expr, Float, Rational, Symbol, cse, numbered_symbols, pi
 from sympy.printing.pycode import PythonCodePrinter
 
 from bisar_budget.theory import differential_range as dr
-from bisar_budget.theory import published
+from bisar_budget.theory import full, published
 from bisar_budget.theory.symbols import (
     RECEIVER,
     TRANSMITTER,
@@ -84,6 +84,80 @@ def both_platforms_arguments() -> tuple[tuple[Symbol, str], ...]:
     return tuple(arguments)
 
 
+def look_arguments(platform: Platform) -> tuple[tuple[Symbol, str], ...]:
+    """Return the line of sight and its derivatives as arguments without a subscript."""
+    names = ("u", "u_dot", "u_ddot", "u_dddot")
+    return tuple(
+        (symbol, f"{name}_{axis}")
+        for name, vector in zip(names, platform.look, strict=True)
+        for axis, symbol in zip("xyz", vector, strict=True)
+    )
+
+
+def _full_evaluators(motion: tuple[Symbol, ...], phase_arguments: tuple[tuple[Symbol, str], ...]) -> list[Evaluator]:
+    """Return the evaluators of the full model."""
+    beta = full.range_error()
+    growth = full.growth(TRANSMITTER)
+    acceleration = zip(TRANSMITTER.acceleration, ("a_x", "a_y", "a_z"), strict=True)
+    *track, slant_range = platform_arguments(TRANSMITTER)
+    # The sums of both platforms' derivatives stand where one platform's do: (u_t + u_r) → s.
+    alone = {symbol: 0 for look in RECEIVER.look for symbol in look}
+    history = [vector.subs(alone) for vector in full.ground_history()]
+    names = ("s", "s_dot", "s_ddot", "s_dddot")
+    sums = [
+        (vector[axis], f"{name}_{'xy'[axis]}") for vector, name in zip(history, names, strict=True) for axis in (0, 1)
+    ]
+    Q = full.ground_matrix().subs(alone)
+    adjugate = Q.adjugate()
+    phases = [full.displacement_phase(order).subs(alone) for order in (2, 3)]
+    return [
+        Evaluator(
+            name="look_series",
+            summary="Line of sight to a platform and its first three derivatives at the aperture midpoint.",
+            details=(
+                "Rows are orders 0 to 3 [1/sⁿ], columns x, y, z, on a path of constant acceleration. Derived here."
+            ),
+            arguments=(*track, *acceleration, slant_range),
+            rows=tuple(tuple(look.subs(growth)) for look in full.look_series(TRANSMITTER)),
+            row_names=("u", "first derivative", "second derivative", "third derivative"),
+        ),
+        Evaluator(
+            name="full_motion",
+            summary="Effects of one unit of each motion error of one platform, every first-order term kept.",
+            details=(
+                "Columns as in published_motion, before what the displacement of the image adds. "
+                "u and its derivatives as look_series gives them. Derived here."
+            ),
+            arguments=(*look_arguments(TRANSMITTER), *phase_arguments),
+            rows=tuple(effects(beta, error) for error in motion),
+            row_names=tuple(f"{kind} {axis}" for kind in published.KINDS for axis in "xyz"),
+        ),
+        Evaluator(
+            name="full_ground",
+            summary="Adjugate and determinant of Q, and the phases that a displacement of one metre adds.",
+            details=(
+                "s is the sum of both platforms' look_series on the ground. Displacement of the image [m] = "
+                "adjugate · (constant term, linear term) / determinant; quadratic and cubic phase at the aperture "
+                "edge per metre of displacement east and north [rad/m]. Derived here."
+            ),
+            arguments=(*sums, *phase_arguments),
+            rows=(
+                tuple(adjugate[0, :]),
+                tuple(adjugate[1, :]),
+                (Q[0, 0] * Q[1, 1] - Q[0, 1] * Q[1, 0],),
+                *(tuple(published.sensitivity(phase, axis) for axis in full.DISPLACEMENT) for phase in phases),
+            ),
+            row_names=(
+                "adjugate, first row",
+                "adjugate, second row",
+                "determinant",
+                "quadratic phase",
+                "cubic phase",
+            ),
+        ),
+    ]
+
+
 def effects(beta: Sequence[Expr], error: Symbol) -> tuple[Expr, ...]:
     """Return what one unit of an error does: β̃₀, β̃₁, QPE, cubic phase at the aperture edge, signed like β̃."""
     per_unit = [published.sensitivity(term, error) for term in beta]
@@ -150,6 +224,7 @@ def evaluators() -> tuple[Evaluator, ...]:
             rows=(tuple(adjugate[0, :]), tuple(adjugate[1, :]), (determinant,)),
             row_names=("adjugate, first row", "adjugate, second row", "determinant"),
         ),
+        *_full_evaluators(motion, phase_arguments),
         Evaluator(
             name="vibration_limit",
             summary="Largest sinusoidal amplitude, 0 to peak, or wideband rms along the line of sight. [m]",

@@ -5,18 +5,29 @@ import textwrap
 import unicodedata
 from collections.abc import Callable
 from dataclasses import dataclass
+from html import escape
 
 from sympy import Basic, MatrixBase, Symbol
 from sympy.printing.latex import LatexPrinter
 from sympy.printing.mathml import MathMLPresentationPrinter
 from sympy.printing.str import StrPrinter
 
-from bisar_budget.theory import published
+from bisar_budget.theory import full, published
 from bisar_budget.theory.published import Equation, Table
 
-_NAME = re.compile(r"(?P<letter>[A-Za-z]+?)(?P<index>_\d)?(?P<accent>tilde|bar)?(?:_(?P<subscript>\w+))?")
+_NAME = re.compile(
+    r"(?P<letter>[A-Za-z]+?)(?P<index>_\d)?(?P<accent>tilde|bar|hat|dot|ddot|dddot)?(?:_(?P<subscript>\w+))?"
+)
 _GREEK = {"lambda": "λ", "tau": "τ", "phi": "φ", "theta": "θ", "beta": "β", "sigma": "σ"}
-_ACCENTS = {"tilde": "\u0303", "bar": "\u0304"}
+_ACCENTS = {
+    "tilde": "\u0303",
+    "bar": "\u0304",
+    "hat": "\u0302",
+    "dot": "\u0307",
+    "ddot": "\u0308",
+    "dddot": "\u20db",
+}
+_ABOVE = {"tilde": "~", "bar": "¯", "hat": "^", "dot": "˙", "ddot": "¨", "dddot": "⃛"}
 _COMMANDS = {
     "Delta": r"\Delta{}",
     "PSLR": r"\mathrm{PSLR}",
@@ -124,7 +135,7 @@ class _MathML(MathMLPresentationPrinter):  # type: ignore[misc]
         if parts.accent:
             over = self.dom.createElement("mover")
             over.appendChild(head)
-            over.appendChild(self._leaf("mo", {"tilde": "~", "bar": "¯"}[parts.accent]))
+            over.appendChild(self._leaf("mo", _ABOVE[parts.accent]))
             head = over
         if not parts.subscript:
             return head
@@ -159,45 +170,49 @@ def as_mathml(expression: Basic) -> str:
 
 
 def derivation(selection: str, format_name: str) -> str:
-    """Write what `bisar-budget derive` prints: `all`, `equations`, `I`, `II` or `vibration`."""
+    """Write what `bisar-budget derive` prints: `all`, `equations`, `I`, `II`, `vibration` or `full`."""
     tables: dict[str, Callable[[], Table]] = {
         "I": published.table_1,
         "II": published.table_2,
         "vibration": published.vibration,
+        "full": full.table,
     }
     blocks = []
     if selection in ("all", "equations"):
-        blocks.append(_EQUATIONS[format_name](published.equations()))
+        blocks.append(_EQUATIONS[format_name]("Equations of Rigling & Moses, derived", published.equations()))
     for name, table in tables.items():
         if selection in ("all", name):
+            if name == "full":
+                blocks.append(_EQUATIONS[format_name]("Equations of the full model", full.equations()))
             blocks.append(_TABLES[format_name](table()))
     return "\n".join(blocks)
 
 
-def _text_equations(equations: tuple[Equation, ...]) -> str:
-    lines = ["Equations of Rigling & Moses, derived", ""]
+def _text_equations(title: str, equations: tuple[Equation, ...]) -> str:
+    lines = [title, ""]
     for equation in equations:
         formula = f"    {as_text(equation.left)} = {as_text(equation.right)}"
-        lines.append(f"{equation.number} {equation.title}")
+        lines.append(f"{equation.number} {equation.title}".strip())
         lines += textwrap.wrap(formula, 100, subsequent_indent=" " * 8, break_long_words=False)
     return "\n".join(lines) + "\n"
 
 
-def _latex_equations(equations: tuple[Equation, ...]) -> str:
-    lines = []
+def _latex_equations(title: str, equations: tuple[Equation, ...]) -> str:
+    lines = [f"% {title}"]
     for equation in equations:
+        tag = rf" \tag*{{{equation.number}}}" if equation.number else ""
         lines += [
             f"% {equation.number} {equation.title}",
-            rf"\[ {as_latex(equation.left)} = {as_latex(equation.right)} \tag*{{{equation.number}}} \]",
+            rf"\[ {as_latex(equation.left)} = {as_latex(equation.right)}{tag} \]",
         ]
     return "\n".join(lines) + "\n"
 
 
-def _markdown_equations(equations: tuple[Equation, ...]) -> str:
-    lines = ["## Equations of Rigling & Moses, derived", ""]
+def _markdown_equations(title: str, equations: tuple[Equation, ...]) -> str:
+    lines = [f"## {title}", ""]
     for equation in equations:
         lines += [
-            f"{equation.number} {equation.title}",
+            f"{equation.number} {equation.title}".strip(),
             "",
             "```math",
             f"{as_latex(equation.left)} = {as_latex(equation.right)}",
@@ -207,11 +222,11 @@ def _markdown_equations(equations: tuple[Equation, ...]) -> str:
     return "\n".join(lines)
 
 
-def _mathml_equations(equations: tuple[Equation, ...]) -> str:
-    lines = ["<dl>"]
+def _mathml_equations(title: str, equations: tuple[Equation, ...]) -> str:
+    lines = [f"<h2>{escape(title)}</h2>", "<dl>"]
     for equation in equations:
         lines.append(
-            f"<dt>{equation.number} {equation.title}</dt>"
+            f"<dt>{f'{equation.number} {equation.title}'.strip()}</dt>"
             f"<dd>{as_mathml(equation.left)} = {as_mathml(equation.right)}</dd>"
         )
     return "\n".join([*lines, "</dl>"]) + "\n"
@@ -288,7 +303,7 @@ def _mathml_table(table: Table) -> str:
     return "\n".join([*lines, "</tbody>", "</table>", notes]) + "\n"
 
 
-_EQUATIONS: dict[str, Callable[[tuple[Equation, ...]], str]] = {
+_EQUATIONS: dict[str, Callable[[str, tuple[Equation, ...]], str]] = {
     "text": _text_equations,
     "latex": _latex_equations,
     "markdown": _markdown_equations,

@@ -39,13 +39,16 @@ n_pull = positive("N_pull")  # autofocus corrects π·N_pull radians
 class Platform:
     """One platform at the aperture midpoint, with the error of its measured motion.
 
-    Vectors are (3,) east-north-up. [m], [m/s], [m/s²]
+    Vectors are (3,) east-north-up. [m], [m/s], [m/s²]. `look` holds the unit vector to the platform and its
+    first three derivatives, [1/sⁿ]; the paper's model has neither them nor the acceleration.
     """
 
     name: str
     subscript: str
     position: Matrix
     velocity: Matrix
+    acceleration: Matrix
+    look: tuple[Matrix, ...]
     position_error: Matrix
     velocity_error: Matrix
     acceleration_error: Matrix
@@ -69,6 +72,8 @@ def platform(name: str, subscript: str) -> Platform:
         subscript=subscript,
         position=ImmutableMatrix([real(f"{axis}_{subscript}") for axis in AXES]),
         velocity=vector("v"),
+        acceleration=vector("a"),
+        look=tuple(vector(name) for name in ("u", "udot", "uddot", "udddot")),
         position_error=vector("ptilde"),
         velocity_error=vector("vtilde"),
         acceleration_error=vector("atilde"),

@@ -1,0 +1,152 @@
+"""The full model: every first-order term of the range error, and what the displacement of the image adds.
+
+Rigling & Moses hold the range constant and look at the quadratic term alone. Here the line of sight turns as it
+does: with u(τ) the unit vector to a platform, a position error r̃(τ) changes the range by −u(τ)·r̃(τ) to first
+order. Constant and linear terms move the response to x̂, where a point has a history of its own; what defocuses is
+the rest. Derived here; nothing of it is in the paper.
+"""
+
+from functools import cache
+
+from sympy import Add, Eq, Expr, Function, ImmutableMatrix, Matrix, Poly, Symbol, diff, expand, factorial, sqrt
+
+from bisar_budget.theory import differential_range as dr
+from bisar_budget.theory import published
+from bisar_budget.theory.published import Equation, Row, Table
+from bisar_budget.theory.symbols import AXES, PLATFORMS, Platform, c, real, tau
+
+ORDER = 3
+
+DISPLACEMENT = ImmutableMatrix([real("xhat"), real("yhat")])
+
+
+def growth(platform: Platform) -> dict[Symbol, Expr]:
+    """d₁ … d₃ of |r|² = R²(1 + d₁τ + d₂τ² + d₃τ³ + …) on a path of constant acceleration. [1/sⁿ]"""
+    track = platform.position + platform.velocity * tau + platform.acceleration * tau**2 / 2
+    square = Poly(expand(track.dot(track)), tau)
+    return {
+        real(f"d_{n}{platform.subscript}"): square.coeff_monomial(tau**n) / platform.slant_range**2
+        for n in range(1, ORDER + 1)
+    }
+
+
+@cache
+def look_series(platform: Platform) -> tuple[Matrix, ...]:
+    """Derivatives of the line of sight u = r/|r| at τ = 0, orders 0 to 3, (3,) each, in `growth`. [1/sⁿ]"""
+    grown = 1 + sum(d * tau**n for n, d in enumerate(growth(platform), start=1))
+    inverse = [diff(1 / sqrt(grown), tau, n).subs(tau, 0) / factorial(n) for n in range(ORDER + 1)]
+    track = (platform.position, platform.velocity, platform.acceleration / 2)
+    series = []
+    for n in range(ORDER + 1):
+        terms = (part * inverse[n - k] for k, part in enumerate(track) if k <= n)
+        series.append(sum(terms, start=Matrix([0, 0, 0])) * factorial(n) / platform.slant_range)
+    return tuple(series)
+
+
+@cache
+def range_error() -> tuple[Expr, ...]:
+    """β̃₀ … β̃₃ of −Σ u(τ)·r̃(τ) + c·t̃(τ), in the derivatives of u. [m/sⁿ]"""
+    total = c * dr.clock_polynomial()
+    for platform in PLATFORMS:
+        look = sum(
+            (derivative * tau**n / factorial(n) for n, derivative in enumerate(platform.look)),
+            start=Matrix([0, 0, 0]),
+        )
+        total -= look.dot(dr.error_polynomial(platform))
+    polynomial = Poly(expand(total), tau)
+    return tuple(polynomial.coeff_monomial(tau**n) for n in range(ORDER + 1))
+
+
+def ground_history() -> tuple[Matrix, ...]:
+    """Derivatives of s = u_t + u_r on the ground, orders 0 to 3, (2,) each: a point has the range −s(τ)·x."""
+    looks = zip(*(platform.look for platform in PLATFORMS), strict=True)
+    return tuple(Matrix([sum(u[axis] for u in both) for axis in range(2)]) for both in looks)
+
+
+def ground_matrix() -> Matrix:
+    """Q = −[s; ṡ], (2, 2): takes a ground point to its constant and linear range. [-], [1/s]"""
+    s, rate, *_ = ground_history()
+    return -Matrix([list(s), list(rate)])
+
+
+def displacement_phase(order: int) -> Expr:
+    """Phase at the aperture edge that a displacement (x̂, ŷ) adds, order 2 or 3: of +s⁽ⁿ⁾·x̂τⁿ/n!. [rad]"""
+    added = ground_history()[order].dot(DISPLACEMENT) / factorial(order)
+    return published.edge_phase(added, order)
+
+
+def effective_coefficients() -> tuple[Expr, Expr]:
+    """β₂, β₃ left at the displaced point: β̃ₙ + s⁽ⁿ⁾·x̂/n!."""
+    history, beta = ground_history(), range_error()
+    second, third = (beta[n] + history[n].dot(DISPLACEMENT) / factorial(n) for n in (2, 3))
+    return second, third
+
+
+def table() -> Table:
+    """Coefficients of the range error with every first-order term, before what the displacement adds."""
+    beta = range_error()
+    motion_free = {e: 0 for platform in PLATFORMS for e in published.motion_errors(platform)}
+    rows = [
+        Row(
+            number=None,
+            error=real("ttilde"),
+            label=Eq(Function("ttilde")(tau), dr.clock_polynomial(), evaluate=False),
+            cells=tuple(cell.subs(motion_free) for cell in beta),
+        )
+    ]
+    for platform in PLATFORMS:
+        polynomial = dr.error_polynomial(platform)
+        for index, error in enumerate(published.motion_errors(platform)):
+            axis = index // 3
+            track = Function(f"{AXES[axis]}tilde_{platform.subscript}")(tau)
+            label = Eq(track, published.single_error(polynomial[axis], error), evaluate=False)
+            cells = tuple(published.single_error(cell, error) for cell in beta)
+            rows.append(Row(number=None, error=error, label=label, cells=cells))
+    return Table(
+        number="Full model",
+        title="Differential range errors with the line of sight turning as it does",
+        columns=("Constant β̃₀", "Linear β̃₁", "Quadratic β̃₂", "Cubic β̃₃"),
+        rows=tuple(rows),
+        notes=("Derived here. u and its derivatives are those of the unit vector to the platform at τ = 0.",),
+    )
+
+
+def equations() -> tuple[Equation, ...]:
+    """How the line of sight turns, where a response goes, and what defocuses there."""
+    platform = PLATFORMS[0]
+    second, third = effective_coefficients()
+    history = ground_history()
+    determinant = history[0][0] * history[1][1] - history[0][1] * history[1][0]
+    constant, linear = real("beta_0tilde"), real("beta_1tilde")
+    moved = -Matrix(
+        [history[1][1] * constant - history[0][1] * linear, history[0][0] * linear - history[1][0] * constant]
+    )
+    grown = (Equation("", "Growth of the squared range", d, value) for d, value in growth(platform).items())
+    names = ("u", "udot", "uddot", "udddot")
+    titles = ("Line of sight", "Its first derivative", "Its second derivative", "Its third derivative")
+    looks = zip(names, titles, look_series(platform), strict=True)
+    return (
+        *grown,
+        *(Equation("", title, Symbol(f"{name}_{platform.subscript}"), look) for name, title, look in looks),
+        Equation("", "Displacement of the image, times the determinant", Symbol("detQ") * DISPLACEMENT, moved),
+        Equation("", "Determinant of Q", Symbol("detQ"), determinant),
+        Equation("", "Quadratic coefficient at the displaced point", real("beta_2"), _collected(second)),
+        Equation("", "Cubic coefficient at the displaced point", real("beta_3"), _collected(third)),
+        Equation("", "Quadratic phase error", real("phi_2"), published.edge_phase(real("beta_2"), 2)),
+        Equation("", "Cubic phase at the aperture edge", real("phi_3"), published.edge_phase(real("beta_3"), 3)),
+    )
+
+
+def _collected(coefficient: Expr) -> Expr:
+    """Write β̃ₙ for what the table has, and keep what the displacement adds."""
+    order = 2 if coefficient == effective_coefficients()[0] else 3
+    return Add(real(f"beta_{order}tilde"), expand(coefficient - range_error()[order]), evaluate=False)
+
+
+def at_constant_range(expression: Expr) -> Expr:
+    """Replace u by (r + vτ)/R, as (17) has it: u is r/R, u̇ is v/R and the rest vanishes."""
+    for platform in PLATFORMS:
+        held = (platform.position / platform.slant_range, platform.velocity / platform.slant_range)
+        for derivative, value in zip(platform.look, (*held, Matrix([0, 0, 0]), Matrix([0, 0, 0])), strict=True):
+            expression = expression.subs(dict(zip(derivative, value, strict=True)))
+    return expand(expression)
