@@ -78,7 +78,7 @@ def cli() -> None:
 @click.option(
     "--model",
     type=click.Choice(["published", "full", "strictest"]),
-    help="Model that gates, over the mission file's. This version has the published one.",
+    help="Model that gates, over the mission file's.",
 )
 @click.option(
     "--date",
@@ -117,10 +117,6 @@ def check(
     """
     from bisar_budget.report import Style, render
 
-    if model in ("full", "strictest"):
-        raise click.UsageError(
-            f"--model {model}: not supported by this version of bisar-budget; it comes with the full model."
-        )
     written = [(name, _format_of(name)) for name in reports]
     files = _expanded(missions)
     _spare(files, [output, *reports])

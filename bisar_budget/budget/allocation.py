@@ -85,9 +85,9 @@ def _divide(split: object, mission: Mission, sources: Sequence[ErrorSource]) -> 
     for platform in ("transmitter", "receiver"):
         rule = mission.allocation.combine
         phases = [
-            source.qpe
+            source.qpe(mission.allocation.model)
             for source in sources
-            if source.qpe is not None
+            if source.declared is not None
             and EQUAL.includes(source.owner, platform)
             and (rule == "each" or source.is_independent)
         ]

@@ -8,17 +8,14 @@ from bisar_budget import evaluators
 from bisar_budget.budget.allocation import Allocation, Split, allocate
 from bisar_budget.budget.combine import combine_displacements, combine_phases
 from bisar_budget.budget.findings import FileWarning, MissionFindings, Resolution, Row
-from bisar_budget.budget.sources import ErrorSource, ImagePlane, error_sources, image_plane
+from bisar_budget.budget.sources import ErrorSource, FullGround, ImagePlane, error_sources, full_ground, image_plane
+from bisar_budget.budget.validity import collection_notes, second_order_note
 from bisar_budget.budget.waivers import apply_waivers
 from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
 from bisar_budget.errors import KeyPath
 from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.model import Mission
 
-FULL_MODEL_NOTE = (
-    "allowable_full and qpe_full_rad are null: the full model is not part of this version, the published one "
-    "holds the range constant and leaves out what the displacement of the image adds"
-)
 NO_REQUIREMENT = "no requirement in the file: computed, not judged"
 
 
@@ -39,10 +36,11 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
     """
     geometry = mission.geometry
     plane = image_plane(geometry)
-    sources = error_sources(mission, geometry)
+    ground = full_ground(mission, geometry)
+    sources = error_sources(mission, geometry, ground)
     allocation = allocate(mission, sources)
     judged = [
-        *_error_rows(mission, allocation, sources, plane),
+        *_error_rows(mission, allocation, sources, plane, ground),
         *_vibration_rows(mission, allocation),
         *_aggregate_rows(mission, allocation, sources, plane),
     ]
@@ -62,37 +60,46 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
         allocation=allocation,
         rows=tuple(rows),
         warnings=(*_unknown_requirement_ids(mission, rows), *warnings, *_nothing_declared(rows)),
-        notes=(FULL_MODEL_NOTE, *_unused_keys(mission)),
+        notes=(*collection_notes(mission, geometry), *_unused_keys(mission)),
     )
 
 
 def _error_rows(
-    mission: Mission, allocation: Allocation, sources: Sequence[ErrorSource], plane: ImagePlane
+    mission: Mission,
+    allocation: Allocation,
+    sources: Sequence[ErrorSource],
+    plane: ImagePlane,
+    ground: FullGround,
 ) -> Iterator[Row]:
+    geometry = mission.geometry
     combine = mission.allocation.combine
     info = f"combine is {combine}: the aggregate decides" if combine != "each" else ""
     gain = allocation.autofocus_gain
     owners = ("transmitter", "receiver", "clock", "mission")
     limits = {owner: allocation.qpe_limit(owner) * gain for owner in owners}
+    model = mission.allocation.model
     for source in sources:
         limit = limits[source.owner]
-        per_unit = abs(source.effect.qpe)
-        allowable = _quotient(limit, per_unit)
+        published = _quotient(limit, abs(source.effect.qpe))
+        full = _quotient(limit, abs(source.full.qpe))
         if source.declared is None:
-            yield _undeclared(mission, source, allowable)
+            yield _undeclared(mission, source, published, full)
             continue
         declared = abs(source.declared)
-        qpe = per_unit * declared
+        qpe = abs(source.qpe(model))
         notes, displacement = source.notes, None
         if source.owner != "mission":
-            displacement = plane.displacement(source.effect, source.declared)
+            displacement = _displacement(source, plane, model)
             if displacement is None:
                 notes = (*notes, plane.degeneracy)
+            if note := second_order_note(mission, geometry, ground, source):
+                notes = (*notes, note)
         over = ""
         if qpe > limit:
             needed = allocation.n_pull_needed(qpe, source.owner)
+            of_model = "full model" if source.by(model) is source.full else source.equation
             over = (
-                f"QPE {qpe:.3g} rad, {limit:.3g} rad allowed ({source.equation}); "
+                f"QPE {qpe:.3g} rad, {limit:.3g} rad allowed ({of_model}); "
                 f"passes with autofocus from n_pull {needed:g}"
             )
         yield _judged(
@@ -101,14 +108,17 @@ def _error_rows(
             metric="quadratic_phase_error",
             unit=source.unit,
             declared=declared,
-            allowable=allowable,
+            allowable=_gating(model, published, full),
             path=source.path,
             equation=source.equation,
             gain=gain,
-            no_limit=source.no_limit,
+            no_limit=_no_limit(source, model),
             info=info,
             over=over,
-            qpe=qpe,
+            doubt=_doubt(source, model, limit),
+            limits=(published, full),
+            qpe=abs(source.qpe("published")),
+            qpe_full=source.qpe("full"),
             displacement=displacement,
             evidence=source.evidence,
             is_independent=source.is_independent,
@@ -116,16 +126,59 @@ def _error_rows(
         )
 
 
-def _undeclared(mission: Mission, source: ErrorSource, allowable: float | None) -> Row:
+def _no_limit(source: ErrorSource, model: str) -> str:
+    return source.no_limit if model == "published" else "no quadratic phase to first order"
+
+
+def _gating(model: str, published: float | None, full: float | None) -> float | None:
+    """Allowable by the model that gates; the strictest takes the smaller, no limit being infinite."""
+    if model == "published":
+        return published
+    if model == "full" or published is None:
+        return full
+    return published if full is None else min(published, full)
+
+
+def _displacement(source: ErrorSource, plane: ImagePlane, model: str) -> GroundVector | None:
+    """Displacement by (25), or by the full model where that takes part. [m]"""
+    declared = source.declared or 0.0
+    if model == "published":
+        return plane.displacement(source.effect, declared)
+    east, north = source.full.displacement
+    return (east * declared + 0.0, north * declared + 0.0)  # no -0.0
+
+
+def _doubt(source: ErrorSource, model: str, limit: float) -> str:
+    """Say that the model that does not gate fails the error, and why it thinks otherwise; else nothing."""
+    if model == "published":
+        qpe = abs(source.qpe("full"))
+        if qpe <= limit * (1 + UTILIZATION_TOLERANCE):
+            return ""
+        turned = source.full.qpe - source.full.moved - source.effect.qpe
+        if ".position." in source.id:
+            cause = "the line of sight turns over a position error, and its displacement defocuses"
+        elif abs(source.full.moved) >= abs(turned):
+            cause = "the displaced response has a quadratic phase of its own"
+        else:
+            cause = "at a squint the range is not constant"
+        return f"the full model says fail: QPE {qpe:.3g} rad, {limit:.3g} rad allowed; {cause}"
+    qpe = abs(source.qpe("published"))
+    if model == "full" and qpe > limit * (1 + UTILIZATION_TOLERANCE):
+        return f"the published model says fail: QPE {qpe:.3g} rad, {limit:.3g} rad allowed ({source.equation})"
+    return ""
+
+
+def _undeclared(mission: Mission, source: ErrorSource, published: float | None, full: float | None) -> Row:
     """Row of an error that the file does not declare, as `_judged` would make it: half of all rows are such."""
+    allowable = _gating(mission.allocation.model, published, full)
     return Row(
         source.id,
         "quadratic_phase_error",
         source.unit,
         None,
         allowable,
-        allowable,  # published
-        None,
+        published,
+        full,
         None,
         None,
         None,
@@ -133,7 +186,7 @@ def _undeclared(mission: Mission, source: ErrorSource, allowable: float | None) 
         None,
         "not_declared",
         mission.line(source.path),
-        source.no_limit if allowable is None else None,
+        _no_limit(source, mission.allocation.model) if allowable is None else None,
         source.notes,
         source.equation,
         mission.requirement_ids.get(source.id),
@@ -214,7 +267,7 @@ def _vibration_allowable(mission: Mission, requirement_db: float | None, split: 
 def _aggregate_rows(
     mission: Mission, allocation: Allocation, sources: Sequence[ErrorSource], plane: ImagePlane
 ) -> Iterator[Row]:
-    combine = mission.allocation.combine
+    combine, model = mission.allocation.combine, mission.allocation.model
     declared = [source for source in sources if source.declared is not None and source.is_independent]
     if combine != "each":
         yield from _qpe_aggregates(mission, allocation, declared)
@@ -226,30 +279,30 @@ def _aggregate_rows(
         id="mission.cubic_phase_error",
         metric="cubic_phase_error",
         unit="rad",
-        declared=combine_phases([s.cubic or 0.0 for s in motion], combine) if motion else None,
+        declared=combine_phases([s.cubic(model) for s in motion], combine) if motion else None,
         allowable=mission.requirements.cubic_phase_error,
         path=("requirements", "cubic_phase_error"),
-        equation="Table I, cubic column",
+        equation="Table I, cubic column" if model == "published" else "full model",
         no_limit=NO_REQUIREMENT,
         info="" if mission.requirements.cubic_phase_error is not None else NO_REQUIREMENT,
         over="cubic phase at the aperture edge above the requirement (Table I); autofocus gain does not apply",
     )
-    moves = [plane.displacement(s.effect, s.declared) for s in motion if s.declared is not None]
+    moves = [_displacement(source, plane, model) for source in motion]
     known = [move for move in moves if move is not None]
     yield _judged(
         mission,
         id="mission.location_error",
         metric="location_error",
         unit="m",
-        declared=combine_displacements(known, combine) if motion and not plane.degeneracy else None,
+        declared=combine_displacements(known, combine) if motion and len(known) == len(moves) else None,
         allowable=mission.requirements.location_error,
         path=("requirements", "location_error"),
-        equation="(25)",
+        equation="(25)" if model == "published" else "full model",
         no_limit=NO_REQUIREMENT,
-        not_evaluated=plane.degeneracy,
+        not_evaluated=plane.degeneracy if model == "published" else "",
         is_declared=bool(motion),
         info="" if mission.requirements.location_error is not None else NO_REQUIREMENT,
-        over="displacement of the image above the requirement, by (25)",
+        over="displacement of the image above the requirement",
     )
     if allocation.n_pull is not None:
         yield _judged(
@@ -257,7 +310,7 @@ def _aggregate_rows(
             id="mission.autofocus_pull_in",
             metric="quadratic_phase_error",
             unit="rad",
-            declared=math.fsum(abs(s.qpe or 0.0) for s in declared) if declared else None,
+            declared=math.fsum(abs(s.qpe(model)) for s in declared) if declared else None,
             allowable=math.pi * allocation.n_pull,
             path=("autofocus", "n_pull"),
             equation="Section VI",
@@ -267,15 +320,22 @@ def _aggregate_rows(
 
 
 def _qpe_aggregates(mission: Mission, allocation: Allocation, declared: Sequence[ErrorSource]) -> Iterator[Row]:
-    combine, gain = mission.allocation.combine, allocation.autofocus_gain
+    combine, model, gain = mission.allocation.combine, mission.allocation.model, allocation.autofocus_gain
     owners = ["transmitter", "receiver", "mission"]
     if allocation.qpe.clock is not None:
         owners.insert(2, "clock")  # else it counts with the receiver
     for owner in owners:
         members = [s for s in declared if owner == "mission" or allocation.qpe.includes(s.owner, owner)]
-        qpe = combine_phases([s.qpe or 0.0 for s in members], combine) if members else None
+        qpe, published, full = (
+            combine_phases([s.qpe(of) for s in members], combine) if members else None
+            for of in (model, "published", "full")
+        )
         limit = allocation.qpe_limit(owner) * gain
         over = "" if qpe is None else f"passes with autofocus from n_pull {allocation.n_pull_needed(qpe, owner):g}"
+        other = {"published": ("full", full), "full": ("published", published)}.get(model)
+        doubt = ""
+        if other is not None and other[1] is not None and other[1] > limit * (1 + UTILIZATION_TOLERANCE):
+            doubt = f"the {other[0]} model says fail: {other[1]:.3g} rad, {limit:.3g} rad allowed"
         yield _judged(
             mission,
             id=f"{'timing' if owner == 'clock' else owner}.quadratic_phase_error",
@@ -289,7 +349,10 @@ def _qpe_aggregates(mission: Mission, allocation: Allocation, declared: Sequence
             equation="sum of the rows" if combine == "sum" else "root-sum-square of the rows",
             gain=gain,
             over=over,
-            qpe=qpe,
+            doubt=doubt,
+            limits=(limit, limit),
+            qpe=published,
+            qpe_full=full,
         )
 
 
@@ -305,12 +368,15 @@ def _judged(
     equation: str,
     gain: float = 1.0,  # of autofocus, within `allowable`
     over: str = "",  # what to say when over the limit
+    doubt: str = "",  # what the model that does not gate says against a pass
     no_limit: str = "",  # why there is no allowable
     not_evaluated: str = "",  # why a declared value cannot be judged
     info: str = "",  # why the row judges nothing
     is_declared: bool = True,  # with `declared` None: something is declared, but its effect has no value
     never_fails: bool = False,
-    qpe: float | None = None,
+    limits: tuple[float | None, float | None] | None = None,  # by the published and the full model; None: one rule
+    qpe: float | None = None,  # by the published model
+    qpe_full: float | None = None,
     displacement: GroundVector | None = None,
     evidence: str | None = None,
     is_independent: bool = True,
@@ -335,6 +401,8 @@ def _judged(
         status, reason = "not_evaluated", not_evaluated
     elif utilization > 1 + UTILIZATION_TOLERANCE:
         status, reason = ("warn" if never_fails else "fail"), over
+    elif doubt:
+        status, reason = "warn", doubt
     elif utilization * gain > 1 + UTILIZATION_TOLERANCE:
         status, reason = "pass_with_autofocus", f"{utilization * gain:.3g} times the limit without autofocus"
         if utilization > warn_above:
@@ -349,10 +417,9 @@ def _judged(
         unit,
         declared,
         allowable,
-        allowable,  # published
-        None,  # full
-        qpe,  # published
-        None,  # full
+        *(limits or (allowable, None)),
+        qpe,
+        qpe_full,
         displacement,
         utilization,
         margin,

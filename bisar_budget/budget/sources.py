@@ -1,7 +1,8 @@
 """Every error a mission can have, with what one unit of it does to the range history and the image.
 
 The list is complete: an error that the file does not declare is in it too, because a designer comes for its
-allowable. Effects are those of the published model (Rigling & Moses, Tables I and II).
+allowable. Effects are those of the published model (Rigling & Moses, Tables I and II) and of the full one, which
+lets the line of sight turn and counts what the displacement of the image adds.
 """
 
 import math
@@ -24,6 +25,8 @@ from bisar_budget.mission.model import Mission, MotionError
 
 PLATFORMS = ("transmitter", "receiver")
 MOTION_UNITS = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2"}
+_AXES: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+_NOWHERE: Vector = (0.0, 0.0, 0.0)
 CLOCK_UNITS = {"constant": "s", "linear": "s/s", "quadratic": "1/s", "cubic": "1/s^2"}
 
 
@@ -31,13 +34,16 @@ class Effect(NamedTuple):
     """What one unit of an error does, signed like the range error.
 
     Constant [m/unit] and linear [(m/s)/unit] term of the range error; quadratic and cubic phase at the
-    aperture edge [rad/unit].
+    aperture edge [rad/unit]. The full model's phases hold what the displacement of the image adds, `moved` of
+    the quadratic one, and it knows the displacement (east, north) [m/unit].
     """
 
     constant: float
     linear: float
     qpe: float
     cubic: float
+    moved: float = 0.0
+    displacement: GroundVector = (0.0, 0.0)
 
 
 class ErrorSource(NamedTuple):
@@ -46,7 +52,8 @@ class ErrorSource(NamedTuple):
     `owner` is transmitter, receiver, clock or mission (nobody's). `declared` is signed and includes the
     coverage factor; None where the file is silent. `is_independent` marks the errors as the file states
     them: sums and root-sum-squares run over these alone, so that an error stated along the track is not
-    counted again by its components along the scene's axes.
+    counted again by its components along the scene's axes. `direction` is a unit vector of the scene, zero for
+    what is no motion.
     """
 
     id: str
@@ -55,32 +62,47 @@ class ErrorSource(NamedTuple):
     declared: float | None
     path: KeyPath
     effect: Effect
+    full: Effect
+    direction: Vector
     equation: str
     no_limit: str
     evidence: str | None = None
     is_independent: bool = True
     notes: tuple[str, ...] = ()
 
-    @property
-    def qpe(self) -> float | None:
-        """Quadratic phase error of the declared error, signed. [rad]"""
-        return None if self.declared is None else self.effect.qpe * self.declared
+    def power(self, tau: float) -> float:
+        """Position error of a unit of it at a slow time: 1, τ or τ²/2 of (22); 0 for what is no motion."""
+        if self.unit == "m":
+            return 1.0
+        return tau if self.unit == "m/s" else tau**2 / 2 if self.unit == "m/s^2" else 0.0
 
-    @property
-    def cubic(self) -> float | None:
-        """Cubic phase of the declared error at the aperture edge, signed. [rad]"""
-        return None if self.declared is None else self.effect.cubic * self.declared
+    def by(self, model: str) -> Effect:
+        """Effect of one unit by a model; by `strictest` that of the larger quadratic phase."""
+        if model == "strictest":
+            model = "full" if abs(self.full.qpe) >= abs(self.effect.qpe) else "published"
+        return self.full if model == "full" else self.effect
+
+    def qpe(self, model: str) -> float:
+        """Quadratic phase error of the declared error by a model, signed; 0 if none is declared. [rad]"""
+        return self.by(model).qpe * (self.declared or 0.0)
+
+    def cubic(self, model: str) -> float:
+        """Cubic phase of the declared error at the aperture edge, signed; by `strictest` the larger. [rad]"""
+        declared = self.declared or 0.0
+        if model == "strictest":
+            return max(self.full.cubic * declared, self.effect.cubic * declared, key=abs)
+        return self.by(model).cubic * declared
 
 
 class ImagePlane(NamedTuple):
-    """Q⁻¹ of (30): takes constant and linear range error to the displacement of the image."""
+    """Q⁻¹: takes constant and linear range error to the displacement of the image."""
 
     adjugate: tuple[tuple[float, ...], ...]
     determinant: float
     degeneracy: str
 
     def displacement(self, effect: Effect, declared: float) -> GroundVector | None:
-        """Displacement (25) on the ground, (2,); None where Q has no inverse. [m]"""
+        """Displacement on the ground, (2,), by (25) with the Q of a model; None where it has no inverse. [m]"""
         if self.degeneracy:
             return None
         scale = declared / self.determinant
@@ -90,6 +112,47 @@ class ImagePlane(NamedTuple):
             (a * effect.constant + b * effect.linear) * scale + 0.0,
             (c * effect.constant + d * effect.linear) * scale + 0.0,
         )
+
+
+class FullGround(NamedTuple):
+    """What displacements do in the full model: Q⁻¹, and the phases that one metre adds, (east, north). [rad/m]
+
+    `looks` are the line of sight of each platform and its derivatives, (4, 3). [1/sⁿ]
+    """
+
+    looks: tuple[tuple[tuple[float, ...], ...], ...]
+    plane: ImagePlane
+    quadratic: tuple[float, ...]
+    cubic: tuple[float, ...]
+
+    def effective(self, constant: float, linear: float, qpe: float, cubic: float) -> Effect:
+        """Effect of an error, what the displacement of the image adds included."""
+        (a, b), (c, d) = self.plane.adjugate
+        determinant = self.plane.determinant
+        x, y = (a * constant + b * linear) / determinant, (c * constant + d * linear) / determinant
+        moved = self.quadratic[0] * x + self.quadratic[1] * y
+        moved_cubic = self.cubic[0] * x + self.cubic[1] * y
+        return Effect(constant, linear, _sum(qpe, moved), _sum(cubic, moved_cubic), moved, (x, y))
+
+
+def _sum(a: float, b: float) -> float:
+    """Add; what is left of terms that cancel exactly is rounding, and would make a limit out of nothing."""
+    total = a + b
+    return total if abs(total) > ROUNDING * (abs(a) + abs(b)) else 0.0
+
+
+def _look_series(state: PlatformState) -> tuple[tuple[float, ...], ...]:
+    return evaluators.look_series(*state.position, *state.velocity, 0.0, 0.0, 0.0, state.slant_range)
+
+
+def full_ground(mission: Mission, geometry: BistaticGeometry) -> FullGround:
+    """Invert the true Q, whose inverse exists wherever a mission is accepted."""
+    looks = tuple(_look_series(state) for state in (geometry.transmitter, geometry.receiver))
+    sums = [t[axis] + r[axis] for t, r in zip(*looks, strict=True) for axis in (0, 1)]
+    first, second, (determinant,), quadratic, cubic = evaluators.full_ground(
+        *(*sums, mission.radar.wavelength, mission.collection.aperture_time)
+    )
+    return FullGround(looks, ImagePlane((first, second), determinant, ""), quadratic, cubic)
 
 
 def image_plane(geometry: BistaticGeometry) -> ImagePlane:
@@ -113,30 +176,35 @@ def image_plane(geometry: BistaticGeometry) -> ImagePlane:
     return ImagePlane((first, second), determinant, degeneracy)
 
 
-def error_sources(mission: Mission, geometry: BistaticGeometry) -> list[ErrorSource]:
+def error_sources(
+    mission: Mission, geometry: BistaticGeometry, ground: FullGround | None = None
+) -> list[ErrorSource]:
     """List every position, velocity, acceleration, clock and other error, declared or not, in a fixed order."""
     sources: list[ErrorSource] = []
-    for name, state in zip(PLATFORMS, (geometry.transmitter, geometry.receiver), strict=True):
-        sources += _motion(mission, name, state)
-    sources += _clock(mission)
+    ground = ground or full_ground(mission, geometry)
+    states = (geometry.transmitter, geometry.receiver)
+    for name, state, look in zip(PLATFORMS, states, ground.looks, strict=True):
+        sources += _motion(mission, name, state, look, ground)
+    sources += _clock(mission, ground)
     sources += _other(mission)
     return sources
 
 
-def _motion(mission: Mission, name: str, state: PlatformState) -> Iterator[ErrorSource]:
-    rows = evaluators.published_motion(
-        *state.position,
-        *state.velocity,
-        state.slant_range,
-        mission.radar.wavelength,
-        mission.collection.aperture_time,
-    )
+def _motion(
+    mission: Mission, name: str, state: PlatformState, look: tuple[tuple[float, ...], ...], ground: FullGround
+) -> Iterator[ErrorSource]:
+    wavelength, T = mission.radar.wavelength, mission.collection.aperture_time
+    rows = evaluators.published_motion(*state.position, *state.velocity, state.slant_range, wavelength, T)
+    u, u_dot, u_ddot, u_dddot = look
+    full_rows = evaluators.full_motion(*(*u, *u_dot, *u_ddot, *u_dddot, wavelength, T))
     error: MotionError = getattr(mission.platforms, name).motion_error
     factor = mission.allocation.coverage_factor
     in_scene = error.frame == "scene"
     axes = state.frame(error.frame)
     for kind_index, (kind, unit) in enumerate(MOTION_UNITS.items()):
-        effects = [Effect._make(row) for row in rows[3 * kind_index :][:3]]
+        of_kind = slice(3 * kind_index, 3 * kind_index + 3)
+        effects = [Effect(constant, linear, qpe, cubic) for constant, linear, qpe, cubic in rows[of_kind]]
+        full = [ground.effective(*row) for row in full_rows[of_kind]]
         values: Vector | None = getattr(error, kind)
         declared = None if values is None else tuple([value * factor for value in values])
         path = ("platforms", name, "motion_error", kind)
@@ -151,6 +219,8 @@ def _motion(mission: Mission, name: str, state: PlatformState) -> Iterator[Error
                 on_axis,
                 own_path if in_scene else path,
                 effects[axis],
+                full[axis],
+                _AXES[axis],
                 equation,
                 no_limit,
                 error.source,
@@ -166,6 +236,8 @@ def _motion(mission: Mission, name: str, state: PlatformState) -> Iterator[Error
                 declared=declared[index],
                 path=(*path, index),
                 effect=_along(effects, direction),
+                full=_along(full, direction),
+                direction=direction,
                 equation=_equation(kind, None),
                 no_limit=_no_limit(kind, f"the {error.frame} frame's {axis_name} axis"),
                 evidence=error.source,
@@ -214,6 +286,11 @@ def _along(effects: list[Effect], direction: Vector) -> Effect:
         linear=project(x.linear, y.linear, z.linear),
         qpe=project(x.qpe, y.qpe, z.qpe),
         cubic=project(x.cubic, y.cubic, z.cubic),
+        moved=project(x.moved, y.moved, z.moved),
+        displacement=(
+            project(x.displacement[0], y.displacement[0], z.displacement[0]),
+            project(x.displacement[1], y.displacement[1], z.displacement[1]),
+        ),
     )
 
 
@@ -232,7 +309,7 @@ def _no_limit(kind: str, axis: str) -> str:
     return f"no quadratic term: the platform's {cause} has no component along {axis}"
 
 
-def _clock(mission: Mission) -> Iterator[ErrorSource]:
+def _clock(mission: Mission, ground: FullGround) -> Iterator[ErrorSource]:
     rows = evaluators.published_clock(SPEED_OF_LIGHT, mission.radar.wavelength, mission.collection.aperture_time)
     for (term, unit), (constant, linear, qpe, cubic) in zip(CLOCK_UNITS.items(), rows, strict=True):
         value: float | None = getattr(mission.timing_error, term)
@@ -242,7 +319,9 @@ def _clock(mission: Mission) -> Iterator[ErrorSource]:
             unit=unit,
             declared=None if value is None else value * mission.allocation.coverage_factor,
             path=("timing_error", term),
-            effect=Effect(constant=constant, linear=linear, qpe=qpe, cubic=cubic),
+            effect=Effect(constant, linear, qpe, cubic),
+            full=ground.effective(constant, linear, qpe, cubic),
+            direction=_NOWHERE,
             equation="Table I row 1, step of Table II" if term == "quadratic" else "Table I row 1",
             no_limit=f"no quadratic term: the clock's {term} term has another order (Table I row 1)",
         )
@@ -257,6 +336,8 @@ def _other(mission: Mission) -> Iterator[ErrorSource]:
             declared=other.quadratic_phase_error,
             path=("other_errors", index, "quadratic_phase_error"),
             effect=Effect(constant=0.0, linear=0.0, qpe=1.0, cubic=0.0),
+            full=Effect(constant=0.0, linear=0.0, qpe=1.0, cubic=0.0),
+            direction=_NOWHERE,
             equation="as declared",
             no_limit="",
             evidence=other.source,

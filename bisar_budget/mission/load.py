@@ -75,7 +75,8 @@ def parse_mission(data: bytes | str, file: str = "-", model: str | None = None) 
     if tree.faults:
         ordered = sorted(dict.fromkeys(tree.faults), key=lambda fault: (fault.line or 0, fault.column or 0))
         raise MissionError(file, tuple(ordered))
-    return cast(Mission, mission._replace(file=file, places=tree.values))
+    read = cast(Mission, mission._replace(file=file, places=tree.values))
+    return read if model is None else read._replace(allocation=read.allocation._replace(model=model))
 
 
 def _file_fault(problem: str, hint: str = "") -> Fault:

@@ -309,7 +309,11 @@ class Allocation(NamedTuple):
         Key(Choice("each", "sum", "rss"), "each: every error alone; sum: worst case; rss: independent errors."),
     ] = "each"
     model: Annotated[
-        str, Key(Choice("published", later={"full": FULL_MODEL, "strictest": FULL_MODEL}), "The model that gates.")
+        str,
+        Key(
+            Choice("published", "full", "strictest"),
+            "The model that gates: the paper's, the full one, or the stricter of both for each row.",
+        ),
     ] = "published"
     coverage_factor: Annotated[
         float,

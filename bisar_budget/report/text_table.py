@@ -34,6 +34,11 @@ _ANSI = {
     "info": "0",
     "not_declared": "2",
 }
+_MODELS = {
+    "published": "published (Rigling & Moses, Tables I and II)",
+    "full": "full (every first-order term, displacement included)",
+    "strictest": "strictest (the stricter of published and full for each row)",
+}
 _EXPLAINED = ("fail", "not_evaluated", "warn", "waived", "pass_with_autofocus")
 
 
@@ -102,7 +107,7 @@ def _head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
     gain = f"; autofocus allows {allocation.autofocus_gain:.3g} times that" if allocation.n_pull else ""
     yield "QPE budget", f"{format_quantity(allocation.qpe_total, 'rad')}: {shares}{gain}"
     rule = {"each": "each error alone", "sum": "worst-case sum", "rss": "root-sum-square"}[mission.combine]
-    yield "Model", f"{mission.model} (Rigling & Moses, Tables I and II), {rule}"
+    yield "Model", f"{_MODELS[mission.model]}, {rule}"
     if mission.coverage_factor != 1:
         yield "Coverage", f"navigation and clock: declared is {mission.coverage_factor:g} times the file's value"
 

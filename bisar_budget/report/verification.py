@@ -48,19 +48,19 @@ def _mission(mission: VerifiedMission, style: Style) -> list[str]:
 def evidence(rows: Sequence[Verdict], style: Style) -> list[str]:
     """Table of the verdicts, with autofocus a second one, and what there is to say about them."""
     width = max((len(row.id) for row in rows), default=0)
-    lines = [f"{'row':<{width}}      limit    budget     exact     image verdict"]
+    lines = [f"{'row':<{width}}      limit   budget     full    exact    image verdict"]
     lines += [
-        f"{row.id:<{width}} {_limit(row):>11} {' '.join(f'{cell:>9}' for cell in _numbers(row))} "
+        f"{row.id:<{width}} {_limit(row):>11} {' '.join(f'{cell:>8}' for cell in _numbers(row))} "
         + _word(row.verdict, style)
         for row in rows
     ]
     refocused = [row for row in rows if row.verdict_autofocus]
     if refocused:
         lines += ["", "At the limit with autofocus, refocused:", ""]
-        lines += [f"{'row':<{width}}      limit    budget  residual      loss verdict"]
+        lines += [f"{'row':<{width}}      limit   budget residual     loss verdict"]
         lines += [
-            f"{row.id:<{width}} {_quantity(row.boundary_autofocus, row.unit):>11} {_phase(row.budget_rad):>9} "
-            f"{_phase(row.measured_residual_qpe_rad):>9} {_decibel(row.refocused_loss_db):>9} "
+            f"{row.id:<{width}} {_quantity(row.boundary_autofocus, row.unit):>11} {_phase(row.budget_rad):>8} "
+            f"{_phase(row.measured_residual_qpe_rad):>8} {_decibel(row.refocused_loss_db):>8} "
             + _word(row.verdict_autofocus or "", style)
             for row in refocused
         ]
@@ -94,17 +94,19 @@ def _limit(row: Verdict) -> str:
     return format_quantity(row.boundary_error, row.unit)
 
 
-def _numbers(row: Verdict) -> tuple[str, str, str]:
-    """Budget, what exact ranges predict, what the image shows."""
+def _numbers(row: Verdict) -> tuple[str, str, str, str]:
+    """Budget, what the full model and exact ranges predict, what the image shows; phases in rad."""
     if row.requirement_db is not None:
-        return _decibel(row.requirement_db), "-", _decibel(row.measured_db)
+        return _decibel(row.requirement_db), "-", "-", _decibel(row.measured_db)
     if row.unit == "m" and row.budget_rad is None:
         moves = (row.displacement_m, row.measured_displacement_m)
         exact, image = ("-" if move is None else format_quantity(math.hypot(*move), "m") for move in moves)
-        return _limit(row), exact, image
+        return _limit(row), "-", exact, image
     if row.measured_cubic_rad is not None:
-        return _phase(row.budget_rad), _phase(row.predicted_cubic_rad), _phase(row.measured_cubic_rad)
-    return _phase(row.budget_rad), _phase(row.predicted_qpe_rad), _phase(row.measured_qpe_rad)
+        return _phase(row.budget_rad), "-", _phase(row.predicted_cubic_rad), _phase(row.measured_cubic_rad)
+    phases = (row.budget_rad, row.full_qpe_rad, row.predicted_qpe_rad, row.measured_qpe_rad)
+    budget, full, exact, image = (_phase(phase) for phase in phases)
+    return budget, full, exact, image
 
 
 def _quantity(value: float | None, unit: str) -> str:
@@ -112,7 +114,7 @@ def _quantity(value: float | None, unit: str) -> str:
 
 
 def _phase(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3f} rad"
+    return "-" if value is None else f"{value:.3f}"
 
 
 def _decibel(value: float | None) -> str:

@@ -115,15 +115,15 @@ class PointCollection:
         clock = self.clock(errors, slow_time)
         return exact_effect(slow_time, *self.paths(errors, slow_time), clock, self.wavelength, self.aperture_time)
 
-    def spatial_frequency(self, point: GroundVector) -> tuple[Floats, Floats]:
-        """Slow time over the aperture, -1 to 1, and a point's frequency along y′ in a chip then. [cycles/m]"""
+    def spatial_frequency(self, chip: Chip) -> tuple[Floats, Floats]:
+        """Slow time over the aperture, -1 to 1, and the frequency at the middle of a chip's cut then. [cycles/m]"""
         slow_time = cell_centres(self.aperture_time, 257)
-        look = self.geometry.look_azimuth
-        across = np.array([-math.sin(look), math.cos(look), 0.0])
+        cut = chip.grid[chip.grid.shape[0] // 2]
+        middle = cut.shape[0] // 2
         slope = np.zeros_like(slow_time)
         for one in self.paths(Errors(), slow_time):
-            sight = np.array([*point, 0.0]) - one.actual
-            slope += sight @ across / np.linalg.norm(sight, axis=1)
+            for pixel, sign in ((cut[middle + 1], 1), (cut[middle - 1], -1)):
+                slope += sign * np.linalg.norm(pixel - one.actual, axis=1) / (2 * self.spacing[1])
         return slow_time / (self.aperture_time / 2), (slope - slope[slope.size // 2]) / self.wavelength
 
     def clock(self, errors: Errors, slow_time: Floats) -> Floats:

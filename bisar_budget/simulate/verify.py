@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from bisar_budget.budget.allocation import allocate
-from bisar_budget.budget.sources import ErrorSource, error_sources, image_plane
+from bisar_budget.budget.sources import ErrorSource, error_sources, full_ground, image_plane
 from bisar_budget.budget.verdicts import Verdict, VerifiedMission
-from bisar_budget.geometry import FRAME_AXES, GroundVector
+from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.model import Mission
 from bisar_budget.simulate import vibration
 from bisar_budget.simulate.autofocus import phase_gradient_autofocus
@@ -24,7 +24,6 @@ from bisar_budget.simulate.phase_history import MotionError
 from bisar_budget.simulate.shift import measured_shift
 
 TOLERANCE = 0.05  # of the budget: nearer than this a limit is confirmed
-FIRST_ORDER_M = 30.0  # beyond, the second order of the range error is no longer small beside a budget
 INSIDE, BEYOND = 0.9, 1.1  # of the limit: the phase on both sides shows that the limit is the limit
 HALF_PIXEL = 0.5  # a displacement nearer than this is the predicted one
 READABLE_RAD = math.pi  # of quadratic or cubic phase; beyond, a response has no one peak whose place could be read
@@ -83,9 +82,11 @@ class _Study:
 
     def __init__(self, mission: Mission) -> None:
         self.mission, self.geometry = mission, mission.geometry
+        self.model = mission.allocation.model
         self.sources = error_sources(mission, self.geometry)
         self.allocation = allocate(mission, self.sources)
         self.plane = image_plane(self.geometry)
+        self.ground = full_ground(mission, self.geometry)
         self.collection = PointCollection(mission, self.geometry)
 
     @cached_property
@@ -95,7 +96,7 @@ class _Study:
 
     def _cases(self) -> Iterator[tuple[str, Callable[[], Verdict]]]:
         for source in self.sources:
-            if source.effect.qpe:
+            if source.by(self.model).qpe:
                 yield source.id, partial(self._other if source.owner == "mission" else self._quadratic, source)
         yield from vibration.cases(self.mission, self.allocation, self.collection)
         requirements = self.mission.requirements
@@ -127,11 +128,8 @@ class _Study:
         if owner == "timing":
             order = ("constant", "linear", "quadratic", "cubic").index(rest[0])
             return Errors(clock=tuple(size if index == order else 0.0 for index in range(4)))
-        kind, axis = rest
-        state = getattr(self.geometry, owner)
-        frame = getattr(self.mission.platforms, owner).motion_error.frame if source.is_independent else "scene"
-        direction = state.frame(frame)[FRAME_AXES[frame].index(axis)]
-        x, y, z = (size * component for component in direction)
+        kind = rest[0]
+        x, y, z = (size * component for component in source.direction)
         error = {
             "position": MotionError(position=(x, y, z)),
             "velocity": MotionError(velocity=(x, y, z)),
@@ -144,8 +142,8 @@ class _Study:
 
     def _quadratic(self, source: ErrorSource) -> Verdict:
         budget = self.allocation.qpe_limit(source.owner)
-        boundary = budget / abs(source.effect.qpe)
-        blank = Verdict(id=source.id, model="published", boundary_error=boundary, unit=source.unit, budget_rad=budget)
+        boundary = budget / abs(source.by(self.model).qpe)
+        blank = Verdict(id=source.id, model=self.model, boundary_error=boundary, unit=source.unit, budget_rad=budget)
         verdict = self._judged_phase(blank, [(source, 1.0)], boundary)
         gain = self.allocation.autofocus_gain
         if gain == 1 or verdict.verdict == "not_evaluated":
@@ -157,25 +155,26 @@ class _Study:
         """All declared errors of an owner at once, each with the sign that makes their phases add."""
         members = [s for s in self._declared if owner == "mission" or self.allocation.qpe.includes(s.owner, owner)]
         budget = self.allocation.qpe_limit(owner)
-        blank = Verdict(id=row_id, model="published", boundary_error=budget, unit="rad", budget_rad=budget)
+        blank = Verdict(id=row_id, model=self.model, boundary_error=budget, unit="rad", budget_rad=budget)
         if self.mission.allocation.combine == "rss":
             return blank._replace(reason="a root-sum-square speaks of many flights, an image shows one")
-        total = math.fsum(abs(s.qpe or 0.0) for s in members)
+        total = math.fsum(abs(s.qpe(self.model)) for s in members)
         if not total:
             return blank._replace(reason="no declared error has a quadratic phase")
-        sizes = [(s, math.copysign(s.declared or 0.0, s.effect.qpe)) for s in members if s.effect.qpe]
+        sizes = [(s, math.copysign(s.declared or 0.0, s.by(self.model).qpe)) for s in members if s.by(self.model).qpe]
         return self._judged_phase(blank, sizes, budget / total)
 
     def _judged_phase(self, blank: Verdict, sizes: Sequence[tuple[ErrorSource, float]], scale: float) -> Verdict:
         """Form the images of errors at the limit and on both sides, and hold the phase to the budget."""
         budget = blank.budget_rad or 0.0
+        blank = blank._replace(full_qpe_rad=abs(math.fsum(s.full.qpe * scale * size for s, size in sizes)))
         try:
             errors = self._scaled(sizes, scale)
             effect = self.collection.effect(errors)
-            if reason := self._beyond_first_order(errors, effect):
+            if reason := self._beyond_first_order(errors, effect, budget):
                 return blank._replace(**_predicted(effect), reason=reason)
             chip, reference = self._chips(errors, effect)
-            quadratic, _ = self._phases(chip, reference, effect)
+            quadratic, _ = self._phases(chip, reference)
             inside, beyond = (self._measured_phase(self._scaled(sizes, scale * f)) for f in (INSIDE, BEYOND))
             clean = impulse_response(reference.cut, self.collection.spacing[1])
             response = impulse_response(chip.cut, self.collection.spacing[1], mask_m=clean.mask_m)
@@ -207,29 +206,34 @@ class _Study:
         form = partial(self.collection.chip, effect.displacement, cells=cells, range_cells=RANGE_CELLS)
         return form(errors), form(Errors(), scatterer=effect.displacement)
 
-    def _phases(self, chip: Chip, reference: Chip, effect: ExactEffect) -> tuple[float, float]:
+    def _phases(self, chip: Chip, reference: Chip) -> tuple[float, float]:
         """Quadratic and cubic phase of a response, measured."""
-        history = self.collection.spatial_frequency(effect.displacement)
+        history = self.collection.spatial_frequency(reference)
         return quadratic_phase_error(chip.cut, reference.cut, self.collection.spacing[1], *history)
 
     def _measured_phase(self, errors: Errors) -> float:
         effect = self.collection.effect(errors)
         cut = self.collection.chip(effect.displacement, errors)
         reference = self.collection.chip(effect.displacement, Errors(), scatterer=effect.displacement)
-        return self._phases(cut, reference, effect)[0]
+        return self._phases(cut, reference)[0]
 
-    def _beyond_first_order(self, errors: Errors, effect: ExactEffect) -> str:
+    def _beyond_first_order(self, errors: Errors, effect: ExactEffect, budget: float) -> str:
+        """Say that the next order of the range error, −Σ|P⊥(r̃_k − x̂)|²/2R_k, matters beside a budget."""
         half = self.collection.aperture_time / 2
-        reach = max(
-            sum(math.hypot(*part) * weight for part, weight in zip(error[:3], (1.0, half, half**2 / 2), strict=True))
-            for error in (errors.transmitter, errors.receiver)
-        )
-        far = max(math.hypot(*effect.displacement), reach)
-        if far <= FIRST_ORDER_M:
+        times = np.array([-half, 0.0, half])
+        moved = np.array([*effect.displacement, 0.0])
+        second = np.zeros(3)
+        for one in self.collection.paths(errors, times):
+            off, ranges = one.measured - one.actual - moved, np.linalg.norm(one.actual, axis=1)
+            along = np.sum(off * one.actual, axis=1) / ranges
+            second -= (np.sum(off**2, axis=1) - along**2) / (2 * ranges)
+        curve = 2 * math.pi / self.collection.wavelength * ((second[0] + second[2]) / 2 - second[1])
+        added = self.ground.effective(float(second[1]), float(second[2] - second[0]) / (2 * half), float(curve), 0.0)
+        if abs(added.qpe) <= TOLERANCE * budget:
             return ""
         return (
-            f"the error at the limit moves platform or image by {far:.3g} m: beyond {FIRST_ORDER_M:g} m the "
-            "second order of the range error matters, which no limit accounts for"
+            f"the error at the limit is beyond first order, where no limit holds: the second order adds "
+            f"{added.qpe:.2g} rad, exact ranges give {abs(effect.quadratic):.3g} rad"
         )
 
     def _published_displacement(
@@ -247,11 +251,9 @@ class _Study:
             return {"verdict_autofocus": "not_evaluated", "reason_autofocus": reason}
         try:
             effect = self.collection.effect(errors)
-            if reason := self._beyond_first_order(errors, effect):
-                return {"verdict_autofocus": "not_evaluated", "reason_autofocus": reason}
             chip, reference = self._chips(errors, effect)
             focused = Chip(phase_gradient_autofocus(chip.image).image, chip.grid)
-            residual = abs(self._phases(focused, reference, effect)[0])
+            residual = abs(self._phases(focused, reference)[0])
             peaks = [impulse_response(one.cut, self.collection.spacing[1]).peak for one in (reference, focused)]
             loss = 20 * math.log10(peaks[0] / peaks[1])
         except (ValueError, np.linalg.LinAlgError) as error:
@@ -270,7 +272,7 @@ class _Study:
         total = self.allocation.qpe_total
         walk = n_pull * self.mission.radar.bandwidth / self.mission.radar.center_frequency / 2  # λN/2 over c/B
         blank = Verdict(
-            id="mission.autofocus_pull_in", model="published", boundary_error=phase, unit="rad", budget_rad=total
+            id="mission.autofocus_pull_in", model=self.model, boundary_error=phase, unit="rad", budget_rad=total
         )
         clock = next(s for s in self.sources if s.id == "timing.quadratic")
         refocused = self._refocused(self._errors(clock, phase / abs(clock.effect.qpe)), total)
@@ -289,19 +291,19 @@ class _Study:
     def _cubic(self, requirement: float) -> Verdict:
         """All declared errors scaled together until Table I's cubic column reaches the requirement."""
         blank = Verdict(
-            id="mission.cubic_phase_error", model="published", boundary_error=requirement, unit="rad",
+            id="mission.cubic_phase_error", model=self.model, boundary_error=requirement, unit="rad",
             budget_rad=requirement,
         )  # fmt: skip
         sizes = [(s, s.declared or 0.0) for s in self._declared]
-        total = abs(math.fsum(s.cubic or 0.0 for s, _ in sizes))
+        total = abs(math.fsum(s.cubic(self.model) for s, _ in sizes))
         if not total:
             return blank._replace(reason="no declared error has a cubic phase by Table I")
         try:
             errors = self._scaled(sizes, requirement / total)
             effect = self.collection.effect(errors)
-            if reason := self._beyond_first_order(errors, effect):
+            if reason := self._beyond_first_order(errors, effect, requirement):
                 return blank._replace(**_predicted(effect), reason=f"declared errors scaled together: {reason}")
-            cubic = abs(self._phases(*self._chips(errors, effect), effect)[1])
+            cubic = abs(self._phases(*self._chips(errors, effect))[1])
         except (ValueError, np.linalg.LinAlgError) as error:
             return blank._replace(reason=f"no image: {error}")
         return blank._replace(
@@ -312,7 +314,7 @@ class _Study:
 
     def _location(self, requirement: float) -> Verdict:
         """All declared errors scaled together until (25) reaches the requirement; the image within half a pixel."""
-        blank = Verdict(id="mission.location_error", model="published", boundary_error=requirement, unit="m")
+        blank = Verdict(id="mission.location_error", model=self.model, boundary_error=requirement, unit="m")
         sizes = [(s, s.declared or 0.0) for s in self._declared]
         declared = self._published_displacement(sizes, 1.0)
         if declared is None:
@@ -324,8 +326,6 @@ class _Study:
         try:
             errors = self._scaled(sizes, scale)
             effect = self.collection.effect(errors)
-            if reason := self._beyond_first_order(errors, effect):
-                return blank._replace(**_predicted(effect), reason=f"declared errors scaled together: {reason}")
             if max(abs(effect.quadratic), abs(effect.cubic)) > READABLE_RAD:
                 reason = (
                     f"scaled to {requirement:g} m the declared errors also defocus, by "
@@ -351,7 +351,7 @@ class _Study:
         budget = self.allocation.qpe_limit(source.owner)
         return Verdict(
             id=source.id,
-            model="published",
+            model=self.model,
             boundary_error=budget,
             unit=source.unit,
             budget_rad=budget,

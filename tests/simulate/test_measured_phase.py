@@ -37,7 +37,7 @@ def chips(c: PointCollection, errors: Errors, **size):
 
 def phases(c: PointCollection, errors: Errors):
     effect, chip, reference = chips(c, errors)
-    history = c.spatial_frequency(effect.displacement)
+    history = c.spatial_frequency(reference)
     return effect, quadratic_phase_error(chip.cut, reference.cut, c.spacing[1], *history)
 
 

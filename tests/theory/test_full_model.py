@@ -1,4 +1,4 @@
-"""The full model's derivation: against direct differentiation, where it reduces to the paper, and where it must not."""
+"""The full model: against direct differentiation, where it reduces to the paper, and where it must not."""
 
 import math
 
@@ -69,7 +69,7 @@ def test_an_error_that_moves_nothing_keeps_its_quadratic_term() -> None:
 
 
 def test_a_monostatic_radar_at_broadside_loses_no_phase_to_the_displacement_of_a_velocity_error() -> None:
-    """Tx = Rx, v ⊥ r, level: an error along the track moves nothing along s̈, the effective β₂ is Table II's two legs."""
+    """Tx = Rx, v ⊥ r, level: what an error along the track adds by displacement is nothing, so Table II twice."""
     growth = full.growth(TRANSMITTER)
     same = dict(
         zip(
@@ -117,7 +117,7 @@ def test_curved_paths_turn_the_line_of_sight() -> None:
     rate = speed / R
     assert looks[1] == pytest.approx((0.0, rate, 0.0))
     assert looks[2] == pytest.approx((-(rate**2), 0.0, 0.0))
-    # Of constant acceleration, not a true circle: the third derivative along y is not -(v/R)³ but that of the parabola.
+    # Of constant acceleration, no true circle: the third derivative along y is that of the parabola.
     step = 1e-2
     position = [(R - speed**2 / R * t * t / 2, speed * t) for t in (-2 * step, -step, 0.0, step, 2 * step)]
     along = [y / math.hypot(x, y) for x, y in position]

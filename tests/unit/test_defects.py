@@ -179,12 +179,12 @@ class TestFaults:
 
 
 class TestModelOption:
-    def test_published_overrides_a_file_that_asks_for_more(self, run) -> None:
-        text = mission_text(allocation__model="full")
-        assert run("check", "-", input=text).exit_code == 2
-        result = run("check", "-", "--model", "published", "--format", "json", input=text)
-        assert result.exit_code == 0
-        assert json.loads(result.stdout)["missions"][0]["model"] == "published"
+    @pytest.mark.parametrize("in_file", [{}, {"allocation__model": "strictest"}])
+    def test_overrides_the_file_also_where_that_has_no_allocation(self, run, in_file) -> None:
+        for model in ("published", "full"):
+            result = run("check", "-", "--model", model, "--format", "json", input=mission_text(**in_file))
+            assert result.exit_code == 0
+            assert json.loads(result.stdout)["missions"][0]["model"] == model
 
 
 class TestInit:

@@ -84,16 +84,19 @@ class TestJson:
         number = (int, float)
         for row in as_json()["missions"][0]["rows"]:
             assert list(row)[: len(ROW_KEYS)] == ROW_KEYS
-            assert row["allowable_full"] is None
-            assert row["qpe_full_rad"] is None
-            for key in ("declared", "allowable", "utilization", "margin", "qpe_published_rad"):
+            for key in (
+                "declared", "allowable", "allowable_published", "allowable_full", "utilization", "margin",
+                "qpe_published_rad", "qpe_full_rad",
+            ):  # fmt: skip
                 assert row[key] is None or isinstance(row[key], number)
             assert row["displacement_m"] is None or len(row["displacement_m"]) == 2
             assert isinstance(row["notes"], list)
             assert row["reason"] is None or row["reason"]
 
-    def test_full_columns_are_null_with_a_reason(self) -> None:
-        assert any("allowable_full" in note for note in as_json()["missions"][0]["notes"])
+    def test_full_columns_are_filled_for_errors_with_a_phase(self) -> None:
+        rows = {row["id"]: row for row in as_json()["missions"][0]["rows"]}
+        assert rows["receiver.velocity.y"]["allowable_full"] > 0
+        assert rows["transmitter.vibration.wideband"]["allowable_full"] is None
 
     def test_no_number_that_json_does_not_have(self) -> None:
         text = render("json", report(), Style())
