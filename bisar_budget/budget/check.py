@@ -8,8 +8,8 @@ from bisar_budget import evaluators
 from bisar_budget.budget.allocation import Allocation, Split, allocate
 from bisar_budget.budget.combine import combine_displacements, combine_phases
 from bisar_budget.budget.findings import FileWarning, MissionFindings, Resolution, Row
-from bisar_budget.budget.sources import ErrorSource, FullGround, ImagePlane, error_sources, full_ground, image_plane
-from bisar_budget.budget.validity import collection_notes, second_order_note
+from bisar_budget.budget.sources import ErrorSource, ImagePlane, error_sources, full_ground, image_plane
+from bisar_budget.budget.validity import FirstOrder, collection_notes
 from bisar_budget.budget.waivers import apply_waivers
 from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
 from bisar_budget.errors import KeyPath
@@ -35,12 +35,12 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
         Rows in the order of the contract, declared or not.
     """
     geometry = mission.geometry
-    plane = image_plane(geometry)
     ground = full_ground(mission, geometry)
+    plane = image_plane(geometry) if mission.allocation.model == "published" else ground.plane
     sources = error_sources(mission, geometry, ground)
     allocation = allocate(mission, sources)
     judged = [
-        *_error_rows(mission, allocation, sources, plane, ground),
+        *_error_rows(mission, allocation, sources, plane, FirstOrder(mission, geometry, ground)),
         *_vibration_rows(mission, allocation),
         *_aggregate_rows(mission, allocation, sources, plane),
     ]
@@ -69,9 +69,8 @@ def _error_rows(
     allocation: Allocation,
     sources: Sequence[ErrorSource],
     plane: ImagePlane,
-    ground: FullGround,
+    first_order: FirstOrder,
 ) -> Iterator[Row]:
-    geometry = mission.geometry
     combine = mission.allocation.combine
     info = f"combine is {combine}: the aggregate decides" if combine != "each" else ""
     gain = allocation.autofocus_gain
@@ -86,16 +85,18 @@ def _error_rows(
             yield _undeclared(mission, source, published, full)
             continue
         declared = abs(source.declared)
-        qpe = abs(source.qpe(model))
+        qpe_published, qpe_full = abs(source.effect.qpe) * declared, source.full.qpe * source.declared
         notes, displacement = source.notes, None
         if source.owner != "mission":
             displacement = _displacement(source, plane, model)
             if displacement is None:
                 notes = (*notes, plane.degeneracy)
-            if note := second_order_note(mission, geometry, ground, source):
+            if note := first_order.note(source):
                 notes = (*notes, note)
-        over = ""
-        if qpe > limit:
+        over = doubt = ""
+        if qpe_published > limit or abs(qpe_full) > limit:
+            qpe = abs(source.qpe(model))
+            doubt = _doubt(source, model, limit)
             needed = allocation.n_pull_needed(qpe, source.owner)
             of_model = "full model" if source.by(model) is source.full else source.equation
             over = (
@@ -115,10 +116,10 @@ def _error_rows(
             no_limit=_no_limit(source, model),
             info=info,
             over=over,
-            doubt=_doubt(source, model, limit),
+            doubt=doubt,
             limits=(published, full),
-            qpe=abs(source.qpe("published")),
-            qpe_full=source.qpe("full"),
+            qpe=qpe_published,
+            qpe_full=qpe_full,
             displacement=displacement,
             evidence=source.evidence,
             is_independent=source.is_independent,
@@ -140,12 +141,8 @@ def _gating(model: str, published: float | None, full: float | None) -> float | 
 
 
 def _displacement(source: ErrorSource, plane: ImagePlane, model: str) -> GroundVector | None:
-    """Displacement by (25), or by the full model where that takes part. [m]"""
-    declared = source.declared or 0.0
-    if model == "published":
-        return plane.displacement(source.effect, declared)
-    east, north = source.full.displacement
-    return (east * declared + 0.0, north * declared + 0.0)  # no -0.0
+    """Displacement by (25), or by the full model where that takes part, whose plane it then is. [m]"""
+    return plane.displacement(source.effect if model == "published" else source.full, source.declared or 0.0)
 
 
 def _doubt(source: ErrorSource, model: str, limit: float) -> str:

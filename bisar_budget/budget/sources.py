@@ -35,7 +35,7 @@ class Effect(NamedTuple):
 
     Constant [m/unit] and linear [(m/s)/unit] term of the range error; quadratic and cubic phase at the
     aperture edge [rad/unit]. The full model's phases hold what the displacement of the image adds, `moved` of
-    the quadratic one, and it knows the displacement (east, north) [m/unit].
+    the quadratic one.
     """
 
     constant: float
@@ -43,7 +43,6 @@ class Effect(NamedTuple):
     qpe: float
     cubic: float
     moved: float = 0.0
-    displacement: GroundVector = (0.0, 0.0)
 
 
 class ErrorSource(NamedTuple):
@@ -115,30 +114,28 @@ class ImagePlane(NamedTuple):
 
 
 class FullGround(NamedTuple):
-    """What displacements do in the full model: Q⁻¹, and the phases that one metre adds, (east, north). [rad/m]
+    """What constant and linear terms do in the full model: Q⁻¹, and the phases that the displacement adds.
 
-    `looks` are the line of sight of each platform and its derivatives, (4, 3). [1/sⁿ]
+    `looks` are the line of sight of each platform and its derivatives, (4, 3) [1/sⁿ]; `quadratic` and `cubic`
+    the phases added per unit of the constant [rad/m] and of the linear term [rad/(m/s)].
     """
 
     looks: tuple[tuple[tuple[float, ...], ...], ...]
     plane: ImagePlane
-    quadratic: tuple[float, ...]
-    cubic: tuple[float, ...]
+    quadratic: tuple[float, float]
+    cubic: tuple[float, float]
 
     def effective(self, constant: float, linear: float, qpe: float, cubic: float) -> Effect:
         """Effect of an error, what the displacement of the image adds included."""
-        (a, b), (c, d) = self.plane.adjugate
-        determinant = self.plane.determinant
-        x, y = (a * constant + b * linear) / determinant, (c * constant + d * linear) / determinant
-        moved = self.quadratic[0] * x + self.quadratic[1] * y
-        moved_cubic = self.cubic[0] * x + self.cubic[1] * y
-        return Effect(constant, linear, _sum(qpe, moved), _sum(cubic, moved_cubic), moved, (x, y))
-
-
-def _sum(a: float, b: float) -> float:
-    """Add; what is left of terms that cancel exactly is rounding, and would make a limit out of nothing."""
-    total = a + b
-    return total if abs(total) > ROUNDING * (abs(a) + abs(b)) else 0.0
+        moved = self.quadratic[0] * constant + self.quadratic[1] * linear
+        moved_cubic = self.cubic[0] * constant + self.cubic[1] * linear
+        both, both_cubic = qpe + moved, cubic + moved_cubic
+        # What is left of terms that cancel exactly is rounding, and would make a limit out of nothing.
+        if abs(both) <= ROUNDING * abs(qpe):
+            both = 0.0
+        if abs(both_cubic) <= ROUNDING * abs(cubic):
+            both_cubic = 0.0
+        return Effect(constant, linear, both, both_cubic, moved)
 
 
 def _look_series(state: PlatformState) -> tuple[tuple[float, ...], ...]:
@@ -152,7 +149,13 @@ def full_ground(mission: Mission, geometry: BistaticGeometry) -> FullGround:
     first, second, (determinant,), quadratic, cubic = evaluators.full_ground(
         *(*sums, mission.radar.wavelength, mission.collection.aperture_time)
     )
-    return FullGround(looks, ImagePlane((first, second), determinant, ""), quadratic, cubic)
+
+    def per_term(per_metre: tuple[float, ...]) -> tuple[float, float]:
+        east, north = per_metre
+        constant, linear = (east * a + north * b for a, b in zip(first, second, strict=True))
+        return (constant / determinant, linear / determinant)
+
+    return FullGround(looks, ImagePlane((first, second), determinant, ""), per_term(quadratic), per_term(cubic))
 
 
 def image_plane(geometry: BistaticGeometry) -> ImagePlane:
@@ -274,24 +277,15 @@ def _along_scene_axis(
 def _along(effects: list[Effect], direction: Vector) -> Effect:
     """Effect of a unit error along a direction: the projection of the three scene effects."""
 
-    def project(x: float, y: float, z: float) -> float:
-        terms = (x * direction[0], y * direction[1], z * direction[2])
-        total = sum(terms)
-        # What is left of terms that cancel exactly is rounding, and would make a limit out of nothing.
-        return total if abs(total) > ROUNDING * sum(abs(term) for term in terms) else 0.0
-
+    u, v, w = direction
     x, y, z = effects
-    return Effect(
-        constant=project(x.constant, y.constant, z.constant),
-        linear=project(x.linear, y.linear, z.linear),
-        qpe=project(x.qpe, y.qpe, z.qpe),
-        cubic=project(x.cubic, y.cubic, z.cubic),
-        moved=project(x.moved, y.moved, z.moved),
-        displacement=(
-            project(x.displacement[0], y.displacement[0], z.displacement[0]),
-            project(x.displacement[1], y.displacement[1], z.displacement[1]),
-        ),
-    )
+    total = []
+    for a, b, c in zip(x, y, z, strict=True):
+        a, b, c = a * u, b * v, c * w
+        term = a + b + c
+        # What is left of terms that cancel exactly is rounding, and would make a limit out of nothing.
+        total.append(term if abs(term) > ROUNDING * (abs(a) + abs(b) + abs(c)) else 0.0)
+    return Effect._make(total)
 
 
 def _equation(kind: str, axis: int | None) -> str:

@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator
 
 from bisar_budget.budget.sources import Effect, ErrorSource, FullGround
-from bisar_budget.geometry import BistaticGeometry, Vector, norm
+from bisar_budget.geometry import BistaticGeometry, dot, norm
 from bisar_budget.mission.model import Mission
 
 FLOOR_RAD = 0.02
@@ -19,47 +19,48 @@ _LONG_APERTURE_RAD = 0.1  # half the turn of a line of sight; the quartic term i
 _NARROW_SINE = 0.2  # between range and Doppler gradient; displacements grow as its inverse
 
 
-def second_order_note(mission: Mission, geometry: BistaticGeometry, ground: FullGround, source: ErrorSource) -> str:
-    """Say that a declared error is beyond first order and what the second order adds; empty where it is inside."""
-    declared = source.declared or 0.0
-    first = source.full.qpe * declared
-    allowed = max(FLOOR_RAD, SHARE * abs(first))
-    half, nearest = (
-        mission.collection.aperture_time / 2,
-        min(geometry.transmitter.slant_range, geometry.receiver.slant_range),
-    )
-    reach = abs(declared) * source.power(half) + norm((*source.full.displacement, 0.0)) * abs(declared)
-    if 4 * math.pi / mission.radar.wavelength * reach**2 / nearest < FLOOR_RAD:
-        return ""  # a bound on what follows, for the many errors that are small
-    added = second_order(mission, geometry, ground, source, declared).qpe
-    if abs(added) <= allowed:
-        return ""
-    return (
-        f"beyond first order: the full model's {first:.3g} rad becomes {first + added:.3g} rad with the second order"
-    )
+class FirstOrder:
+    """The first order of one mission's range error, and what the second adds to it."""
 
+    def __init__(self, mission: Mission, geometry: BistaticGeometry, ground: FullGround) -> None:
+        self.geometry, self.ground = geometry, ground
+        self.wavelength, self.T = mission.radar.wavelength, mission.collection.aperture_time
+        nearest = min(geometry.transmitter.slant_range, geometry.receiver.slant_range)
+        # Within this of platform and image the second order cannot reach the floor.
+        self._harmless = math.sqrt(FLOOR_RAD * nearest * self.wavelength / (4 * math.pi))
 
-def second_order(
-    mission: Mission, geometry: BistaticGeometry, ground: FullGround, source: ErrorSource, size: float
-) -> Effect:
-    """What the second order of the range error adds to an error of a size: displacement and quadratic phase."""
-    T = mission.collection.aperture_time
-    moved = (source.full.displacement[0] * size, source.full.displacement[1] * size, 0.0)
+    def note(self, source: ErrorSource) -> str:
+        """Say that a declared error is beyond first order and what the second adds; empty where it is inside."""
+        declared = source.declared or 0.0
+        east, north = self.ground.plane.displacement(source.full, declared) or (0.0, 0.0)
+        if abs(declared) * source.power(self.T / 2) + math.hypot(east, north) < self._harmless:
+            return ""
+        first, added = source.full.qpe * declared, self.second(source, declared).qpe
+        if abs(added) <= max(FLOOR_RAD, SHARE * abs(first)):
+            return ""
+        total = first + added
+        return f"beyond first order: the full model's {first:.3g} rad becomes {total:.3g} rad with the second order"
 
-    def range_error(tau: float) -> float:
-        total = 0.0
-        for name, state in (("transmitter", geometry.transmitter), ("receiver", geometry.receiver)):
-            own = size * source.power(tau) if source.owner == name else 0.0
-            off = tuple(own * d - m for d, m in zip(source.direction, moved, strict=True))
-            at: Vector = tuple(p + v * tau for p, v in zip(state.position, state.velocity, strict=True))  # type: ignore[assignment]
-            R = norm(at)
-            along = sum(o * p for o, p in zip(off, at, strict=True)) / R
-            total -= (sum(o * o for o in off) - along**2) / (2 * R)
-        return total
+    def second(self, source: ErrorSource, size: float) -> Effect:
+        """What the second order adds to an error of a size: displacement and quadratic phase."""
+        T = self.T
+        east, north = self.ground.plane.displacement(source.full, size) or (0.0, 0.0)
 
-    before, middle, after = range_error(-T / 2), range_error(0.0), range_error(T / 2)
-    quadratic = 2 * math.pi / mission.radar.wavelength * ((before + after) / 2 - middle)
-    return ground.effective(middle, (after - before) / T, quadratic, 0.0)
+        def range_error(tau: float) -> float:
+            total = 0.0
+            for name, state in (("transmitter", self.geometry.transmitter), ("receiver", self.geometry.receiver)):
+                own = size * source.power(tau) if source.owner == name else 0.0
+                d, p, v = source.direction, state.position, state.velocity
+                off = (own * d[0] - east, own * d[1] - north, own * d[2])
+                at = (p[0] + v[0] * tau, p[1] + v[1] * tau, p[2] + v[2] * tau)
+                R = norm(at)
+                along = dot(off, at) / R
+                total -= (dot(off, off) - along * along) / (2 * R)
+            return total
+
+        before, middle, after = range_error(-T / 2), range_error(0.0), range_error(T / 2)
+        quadratic = 2 * math.pi / self.wavelength * ((before + after) / 2 - middle)
+        return self.ground.effective(middle, (after - before) / T, quadratic, 0.0)
 
 
 def collection_notes(mission: Mission, geometry: BistaticGeometry) -> Iterator[str]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bisar_budget.budget.sources import error_sources, full_ground
-from bisar_budget.budget.validity import FLOOR_RAD, SHARE, second_order
+from bisar_budget.budget.validity import FLOOR_RAD, SHARE, FirstOrder
 from bisar_budget.errors import MissionError
 from bisar_budget.geometry import norm
 from bisar_budget.mission.load import parse_mission
@@ -55,16 +55,18 @@ def test_shift_and_phase_of_every_row_inside_first_order_are_those_of_exact_rang
     for number, mission in enumerate(random_missions(500, seed=11)):
         study, geometry = _Study(mission), mission.geometry
         ground = full_ground(mission, geometry)
+        first_order = FirstOrder(mission, geometry, ground)
         turn = max(norm(p.look_rate) * 2 for p in (geometry.transmitter, geometry.receiver))
         is_strained = turn > LONG_RAD or math.sin(geometry.gradient_angle) < 0.2
         for source in study.sources:
-            moves = math.hypot(*source.full.displacement)
+            per_unit = ground.plane.displacement(source.full, 1.0)
+            moves = math.hypot(*per_unit)
             sizes = [math.pi / 8 / abs(source.full.qpe)] if source.full.qpe else []
             size = min([*sizes, *([0.99 * NEAR_M / moves] if moves else [])], default=0.0)
-            second = second_order(mission, geometry, ground, source, size)
+            second = first_order.second(source, size)
             first = source.full.qpe * size
             goes_beyond = abs(second.qpe) > max(FLOOR_RAD, SHARE * abs(first)) or (
-                math.hypot(*second.displacement) > max(FLOOR_M, SHARE * moves * size)
+                math.hypot(*ground.plane.displacement(second, 1.0)) > max(FLOOR_M, SHARE * moves * size)
             )
             if not size or is_strained or goes_beyond:
                 outside += 1
@@ -74,7 +76,7 @@ def test_shift_and_phase_of_every_row_inside_first_order_are_those_of_exact_rang
             off = abs(effect.quadratic - first)
             worst = max(worst, (off, f"{number} {source.id}"))
             assert off <= max(FLOOR_RAD, 0.02 * abs(effect.quadratic)), (number, source.id)
-            shift = [size * component for component in source.full.displacement]
+            shift = [size * component for component in per_unit]
             assert math.dist(effect.displacement, shift) <= max(FLOOR_M, 0.02 * moves * size), (number, source.id)
     print(f"{inside} rows inside first order, {outside} outside; largest difference {worst[0]:.4f} rad, {worst[1]}")
     assert inside > 10 * outside
@@ -88,10 +90,11 @@ def test_the_second_order_is_what_is_missing_beyond_the_first() -> None:
         if math.sin(geometry.gradient_angle) < 0.3:
             continue
         ground = full_ground(mission, geometry)
+        first_order = FirstOrder(mission, geometry, ground)
         for source in study.sources:
             size = math.pi / 8 / abs(source.full.qpe) if source.full.qpe else 0.0
-            second = second_order(mission, geometry, ground, source, size).qpe
-            if not 0.1 < abs(second) < 0.5 or math.hypot(*source.full.displacement) * size > 100:
+            second = first_order.second(source, size).qpe
+            if not 0.1 < abs(second) < 0.5 or math.hypot(*ground.plane.displacement(source.full, size)) > 100:
                 continue
             effect = study.collection.effect(study._errors(source, size))
             missing = effect.quadratic - source.full.qpe * size
@@ -125,11 +128,12 @@ def test_a_horizontal_error_common_to_both_platforms_only_moves_the_image() -> N
     """The whole collection is elsewhere: by first order the effects of both cancel, whatever the geometry."""
     for mission in random_missions(20, seed=8):
         sources = {s.id: s for s in error_sources(mission, mission.geometry)}
+        plane = full_ground(mission, mission.geometry).plane
         for axis, moved in (("x", (1.0, 0.0)), ("y", (0.0, 1.0))):
             t, r = (sources[f"{name}.position.{axis}"].full for name in ("transmitter", "receiver"))
             assert t.qpe == pytest.approx(-r.qpe, rel=1e-9)
             assert t.cubic == pytest.approx(-r.cubic, rel=1e-9)
-            both = [a + b for a, b in zip(t.displacement, r.displacement, strict=True)]
+            both = [a + b for a, b in zip(plane.displacement(t, 1.0), plane.displacement(r, 1.0), strict=True)]
             assert both == pytest.approx(moved, abs=1e-9)
 
 
