@@ -205,15 +205,34 @@ class Platform(NamedTuple):
     def state(self) -> PlatformState:
         """Position and velocity in the frame of the scene."""
         if self.position is not None and self.velocity is not None:
-            return PlatformState(position=self.position, velocity=self.velocity)
-        return state_from_angles(
-            slant_range=self.slant_range or 0.0,
-            azimuth=self.azimuth or 0.0,
-            elevation=self.elevation or 0.0,
-            speed=self.speed or 0.0,
-            motion_azimuth=self.motion_azimuth or 0.0,
-            climb=self.climb or 0.0,
-        )
+            return _state_from_vectors(self.position, self.velocity)
+        polar = (self.slant_range, self.azimuth, self.elevation, self.speed, self.motion_azimuth, self.climb)
+        return _state_from_angles(*polar)
+
+
+# Asked for while a platform is read, while its mission is, and when that is checked.
+@lru_cache(maxsize=8)
+def _state_from_vectors(position: Vector, velocity: Vector) -> PlatformState:
+    return PlatformState(position=position, velocity=velocity)
+
+
+@lru_cache(maxsize=8)
+def _state_from_angles(
+    slant_range: float | None,
+    azimuth: float | None,
+    elevation: float | None,
+    speed: float | None,
+    motion_azimuth: float | None,
+    climb: float | None,
+) -> PlatformState:
+    return state_from_angles(
+        slant_range=slant_range or 0.0,
+        azimuth=azimuth or 0.0,
+        elevation=elevation or 0.0,
+        speed=speed or 0.0,
+        motion_azimuth=motion_azimuth or 0.0,
+        climb=climb or 0.0,
+    )
 
 
 class Platforms(NamedTuple):
