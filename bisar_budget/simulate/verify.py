@@ -52,10 +52,10 @@ def verify_mission(
         Rows with a limit, in the order of `check`, and both platforms' vibration together.
     """
     mission = mission._replace(places={})  # the parser's marks cannot go to another process, and nobody asks here
-    wanted = [row_id for row_id in _Study(mission).cases if fnmatchcase(row_id, only)]
+    wanted = [row_id for row_id in Study(mission).cases if fnmatchcase(row_id, only)]
     rows: list[Verdict] = []
     if min(jobs, len(wanted)) <= 1:
-        study = _Study(mission)
+        study = Study(mission)
         for row_id in wanted:
             rows.append(study.cases[row_id]())
             progress(row_id)
@@ -70,14 +70,14 @@ def verify_mission(
 
 def rows_to_verify(mission: Mission, only: str = "*") -> list[str]:
     """Ids of the rows that `verify_mission` would verify."""
-    return [row_id for row_id in _Study(mission).cases if fnmatchcase(row_id, only)]
+    return [row_id for row_id in Study(mission).cases if fnmatchcase(row_id, only)]
 
 
 def _verify_row(mission: Mission, row_id: str) -> Verdict:
-    return _Study(mission).cases[row_id]()
+    return Study(mission).cases[row_id]()
 
 
-class _Study:
+class Study:
     """One mission with what its rows share, and a case for each limit: a call that gives the verdict."""
 
     def __init__(self, mission: Mission) -> None:
@@ -122,7 +122,7 @@ class _Study:
     def _declared(self) -> list[ErrorSource]:
         return [s for s in self.sources if s.declared and s.is_independent and s.owner != "mission"]
 
-    def _errors(self, source: ErrorSource, size: float) -> Errors:
+    def errors(self, source: ErrorSource, size: float) -> Errors:
         """Return one error of a given size and nothing else."""
         owner, *rest = source.id.split(".")
         if owner == "timing":
@@ -138,7 +138,7 @@ class _Study:
         return Errors().of(owner, error)
 
     def _scaled(self, sizes: Sequence[tuple[ErrorSource, float]], scale: float) -> Errors:
-        return superposed(self._errors(source, scale * size) for source, size in sizes)
+        return superposed(self.errors(source, scale * size) for source, size in sizes)
 
     def _quadratic(self, source: ErrorSource) -> Verdict:
         budget = self.allocation.qpe_limit(source.owner)
@@ -148,7 +148,7 @@ class _Study:
         gain = self.allocation.autofocus_gain
         if gain == 1 or verdict.verdict == "not_evaluated":
             return verdict
-        refocused = self._refocused(self._errors(source, gain * boundary), budget)
+        refocused = self._refocused(self.errors(source, gain * boundary), budget)
         return verdict._replace(boundary_autofocus=gain * boundary, **refocused)
 
     def _sum(self, row_id: str, owner: str) -> Verdict:
@@ -275,7 +275,7 @@ class _Study:
             id="mission.autofocus_pull_in", model=self.model, boundary_error=phase, unit="rad", budget_rad=total
         )
         clock = next(s for s in self.sources if s.id == "timing.quadratic")
-        refocused = self._refocused(self._errors(clock, phase / abs(clock.effect.qpe)), total)
+        refocused = self._refocused(self.errors(clock, phase / abs(clock.effect.qpe)), total)
         verdict = str(refocused["verdict_autofocus"])
         bound = self.mission.radar.center_frequency / self.mission.radar.bandwidth
         reason = f"range walk of {walk:.2g} cells; it stays within half a cell up to n_pull {bound:.3g}, f0/B"

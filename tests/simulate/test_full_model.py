@@ -10,7 +10,7 @@ from bisar_budget.budget.validity import FLOOR_RAD, SHARE, FirstOrder
 from bisar_budget.errors import MissionError
 from bisar_budget.geometry import norm
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.simulate.verify import _Study, verify_mission
+from bisar_budget.simulate.verify import Study, verify_mission
 from tests.conftest import mission_text
 from tests.simulate.conftest import collection
 
@@ -53,7 +53,7 @@ def test_shift_and_phase_of_every_row_inside_first_order_are_those_of_exact_rang
     inside = outside = 0
     worst = (0.0, "")
     for number, mission in enumerate(random_missions(500, seed=11)):
-        study, geometry = _Study(mission), mission.geometry
+        study, geometry = Study(mission), mission.geometry
         ground = full_ground(mission, geometry)
         first_order = FirstOrder(mission, geometry, ground)
         turn = max(norm(p.look_rate) * 2 for p in (geometry.transmitter, geometry.receiver))
@@ -72,7 +72,7 @@ def test_shift_and_phase_of_every_row_inside_first_order_are_those_of_exact_rang
                 outside += 1
                 continue
             inside += 1
-            effect = study.collection.effect(study._errors(source, size))
+            effect = study.collection.effect(study.errors(source, size))
             off = abs(effect.quadratic - first)
             worst = max(worst, (off, f"{number} {source.id}"))
             assert off <= max(FLOOR_RAD, 0.02 * abs(effect.quadratic)), (number, source.id)
@@ -86,7 +86,7 @@ def test_the_second_order_is_what_is_missing_beyond_the_first() -> None:
     """Where the second order adds 0.1 to 0.5 rad it explains the difference to exact ranges to a quarter."""
     explained = 0
     for mission in random_missions(300, seed=3):
-        study, geometry = _Study(mission), mission.geometry
+        study, geometry = Study(mission), mission.geometry
         if math.sin(geometry.gradient_angle) < 0.3:
             continue
         ground = full_ground(mission, geometry)
@@ -96,7 +96,7 @@ def test_the_second_order_is_what_is_missing_beyond_the_first() -> None:
             second = first_order.second(source, size).qpe
             if not 0.1 < abs(second) < 0.5 or math.hypot(*ground.plane.displacement(source.full, size)) > 100:
                 continue
-            effect = study.collection.effect(study._errors(source, size))
+            effect = study.collection.effect(study.errors(source, size))
             missing = effect.quadratic - source.full.qpe * size
             assert missing == pytest.approx(second, rel=0.25, abs=0.02), source.id
             explained += 1
