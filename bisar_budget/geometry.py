@@ -13,6 +13,8 @@ from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT, 
 Vector = tuple[float, float, float]
 GroundVector = tuple[float, float]
 
+STRAIGHT: Vector = (0.0, 0.0, 0.0)  # acceleration of a platform whose path does not curve
+
 FRAME_AXES = {
     "scene": ("x", "y", "z"),
     "track": ("along", "cross", "up"),
@@ -54,10 +56,20 @@ def without_rounding(a: Vector) -> Vector:
 
 @dataclass(frozen=True, kw_only=True)
 class PlatformState:
-    """Position [m] and velocity [m/s] of one platform at the aperture midpoint."""
+    """Position [m] and velocity [m/s] of one platform at the aperture midpoint, and its acceleration [m/s²]."""
 
     position: Vector
     velocity: Vector
+    acceleration: Vector = STRAIGHT
+
+    def at(self, tau: float) -> tuple[Vector, Vector]:
+        """Position and velocity at a slow time from the midpoint. [m], [m/s]"""
+        p, v, a = self.position, self.velocity, self.acceleration
+        half = tau * tau / 2
+        return (
+            (p[0] + v[0] * tau + a[0] * half, p[1] + v[1] * tau + a[1] * half, p[2] + v[2] * tau + a[2] * half),
+            (v[0] + a[0] * tau, v[1] + a[1] * tau, v[2] + a[2] * tau),
+        )
 
     @cached_property
     def slant_range(self) -> float:
@@ -125,7 +137,14 @@ class PlatformState:
 
 
 def state_from_angles(
-    *, slant_range: float, azimuth: float, elevation: float, speed: float, motion_azimuth: float, climb: float
+    *,
+    slant_range: float,
+    azimuth: float,
+    elevation: float,
+    speed: float,
+    motion_azimuth: float,
+    climb: float,
+    acceleration: Vector = STRAIGHT,
 ) -> PlatformState:
     """Position and velocity from range and angles; `speed` is over ground, `climb` its vertical part."""
     position = (
@@ -134,7 +153,9 @@ def state_from_angles(
         slant_range * math.sin(elevation),
     )
     velocity = (speed * math.cos(motion_azimuth), speed * math.sin(motion_azimuth), climb)
-    return PlatformState(position=without_rounding(position), velocity=without_rounding(velocity))
+    return PlatformState(
+        position=without_rounding(position), velocity=without_rounding(velocity), acceleration=acceleration
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

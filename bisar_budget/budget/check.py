@@ -87,7 +87,7 @@ def _error_rows(
         declared = abs(source.declared)
         qpe_published, qpe_full = abs(source.effect.qpe) * declared, source.full.qpe * source.declared
         notes, displacement = source.notes, None
-        if source.owner != "mission":
+        if source.is_motion:
             displacement = _displacement(source, plane, model)
             if displacement is None:
                 notes = (*notes, plane.degeneracy)
@@ -152,7 +152,9 @@ def _doubt(source: ErrorSource, model: str, limit: float) -> str:
         if qpe <= limit * (1 + UTILIZATION_TOLERANCE):
             return ""
         turned = source.full.qpe - source.full.moved - source.effect.qpe
-        if ".position." in source.id:
+        if source.id == "mission.terrain":
+            cause = "a bistatic image defocuses on a wrong height"
+        elif ".position." in source.id:
             cause = "the line of sight turns over a position error, and its displacement defocuses"
         elif abs(source.full.moved) >= abs(turned):
             cause = "the displaced response has a quadratic phase of its own"
@@ -270,7 +272,7 @@ def _aggregate_rows(
         yield from _qpe_aggregates(mission, allocation, declared)
     # `each` looks at single rows, those along the scene's axes included.
     single = [s for s in sources if s.declared is not None] if combine == "each" else declared
-    motion = [source for source in single if source.owner != "mission"]
+    motion = [source for source in single if source.is_motion]
     yield _judged(
         mission,
         id="mission.cubic_phase_error",

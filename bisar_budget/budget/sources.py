@@ -52,7 +52,7 @@ class ErrorSource(NamedTuple):
     coverage factor; None where the file is silent. `is_independent` marks the errors as the file states
     them: sums and root-sum-squares run over these alone, so that an error stated along the track is not
     counted again by its components along the scene's axes. `direction` is a unit vector of the scene, zero for
-    what is no motion.
+    what is no motion; of the mission's own it is that of both platforms.
     """
 
     id: str
@@ -68,6 +68,15 @@ class ErrorSource(NamedTuple):
     evidence: str | None = None
     is_independent: bool = True
     notes: tuple[str, ...] = ()
+
+    @property
+    def is_motion(self) -> bool:
+        """Whether it moves platforms, or the clock: what only is a phase displaces nothing."""
+        return self.unit != "rad"
+
+    def moves(self, platform: str) -> bool:
+        """Whether it is an error of a platform's position; one of the mission's own is of both."""
+        return self.owner in (platform, "mission")
 
     def power(self, tau: float) -> float:
         """Position error of a unit of it at a slow time: 1, τ or τ²/2 of (22); 0 for what is no motion."""
@@ -139,7 +148,7 @@ class FullGround(NamedTuple):
 
 
 def _look_series(state: PlatformState) -> tuple[tuple[float, ...], ...]:
-    return evaluators.look_series(*state.position, *state.velocity, 0.0, 0.0, 0.0, state.slant_range)
+    return evaluators.look_series(*state.position, *state.velocity, *state.acceleration, state.slant_range)
 
 
 def full_ground(mission: Mission, geometry: BistaticGeometry) -> FullGround:
@@ -189,6 +198,7 @@ def error_sources(
     for name, state, look in zip(PLATFORMS, states, ground.looks, strict=True):
         sources += _motion(mission, name, state, look, ground)
     sources += _clock(mission, ground)
+    sources += _terrain(mission, sources)
     sources += _other(mission)
     return sources
 
@@ -319,6 +329,27 @@ def _clock(mission: Mission, ground: FullGround) -> Iterator[ErrorSource]:
             equation="Table I row 1, step of Table II" if term == "quadratic" else "Table I row 1",
             no_limit=f"no quadratic term: the clock's {term} term has another order (Table I row 1)",
         )
+
+
+def _terrain(mission: Mission, sources: list[ErrorSource]) -> Iterator[ErrorSource]:
+    """A scene that is higher than the processor takes it for: both platforms measured too high by as much."""
+    height = mission.scene.height_error
+    if height is None:
+        return
+    up = [source for source in sources if source.id in ("transmitter.position.z", "receiver.position.z")]
+    yield ErrorSource(
+        id="mission.terrain",
+        owner="mission",
+        unit="m",
+        declared=height,
+        path=("scene", "height_error"),
+        effect=Effect._make(map(sum, zip(*(source.effect for source in up), strict=True))),
+        full=Effect._make(map(sum, zip(*(source.full for source in up), strict=True))),
+        direction=_AXES[2],
+        equation="full model",
+        no_limit="no quadratic term: to the published model a height error moves the image",
+        notes=("held to the total budget: it belongs to no platform",),
+    )
 
 
 def _other(mission: Mission) -> Iterator[ErrorSource]:

@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator
 
 from bisar_budget.budget.sources import Effect, ErrorSource, FullGround
-from bisar_budget.geometry import BistaticGeometry, dot, norm
+from bisar_budget.geometry import STRAIGHT, BistaticGeometry, dot, norm
 from bisar_budget.mission.model import Mission
 
 FLOOR_RAD = 0.02
@@ -49,10 +49,9 @@ class FirstOrder:
         def range_error(tau: float) -> float:
             total = 0.0
             for name, state in (("transmitter", self.geometry.transmitter), ("receiver", self.geometry.receiver)):
-                own = size * source.power(tau) if source.owner == name else 0.0
-                d, p, v = source.direction, state.position, state.velocity
+                own = size * source.power(tau) if source.moves(name) else 0.0
+                d, at = source.direction, state.at(tau)[0]
                 off = (own * d[0] - east, own * d[1] - north, own * d[2])
-                at = (p[0] + v[0] * tau, p[1] + v[1] * tau, p[2] + v[2] * tau)
                 R = norm(at)
                 along = dot(off, at) / R
                 total -= (dot(off, off) - along * along) / (2 * R)
@@ -72,6 +71,8 @@ def collection_notes(mission: Mission, geometry: BistaticGeometry) -> Iterator[s
             f"displacements are {1 / sine:.2g} times those at right angles, and first order ends earlier"
         )
     for name, state in (("transmitter", geometry.transmitter), ("receiver", geometry.receiver)):
+        if state.acceleration != STRAIGHT:
+            yield f"the {name}'s path curves: the published model takes it for straight, the full model does not"
         turn = norm(state.look_rate) * mission.collection.aperture_time / 2
         if turn > _LONG_APERTURE_RAD:
             yield (

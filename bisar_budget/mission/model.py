@@ -10,6 +10,7 @@ from bisar_budget import units
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.errors import KeyPath, Problem
 from bisar_budget.geometry import (
+    STRAIGHT,
     BistaticGeometry,
     PlatformState,
     UndefinedFrameError,
@@ -36,7 +37,7 @@ from bisar_budget.mission.readers import (
 )
 
 STILL = 1e-6  # m/s; slower than this no platform flies an aperture
-FULL_MODEL = "it comes with the full model"
+LATER = "it comes with a later one"
 
 FREQUENCY = Quantity(units.FREQUENCY, gt=0, ge=1e3, le=1e13)
 VIBRATION_FREQUENCY = Quantity(units.FREQUENCY, gt=0, le=1e9)
@@ -89,13 +90,15 @@ class Scene(NamedTuple):
     """The imaged ground."""
 
     radius: Annotated[float | None, Key(RANGE, "Radius of the scene about its centre.")] = None
-    height_error: Annotated[None, Key(Later(FULL_MODEL))] = None
+    height_error: Annotated[
+        float | None, Key(COORDINATE, "How much higher the scene is than the processor takes it for.")
+    ] = None
 
 
 class Sinusoid(NamedTuple):
     """One sinusoidal vibration along the line of sight."""
 
-    amplitude: Annotated[float, Key(Scalar(SIZE, FULL_MODEL), "0 to peak, along the line of sight.")]
+    amplitude: Annotated[float, Key(Scalar(SIZE, LATER), "0 to peak, along the line of sight.")]
     frequency: Annotated[float, Key(VIBRATION_FREQUENCY)]
 
 
@@ -125,7 +128,7 @@ class MotionError(NamedTuple):
     position: Annotated[Vector | None, Key(Triple(COORDINATE, or_scalar=True), "At the midpoint.")] = None
     velocity: Annotated[Vector | None, Key(Triple(VELOCITY, or_scalar=True), "Constant part.")] = None
     acceleration: Annotated[Vector | None, Key(Triple(ACCELERATION, or_scalar=True), "Constant part.")] = None
-    covariance: Annotated[None, Key(Later(FULL_MODEL))] = None
+    covariance: Annotated[None, Key(Later(LATER))] = None
     distribution: Annotated[
         str,
         Key(
@@ -151,7 +154,9 @@ class Platform(NamedTuple):
 
     position: Annotated[Vector | None, Key(Triple(COORDINATE), "East, north, up of the scene centre.")] = None
     velocity: Annotated[Vector | None, Key(Triple(VELOCITY), "East, north, up.")] = None
-    acceleration: Annotated[None, Key(Later(FULL_MODEL))] = None
+    acceleration: Annotated[
+        Vector | None, Key(Triple(ACCELERATION), "East, north, up; constant over the aperture: a curved path.")
+    ] = None
     slant_range: Annotated[float | None, Key(RANGE, "Distance to the scene centre.")] = None
     azimuth: Annotated[float | None, Key(DIRECTION, "From east, counter-clockwise.")] = None
     elevation: Annotated[float | None, Key(ELEVATION, "Above the ground, seen from the scene centre.")] = None
@@ -167,7 +172,8 @@ class Platform(NamedTuple):
         """Hold it to one complete geometry, above the ground, off the scene centre."""
         if not values.keys() >= GEOMETRY_KEYS:
             return  # one of them is wrong by itself
-        platform = Platform(**{key: values[key] for key in GEOMETRY_KEYS})
+        acceleration = values.get("acceleration")
+        platform = Platform(acceleration=acceleration, **{key: values[key] for key in GEOMETRY_KEYS})
         unclear = platform._unclear_geometry()
         if unclear is not None:
             yield unclear
@@ -205,15 +211,15 @@ class Platform(NamedTuple):
     def state(self) -> PlatformState:
         """Position and velocity in the frame of the scene."""
         if self.position is not None and self.velocity is not None:
-            return _state_from_vectors(self.position, self.velocity)
+            return _state_from_vectors(self.position, self.velocity, self.acceleration)
         polar = (self.slant_range, self.azimuth, self.elevation, self.speed, self.motion_azimuth, self.climb)
-        return _state_from_angles(*polar)
+        return _state_from_angles(*polar, self.acceleration)
 
 
 # Asked for while a platform is read, while its mission is, and when that is checked.
 @lru_cache(maxsize=8)
-def _state_from_vectors(position: Vector, velocity: Vector) -> PlatformState:
-    return PlatformState(position=position, velocity=velocity)
+def _state_from_vectors(position: Vector, velocity: Vector, acceleration: Vector | None) -> PlatformState:
+    return PlatformState(position=position, velocity=velocity, acceleration=acceleration or STRAIGHT)
 
 
 @lru_cache(maxsize=8)
@@ -224,6 +230,7 @@ def _state_from_angles(
     speed: float | None,
     motion_azimuth: float | None,
     climb: float | None,
+    acceleration: Vector | None,
 ) -> PlatformState:
     return state_from_angles(
         slant_range=slant_range or 0.0,
@@ -232,6 +239,7 @@ def _state_from_angles(
         speed=speed or 0.0,
         motion_azimuth=motion_azimuth or 0.0,
         climb=climb or 0.0,
+        acceleration=acceleration or STRAIGHT,
     )
 
 
@@ -385,7 +393,7 @@ class Mission(NamedTuple):
     collection: Annotated[Collection, Key(Section(Collection))]
     platforms: Annotated[Platforms, Key(Section(Platforms))]
     scene: Annotated[Scene, Key(Section(Scene))] = Scene()
-    common_motion_error: Annotated[None, Key(Later(FULL_MODEL))] = None
+    common_motion_error: Annotated[None, Key(Later(LATER))] = None
     timing_error: Annotated[TimingError, Key(Section(TimingError))] = TimingError()
     other_errors: Annotated[tuple[OtherError, ...], Key(ListOf(OtherError))] = ()
     requirements: Annotated[Requirements, Key(Section(Requirements))] = Requirements()
@@ -444,13 +452,22 @@ def _no_image(geometry: BistaticGeometry) -> Iterator[Problem]:
 def _dives(platforms: Platforms, aperture_time: float) -> Iterator[Problem]:
     for name, platform in (("transmitter", platforms.transmitter), ("receiver", platforms.receiver)):
         state = platform.state
-        lowest = state.position[2] - abs(state.velocity[2]) * aperture_time / 2
+        lowest = min(state.at(tau)[0][2] for tau in _turning_points(state, aperture_time / 2))
         if lowest < 0 <= state.position[2]:
             key: KeyPath = ("climb",) if platform.velocity is None else ("velocity", 2)
+            if platform.acceleration is not None:
+                key = ("acceleration", 2)
             yield Problem(
                 f"takes the platform below the ground within the aperture, to z = {lowest:.4g} m",
                 at=("platforms", name, *key),
             )
+
+
+def _turning_points(state: PlatformState, half: float) -> Iterator[float]:
+    """Slow times within the aperture where a platform can be lowest: its ends, and where it stops sinking."""
+    yield from (-half, half)
+    if state.acceleration[2] > 0:
+        yield max(-half, min(half, -state.velocity[2] / state.acceleration[2]))
 
 
 MISSION = Section(Mission)

@@ -77,7 +77,7 @@ def path(
     error: MotionError | None = None,
     rng: np.random.Generator | None = None,
 ) -> Path:
-    """Fly one platform straight through its midpoint state, and measure it with an error.
+    """Fly one platform through its midpoint state, at its acceleration, and measure it with an error.
 
     Parameters
     ----------
@@ -97,6 +97,7 @@ def path(
     """
     tau = slow_time[:, None]
     actual = np.asarray(state.position) + np.asarray(state.velocity) * tau
+    actual = actual + np.asarray(state.acceleration) * tau**2 / 2
     if error is None:
         return Path(actual=actual, measured=actual)
     # (22): p̃ + ṽτ + ãτ²/2

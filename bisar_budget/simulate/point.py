@@ -225,8 +225,8 @@ def _indicated(geometry: BistaticGeometry, time: float, value: float, slope: flo
     """Ground point that a piece of range error indicates, (29), with Q at the piece's own time."""
     look, rate = np.zeros(2), np.zeros(2)
     for state in (geometry.transmitter, geometry.receiver):
-        x, y, z = (p + v * time for p, v in zip(state.position, state.velocity, strict=True))
-        moved = PlatformState(position=(x, y, z), velocity=state.velocity)
+        position, velocity = state.at(time)
+        moved = PlatformState(position=position, velocity=velocity)
         look = look + np.array(moved.look[:2])
         rate = rate + np.array(moved.look_rate[:2])
     indicated: Floats = np.asarray(np.linalg.solve(-np.stack((look, rate)), np.array([value, slope])), dtype=float)

@@ -97,7 +97,7 @@ class Study:
     def _cases(self) -> Iterator[tuple[str, Callable[[], Verdict]]]:
         for source in self.sources:
             if source.by(self.model).qpe:
-                yield source.id, partial(self._other if source.owner == "mission" else self._quadratic, source)
+                yield source.id, partial(self._quadratic if source.is_motion else self._other, source)
         yield from vibration.cases(self.mission, self.allocation, self.collection)
         requirements = self.mission.requirements
         if self.mission.allocation.combine != "each":
@@ -120,7 +120,7 @@ class Study:
     # The declared errors that an image can show; `other` errors are phases without a motion.
     @property
     def _declared(self) -> list[ErrorSource]:
-        return [s for s in self.sources if s.declared and s.is_independent and s.owner != "mission"]
+        return [s for s in self.sources if s.declared and s.is_independent and s.is_motion]
 
     def errors(self, source: ErrorSource, size: float) -> Errors:
         """Return one error of a given size and nothing else."""
@@ -128,6 +128,9 @@ class Study:
         if owner == "timing":
             order = ("constant", "linear", "quadratic", "cubic").index(rest[0])
             return Errors(clock=tuple(size if index == order else 0.0 for index in range(4)))
+        if owner == "mission":  # a scene that is higher: both platforms measured too high
+            up = MotionError(position=(0.0, 0.0, size))
+            return Errors(transmitter=up, receiver=up)
         kind = rest[0]
         x, y, z = (size * component for component in source.direction)
         error = {

@@ -5,14 +5,19 @@ import math
 import numpy as np
 import pytest
 
+from bisar_budget.budget.check import check_mission
 from bisar_budget.budget.sources import error_sources, full_ground
 from bisar_budget.budget.validity import FLOOR_RAD, SHARE, FirstOrder
+from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.errors import MissionError
 from bisar_budget.geometry import norm
 from bisar_budget.mission.load import parse_mission
+from bisar_budget.simulate.exact import exact_effect
+from bisar_budget.simulate.phase_history import cell_centres, path
 from bisar_budget.simulate.verify import Study, verify_mission
-from tests.conftest import mission_text
-from tests.simulate.conftest import collection
+from tests.conftest import TODAY, findings, mission_text
+from tests.conftest import row as row_of
+from tests.simulate.conftest import collection, platform
 
 FLOOR_M = 0.1  # of shift, a fifth of a resolution cell
 NEAR_M = 10.0  # of displacement; farther the next order but one begins to show
@@ -158,3 +163,88 @@ def test_phases_at_four_times_the_published_limit(squint, platform, axis, taylor
     size = math.pi / 2 / abs(source.effect.qpe)
     assert abs(source.full.qpe - source.full.moved) * size == pytest.approx(taylor, rel=0.005, abs=0.001)
     assert abs(source.full.qpe) * size == pytest.approx(full, rel=0.005)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_curved_and_climbing_paths(seed: int) -> None:
+    """Turns of up to 3 m/s², which Table II does not know: full model and exact ranges agree."""
+    rng = np.random.default_rng(seed)
+    platforms = {
+        "transmitter": {
+            "position": [24e3, -9e3, 5e3], "velocity": [40, 130, 5], "acceleration": rng.uniform(-3, 3, 3).tolist(),
+        },
+        "receiver": {
+            "position": [4e3, 7e3, 2e3], "velocity": [-45, 35, -3], "acceleration": rng.uniform(-3, 3, 3).tolist(),
+        },
+    }  # fmt: skip
+    mission = parse_mission(mission_text(platforms=platforms, collection={"aperture_time": 4}))
+    study = Study(mission)
+    first_order = FirstOrder(mission, mission.geometry, study.ground)
+    seen = 0
+    for source in study.sources:
+        size = math.pi / 8 / abs(source.full.qpe) if source.full.qpe else 0.0
+        if not size or abs(first_order.second(source, size).qpe) > FLOOR_RAD:
+            continue
+        effect = study.collection.effect(study.errors(source, size))
+        assert effect.quadratic == pytest.approx(source.full.qpe * size, rel=0.02, abs=0.02), source.id
+        assert effect.cubic == pytest.approx(source.full.cubic * size, rel=0.02, abs=0.02), source.id
+        seen += 1
+    assert seen > 10
+
+
+def test_images_of_a_curved_path_show_the_full_limits() -> None:
+    platforms = {
+        "transmitter": {"position": [24e3, -9e3, 5e3], "velocity": [40, 130, 5], "acceleration": [-2, 1, 0.5]},
+        "receiver": {"position": [4e3, 7e3, 2e3], "velocity": [-45, 35, -3], "acceleration": [1, 2, -0.3]},
+    }
+    changes = {"platforms": platforms, "collection": {"aperture_time": 4}, "allocation__model": "full"}
+    for row in verify_mission(parse_mission(mission_text(**changes)), "*.acceleration.?").rows:
+        assert row.verdict == "confirmed", row
+
+
+def raised(separation_deg: float, squint_deg: float, height: float, slant_ranges=(8.5e3, 8.5e3), **changes):
+    """Two aircraft at 3 km over a scene whose height is wrong."""
+    states = [
+        platform(slant_range, 3e3, math.radians(azimuth), speed, math.radians(squint_deg))
+        for slant_range, azimuth, speed in zip(slant_ranges, (0, separation_deg), (150, 60), strict=True)
+    ]
+    platforms = {
+        name: {"position": list(state.position), "velocity": list(state.velocity)}
+        for name, state in zip(("transmitter", "receiver"), states, strict=True)
+    }
+    return {"platforms": platforms, "scene": {"height_error": height}, **changes}
+
+
+@pytest.mark.parametrize(
+    ("separation", "squint", "size"), [(45, 0, 0.06), (45, 30, 0.24), (120, 0, 1.1), (120, 20, 0.11)]
+)
+def test_a_height_error_defocuses_a_bistatic_image(separation: float, squint: float, size: float) -> None:
+    """10 m with perfect navigation, against exact ranges to a scatterer 10 m up: up to a radian."""
+    mission = parse_mission(mission_text(**raised(separation, squint, 10)))
+    terrain = row_of(check_mission(mission, TODAY), "mission.terrain")
+    slow_time = cell_centres(6.0, 256)
+    flown = [path(state, slow_time) for state in (mission.geometry.transmitter, mission.geometry.receiver)]
+    up = np.array([0.0, 0.0, 10.0])
+    # As a clock error: what the echo's path is longer by than one from the scene centre.
+    longer = sum(np.linalg.norm(p.actual - up, axis=1) - np.linalg.norm(p.actual, axis=1) for p in flown)
+    effect = exact_effect(slow_time, *flown, longer / SPEED_OF_LIGHT, mission.radar.wavelength, 6.0)
+    assert terrain.qpe_full_rad == pytest.approx(effect.quadratic, rel=0.02)
+    assert abs(terrain.qpe_full_rad) == pytest.approx(size, rel=0.2)
+    assert math.dist(terrain.displacement_m, effect.displacement) < 0.3  # Q with the range held constant
+
+
+def test_a_height_error_warns_where_the_full_model_fails_it_and_is_imaged() -> None:
+    found = findings(**raised(120, 0, 10))
+    terrain = row_of(found, "mission.terrain")
+    assert (terrain.allowable, terrain.status) == (None, "warn")
+    assert "wrong height" in terrain.reason
+    mission = parse_mission(mission_text(**raised(120, 0, 1, allocation__model="full")))
+    (verdict,) = verify_mission(mission, "mission.terrain").rows
+    assert verdict.verdict == "confirmed"
+    assert verdict.boundary_error == pytest.approx(math.pi / 4 / 0.112, rel=0.02)
+
+
+def test_a_flat_monostatic_image_only_shifts_on_a_wrong_height() -> None:
+    platforms = {name: {"position": [20e3, 0, 6e3], "velocity": [0, 120, 0]} for name in ("transmitter", "receiver")}
+    found = findings(platforms=platforms, scene={"height_error": 20})
+    assert abs(row_of(found, "mission.terrain").qpe_full_rad) < 1e-9
