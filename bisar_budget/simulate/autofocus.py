@@ -24,7 +24,7 @@ Indices = NDArray[np.int64]
 
 _ITERATIONS = 40
 _LINES = 64  # range lines used; more cost time and gain little
-_PER_LINE = 3  # targets
+_PER_LINE = 6  # targets
 _SECONDARY = 0.1  # of a line's strongest power: a further target, not its sidelobe
 _FALSE_ALARM = 1e-3  # chance that clutter alone shows a target anywhere in the image
 _RANGE_OF_LEVELS = 1e-6  # a line's clutter, of the image's peak power, at least: rounding is no clutter
@@ -38,7 +38,7 @@ _COHERENT = 0.5  # rad rms: below it responses add up in phase over the whole ap
 _SIGNIFICANT = 2.0  # standard deviations
 _BLOCK = 16  # range lines corrected at once, for the cache
 _DRIFT_SETTLED = 1e-3  # rad at the aperture edge
-_CORRELATED = 6.0  # standard deviations: a correlation peak, not the correlation of speckle
+_CORRELATED = 6.0  # standard deviations of the correlation of speckle, whose highest of many is about 4
 
 
 class Focused(NamedTuple):
@@ -203,8 +203,9 @@ def aperture_band(spectrum: Complexes) -> Indices:
     used = np.nonzero(strength > _SUPPORT * strength.max())[0]
     gaps = np.diff(used, append=used[0] + count)
     widest = int(np.argmax(gaps))
-    if gaps[widest] < _SMALLEST_GAP * count:
-        return (np.arange(count) - count // 2) % count
+    if gaps[widest] - 1 < _SMALLEST_GAP * count:
+        band: Indices = (np.arange(count) - count // 2) % count
+        return band
     first = used[(widest + 1) % used.size]
     return np.asarray((first + np.arange(count - gaps[widest] + 1)) % count, dtype=np.int64)
 
@@ -354,8 +355,9 @@ def _basis(strength: Floats, order: int) -> Floats:
     columns = [place**power for power in range(4)]
     columns += [np.cos(math.pi / 2 * n * (place + 1)) for n in range(1, min(order, strength.size // 2) - 3)]
     functions = np.stack(columns, axis=1)
-    triangle = np.linalg.qr(np.sqrt(strength)[:, None] * functions, mode="r")
-    return np.asarray(np.linalg.solve(triangle.T, functions.T).T, dtype=float)
+    _, triangle = np.linalg.qr(np.sqrt(strength)[:, None] * functions)
+    basis: Floats = np.linalg.solve(triangle.T, functions.T).T
+    return basis
 
 
 def _step(responses: Complexes, basis: Floats, strength: Floats, samples: int) -> Floats:
@@ -393,13 +395,16 @@ def _drifts(aperture: Complexes, parts: list[Indices], pairs: list[tuple[int, in
     """Difference of phase slope between sub-apertures, per aperture sample; None if they do not correlate."""
     samples = 2 * aperture.shape[1]  # of powers, which have twice the band
     powers = [np.fft.fft(np.abs(np.fft.ifft(aperture[:, part], samples, axis=1)) ** 2, axis=1) for part in parts]
+    for power in powers:
+        power[:, 0] = 0  # the mean correlates everywhere
+        power /= np.linalg.norm(power)
+    # Speckle of disjoint sub-apertures is independent, from cell to cell and from line to line.
+    least = _CORRELATED / math.sqrt(aperture.shape[0] * parts[-1].size)
     drifts = []
     for a, b in pairs:
-        cross = np.sum(powers[b] * powers[a].conj(), axis=0)
-        cross[0] = 0  # the mean correlates everywhere
-        correlation = np.fft.ifft(cross).real
+        correlation = np.fft.ifft(np.sum(powers[b] * powers[a].conj(), axis=0)).real * samples
         top = int(np.argmax(correlation))
-        if correlation[top] <= _CORRELATED * math.sqrt(float(np.median(correlation**2)) / 0.455):
+        if correlation[top] <= least:
             return None
         before, at, after = correlation[top - 1], correlation[top], correlation[(top + 1) % samples]
         shift = top + (before - after) / (2 * (before - 2 * at + after))
