@@ -23,8 +23,9 @@ from bisar_budget.simulate.rotation import rotated, scene_axes
 Indices = NDArray[np.int64]
 
 _ITERATIONS = 40
-_LINES = 64  # range lines used; more cost time and gain little
-_PER_LINE = 6  # targets
+_LINES = 96  # range lines used; more cost time and gain little
+_TARGETS = 96
+_PER_LINE = 6
 _SECONDARY = 0.1  # of a line's strongest power: a further target, not its sidelobe
 _FALSE_ALARM = 1e-3  # chance that clutter alone shows a target anywhere in the image
 _RANGE_OF_LEVELS = 1e-6  # a line's clutter, of the image's peak power, at least: rounding is no clutter
@@ -323,7 +324,8 @@ def _targets(power: Floats, half: int, threshold: float) -> tuple[Indices, Indic
         found.append((row, column))
         left[row[:, None], (column[:, None] + window) % power.shape[1]] = 0
     rows, columns = (np.concatenate(part) for part in zip(*found, strict=True))
-    return rows, columns
+    best = np.argsort(power[rows, columns])[::-1][:_TARGETS]
+    return rows[best], columns[best]
 
 
 def _centred(aperture: Complexes, column: Indices, samples: int) -> Complexes:
@@ -332,17 +334,27 @@ def _centred(aperture: Complexes, column: Indices, samples: int) -> Complexes:
     A window off the peak by a fraction of a sample bends the phase at the aperture's edges, the same way every
     time, and the iteration would follow. Newton's method on the power finds the interpolated peak.
     """
-    bins = np.arange(aperture.shape[1]) - (aperture.shape[1] - 1) / 2
-    ramp = 2 * math.pi / samples * bins
+    count = aperture.shape[1]
+    turn = 2 * math.pi / samples
+    ramp = turn * (np.arange(count) - (count - 1) / 2)
     moments = np.stack((ramp**0, ramp, ramp**2), axis=1).astype(complex)
-    centred = aperture * np.exp(1j * np.outer(column, ramp))
-    for _ in range(3):
+    centred = aperture * _phasors(turn * column.astype(np.float64), count)
+    for _ in range(2):
         value, first, second = (centred @ moments).T
         slope = -np.imag(value.conj() * first)
         curvature = np.abs(first) ** 2 - np.real(value.conj() * second)
-        move = np.where(curvature < 0, np.clip(-slope / np.where(curvature < 0, curvature, -1.0), -0.5, 0.5), 0.0)
-        centred = centred * np.exp(1j * np.outer(move, ramp))
+        bend = np.where(curvature < 0, curvature, -np.inf)
+        move = np.asarray(np.clip(-slope / bend, -0.5, 0.5), dtype=np.float64)
+        centred *= _phasors(turn * move, count)
     return centred
+
+
+def _phasors(angle: Floats, count: int) -> Complexes:
+    """exp(j · angle · n), n = 0 … count - 1, as products of coarse and fine steps: exponentials are dear."""
+    fine = np.exp(1j * np.outer(angle, np.arange(32)))
+    coarse = np.exp(1j * np.outer(angle, np.arange(0, count, 32)))
+    phasors: Complexes = (coarse[:, :, None] * fine[:, None, :]).reshape(angle.size, -1)[:, :count]
+    return phasors
 
 
 def _basis(strength: Floats, order: int) -> Floats:
@@ -363,7 +375,6 @@ def _basis(strength: Floats, order: int) -> Floats:
 def _step(responses: Complexes, basis: Floats, strength: Floats, samples: int) -> Floats:
     """One estimate of the common phase of windowed, centred responses over the aperture."""
     count = responses.shape[1]
-    bins = np.arange(count) - (count - 1) / 2
     # Gradient kernel: the maximum-likelihood phase difference of neighbours, integrated.
     difference = np.sum(responses[:, 1:] * responses[:, :-1].conj(), axis=0)
     phase = np.concatenate(([0.0], np.cumsum(np.angle(difference))))
@@ -372,11 +383,11 @@ def _step(responses: Complexes, basis: Floats, strength: Floats, samples: int) -
     phase = basis @ coefficients
     if np.linalg.norm(coefficients) > _COHERENT * math.sqrt(count):
         return phase
+    lag = max(1, count // 4)
     for _ in range(2):
         aligned = responses * np.exp(-1j * phase)
-        for lag in (1, max(1, count // 32), max(1, count // 4)):
-            slope = np.angle(np.sum(aligned[:, lag:] * aligned[:, :-lag].conj(), axis=1)) / lag
-            aligned *= np.exp(-1j * np.outer(slope, bins))
+        slope = np.angle(np.sum(aligned[:, lag:] * aligned[:, :-lag].conj(), axis=1)) / lag
+        aligned *= _phasors(-slope, count)
         # Power iteration for the principal eigenvector of the covariance over the aperture.
         amplitude = aligned.mean(axis=1)
         vector = amplitude.conj() @ aligned
