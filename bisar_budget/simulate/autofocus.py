@@ -12,6 +12,7 @@ Synthetic Aperture Radar, chapter 6.
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -155,6 +156,13 @@ def map_drift(image: Complexes, sub_apertures: int = 2) -> Focused:
             break
     total[band] = _without_trend(shapes @ size)
     return Focused(image=_corrected(image, total), phase=total)
+
+
+# As the mission file names them; map drift with the sub-apertures that see a cubic phase too.
+ALGORITHMS: dict[str, Callable[[Complexes], Focused]] = {
+    "pga": phase_gradient_autofocus,
+    "map_drift": partial(map_drift, sub_apertures=3),
+}
 
 
 def autofocus_in_scene_axes(

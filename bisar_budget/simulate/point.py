@@ -9,7 +9,7 @@ from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vector
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.model import MotionError as DeclaredError
-from bisar_budget.simulate.autofocus import phase_gradient_autofocus
+from bisar_budget.simulate.autofocus import ALGORITHMS
 from bisar_budget.simulate.collection import baseband
 from bisar_budget.simulate.exact import ExactEffect, exact_effect
 from bisar_budget.simulate.image_formation import backprojection, ground_grid, taylor_window
@@ -70,11 +70,9 @@ def simulate_point(mission: Mission) -> PointImages:
     Raises
     ------
     SimulationError
-        Autofocus other than by phase gradient, too few pulses for the patch, lines of equal range that bend
-        through cells, or an image beyond `simulation.memory_limit`.
+        Too few pulses for the patch, lines of equal range that bend through cells, or an image beyond
+        `simulation.memory_limit`.
     """
-    if mission.autofocus.algorithm != "pga":
-        raise SimulationError(f"autofocus.algorithm {mission.autofocus.algorithm}: this version focuses by pga only")
     geometry, settings = mission.geometry, mission.simulation
     T, wavelength = mission.collection.aperture_time, mission.radar.wavelength
     cross_range = geometry.cross_range_resolution(wavelength, T)
@@ -133,7 +131,7 @@ def simulate_point(mission: Mission) -> PointImages:
     rotated = image(flown, clock, look, (0.0, 0.0))
     still = (path(geometry.transmitter, slow_time), path(geometry.receiver, slow_time))
     error_free = image(still, 0 * slow_time, look, effect.displacement)
-    focused = phase_gradient_autofocus(rotated).image
+    focused = ALGORITHMS[mission.autofocus.algorithm](rotated).image
     clean = _measured(error_free, extent / count, None)
     times = np.array([-T / 3, 0.0, T / 3])  # centres of three sub-apertures
     values, slopes = np.interp(times, fine, left), np.interp(times, fine, slope)

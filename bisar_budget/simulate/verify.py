@@ -16,7 +16,7 @@ from bisar_budget.budget.verdicts import Verdict, VerifiedMission
 from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.model import Mission
 from bisar_budget.simulate import vibration
-from bisar_budget.simulate.autofocus import phase_gradient_autofocus
+from bisar_budget.simulate.autofocus import ALGORITHMS
 from bisar_budget.simulate.collection import CELLS, RANGE_CELLS, Chip, Errors, PointCollection, superposed
 from bisar_budget.simulate.exact import ExactEffect
 from bisar_budget.simulate.impulse_response import impulse_response, quadratic_phase_error
@@ -249,13 +249,10 @@ class Study:
 
     def _refocused(self, errors: Errors, budget: float) -> dict[str, Any]:
         """Form the image at the limit with autofocus and refocus it; hold what is left to the plain budget."""
-        if self.mission.autofocus.algorithm != "pga":
-            reason = f"autofocus.algorithm {self.mission.autofocus.algorithm}: this version focuses by pga only"
-            return {"verdict_autofocus": "not_evaluated", "reason_autofocus": reason}
         try:
             effect = self.collection.effect(errors)
             chip, reference = self._chips(errors, effect)
-            focused = Chip(phase_gradient_autofocus(chip.image).image, chip.grid)
+            focused = Chip(ALGORITHMS[self.mission.autofocus.algorithm](chip.image).image, chip.grid)
             residual = abs(self._phases(focused, reference)[0])
             peaks = [impulse_response(one.cut, self.collection.spacing[1]).peak for one in (reference, focused)]
             loss = 20 * math.log10(peaks[0] / peaks[1])

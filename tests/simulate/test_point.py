@@ -116,9 +116,14 @@ class TestRefusals:
         with pytest.raises(SimulationError, match="aliases below"):
             simulate_point(parse_mission(mission_text(collection__pulses=16)))
 
-    def test_map_drift_is_not_replaced_in_silence(self) -> None:
-        with pytest.raises(SimulationError, match="map_drift"):
-            simulate_point(parse_mission(mission_text(autofocus={"algorithm": "map_drift"})))
+    def test_map_drift_refocuses_the_paper_s_example_too(self) -> None:
+        images = simulate_point(load_mission(str(SECTION_V)))
+        mission = load_mission(str(SECTION_V))
+        drift = simulate_point(mission._replace(autofocus=mission.autofocus._replace(algorithm="map_drift")))
+        assert not np.array_equal(drift.focused, images.focused)
+        loss = 20 * math.log10(drift.focused_response.peak / drift.clean_response.peak)
+        assert loss == pytest.approx(0, abs=0.2)
+        assert drift.focused_response.irw_m / drift.clean_response.irw_m == pytest.approx(1, abs=0.05)
 
     def test_memory_limit(self) -> None:
         smeared = {"platforms__transmitter__motion_error__acceleration": [0.02, 0, 0]}

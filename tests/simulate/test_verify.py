@@ -247,8 +247,9 @@ class TestTogether:
 
 
 class TestAutofocus:
-    def test_every_limit_with_autofocus_refocuses_inside_the_plain_budget(self) -> None:
-        rows = verdicts("receiver.acceleration.*", autofocus={"algorithm": "pga", "n_pull": 4})
+    @pytest.mark.parametrize("algorithm", ["pga", "map_drift"])
+    def test_every_limit_with_autofocus_refocuses_inside_the_plain_budget(self, algorithm: str) -> None:
+        rows = verdicts("receiver.acceleration.*", autofocus={"algorithm": algorithm, "n_pull": 4})
         assert len(rows) == 3
         for row in rows.values():
             assert row.boundary_autofocus == pytest.approx(16 * row.boundary_error)
