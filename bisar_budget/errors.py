@@ -1,8 +1,44 @@
 """What goes wrong with input, said so that it can be mended: where, what, the value given, what is accepted."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 KeyPath = tuple[str | int, ...]
+
+
+class Region(NamedTuple):
+    """Where a value stands, counted from 1 in characters; `end_column` is the one behind its last.
+
+    The ends are None for a mapping or a list: it is pointed at, not spanned.
+    """
+
+    line: int
+    column: int
+    end_line: int | None = None
+    end_column: int | None = None
+
+
+class Place(int):
+    """Line of a value in a file, from 1, which also knows where on the line the value stands.
+
+    A number for everybody who wants the line; reports for editors and pull requests ask for the region.
+    """
+
+    _event: Any  # the YAML parser's
+
+    @classmethod
+    def of(cls, event: Any) -> "Place":
+        """Place of what the YAML parser saw."""
+        place = cls(event.start_mark.line + 1)
+        place._event = event
+        return place
+
+    @property
+    def region(self) -> Region:
+        """Start of the value and, for a scalar, its end."""
+        start, end = self._event.start_mark, self._event.end_mark
+        if getattr(self._event, "value", None) is None:
+            return Region(start.line + 1, start.column + 1)
+        return Region(start.line + 1, start.column + 1, end.line + 1, end.column + 1)
 
 
 def printable(text: str) -> str:
