@@ -16,6 +16,7 @@ from bisar_budget.errors import printable
 if TYPE_CHECKING:
     from bisar_budget.budget.findings import MissionFindings, Report
     from bisar_budget.mission.model import Mission
+    from bisar_budget.report import Style
 
 EXIT_BROKEN, EXIT_USAGE, EXIT_OUR_FAULT, EXIT_INTERRUPTED = 1, 2, 3, 130
 
@@ -59,10 +60,10 @@ def cli() -> None:
 @click.option(
     "--format",
     "format_name",
-    type=click.Choice(["text", "json", "csv"]),
+    type=click.Choice(["text", "json", "csv", "junit", "sarif", "github", "needs"]),
     default="text",
     show_default=True,
-    help="Format of the report.",
+    help="Format of the report; github: annotations of a pull request, needs: for Sphinx-Needs.",
 )
 @click.option("-o", "--output", metavar="FILE", help="Write the report to FILE instead of standard output.")
 @click.option(
@@ -70,7 +71,8 @@ def cli() -> None:
     "reports",
     multiple=True,
     metavar="FILE",
-    help="Also write a report to FILE, in the format of its suffix: .txt, .json or .csv. Repeatable.",
+    help="Also write a report to FILE, in the format of its suffix: .txt, .json, .csv, .xml (JUnit), .sarif "
+    "or .needs.json. Repeatable.",
 )
 @click.option("--strict", is_flag=True, help="Fail on warnings and on rows that could not be evaluated.")
 @click.option("--exit-zero", is_flag=True, help="Exit with 0 even if a requirement is broken.")
@@ -124,15 +126,17 @@ def check(
     report = _checked(files, today.date() if today else _today(), model)
     if format_name != "text" or output is not None or quiet or not _is_terminal():
         _say_faults(report)
-    verbosity = -1 if quiet else 1 if verbose else 0
+    style = Style(verbosity=-1 if quiet else 1 if verbose else 0, root=_repository())
     for path, its_format in written:
-        _write(path, render(its_format, report, Style(verbosity=verbosity)))
+        _write(path, render(its_format, report, style))
     use_color = color == "always" or (color == "auto" and output is None and _wants_color())
-    text = render(format_name, report, Style(color=use_color, verbosity=verbosity))
+    text = render(format_name, report, style._replace(color=use_color))
     if output is None:
         _print(text)
     else:
         _write(output, text)
+    if format_name == "github":
+        _append_step_summary(report, style)
     code = report.exit_code(strict)
     sys.exit(0 if exit_zero and code == EXIT_BROKEN else code)
 
@@ -196,12 +200,34 @@ def _today() -> date:
 
 
 def _format_of(name: str) -> str:
-    from bisar_budget.report import SUFFIXES
+    from bisar_budget.report import SUFFIXES, format_of
 
-    suffix = os.path.splitext(name)[1].lower()
-    if suffix not in SUFFIXES:
+    format_name = format_of(name)
+    if format_name is None:
         raise click.UsageError(f"--report {name}: the suffix must be one of {', '.join(SUFFIXES)}")
-    return SUFFIXES[suffix]
+    return format_name
+
+
+def _repository() -> str:
+    """Folder that reports name files from: GitHub's checkout, else the current folder."""
+    with suppress(OSError):  # somebody removed it under us
+        return os.path.abspath(os.environ.get("GITHUB_WORKSPACE") or os.getcwd())
+    return ""
+
+
+def _append_step_summary(report: "Report", style: "Style") -> None:
+    """Add to the page of the run on GitHub; that it cannot be written changes no exit code."""
+    path = os.environ.get("GITHUB_STEP_SUMMARY")
+    if not path:
+        return
+    from bisar_budget.report.github import step_summary
+
+    try:
+        with open(path, "a", encoding="utf-8", errors="backslashreplace", newline="\n") as file:
+            file.write(step_summary(report, style))
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        _complain(f"Warning: cannot write the step summary {printable(path)}: {reason}")
 
 
 def _say_faults(report: "Report") -> None:
