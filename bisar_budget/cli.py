@@ -90,6 +90,12 @@ def cli() -> None:
 @click.option("-q", "--quiet", is_flag=True, help="One line per mission.")
 @click.option("-v", "--verbose", is_flag=True, help="Reason, equation, displacement and evidence of every row.")
 @click.option(
+    "--explain",
+    metavar="ID",
+    help="Instead of the report, show how the row ID comes to its status: from the line of the file through "
+    "the equations, with the numbers put in, to the verdict. Exits with 0.",
+)
+@click.option(
     "--color",
     type=click.Choice(["auto", "always", "never"]),
     default="auto",
@@ -107,6 +113,7 @@ def check(
     today: datetime | None,
     quiet: bool,
     verbose: bool,
+    explain: str | None,
     color: str,
 ) -> None:
     """Check mission files against their requirements.
@@ -123,6 +130,11 @@ def check(
     written = [(name, _format_of(name)) for name in reports]
     files = _expanded(missions)
     _spare(files, [output, *reports])
+    if explain is not None:
+        if format_name != "text" or reports:
+            raise click.UsageError("--explain writes text: it excludes --format and --report.")
+        _explain(files, explain, today.date() if today else _today(), model, output)
+        return
     report = _checked(files, today.date() if today else _today(), model)
     if format_name != "text" or output is not None or quiet or not _is_terminal():
         _say_faults(report)
@@ -158,7 +170,33 @@ def _checked(files: Sequence[str], today: date, model: str | None) -> "Report":
     return Report(version=__version__, missions=tuple(missions))
 
 
-def _loaded(files: Sequence[str]) -> "list[Mission]":
+def _explain(files: Sequence[str], row_id: str, today: date, model: str | None, output: str | None) -> None:
+    """Explain a row in every mission that has it."""
+    from bisar_budget.budget.check import check_mission
+    from bisar_budget.mission.readers import did_you_mean
+    from bisar_budget.report.explanation import explain
+
+    texts: list[str] = []
+    known: dict[str, None] = {}
+    for mission in _loaded(files, model):
+        found = check_mission(mission, today)
+        known |= dict.fromkeys(row.id for row in found.rows)
+        if any(row.id == row_id for row in found.rows):
+            texts.append(explain(mission, found, row_id))
+    if not texts:
+        hint = did_you_mean(row_id, tuple(known))
+        raise click.UsageError(f"--explain {printable(row_id)}: no row has this id. {hint or 'A check lists them.'}")
+    _deliver("\n".join(texts), output)
+
+
+def _deliver(text: str, output: str | None) -> None:
+    if output is None:
+        _print(text)
+    else:
+        _write(output, text)
+
+
+def _loaded(files: Sequence[str], model: str | None = None) -> "list[Mission]":
     """Load every mission, or say every fault of every file and exit."""
     from bisar_budget.errors import MissionError
     from bisar_budget.mission.load import load_mission
@@ -166,7 +204,7 @@ def _loaded(files: Sequence[str]) -> "list[Mission]":
     loaded, is_usable = [], True
     for file in files:
         try:
-            loaded.append(load_mission(file))
+            loaded.append(load_mission(file, model))
         except MissionError as error:
             is_usable = False
             for line in error.lines():
