@@ -365,6 +365,96 @@ def _fail(message: str) -> NoReturn:
     sys.exit(EXIT_USAGE)
 
 
+class _Part(click.ParamType[float]):
+    """A part of something: `10%` or 0.1."""
+
+    name = "percent"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        from bisar_budget.errors import InvalidValueError
+        from bisar_budget.units import RATIO, parse_quantity
+
+        try:
+            part = parse_quantity(value, RATIO)
+        except InvalidValueError:
+            part = -1.0
+        if not 0 <= part <= 1:
+            self.fail(f"{printable(str(value))}: must be 0% to 100%, such as 10% or 0.1.", param, ctx)
+        return part
+
+
+@cli.command()
+@click.argument("files", nargs=-1, required=True, metavar="OLD NEW | MISSION...")
+@click.option("--base", metavar="REV", help="Compare each MISSION with itself in this git revision.")
+@click.option(
+    "--fail-on-erosion",
+    "tolerated",
+    type=_Part(),
+    metavar="PERCENT",
+    help="Exit with 1 if a row fails that did not, or uses up more than this part of what was left of its limit.",
+)
+@click.option(
+    "--format",
+    "format_name",
+    type=click.Choice(["text", "markdown", "json"]),
+    default="text",
+    show_default=True,
+    help="Format of the comparison.",
+)
+@click.option("-o", "--output", metavar="FILE", help="Write to FILE instead of standard output.")
+@click.option(
+    "--date",
+    "today",
+    type=click.DateTime(["%Y-%m-%d"]),
+    help="Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC).",
+)
+def diff(
+    files: Sequence[str],
+    base: str | None,
+    tolerated: float | None,
+    format_name: str,
+    output: str | None,
+    today: datetime | None,
+) -> None:
+    """Compare the findings of two mission files, or of one before and after a change.
+
+    Rows are sorted by erosion: the part of what was left of a limit that the change uses up, (u2 - u1)/(1 - u1)
+    with the utilizations before and after. Exit code: 0, or 1 with --fail-on-erosion, 2 for wrong usage,
+    an unusable file or an unknown revision.
+    """
+    from bisar_budget.budget.check import check_mission
+    from bisar_budget.errors import MissionError
+    from bisar_budget.mission.load import load_mission, parse_mission
+    from bisar_budget.mission.revision import RevisionError, file_at
+    from bisar_budget.report import difference
+    from bisar_budget.report.comparison import compare
+
+    if base is None and len(files) != 2:
+        raise click.UsageError("give two mission files, OLD and NEW, or mission files and --base REV.")
+    _spare(files, [output])
+    day = today.date() if today else _today()
+    pairs = [(files[0], files[1])] if base is None else [(file, file) for file in _expanded(files)]
+    changes = []
+    for before, after in pairs:
+        try:
+            old = load_mission(before) if base is None else parse_mission(file_at(before, base), f"{base}:{before}")
+            new = load_mission(after)
+        except RevisionError as error:
+            _fail(str(error))
+        except MissionError as error:
+            for line in error.lines():
+                _complain(line)
+            sys.exit(EXIT_USAGE)
+        changes.append(compare(check_mission(old, day), check_mission(new, day)))
+    if format_name == "json":
+        text = difference.as_json(__version__, changes, tolerated)
+    else:
+        text = (difference.as_text if format_name == "text" else difference.as_markdown)(changes, tolerated)
+    _deliver(text, output)
+    is_refused = tolerated is not None and any(change.broken(tolerated) for change in changes)
+    sys.exit(EXIT_BROKEN if is_refused else 0)
+
+
 @cli.command()
 @click.argument("missions", nargs=-1, required=True, metavar="MISSION...")
 @click.option("--only", default="*", metavar="GLOB", help="Verify only the rows whose id matches.")
