@@ -9,6 +9,7 @@ from datetime import UTC, date, datetime
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
+from click.core import ParameterSource
 
 from bisar_budget import __version__
 from bisar_budget.errors import printable
@@ -55,11 +56,53 @@ def cli() -> None:
     """
 
 
-@cli.command()
+class _Gate(click.Command):
+    """A command whose options default to the project's settings; BISAR_BUDGET_… stands above them."""
+
+    def make_context(self, *args: Any, **extra: Any) -> click.Context:
+        try:
+            return super().make_context(*args, default_map=self._defaults(), **extra)
+        except click.BadParameter as error:
+            if error.ctx is not None and error.param is not None and error.param.envvar:
+                source = error.ctx.get_parameter_source(str(error.param.name))
+                if source is ParameterSource.ENVIRONMENT:
+                    error.param_hint = str(error.param.envvar)  # not the option that nobody wrote
+            raise
+
+    def _defaults(self) -> dict[str, Any]:
+        from bisar_budget.settings import TABLE, SettingsError, project_settings
+
+        options = {p.opts[0].removeprefix("--"): p for p in self.params if isinstance(p, click.Option) and p.envvar}
+        known = ["BISAR_BUDGET_DEBUG", *(str(option.envvar) for option in options.values())]
+        for name in os.environ:
+            if name.startswith("BISAR_BUDGET_") and name not in known:
+                raise click.UsageError(f"{printable(name)}: is not a known variable; known: {', '.join(known)}.")
+        try:
+            settings = project_settings(os.getcwd())
+        except SettingsError as error:
+            raise click.UsageError(printable(str(error))) from None
+        except OSError:  # somebody removed the current folder
+            settings = None
+        defaults = {}
+        for key, value in settings.values.items() if settings else ():
+            option = options[key]
+            try:
+                for item in value if isinstance(value, list) else [value]:
+                    option.type.convert(item, option, None)
+                    if key == "report":
+                        _format_of(item)
+            except click.UsageError as error:
+                raise click.UsageError(f"{settings.file}: {TABLE}.{key}: {error.message}") from None  # type: ignore[union-attr]
+            defaults[str(option.name)] = value
+        return defaults
+
+
+@cli.command(cls=_Gate)
 @click.argument("missions", nargs=-1, required=True, metavar="MISSION...")
 @click.option(
     "--format",
     "format_name",
+    envvar="BISAR_BUDGET_FORMAT",
     type=click.Choice(["text", "json", "csv", "junit", "sarif", "github", "needs"]),
     default="text",
     show_default=True,
@@ -69,15 +112,25 @@ def cli() -> None:
 @click.option(
     "--report",
     "reports",
+    envvar="BISAR_BUDGET_REPORT",
     multiple=True,
     metavar="FILE",
     help="Also write a report to FILE, in the format of its suffix: .txt, .json, .csv, .xml (JUnit), .sarif "
     "or .needs.json. Repeatable.",
 )
-@click.option("--strict", is_flag=True, help="Fail on warnings and on rows that could not be evaluated.")
-@click.option("--exit-zero", is_flag=True, help="Exit with 0 even if a requirement is broken.")
+@click.option(
+    "--strict/--no-strict",
+    envvar="BISAR_BUDGET_STRICT",
+    help="Fail on warnings and on rows that could not be evaluated.",
+)
+@click.option(
+    "--exit-zero/--no-exit-zero",
+    envvar="BISAR_BUDGET_EXIT_ZERO",
+    help="Exit with 0 even if a requirement is broken.",
+)
 @click.option(
     "--model",
+    envvar="BISAR_BUDGET_MODEL",
     type=click.Choice(["published", "full", "strictest"]),
     help="Model that gates, over the mission file's. This version has the published one.",
 )
@@ -97,6 +150,7 @@ def cli() -> None:
 )
 @click.option(
     "--color",
+    envvar="BISAR_BUDGET_COLOR",
     type=click.Choice(["auto", "always", "never"]),
     default="auto",
     show_default=True,
@@ -120,6 +174,9 @@ def check(
 
     MISSION is a YAML file, a glob pattern, or - for standard input. Exit code: 0 all met,
     1 a requirement is broken, 2 wrong usage or an unusable mission file, 3 a fault of the tool.
+
+    Defaults of --format, --report, --strict, --exit-zero, --model and --color: [tool.bisar-budget] in
+    the nearest pyproject.toml, and over it the variables BISAR_BUDGET_FORMAT and so on.
     """
     from bisar_budget.report import Style, render
 
@@ -131,7 +188,8 @@ def check(
     files = _expanded(missions)
     _spare(files, [output, *reports])
     if explain is not None:
-        if format_name != "text" or reports:
+        given = click.get_current_context().get_parameter_source
+        if any(given(name) is ParameterSource.COMMANDLINE for name in ("format_name", "reports")):
             raise click.UsageError("--explain writes text: it excludes --format and --report.")
         _explain(files, explain, today.date() if today else _today(), model, output)
         return
