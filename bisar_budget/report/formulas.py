@@ -5,7 +5,8 @@ SymPy itself stays out of a check.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from unicodedata import combining
 
 AXES = "xyz"
 # Table I: coefficients of the range error; {a} is the axis, {s} the platform's subscript.
@@ -58,3 +59,20 @@ def number(value: float) -> str:
     """Six digits, so that a reader can repeat the sum."""
     text = f"{value:.6g}"
     return f"({text})" if text.startswith("-") else text
+
+
+def step(title: str, *equations: str) -> Iterator[str]:
+    """One step of an explanation: a title, its equations indented under it."""
+    yield title
+    yield from (f"    {equation}" for equation in equations)
+
+
+def equation(symbol: str, formula: str, values: Mapping[str, float], result: float, unit: str) -> tuple[str, str]:
+    """Write the formula, and under it the same with numbers; their equals signs stand above each other."""
+    margin = " " * sum(not combining(letter) for letter in symbol)
+    return f"{symbol} = {formula}", f"{margin} = {filled(formula, values)} = {with_unit(result, unit)}"
+
+
+def with_unit(value: float, unit: str) -> str:
+    """Six digits and the unit."""
+    return f"{value + 0.0:.6g} {unit.replace('^2', '²')}".rstrip()  # + 0.0 takes the sign from a zero

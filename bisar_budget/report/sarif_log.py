@@ -79,10 +79,11 @@ def render(report: Report, style: Style) -> str:
     """Write one log with one run."""
     results: list[dict[str, Any]] = []
     notifications = []
-    artifacts = []
-    for index, mission in enumerate(report.missions):
-        artifact = _artifact(mission.file, index, style)
-        artifacts.append({"location": _without_index(artifact), "mimeType": "application/yaml"})
+    artifacts: dict[str, dict[str, Any]] = {}  # by URI: a file may be named in two ways
+    for mission in report.missions:
+        location = _artifact_location(mission.file, style)
+        artifacts.setdefault(location["uri"], {"location": location, "mimeType": "application/yaml"})
+        artifact = {**location, "index": list(artifacts).index(location["uri"])}
         if isinstance(mission, UnusableMission):
             notifications += [_notification(fault, artifact) for fault in mission.faults]
             continue
@@ -94,7 +95,7 @@ def render(report: Report, style: Style) -> str:
         "invocations": [
             {"executionSuccessful": not notifications, "toolExecutionNotifications": notifications},
         ],
-        "artifacts": artifacts,
+        "artifacts": list(artifacts.values()),
         "results": results,
     }
     return json.dumps({"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}, allow_nan=False) + "\n"
@@ -132,15 +133,10 @@ def _rule(rule: str, short: str, help_text: str) -> dict[str, Any]:
     }
 
 
-def _artifact(file: str, index: int, style: Style) -> dict[str, Any]:
+def _artifact_location(file: str, style: Style) -> dict[str, Any]:
     path = "standard input" if file == "-" else source_path(file, style.root)
     address = uri(path)
-    base = {} if address.startswith("file:") else {"uriBaseId": SRCROOT}
-    return {"uri": address, **base, "index": index}
-
-
-def _without_index(artifact: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in artifact.items() if key != "index"}
+    return {"uri": address} if address.startswith("file:") else {"uri": address, "uriBaseId": SRCROOT}
 
 
 def _result(row: Row, mission: MissionFindings, artifact: dict[str, Any]) -> dict[str, Any]:

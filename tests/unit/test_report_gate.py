@@ -193,6 +193,53 @@ class TestSarif:
             place = physical["artifactLocation"]
             assert run["artifacts"][place["index"]]["location"]["uri"] == place["uri"]
 
+    # Property of each object of the standard (section) to those it may have; its schema allows no other.
+    OBJECTS = {
+        "run": {"tool", "columnKind", "invocations", "artifacts", "results"},  # 3.14
+        "driver": {"name", "version", "rules", "notifications"},  # 3.19
+        "invocations": {"executionSuccessful", "toolExecutionNotifications"},  # 3.20
+        "artifacts": {"location", "mimeType"},  # 3.24
+        "results": {
+            "ruleId", "ruleIndex", "level", "message", "locations", "partialFingerprints", "suppressions",
+            "properties",
+        },  # 3.27
+        "locations": {"physicalLocation", "logicalLocations"},  # 3.28
+        "physicalLocation": {"artifactLocation", "region"},  # 3.29
+        "artifactLocation": {"uri", "uriBaseId", "index"},  # 3.4
+        "region": {"startLine", "startColumn", "endLine", "endColumn"},  # 3.30
+        "logicalLocations": {"fullyQualifiedName", "kind"},  # 3.33
+        "suppressions": {"kind", "status", "justification", "location", "properties"},  # 3.35
+        "rules": {
+            "id", "name", "shortDescription", "fullDescription", "help", "defaultConfiguration", "properties",
+        },  # 3.49
+        "toolExecutionNotifications": {"descriptor", "level", "message", "locations"},  # 3.58
+        "message": {"text"},  # 3.11
+    }  # fmt: skip
+
+    def test_only_properties_of_the_standard(self) -> None:
+        seen = set()
+
+        def walk(value, name: str) -> None:
+            for item in value if isinstance(value, list) else [value]:
+                if isinstance(item, dict):
+                    if name in self.OBJECTS:
+                        seen.add(name)
+                        assert item.keys() <= self.OBJECTS[name], name
+                    for key, inner in item.items():
+                        if key != "properties":
+                            walk(inner, key)
+
+        run = sarif()
+        walk(run, "run")
+        assert seen == self.OBJECTS.keys()
+        for result in run["results"]:
+            for value in result["partialFingerprints"].values():
+                assert isinstance(value, str)
+
+    def test_a_file_named_twice_is_one_artifact(self) -> None:
+        twice = (findings(**STATUSES), findings(**STATUSES))
+        assert len(sarif(*twice)["artifacts"]) == 1
+
     def test_levels(self) -> None:
         found = findings(**STATUSES)
         status = {escapes.printable(row.id): row.status for row in found.rows}
