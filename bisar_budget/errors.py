@@ -23,20 +23,24 @@ class Place(int):
     A number for everybody who wants the line; reports for editors and pull requests ask for the region.
     """
 
-    _event: Any  # the YAML parser's
+    _start: Any  # the YAML parser's marks
+    _end: Any
 
     @classmethod
     def of(cls, event: Any) -> "Place":
-        """Place of what the YAML parser saw."""
-        place = cls(event.start_mark.line + 1)
-        place._event = event
+        """Place of what the YAML parser saw; one for every event, since many rows point at the same key."""
+        place: Place | None = getattr(event, "place", None)
+        if place is None:
+            place = event.place = cls(event.start_mark.line + 1)
+            place._start = event.start_mark
+            place._end = None if getattr(event, "value", None) is None else event.end_mark
         return place
 
     @property
     def region(self) -> Region:
         """Start of the value and, for a scalar, its end."""
-        start, end = self._event.start_mark, self._event.end_mark
-        if getattr(self._event, "value", None) is None:
+        start, end = self._start, self._end
+        if end is None:
             return Region(start.line + 1, start.column + 1)
         return Region(start.line + 1, start.column + 1, end.line + 1, end.column + 1)
 
