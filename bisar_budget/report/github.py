@@ -65,9 +65,9 @@ def _region(line: int | None) -> Region | None:
 
 
 def _command(annotation: _Annotation) -> str:
-    properties = {"file": annotation.file}
+    properties = {"file": annotation.file} if annotation.file != "-" else {}
     region = annotation.region
-    if region is not None:
+    if region is not None and properties:  # a line of standard input is no place in a repository
         properties |= {"line": str(region.line)}
         if region.end_line is not None and region.end_line != region.line:
             properties |= {"endLine": str(region.end_line)}  # GitHub takes columns within one line only

@@ -372,6 +372,11 @@ class TestGithub:
         passing = findings(timing_error__constant=0)
         assert render("github", report(passing), Style()) == "bisar-budget: 1 mission, nothing to remark\n"
 
+    def test_standard_input_is_no_place_in_the_repository(self) -> None:
+        for _, properties, message in self.commands(findings(**STATUSES)._replace(file="-")):
+            assert properties.keys() == {"title"}
+            assert message
+
     def test_columns_are_left_out_over_several_lines(self) -> None:
         """GitHub takes a column within one line only."""
         text = mission_text().replace("6 s", "6 s", 1) + 'timing_error: {quadratic: "1e-6\n  1/s"}\n'
