@@ -1,7 +1,7 @@
 """Measure what the project promises about speed, as ratios of medians taken in turn within one run.
 
     python benchmarks/run.py            # all
-    python benchmarks/run.py cold       # one of: cold, gate, evaluators
+    python benchmarks/run.py cold       # one of: cold, gate, formats, evaluators
 
 Absolute times on a shared machine mean little; each figure is measured side by side with its yardstick,
 A B A B …, and the ratio of the medians is what counts. Accuracy stands beside each figure.
@@ -101,6 +101,28 @@ for name in sys.argv[1:]:
                 print(f"    {format_name:5} {a:6.2f} s ÷ {b:6.2f} s = {a / b:.2f}")
 
 
+def formats(runs: int) -> None:
+    """What the reports of a pull request cost on top of the check itself."""
+    sources = [*sorted(MISSION.parent.glob("*.yaml")), ROOT / "tests" / "acceptance" / "good" / "every_key.yaml"]
+    script = str(Path(sys.executable).with_name("bisar-budget"))
+    with tempfile.TemporaryDirectory() as folder:
+        files = []
+        for index in range(100):
+            path = Path(folder) / f"mission_{index:03}.yaml"
+            path.write_text(sources[index % len(sources)].read_text(encoding="utf-8"), encoding="utf-8")
+            files.append(str(path))
+        junit, sarif = (str(Path(folder) / name) for name in ("budget.xml", "budget.sarif"))
+        text, machine = in_turn(
+            runs,
+            process(script, "check", *files),
+            process(script, "check", "--format", "junit", "-o", junit, "--report", sarif, *files),
+        )
+        print("gate over 100 missions to JUnit and SARIF ÷ the same check to text, CPU (at most 1.5)")
+        print(f"  {machine * 1e3:6.0f} ms ÷ {text * 1e3:6.0f} ms = {machine / text:.2f}")
+        sizes = [os.path.getsize(path) / 1e3 for path in (junit, sarif)]
+        print(f"  JUnit {sizes[0]:.0f} kB, SARIF {sizes[1]:.0f} kB")
+
+
 def evaluators(runs: int) -> None:
     import numpy as np
 
@@ -167,7 +189,7 @@ def evaluators(runs: int) -> None:
     print(f"  largest relative difference {error:.1e} ({error / math.ulp(1.0):.1f} last places)")
 
 
-TASKS = {"cold": (cold, 21), "gate": (gate, 5), "evaluators": (evaluators, 11)}
+TASKS = {"cold": (cold, 21), "gate": (gate, 5), "formats": (formats, 11), "evaluators": (evaluators, 11)}
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)

@@ -9,6 +9,7 @@ from datetime import UTC, date, datetime
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
+from click.core import ParameterSource
 
 from bisar_budget import __version__
 from bisar_budget.errors import printable
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from bisar_budget.budget.findings import MissionFindings, Report
     from bisar_budget.budget.verdicts import VerifiedMission
     from bisar_budget.mission.model import Mission
+    from bisar_budget.report import Style
 
 EXIT_BROKEN, EXIT_USAGE, EXIT_OUR_FAULT, EXIT_INTERRUPTED = 1, 2, 3, 130
 
@@ -55,28 +57,81 @@ def cli() -> None:
     """
 
 
-@cli.command()
+class _Gate(click.Command):
+    """A command whose options default to the project's settings; BISAR_BUDGET_… stands above them."""
+
+    def make_context(self, *args: Any, **extra: Any) -> click.Context:
+        try:
+            return super().make_context(*args, default_map=self._defaults(), **extra)
+        except click.BadParameter as error:
+            if error.ctx is not None and error.param is not None and error.param.envvar:
+                source = error.ctx.get_parameter_source(str(error.param.name))
+                if source is ParameterSource.ENVIRONMENT:
+                    error.param_hint = str(error.param.envvar)  # not the option that nobody wrote
+            raise
+
+    def _defaults(self) -> dict[str, Any]:
+        from bisar_budget.settings import TABLE, SettingsError, project_settings
+
+        options = {p.opts[0].removeprefix("--"): p for p in self.params if isinstance(p, click.Option) and p.envvar}
+        known = ["BISAR_BUDGET_DEBUG", *(str(option.envvar) for option in options.values())]
+        for name in os.environ:
+            if name.startswith("BISAR_BUDGET_") and name not in known:
+                raise click.UsageError(f"{printable(name)}: is not a known variable; known: {', '.join(known)}.")
+        try:
+            settings = project_settings(os.getcwd())
+        except SettingsError as error:
+            raise click.UsageError(printable(str(error))) from None
+        except OSError:  # somebody removed the current folder
+            settings = None
+        defaults = {}
+        for key, value in settings.values.items() if settings else ():
+            option = options[key]
+            try:
+                for item in value if isinstance(value, list) else [value]:
+                    option.type.convert(item, option, None)
+                    if key == "report":
+                        _format_of(item)
+            except click.UsageError as error:
+                raise click.UsageError(f"{settings.file}: {TABLE}.{key}: {error.message}") from None  # type: ignore[union-attr]
+            defaults[str(option.name)] = value
+        return defaults
+
+
+@cli.command(cls=_Gate)
 @click.argument("missions", nargs=-1, required=True, metavar="MISSION...")
 @click.option(
     "--format",
     "format_name",
-    type=click.Choice(["text", "json", "csv"]),
+    envvar="BISAR_BUDGET_FORMAT",
+    type=click.Choice(["text", "json", "csv", "junit", "sarif", "github", "needs"]),
     default="text",
     show_default=True,
-    help="Format of the report.",
+    help="Format of the report; github: annotations of a pull request, needs: for Sphinx-Needs.",
 )
 @click.option("-o", "--output", metavar="FILE", help="Write the report to FILE instead of standard output.")
 @click.option(
     "--report",
     "reports",
+    envvar="BISAR_BUDGET_REPORT",
     multiple=True,
     metavar="FILE",
-    help="Also write a report to FILE, in the format of its suffix: .txt, .json or .csv. Repeatable.",
+    help="Also write a report to FILE, in the format of its suffix: .txt, .json, .csv, .xml (JUnit), .sarif "
+    "or .needs.json. Repeatable.",
 )
-@click.option("--strict", is_flag=True, help="Fail on warnings and on rows that could not be evaluated.")
-@click.option("--exit-zero", is_flag=True, help="Exit with 0 even if a requirement is broken.")
+@click.option(
+    "--strict/--no-strict",
+    envvar="BISAR_BUDGET_STRICT",
+    help="Fail on warnings and on rows that could not be evaluated.",
+)
+@click.option(
+    "--exit-zero/--no-exit-zero",
+    envvar="BISAR_BUDGET_EXIT_ZERO",
+    help="Exit with 0 even if a requirement is broken.",
+)
 @click.option(
     "--model",
+    envvar="BISAR_BUDGET_MODEL",
     type=click.Choice(["published", "full", "strictest"]),
     help="Model that gates, over the mission file's.",
 )
@@ -90,7 +145,14 @@ def cli() -> None:
 @click.option("-q", "--quiet", is_flag=True, help="One line per mission.")
 @click.option("-v", "--verbose", is_flag=True, help="Reason, equation, displacement and evidence of every row.")
 @click.option(
+    "--explain",
+    metavar="ID",
+    help="Instead of the report, show how the row ID comes to its status: from the line of the file through "
+    "the equations, with the numbers put in, to the verdict. Exits with 0.",
+)
+@click.option(
     "--color",
+    envvar="BISAR_BUDGET_COLOR",
     type=click.Choice(["auto", "always", "never"]),
     default="auto",
     show_default=True,
@@ -108,30 +170,42 @@ def check(
     verifying: bool,
     quiet: bool,
     verbose: bool,
+    explain: str | None,
     color: str,
 ) -> None:
     """Check mission files against their requirements.
 
     MISSION is a YAML file, a glob pattern, or - for standard input. Exit code: 0 all met,
     1 a requirement is broken, 2 wrong usage or an unusable mission file, 3 a fault of the tool.
+
+    Defaults of --format, --report, --strict, --exit-zero, --model and --color: [tool.bisar-budget] in
+    the nearest pyproject.toml, and over it the variables BISAR_BUDGET_FORMAT and so on.
     """
     from bisar_budget.report import Style, render
 
     written = [(name, _format_of(name)) for name in reports]
     files = _expanded(missions)
     _spare(files, [output, *reports])
+    if explain is not None:
+        given = click.get_current_context().get_parameter_source
+        if any(given(name) is ParameterSource.COMMANDLINE for name in ("format_name", "reports")):
+            raise click.UsageError("--explain writes text: it excludes --format and --report.")
+        _explain(files, explain, today.date() if today else _today(), model, output)
+        return
     report = _checked(files, today.date() if today else _today(), model, verifying)
     if format_name != "text" or output is not None or quiet or not _is_terminal():
         _say_faults(report)
-    verbosity = -1 if quiet else 1 if verbose else 0
+    style = Style(verbosity=-1 if quiet else 1 if verbose else 0, root=_repository())
     for path, its_format in written:
-        _write(path, render(its_format, report, Style(verbosity=verbosity)))
+        _write(path, render(its_format, report, style))
     use_color = color == "always" or (color == "auto" and output is None and _wants_color())
-    text = render(format_name, report, Style(color=use_color, verbosity=verbosity))
+    text = render(format_name, report, style._replace(color=use_color))
     if output is None:
         _print(text)
     else:
         _write(output, text)
+    if format_name == "github":
+        _append_step_summary(report, style)
     code = report.exit_code(strict)
     sys.exit(0 if exit_zero and code == EXIT_BROKEN else code)
 
@@ -165,7 +239,33 @@ def _checked(files: Sequence[str], today: date, model: str | None, verifying: bo
     return Report(version=__version__, missions=tuple(missions))
 
 
-def _loaded(files: Sequence[str]) -> "list[Mission]":
+def _explain(files: Sequence[str], row_id: str, today: date, model: str | None, output: str | None) -> None:
+    """Explain a row in every mission that has it."""
+    from bisar_budget.budget.check import check_mission
+    from bisar_budget.mission.readers import did_you_mean
+    from bisar_budget.report.explanation import explain
+
+    texts: list[str] = []
+    known: dict[str, None] = {}
+    for mission in _loaded(files, model):
+        found = check_mission(mission, today)
+        known |= dict.fromkeys(row.id for row in found.rows)
+        if any(row.id == row_id for row in found.rows):
+            texts.append(explain(mission, found, row_id))
+    if not texts:
+        hint = did_you_mean(row_id, tuple(known))
+        raise click.UsageError(f"--explain {printable(row_id)}: no row has this id. {hint or 'A check lists them.'}")
+    _deliver("\n".join(texts), output)
+
+
+def _deliver(text: str, output: str | None) -> None:
+    if output is None:
+        _print(text)
+    else:
+        _write(output, text)
+
+
+def _loaded(files: Sequence[str], model: str | None = None) -> "list[Mission]":
     """Load every mission, or say every fault of every file and exit."""
     from bisar_budget.errors import MissionError
     from bisar_budget.mission.load import load_mission
@@ -173,7 +273,7 @@ def _loaded(files: Sequence[str]) -> "list[Mission]":
     loaded, is_usable = [], True
     for file in files:
         try:
-            loaded.append(load_mission(file))
+            loaded.append(load_mission(file, model))
         except MissionError as error:
             is_usable = False
             for line in error.lines():
@@ -207,12 +307,34 @@ def _today() -> date:
 
 
 def _format_of(name: str) -> str:
-    from bisar_budget.report import SUFFIXES
+    from bisar_budget.report import SUFFIXES, format_of
 
-    suffix = os.path.splitext(name)[1].lower()
-    if suffix not in SUFFIXES:
+    format_name = format_of(name)
+    if format_name is None:
         raise click.UsageError(f"--report {name}: the suffix must be one of {', '.join(SUFFIXES)}")
-    return SUFFIXES[suffix]
+    return format_name
+
+
+def _repository() -> str:
+    """Folder that reports name files from: GitHub's checkout, else the current folder."""
+    with suppress(OSError):  # somebody removed it under us
+        return os.path.abspath(os.environ.get("GITHUB_WORKSPACE") or os.getcwd())
+    return ""
+
+
+def _append_step_summary(report: "Report", style: "Style") -> None:
+    """Add to the page of the run on GitHub; that it cannot be written changes no exit code."""
+    path = os.environ.get("GITHUB_STEP_SUMMARY")
+    if not path:
+        return
+    from bisar_budget.report.github import step_summary
+
+    try:
+        with open(path, "a", encoding="utf-8", errors="backslashreplace", newline="\n") as file:
+            file.write(step_summary(report, style))
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        _complain(f"Warning: cannot write the step summary {printable(path)}: {reason}")
 
 
 def _say_faults(report: "Report") -> None:
@@ -310,6 +432,96 @@ def _write(path: str, text: str) -> None:
 def _fail(message: str) -> NoReturn:
     _complain(f"Error: {printable(message)}")
     sys.exit(EXIT_USAGE)
+
+
+class _Part(click.ParamType[float]):
+    """A part of something: `10%` or 0.1."""
+
+    name = "percent"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        from bisar_budget.errors import InvalidValueError
+        from bisar_budget.units import RATIO, parse_quantity
+
+        try:
+            part = parse_quantity(value, RATIO)
+        except InvalidValueError:
+            part = -1.0
+        if not 0 <= part <= 1:
+            self.fail(f"{printable(str(value))}: must be 0% to 100%, such as 10% or 0.1.", param, ctx)
+        return part
+
+
+@cli.command()
+@click.argument("files", nargs=-1, required=True, metavar="OLD NEW | MISSION...")
+@click.option("--base", metavar="REV", help="Compare each MISSION with itself in this git revision.")
+@click.option(
+    "--fail-on-erosion",
+    "tolerated",
+    type=_Part(),
+    metavar="PERCENT",
+    help="Exit with 1 if a row fails that did not, or uses up more than this part of what was left of its limit.",
+)
+@click.option(
+    "--format",
+    "format_name",
+    type=click.Choice(["text", "markdown", "json"]),
+    default="text",
+    show_default=True,
+    help="Format of the comparison.",
+)
+@click.option("-o", "--output", metavar="FILE", help="Write to FILE instead of standard output.")
+@click.option(
+    "--date",
+    "today",
+    type=click.DateTime(["%Y-%m-%d"]),
+    help="Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC).",
+)
+def diff(
+    files: Sequence[str],
+    base: str | None,
+    tolerated: float | None,
+    format_name: str,
+    output: str | None,
+    today: datetime | None,
+) -> None:
+    """Compare the findings of two mission files, or of one before and after a change.
+
+    Rows are sorted by erosion: the part of what was left of a limit that the change uses up, (u2 - u1)/(1 - u1)
+    with the utilizations before and after. Exit code: 0, or 1 with --fail-on-erosion, 2 for wrong usage,
+    an unusable file or an unknown revision.
+    """
+    from bisar_budget.budget.check import check_mission
+    from bisar_budget.errors import MissionError
+    from bisar_budget.mission.load import load_mission, parse_mission
+    from bisar_budget.mission.revision import RevisionError, file_at
+    from bisar_budget.report import difference
+    from bisar_budget.report.comparison import compare
+
+    if base is None and len(files) != 2:
+        raise click.UsageError("give two mission files, OLD and NEW, or mission files and --base REV.")
+    _spare(files, [output])
+    day = today.date() if today else _today()
+    pairs = [(files[0], files[1])] if base is None else [(file, file) for file in _expanded(files)]
+    changes = []
+    for before, after in pairs:
+        try:
+            old = load_mission(before) if base is None else parse_mission(file_at(before, base), f"{base}:{before}")
+            new = load_mission(after)
+        except RevisionError as error:
+            _fail(str(error))
+        except MissionError as error:
+            for line in error.lines():
+                _complain(line)
+            sys.exit(EXIT_USAGE)
+        changes.append(compare(check_mission(old, day), check_mission(new, day)))
+    if format_name == "json":
+        text = difference.as_json(__version__, changes, tolerated)
+    else:
+        text = (difference.as_text if format_name == "text" else difference.as_markdown)(changes, tolerated)
+    _deliver(text, output)
+    is_refused = tolerated is not None and any(change.broken(tolerated) for change in changes)
+    sys.exit(EXIT_BROKEN if is_refused else 0)
 
 
 @cli.command()

@@ -1,8 +1,48 @@
 """What goes wrong with input, said so that it can be mended: where, what, the value given, what is accepted."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 KeyPath = tuple[str | int, ...]
+
+
+class Region(NamedTuple):
+    """Where a value stands, counted from 1 in characters; `end_column` is the one behind its last.
+
+    The ends are None for a mapping or a list: it is pointed at, not spanned.
+    """
+
+    line: int
+    column: int
+    end_line: int | None = None
+    end_column: int | None = None
+
+
+class Place(int):
+    """Line of a value in a file, from 1, which also knows where on the line the value stands.
+
+    A number for everybody who wants the line; reports for editors and pull requests ask for the region.
+    """
+
+    _start: Any  # the YAML parser's marks
+    _end: Any
+
+    @classmethod
+    def of(cls, event: Any) -> "Place":
+        """Place of what the YAML parser saw; one for every event, since many rows point at the same key."""
+        place: Place | None = getattr(event, "place", None)
+        if place is None:
+            place = event.place = cls(event.start_mark.line + 1)
+            place._start = event.start_mark
+            place._end = None if getattr(event, "value", None) is None else event.end_mark
+        return place
+
+    @property
+    def region(self) -> Region:
+        """Start of the value and, for a scalar, its end."""
+        start, end = self._start, self._end
+        if end is None:
+            return Region(start.line + 1, start.column + 1)
+        return Region(start.line + 1, start.column + 1, end.line + 1, end.column + 1)
 
 
 def printable(text: str) -> str:

@@ -103,7 +103,7 @@ class _UnusableError(Exception):
 
 
 class _Tree:
-    """What the file says: nested dict, list and str, with the parser's mark of every key and value.
+    """What the file says: nested dict, list and str, with the parser's event of every key and value.
 
     What cannot be read is reported and stands in the tree as `INVALID`.
     """
@@ -111,7 +111,7 @@ class _Tree:
     def __init__(self) -> None:
         self.root: Any = INVALID
         self.keys: dict[KeyPath, Any] = {}
-        self.values: dict[KeyPath, Any] = {}
+        self.values: dict[KeyPath, Any] = {}  # events, which hold the marks of start and end
         self.faults: list[Fault] = []
 
     def fault(self, mark: Any, path: KeyPath, problem: str, **more: str) -> None:
@@ -130,11 +130,12 @@ class _Tree:
                 value = None
                 break
         is_key = value is None or problem.problem == "is not a known key"
-        mark = (self.keys if is_key else self.values).get(path)
+        place = (self.keys if is_key else self.values).get(path)
         for length in range(len(path) - 1, 0, -1):
-            if mark is not None:
+            if place is not None:
                 break
-            mark = self.keys.get(path[:length]) or self.values.get(path[:length])
+            place = self.keys.get(path[:length]) or self.values.get(path[:length])
+        mark = None if place is None else place.start_mark
         given = _shown(value) if isinstance(value, str) and not is_key else ""
         self.fault(mark, path, problem.problem, given=given, accepted=problem.accepted, hint=problem.hint)
 
@@ -151,7 +152,8 @@ class _Tree:
 
     def _node(self, next_event: Callable[[], Any], event: Any, path: KeyPath) -> Any:
         """Read one value; the depth of the recursion is bounded by `MAX_DEPTH`."""
-        mark = self.values[path] = event.start_mark
+        self.values[path] = event
+        mark = event.start_mark
         kind = type(event)
         if kind is ScalarEvent:
             value: Any = event.value
@@ -185,15 +187,15 @@ class _Tree:
             key = event.value
             here = (*path, key)
             if key in mapping:
-                first = self.keys[here].line + 1
+                first = self.keys[here].start_mark.line + 1
                 problem = f"is a duplicate key; the first is in line {first}"
                 self.fault(mark, here, problem, accepted="each key once")
                 self._node(next_event, next_event(), (*path, f"{key} (again)"))
                 continue
-            self.keys[here] = mark
+            self.keys[here] = event
             event = next_event()
             if type(event) is ScalarEvent and event.tag is None and event.value not in _NULLS:
-                self.values[here] = event.start_mark  # as `_node` would: most values are such
+                self.values[here] = event  # as `_node` would: most values are such
                 mapping[key] = event.value
             else:
                 mapping[key] = self._node(next_event, event, here)

@@ -8,7 +8,7 @@ from typing import Annotated, Any, NamedTuple
 
 from bisar_budget import units
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.errors import KeyPath, Problem
+from bisar_budget.errors import KeyPath, Place, Problem
 from bisar_budget.geometry import (
     STRAIGHT,
     BistaticGeometry,
@@ -384,7 +384,7 @@ class Waiver(NamedTuple):
 class Mission(NamedTuple):
     """A mission file that can be used.
 
-    `file` and `places` say where it stands: the path of each value to the parser's mark.
+    `file` and `places` say where it stands: the path of each value to the parser's event.
     """
 
     schema_version: Annotated[int, Key(Version())]
@@ -425,7 +425,7 @@ class Mission(NamedTuple):
         """Both platforms in the frame of the scene."""
         return _geometry(self.platforms)
 
-    def line(self, path: KeyPath) -> int | None:
+    def line(self, path: KeyPath) -> Place | None:
         """Line of a value in the mission file, from 1, else of the nearest key above it that exists.
 
         At last that is the file's first key; None for a mission that came from no file.
@@ -433,8 +433,8 @@ class Mission(NamedTuple):
         places = self.places
         while path and path not in places:
             path = path[:-1]
-        place = places.get(path)
-        return None if place is None else int(place.line) + 1
+        event = places.get(path)
+        return None if event is None else Place.of(event)
 
 
 @lru_cache(maxsize=4)  # asked for when a mission is read and again when it is checked

@@ -5,6 +5,7 @@ import io
 from collections.abc import Iterator
 
 from bisar_budget.budget.findings import MissionFindings, Report, UnusableMission
+from bisar_budget.errors import printable
 from bisar_budget.report import Style
 
 COLUMNS = (
@@ -90,4 +91,5 @@ def _rows(mission: MissionFindings) -> Iterator[list[object]]:
 
 def _text(value: str | None) -> str | None:
     """Keep text of the user's own from being run: a spreadsheet takes what starts like a formula for one."""
-    return f"'{value}" if value and value != "-" and value[0] in "=+-@\t\r" else value
+    value = printable(value) if value else value
+    return f"'{value}" if value and value != "-" and value[0] in "=+-@" else value

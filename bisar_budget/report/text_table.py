@@ -143,6 +143,8 @@ def _row(row: Row, style: Style) -> list[str]:
         lines = [f"{WORDS[status]:<8} {row.id}", _cells("", "", declared, allowable, use, reference)]
     if style.color:
         lines[0] = _word(status, style, 8) + lines[0][8:]
+    if row.requirement_id and status not in _EXPLAINED and style.verbosity < 1:
+        lines.append(f"{'':<8} [{row.requirement_id}]")  # the others have it with their reason
     return lines
 
 
@@ -200,7 +202,7 @@ def _details(row: Row, mission: MissionFindings, style: Style) -> list[str]:
 def _asides(mission: MissionFindings, style: Style) -> Iterator[str]:
     for warning in mission.warnings:
         place = f"{printable(mission.file)}:{warning.line}: " if warning.line is not None else ""
-        yield f"warning: {place}{warning.message}"
+        yield f"warning: {place}{printable(warning.message)}"
     if style.verbosity > 0:
         yield from (f"note: {note}" for note in mission.notes)
 

@@ -284,7 +284,7 @@ def test_version(run) -> None:
     assert __version__ in run("--version").stdout
 
 
-@pytest.mark.parametrize("command", [[], ["check"], ["derive"], ["init"], ["schema"]])
+@pytest.mark.parametrize("command", [[], ["check"], ["derive"], ["diff"], ["init"], ["schema"]])
 def test_help_fits_the_terminal(run, command) -> None:
     result = run(*command, "--help", terminal_width=80)
     assert result.exit_code == 0

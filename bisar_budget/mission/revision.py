@@ -1,0 +1,47 @@
+"""A mission file as it stood in a git revision."""
+
+import os
+from subprocess import DEVNULL, PIPE, run
+
+from bisar_budget.errors import printable
+
+
+class RevisionError(Exception):
+    """No such file in no such revision, or no repository; the message says which."""
+
+
+def file_at(path: str, revision: str) -> bytes:
+    """Content of a file as committed in `revision`: a branch, tag or commit.
+
+    Raises
+    ------
+    RevisionError
+        Git is not there, the file is in no repository, the revision is unknown or has no such file.
+    """
+    folder, name = os.path.split(os.path.abspath(path))
+    if not os.path.isdir(folder):
+        raise RevisionError(f"{path}: there is no folder {folder}")
+    if not _git(folder, "rev-parse", "--git-dir")[0]:
+        raise RevisionError(f"{path} is in no git repository")
+    # What starts with a dash would be an option to git.
+    is_known, commit = (
+        (False, b"")
+        if revision.startswith("-")
+        else _git(folder, "rev-parse", "--verify", "--quiet", f"{revision}^{{commit}}")
+    )
+    if not is_known:
+        raise RevisionError(f"the repository of {path} has no revision {printable(revision)}")
+    is_there, content = _git(folder, "cat-file", "blob", f"{commit.decode().strip()}:./{name}")
+    if not is_there:
+        raise RevisionError(f"{path} is not in revision {printable(revision)}")
+    return content
+
+
+def _git(folder: str, *arguments: str) -> tuple[bool, bytes]:
+    try:
+        done = run(["git", "-C", folder, *arguments], stdin=DEVNULL, stdout=PIPE, stderr=DEVNULL, check=False)
+    except OSError:
+        raise RevisionError("git cannot be run; --base needs it") from None
+    except ValueError:  # a NUL in the name
+        return False, b""
+    return done.returncode == 0, done.stdout

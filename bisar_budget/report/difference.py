@@ -1,0 +1,123 @@
+"""What a change does to missions, as text, Markdown or JSON `bisar-budget/diff/1`."""
+
+import json
+from collections.abc import Sequence
+from typing import Any
+
+from bisar_budget.budget.findings import Row
+from bisar_budget.errors import printable
+from bisar_budget.report.comparison import Change, MissionChange
+from bisar_budget.report.escapes import markdown_text
+from bisar_budget.report.text_table import WORDS, percent
+from bisar_budget.units import format_quantity
+
+FORMAT = "bisar-budget/diff/1"
+
+
+def as_text(missions: Sequence[MissionChange], tolerated: float | None) -> str:
+    """Write a table per mission, the largest erosion first, and one summary line each."""
+    return "\n\n".join("\n".join(_text(mission, tolerated)) for mission in missions) + "\n"
+
+
+def _text(mission: MissionChange, tolerated: float | None) -> list[str]:
+    lines = [printable(f"{mission.before.file} -> {mission.after.file}"), ""]
+    if mission.changes:
+        lines.append(_cells("row", "before", "after", "erosion", "status"))
+        for change in mission.changes:
+            numbers = (_use(change.before), _use(change.after), _erosion(change), _statuses(change))
+            name = printable(change.id)
+            lines += [_cells(name, *numbers)] if len(name) <= 34 else [name, _cells("", *numbers)]
+        lines.append("")
+    return [*lines, _summary(mission, tolerated)]
+
+
+def _cells(row: str, before: str, after: str, erosion: str, status: str) -> str:
+    return f"{row:<34} {before:>8} {after:>8} {erosion:>8}  {status}".rstrip()
+
+
+def _use(row: Row | None) -> str:
+    return "-" if row is None or row.utilization is None else percent(row.utilization)
+
+
+def _erosion(change: Change) -> str:
+    sign = "-" if change.erosion < 0 else ""
+    return sign + percent(abs(change.erosion))
+
+
+def _statuses(change: Change) -> str:
+    before, after = ("-" if row is None else WORDS[row.status] for row in (change.before, change.after))
+    return after if before == after else f"{before} -> {after}"
+
+
+def _summary(mission: MissionChange, tolerated: float | None) -> str:
+    newly = sum(change.is_newly_failing for change in mission.changes)
+    text = f"{len(mission.changes)} rows changed, {mission.unchanged} not, {newly} newly failing"
+    if tolerated is not None:
+        refused = len(mission.broken(tolerated))
+        text += f"; {refused} refused (newly failing, or erosion above {percent(tolerated)})"
+    return text
+
+
+def as_markdown(missions: Sequence[MissionChange], tolerated: float | None) -> str:
+    """Write the same for the comment of a pull request, with declared and allowable values."""
+    lines: list[str] = []
+    for mission in missions:
+        lines += [f"### {markdown_text(mission.after.file)}: {_summary(mission, tolerated)}", ""]
+        if mission.changes:
+            lines.append("| row | declared | allowable | use before | use after | erosion | status |")
+            lines.append("| --- | --- | --- | --- | --- | --- | --- |")
+        for change in mission.changes:
+            cells = (
+                markdown_text(change.id),
+                _values(change, "declared"),
+                _values(change, "allowable"),
+                _use(change.before),
+                _use(change.after),
+                _erosion(change),
+                _statuses(change).replace("->", "→"),
+            )
+            lines.append(f"| {' | '.join(cells)} |")
+        lines += [""] if mission.changes else []
+    return "\n".join(lines).rstrip("\n") + "\n"
+
+
+def _values(change: Change, field: str) -> str:
+    texts = []
+    for row in (change.before, change.after):
+        value = getattr(row, field, None)
+        rounding = "down" if field == "allowable" else "nearest"
+        texts.append("-" if row is None or value is None else format_quantity(value, row.unit, 3, rounding))
+    return texts[0] if texts[0] == texts[1] else " → ".join(texts)
+
+
+def as_json(version: str, missions: Sequence[MissionChange], tolerated: float | None) -> str:
+    """Write the contract; keys may be added, never changed or removed."""
+    document = {
+        "format": FORMAT,
+        "version": version,
+        "tolerated_erosion": tolerated,
+        "missions": [
+            {
+                "before": {"file": mission.before.file, "status": mission.before.status},
+                "after": {"file": mission.after.file, "status": mission.after.status},
+                "unchanged": mission.unchanged,
+                "rows": [_document(change, tolerated) for change in mission.changes],
+            }
+            for mission in missions
+        ],
+    }
+    return json.dumps(document, indent=2, allow_nan=False) + "\n"
+
+
+def _document(change: Change, tolerated: float | None) -> dict[str, Any]:
+    keys = ("status", "declared", "allowable", "utilization", "margin", "line", "requirement_id")
+    return {
+        "id": change.id,
+        "erosion": change.erosion,
+        "is_newly_failing": change.is_newly_failing,
+        "is_refused": tolerated is not None and change.breaks(tolerated),
+        **{
+            name: None if row is None else {key: getattr(row, key) for key in keys}
+            for name, row in (("before", change.before), ("after", change.after))
+        },
+    }

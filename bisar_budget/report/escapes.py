@@ -1,0 +1,66 @@
+"""Text of the user's own, made harmless in each language that a report is written in.
+
+Every function first takes out what is not printable (controls, line ends, marks that turn the reading
+direction, halves of characters from file names that are not UTF-8), then what the language would read as its own.
+"""
+
+import os
+import re
+from urllib.parse import quote
+
+from bisar_budget.errors import printable
+
+_XML = {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "'": "&apos;"}
+_XML_SPECIAL = re.compile("[&<>\"']")
+# What can mean something in Markdown or in the HTML within it, at least at the start of a line.
+_MARKDOWN_SPECIAL = re.compile(r"[\\`*_{}\[\]<>()#|&~!@:$^]")
+
+
+def xml_text(text: str) -> str:
+    """Escape for XML, elements and attributes alike; characters that XML does not have cannot occur."""
+    text = printable(text)
+    return _XML_SPECIAL.sub(lambda match: _XML[match[0]], text) if _XML_SPECIAL.search(text) else text
+
+
+def markdown_text(text: str) -> str:
+    """Escape for Markdown, also within a table: a character reference is text everywhere."""
+    return _MARKDOWN_SPECIAL.sub(lambda match: f"&#{ord(match[0])};", printable(text))
+
+
+def command_text(text: str) -> str:
+    """Escape the message of a workflow command of GitHub's runner."""
+    return printable(text).replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+
+
+def command_property(text: str) -> str:
+    """Escape a property of a workflow command, which also ends at a colon or a comma."""
+    return command_text(text).replace(":", "%3A").replace(",", "%2C")
+
+
+def rst_text(text: str) -> str:
+    """Escape for one line of reStructuredText: any punctuation can mean something there."""
+    return re.sub(r"([!-/:-@\[-`{-~])", r"\\\1", printable(text))
+
+
+def need_text(text: str) -> str:
+    """Keep a field of a need from being run: Sphinx-Needs calls `[[function()]]` and looks up `<<variant>>`."""
+    return printable(text).replace("[[", "[ [").replace("<<", "< <")
+
+
+def uri(path: str) -> str:
+    """Percent-encode a path with forward slashes; an absolute one becomes a `file` URI."""
+    encoded = quote(os.fsencode(path), safe="/")
+    return f"file:///{encoded.lstrip('/')}" if os.path.isabs(path) else encoded
+
+
+def source_path(file: str, root: str) -> str:
+    """Path of a mission file as a repository knows it: below `root`, with forward slashes.
+
+    Outside of it the path is absolute; without a root it stays as given.
+    """
+    if root:
+        file = os.path.abspath(file)
+        below = os.path.join(root, "")
+        if file.startswith(below):
+            file = file[len(below) :]
+    return file.replace(os.sep, "/")

@@ -1,0 +1,215 @@
+"""The first half of an explanation: one error, from its line in the mission file to what it does to the image."""
+
+import math
+from collections.abc import Iterator, Mapping
+
+from bisar_budget.budget.findings import MissionFindings
+from bisar_budget.budget.sources import MOTION_UNITS, Effect, ErrorSource, ImagePlane, full_ground, image_plane
+from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.errors import KeyPath, printable
+from bisar_budget.geometry import FRAME_AXES, PlatformState
+from bisar_budget.mission.model import Mission
+from bisar_budget.report import formulas
+from bisar_budget.report.formulas import equation, number, step, with_unit
+
+_RATES = ("m", "m/s", "m/s²", "m/s³")  # units of the range error's coefficients
+
+
+def declaration(mission: Mission, source: ErrorSource) -> Iterator[str]:
+    """From the file to `declared`: where it stands, frame, coverage factor."""
+    if source.declared is None:
+        yield missing(mission, source.path)
+        return
+    yield from step(f"Declared in {place(mission, source.path)}", as_written(mission, source.path))
+    if source.evidence:
+        yield from step("Evidence", printable(source.evidence))
+    platform, kind, axis = (*source.id.split(".", 2), "")[:3]
+    k = mission.allocation.coverage_factor
+    if kind in MOTION_UNITS and platform in ("transmitter", "receiver"):
+        error = getattr(mission.platforms, platform).motion_error
+        stated = getattr(error, kind)
+        if error.frame != "scene" and axis in formulas.AXES:
+            yield from _turned(mission, source, axis)
+            return
+        own = stated[FRAME_AXES[error.frame].index(axis)]
+    elif source.owner == "clock":
+        own = getattr(mission.timing_error, kind)
+    else:
+        return  # an error of nobody's: no coverage factor
+    lines = equation("declared", "k*|value|", {"k": k, "value": own}, abs(source.declared), source.unit)
+    yield from step("Coverage factor allocation.coverage_factor", *lines)
+
+
+def _turned(mission: Mission, source: ErrorSource, axis: str) -> Iterator[str]:
+    """Errors of another frame along one axis of the scene."""
+    platform, kind, _ = source.id.split(".")
+    error = getattr(mission.platforms, platform).motion_error
+    axes = getattr(mission.platforms, platform).state.frame(error.frame)
+    k = mission.allocation.coverage_factor
+    parts = [
+        f"{number(k * value)}*{number(direction[formulas.AXES.index(axis)])}"
+        for value, direction in zip(getattr(error, kind), axes, strict=True)
+    ]
+    if error.distribution == "normal":
+        text = "sqrt(" + " + ".join(f"({part})^2" for part in parts) + ")"
+        how = "one-sigma values turn like a covariance"
+    else:
+        text = " + ".join(f"|{part}|" for part in parts)
+        how = "bounds add as magnitudes"
+    title = f"Along {axis} from the {error.frame} frame ({', '.join(FRAME_AXES[error.frame])}): {how}"
+    yield from step(title, f"declared = {text} = {with_unit(abs(source.declared or 0.0), source.unit)}")
+
+
+def effect(
+    mission: Mission, found: MissionFindings, source: ErrorSource, sources: Mapping[str, ErrorSource]
+) -> Iterator[str]:
+    """From `declared` to the quadratic phase error; for one unit where nothing is declared."""
+    size = 1.0 if source.declared is None else abs(source.declared)
+    each = " of one unit" if source.declared is None else ""
+    qpe = abs(source.effect.qpe) * size
+    platform, kind, axis = (*source.id.split(".", 2), "")[:3]
+    if not source.is_motion:
+        yield from step("Quadratic phase error, as declared", f"QPE = {size:.6g} rad")
+    elif source.owner == "mission":
+        yield from step("Published model: a height error moves the image, no quadratic term")
+    elif source.owner == "clock":
+        yield from _clock_effect(mission, source, size, each)
+    elif axis in formulas.AXES:
+        state = getattr(found.geometry, platform)
+        values = _motion_values(mission, state, platform, kind, axis, size)
+        coefficients = (source.effect.constant, source.effect.linear)
+        for order, formula in formulas.motion_coefficients(kind, axis, platform).items():
+            result = coefficients[order] * size if order < 2 else _coefficient(mission, source, order) * size
+            yield from step(
+                f"Table I row {2 + 3 * formulas.AXES.index(axis) + list(MOTION_UNITS).index(kind)}{each}",
+                *equation(f"β̃_{order}", formula, values, result, _RATES[order]),
+            )
+        phase = formulas.motion_phase(kind, axis, platform)
+        if phase is not None:
+            yield from step(f"{source.equation}{each}", *equation("QPE", phase, values, qpe, "rad"))
+    else:
+        yield from _projected_effect(mission, found, source, sources, size, each)
+    if source.is_motion:
+        yield from _full(source, size, each)
+        yield from _displacement(mission, found, source)
+
+
+def _coefficient(mission: Mission, source: ErrorSource, order: int) -> float:
+    """β̃₂ or β̃₃ of one unit, from its phase at the aperture edge (2π/λ)·β·(T/2)ⁿ."""
+    phase = source.effect.qpe if order == 2 else source.effect.cubic
+    return phase * mission.radar.wavelength / (2 * math.pi * (mission.collection.aperture_time / 2) ** order)
+
+
+def _motion_values(
+    mission: Mission, state: PlatformState, platform: str, kind: str, axis: str, size: float
+) -> dict[str, float]:
+    index, s = formulas.AXES.index(axis), platform[0]
+    return {
+        "T": mission.collection.aperture_time,
+        "λ": mission.radar.wavelength,
+        f"R_{s}": state.slant_range,
+        f"{axis}_{s}": state.position[index],
+        f"v_{axis}{s}": state.velocity[index],
+        formulas.motion_symbol(kind, axis, platform): size,
+    }
+
+
+def _clock_effect(mission: Mission, source: ErrorSource, size: float, each: str) -> Iterator[str]:
+    order = ("constant", "linear", "quadratic", "cubic").index(source.id.split(".")[1])
+    values = {
+        "c": SPEED_OF_LIGHT,
+        "T": mission.collection.aperture_time,
+        "f_0": mission.radar.center_frequency,
+        f"t̃_{order}": size,
+    }
+    result = SPEED_OF_LIGHT * size
+    lines = equation(f"β̃_{order}", formulas.clock_coefficient(order), values, result, _RATES[order])
+    yield from step(f"Table I row 1{each}", *lines)
+    if order == 2:
+        qpe = abs(source.effect.qpe) * size
+        yield from step(f"{source.equation}{each}", *equation("QPE", formulas.CLOCK_PHASE, values, qpe, "rad"))
+
+
+def _projected_effect(
+    mission: Mission,
+    found: MissionFindings,
+    source: ErrorSource,
+    sources: Mapping[str, ErrorSource],
+    size: float,
+    each: str,
+) -> Iterator[str]:
+    """Along an axis of another frame: the projection of the effects along the axes of the scene."""
+    platform, kind, axis = source.id.split(".")
+    state: PlatformState = getattr(found.geometry, platform)
+    frame = getattr(mission.platforms, platform).motion_error.frame
+    direction = state.frame(frame)[FRAME_AXES[frame].index(axis)]
+    along = [sources[f"{platform}.{kind}.{letter}"].effect.qpe for letter in formulas.AXES]
+    terms = " + ".join(f"{number(q)}*{number(d)}" for q, d in zip(along, direction, strict=True))
+    unit = f"rad per {source.unit}"
+    yield from step(
+        f"{source.equation}, {unit.replace('^2', '²')} along x, y, z times the {axis} axis",
+        f"QPE/unit = |{terms}| = {with_unit(abs(source.effect.qpe), unit)}",
+    )
+    values = {"QPE/unit": abs(source.effect.qpe), "declared": size}
+    qpe = abs(source.effect.qpe) * size
+    yield from step(f"Quadratic phase error{each}", *equation("QPE", "QPE/unit*declared", values, qpe, "rad"))
+
+
+def _full(source: ErrorSource, size: float, each: str) -> Iterator[str]:
+    """What the full model makes of it, signed as declared."""
+    size = math.copysign(size, source.declared or 1.0)
+    moved = source.full.moved * size
+    values = {"φ_turning": source.full.qpe * size - moved, "φ_displaced": moved}
+    title = f"Full model{each}: phase as the line of sight turns, and what the displaced response adds"
+    yield from step(title, *equation("QPE_full", "φ_turning + φ_displaced", values, source.full.qpe * size, "rad"))
+
+
+def plane_and_effect(mission: Mission, found: MissionFindings, source: ErrorSource) -> tuple[ImagePlane, Effect, str]:
+    """Image plane and effect of the model that says where the image goes, and its name."""
+    if mission.allocation.model == "published":
+        return image_plane(found.geometry), source.effect, "(25), (30)"
+    return full_ground(mission, found.geometry).plane, source.full, "Full model"
+
+
+def _displacement(mission: Mission, found: MissionFindings, source: ErrorSource) -> Iterator[str]:
+    plane, by_model, title = plane_and_effect(mission, found, source)
+    if plane.degeneracy or source.declared is None:
+        return
+    moved = plane.displacement(by_model, source.declared)
+    if moved is None or moved == (0.0, 0.0):
+        return
+    values = {
+        "β̃_0": by_model.constant * source.declared,
+        "β̃_1": by_model.linear * source.declared,
+        "det Q": plane.determinant,
+    }
+    lines: list[str] = []
+    for symbol, (first, second), result in zip(("x̃", "ỹ"), plane.adjugate, moved, strict=True):
+        entries = {"adj_0": first, "adj_1": second}
+        lines += equation(symbol, "(adj_0*β̃_0 + adj_1*β̃_1)/(det Q)", values | entries, result, "m")
+    yield from step(f"{title}: the image moves east, north by", *lines)
+
+
+def place(mission: Mission, path: KeyPath) -> str:
+    """File, line and column of a value, else of the nearest key above it."""
+    line = mission.line(path)
+    file = printable(mission.file)
+    return file if line is None else f"{file}:{line.region.line}:{line.region.column}"
+
+
+def missing(mission: Mission, path: KeyPath) -> str:
+    """Say that the file is silent."""
+    return f"Not declared: no {dotted(path)} (the nearest key is at {place(mission, path)})"
+
+
+def as_written(mission: Mission, path: KeyPath) -> str:
+    """Key and text of the value, or of the nearest one above it that stands in the file."""
+    while path and path not in mission.places:
+        path = path[:-1]
+    written = getattr(mission.places.get(path), "value", None)
+    return f"{dotted(path)}: {printable(written)}" if written is not None else dotted(path)
+
+
+def dotted(path: KeyPath) -> str:
+    """Path of keys as it is written in messages."""
+    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".")

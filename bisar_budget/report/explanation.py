@@ -1,0 +1,192 @@
+"""How a row comes to its status: from the line of the mission file through the equations to the verdict."""
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+
+from bisar_budget.budget.allocation import Allocation
+from bisar_budget.budget.findings import MissionFindings, Row
+from bisar_budget.budget.sources import ErrorSource, error_sources
+from bisar_budget.errors import KeyPath, printable
+from bisar_budget.mission.model import Mission
+from bisar_budget.report import formulas
+from bisar_budget.report.explained_error import as_written, declaration, effect, missing, place, plane_and_effect
+from bisar_budget.report.formulas import equation, number, step
+from bisar_budget.report.text_table import WORDS, percent
+from bisar_budget.units import format_quantity
+
+_RULES = {"each": "the largest", "sum": "the sum", "rss": "the root-sum-square"}
+
+
+def explain(mission: Mission, found: MissionFindings, row_id: str) -> str:
+    """Write the chain of equations of one row of a mission, with the numbers put in.
+
+    Parameters
+    ----------
+    mission : Mission
+        As loaded.
+    found : MissionFindings
+        What the check of it found.
+    row_id : str
+        Id of one of its rows.
+    """
+    row = next(row for row in found.rows if row.id == row_id)
+    own_id = f" [{printable(row.requirement_id)}]" if row.requirement_id else ""
+    lines = [f"{WORDS[row.status]} {printable(row.id)}{own_id} of {printable(mission.name)}", ""]
+    sources = {source.id: source for source in error_sources(mission, found.geometry)}
+    source = sources.get(row.id)
+    if source is not None:
+        lines += declaration(mission, source)
+        lines += effect(mission, found, source, sources)
+        lines += _budget(found.allocation, source.owner, source.by(mission.allocation.model).qpe, row)
+    elif ".vibration." in row.id:
+        lines += _vibration(mission, found.allocation, row)
+    elif row.id.endswith(".quadratic_phase_error") or row.id == "mission.autofocus_pull_in":
+        lines += _phase_aggregate(found, row, sources.values())
+    elif row.id == "mission.cubic_phase_error":
+        lines += _cubic_aggregate(found, row, sources.values())
+    elif row.id == "mission.location_error":
+        lines += _location_aggregate(mission, found, row, sources.values())
+    lines += _verdict(row)
+    return "\n".join(lines) + "\n"
+
+
+def _budget(allocation: Allocation, owner: str, qpe_per_unit: float, row: Row) -> Iterator[str]:
+    limit = allocation.qpe_limit(owner) * allocation.autofocus_gain
+    yield from _limit(allocation, owner, limit)
+    if row.allowable is None:
+        yield from step("Allowable: no limit", printable(row.reason or "this effect has none"))
+        return
+    values = {"limit": limit, "QPE/unit": abs(qpe_per_unit)}
+    yield from step("Allowable", *equation("allowable", "limit/(QPE/unit)", values, row.allowable, row.unit))
+
+
+def _limit(allocation: Allocation, owner: str, limit: float) -> Iterator[str]:
+    """Budget times share times gain."""
+    total, share, gain = allocation.qpe_total, allocation.qpe.of(owner), allocation.autofocus_gain
+    whose = {
+        "clock": "the receiver’s share" if allocation.qpe.clock is None else "the clock’s share",
+        "mission": "all of it: it belongs to no platform",
+    }
+    yield from _autofocus_gain(allocation)
+    values = {"total": total, "share": share, "gain": gain}
+    title = f"Budget requirements.quadratic_phase_error, {whose.get(owner, f'the {owner}’s share')}"
+    yield from step(title, *equation("limit", "total*share*gain", values, limit, "rad"))
+
+
+def _autofocus_gain(allocation: Allocation) -> Iterator[str]:
+    if allocation.n_pull is None:
+        yield from step("No autofocus (autofocus.n_pull): gain = 1")
+        return
+    values = {"N_pull": allocation.n_pull, "q": allocation.qpe_total}
+    raw = math.pi * allocation.n_pull / allocation.qpe_total
+    lines = equation("gain", formulas.AUTOFOCUS_GAIN, values, raw, "")
+    yield from step("Autofocus, Section VI" + (", never below 1" if raw < 1 else ""), *lines)
+
+
+def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[str]:
+    platform = row.id.split(".")[0]
+    is_sinusoid = row.metric == "pslr"
+    key = "sinusoidal" if is_sinusoid else "wideband"
+    path: KeyPath = ("platforms", platform, "motion_error", "vibration", key)
+    if row.declared is None:
+        yield missing(mission, path)
+    else:
+        path = (*path, int(row.id.rsplit(".", 1)[1]), "amplitude") if is_sinusoid else (*path, "rms")
+        yield from step(f"Declared in {place(mission, path)}", as_written(mission, path))
+    if row.evidence:
+        yield from step("Evidence", printable(row.evidence))
+    requirement = mission.requirements.pslr if is_sinusoid else mission.requirements.islr
+    if requirement is None or row.allowable is None:
+        return
+    name = row.metric.upper()
+    ratio = 10 ** (requirement / 10)
+    yield from step(
+        f"requirements.{row.metric} as a power ratio",
+        *equation(name, "10^(dB/10)", {"dB": requirement}, ratio, ""),
+    )
+    split = allocation.pslr if is_sinusoid else allocation.islr
+    values = {name: ratio, "λ": mission.radar.wavelength, "s": split.of(platform)}
+    lines = equation("allowable", formulas.VIBRATION[row.metric], values, row.allowable, "m")
+    yield from step(f"{row.equation}, s is the {platform}’s share of power", *lines)
+
+
+def _phase_aggregate(found: MissionFindings, row: Row, sources: Iterable[ErrorSource]) -> Iterator[str]:
+    owner = {"timing": "clock"}.get(row.id.split(".")[0], row.id.split(".")[0])
+    members = [
+        source
+        for source in sources
+        if source.declared is not None
+        and source.is_independent
+        and (owner == "mission" or found.allocation.qpe.includes(source.owner, owner))
+    ]
+    rule = "sum" if row.id == "mission.autofocus_pull_in" else found.combine
+    yield from _combined("QPE", rule, [(source.id, abs(source.qpe(found.model))) for source in members], row)
+    if row.id == "mission.autofocus_pull_in":
+        values = {"N_pull": found.allocation.n_pull or 0.0}
+        lines = equation("allowable", "π*N_pull", values, row.allowable or 0.0, "rad")
+        yield from step("What autofocus corrects, Section VI", *lines)
+    else:
+        yield from _limit(found.allocation, owner, row.allowable or 0.0)
+
+
+def _cubic_aggregate(found: MissionFindings, row: Row, sources: Iterable[ErrorSource]) -> Iterator[str]:
+    members = [
+        (source.id, abs(source.cubic(found.model)))
+        for source in sources
+        if source.declared is not None and source.is_motion and (source.is_independent or found.combine == "each")
+    ]
+    yield from _combined("cubic phase", found.combine, members, row)
+    if row.allowable is not None:
+        yield from step("Allowable", f"requirements.cubic_phase_error = {row.allowable:.6g} rad")
+
+
+def _location_aggregate(
+    mission: Mission, found: MissionFindings, row: Row, sources: Iterable[ErrorSource]
+) -> Iterator[str]:
+    members, title = [], "(25), (30)"
+    for source in sources:
+        if source.declared is None or not source.is_motion:
+            continue
+        plane, by_model, title = plane_and_effect(mission, found, source)
+        moved = plane.displacement(by_model, source.declared)
+        if moved is not None and (source.is_independent or found.combine == "each"):
+            members.append((source.id, math.hypot(*moved)))
+    rule = "the longest sum over all signs of the vectors" if found.combine == "sum" else _RULES[found.combine]
+    yield from step(f"{title}: displacements, {rule}", *_listed(members, "m"))
+    if row.declared is not None:
+        yield f"    combined = {row.declared:.6g} m"
+    if row.allowable is not None:
+        where = place(mission, ("requirements", "location_error"))
+        yield from step("Allowable", f"requirements.location_error = {row.allowable:.6g} m, {where}")
+
+
+def _combined(symbol: str, rule: str, members: Sequence[tuple[str, float]], row: Row) -> Iterator[str]:
+    yield from step(f"{symbol} of the declared errors, {_RULES[rule]}", *_listed(members, "rad"))
+    if row.declared is None or not members:
+        return
+    sizes = [number(size) for _, size in members if size] or ["0"]
+    if rule == "sum":
+        text = " + ".join(sizes)
+    elif rule == "rss":
+        text = "sqrt(" + " + ".join(f"{size}^2" for size in sizes) + ")"
+    else:
+        text = f"max(0, {', '.join(sizes)})"
+    yield f"    combined = {text} = {row.declared:.6g} rad"
+
+
+def _listed(members: Sequence[tuple[str, float]], unit: str) -> list[str]:
+    width = max((len(name) for name, _ in members), default=0)
+    return [f"{printable(name):<{width}}  {size:.6g} {unit}" for name, size in members if size] or ["none"]
+
+
+def _verdict(row: Row) -> Iterator[str]:
+    if row.declared is not None and row.allowable is not None and row.utilization is not None:
+        values = {"declared": row.declared, "allowable": row.allowable}
+        formula, numbers = equation("utilization", "declared/allowable", values, row.utilization, "")
+        yield from step("Utilization", formula, f"{numbers} = {percent(row.utilization)}")
+    yield ""
+    texts = [text for text in (row.reason, *row.notes) if text]
+    declared = "" if row.declared is None else f", declared {format_quantity(row.declared, row.unit)}"
+    allowable = "" if row.allowable is None else f", allowable {format_quantity(row.allowable, row.unit, 3, 'down')}"
+    yield f"{WORDS[row.status]}{declared}{allowable}"
+    yield from (f"    {printable(text)}" for text in texts)

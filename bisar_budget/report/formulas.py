@@ -1,0 +1,78 @@
+"""The formulas behind a row as text, and the same with the numbers put in.
+
+Each text is, letter for letter, the cell that `bisar-budget derive` prints for it (a test compares them);
+SymPy itself stays out of a check.
+"""
+
+import re
+from collections.abc import Iterator, Mapping
+from unicodedata import combining
+
+AXES = "xyz"
+# Table I: coefficients of the range error; {a} is the axis, {s} the platform's subscript.
+_COEFFICIENTS = {
+    "position": {0: "-p\u0303_{a}{s}*{a}_{s}/R_{s}", 1: "-p\u0303_{a}{s}*v_{a}{s}/R_{s}"},
+    "velocity": {1: "-ṽ_{a}{s}*{a}_{s}/R_{s}", 2: "-v_{a}{s}*ṽ_{a}{s}/R_{s}"},
+    "acceleration": {2: "-ã_{a}{s}*{a}_{s}/(2*R_{s})", 3: "-ã_{a}{s}*v_{a}{s}/(2*R_{s})"},
+}
+# Table II: quadratic phase error at the aperture edge.
+_PHASES = {
+    "velocity": "π*T^2*|v_{a}{s}*ṽ_{a}{s}|/(2*R_{s}*λ)",
+    "acceleration": "π*T^2*|ã_{a}{s}*{a}_{s}|/(4*R_{s}*λ)",
+}
+_LETTERS = {"position": "p\u0303", "velocity": "ṽ", "acceleration": "ã"}
+CLOCK_PHASE = "π*T^2*f_0*|t̃_2|/2"
+VIBRATION = {"pslr": "sqrt(PSLR)*λ*sqrt(s)/(2*π)", "islr": "sqrt(ISLR)*λ*sqrt(s)/(2*π)"}
+AUTOFOCUS_GAIN = "π*N_pull/q"
+
+
+def motion_symbol(kind: str, axis: str, platform: str) -> str:
+    """Symbol of one motion error, such as `ã_xt`."""
+    return f"{_LETTERS[kind]}_{axis}{platform[0]}"
+
+
+def motion_coefficients(kind: str, axis: str, platform: str) -> dict[int, str]:
+    """Cells of Table I for one motion error, by order in slow time."""
+    return {order: text.format(a=axis, s=platform[0]) for order, text in _COEFFICIENTS[kind].items()}
+
+
+def motion_phase(kind: str, axis: str, platform: str) -> str | None:
+    """Cell of Table II; None for a position error, which has none."""
+    text = _PHASES.get(kind)
+    return None if text is None else text.format(a=axis, s=platform[0])
+
+
+def clock_coefficient(order: int) -> str:
+    """Cell of the first row of Table I."""
+    return f"c*t̃_{order}"
+
+
+def filled(formula: str, values: Mapping[str, float]) -> str:
+    """Put numbers for the symbols, six digits each; negative ones in brackets."""
+    names = sorted(values, key=len, reverse=True)
+    # A symbol ends where no letter, digit or accent follows: v_x is not the start of v_xt.
+    pattern = re.compile(r"(?<![\w\u0300-\u036f])(?:" + "|".join(map(re.escape, names)) + r")(?![\w\u0300-\u036f])")
+    return pattern.sub(lambda match: number(values[match[0]]), formula)
+
+
+def number(value: float) -> str:
+    """Six digits, so that a reader can repeat the sum."""
+    text = f"{value:.6g}"
+    return f"({text})" if text.startswith("-") else text
+
+
+def step(title: str, *equations: str) -> Iterator[str]:
+    """One step of an explanation: a title, its equations indented under it."""
+    yield title
+    yield from (f"    {equation}" for equation in equations)
+
+
+def equation(symbol: str, formula: str, values: Mapping[str, float], result: float, unit: str) -> tuple[str, str]:
+    """Write the formula, and under it the same with numbers; their equals signs stand above each other."""
+    margin = " " * sum(not combining(letter) for letter in symbol)
+    return f"{symbol} = {formula}", f"{margin} = {filled(formula, values)} = {with_unit(result, unit)}"
+
+
+def with_unit(value: float, unit: str) -> str:
+    """Six digits and the unit."""
+    return f"{value + 0.0:.6g} {unit.replace('^2', '²')}".rstrip()  # + 0.0 takes the sign from a zero

@@ -1,0 +1,169 @@
+"""`check --explain`: every formula is the derivation's, every number put in gives what the check found."""
+
+import math
+import re
+
+import pytest
+
+from bisar_budget.budget.check import check_mission
+from bisar_budget.mission.load import load_mission, parse_mission
+from bisar_budget.report import formulas
+from bisar_budget.report.explanation import explain
+from bisar_budget.theory import render
+from tests.conftest import ROOT, TODAY, mission_text
+
+MISSIONS = [
+    *sorted((ROOT / "specs" / "missions").glob("*.yaml")),
+    *sorted((ROOT / "tests" / "acceptance" / "good").glob("*.yaml")),
+]
+
+
+def cells(table: str) -> list[list[str]]:
+    return [re.split(r" {2,}", line) for line in render.derivation(table, "text").splitlines()]
+
+
+def test_table_1_is_what_the_derivation_prints() -> None:
+    rows = [row for row in cells("I") if row[0].isdigit()]
+    printed = {cell for row in rows for cell in row[2:] if cell != "-"}
+    ours = {formulas.clock_coefficient(order) for order in range(4)}
+    for platform in ("transmitter", "receiver"):
+        for number, row in enumerate([row for row in rows if f"_{platform[0]}(" in row[1]]):
+            kind, axis = ("position", "velocity", "acceleration")[number % 3], "xyz"[number // 3]
+            texts = formulas.motion_coefficients(kind, axis, platform)
+            assert [texts.get(order, "-") for order in range(4)] == row[2:6]
+            ours |= set(texts.values())
+    assert ours == printed
+
+
+def test_table_2_is_what_the_derivation_prints() -> None:
+    printed = [row[2] for row in cells("II") if row[0].isdigit() or row[0] == "-"]
+    ours = [
+        formulas.motion_phase(kind, axis, platform)
+        for platform in ("transmitter", "receiver")
+        for kind in ("velocity", "acceleration")
+        for axis in "xyz"
+    ]
+    assert [*ours, formulas.CLOCK_PHASE] == printed
+
+
+def test_vibration_and_autofocus_are_what_the_derivation_prints() -> None:
+    assert [row[3] for row in cells("vibration") if row[0] == "-"] == list(formulas.VIBRATION.values())
+    assert f"G = {formulas.AUTOFOCUS_GAIN}" in render.derivation("equations", "text")
+
+
+def evaluated(text: str) -> float:
+    """Do the sum as a reader with a calculator would."""
+    text = re.sub(r"\|([^|]*)\|", r"abs(\1)", text).replace("^", "**").replace("π", "pi")
+    names = {"pi": math.pi, "sqrt": math.sqrt, "abs": abs, "max": max}
+    return float(eval(text, {"__builtins__": {}}, names))
+
+
+def sums(text: str) -> list[tuple[str, str, float]]:
+    """Every `symbol = numbers = value` of an explanation; the symbol may stand in the line above."""
+    found, symbol = [], ""
+    for line in text.splitlines():
+        left, *parts = line.split(" = ")
+        symbol = left.strip() or symbol
+        if line.startswith("    ") and len(parts) >= 2:
+            found.append((symbol, parts[0].strip().removeprefix("= "), float(parts[1].split(" ")[0])))
+    return found
+
+
+@pytest.mark.parametrize("model", ["published", "full", "strictest"])
+@pytest.mark.parametrize("path", MISSIONS, ids=lambda path: path.stem)
+def test_every_row_can_be_repeated_by_hand(path, model: str) -> None:
+    """Six digits are put in, so a sum agrees to 1e-5 of its terms' sizes."""
+    mission = load_mission(str(path), model)
+    found = check_mission(mission, TODAY)
+    for row in found.rows:
+        results: dict[str, float] = {}
+        for symbol, numbers, value in sums(explain(mission, found, row.id)):
+            sizes = evaluated(re.sub(r"(^|\(|\+ )-", r"\1", numbers))
+            assert abs(evaluated(numbers) - value) <= 1e-5 * max(abs(sizes), abs(value)), (row.id, symbol, numbers)
+            results[symbol] = value
+        assert results or row.allowable is None or row.declared is None
+        if row.qpe_published_rad is not None and row.unit != "rad" and row.qpe_published_rad:
+            assert results["QPE"] == pytest.approx(row.qpe_published_rad, rel=1e-5), row.id
+        if row.qpe_full_rad and row.unit != "rad":
+            assert results["QPE_full"] == pytest.approx(row.qpe_full_rad, rel=1e-5), row.id
+        if row.utilization is not None and row.allowable is not None:
+            assert results["utilization"] == pytest.approx(row.utilization, rel=1e-5, abs=1e-12), row.id
+        if row.allowable is not None and row.unit not in ("rad",) and row.metric != "location_error":
+            assert results["allowable"] == pytest.approx(row.allowable, rel=1e-5), row.id
+
+
+def explained(row_id: str, **changes) -> str:
+    mission = parse_mission(mission_text(**changes), "m.yaml")
+    return explain(mission, check_mission(mission, TODAY), row_id)
+
+
+def test_starts_at_the_line_of_the_file() -> None:
+    changes = {"platforms__transmitter__motion_error": {"acceleration": "500 ug", "source": "data sheet"}}
+    text = explained("transmitter.acceleration.x", **changes)
+    line = next(n for n, line in enumerate(mission_text(**changes).splitlines(), 1) if "500 ug" in line)
+    assert f"m.yaml:{line}:21" in text
+    assert "platforms.transmitter.motion_error.acceleration: 500 ug" in text
+    assert "data sheet" in text
+
+
+def test_coverage_factor_and_share_and_gain_stand_in_the_chain() -> None:
+    text = explained(
+        "timing.quadratic",
+        timing_error__quadratic=1e-13,
+        allocation={
+            "coverage_factor": 3,
+            "split": {"transmitter": 0.5, "receiver": 0.2, "clock": 0.2, "reserve": 0.1},
+        },
+        autofocus__n_pull=2,
+    )
+    assert "= 3*|1e-13| = 3e-13 1/s" in text
+    assert "= 0.785398*0.2*8 = 1.25664 rad" in text
+    assert "the clock’s share" in text
+
+
+def test_a_frame_is_turned_before_the_eyes_of_the_reader() -> None:
+    error = {"frame": "look", "velocity": ["1 mm/s", "2 mm/s", "3 mm/s"], "distribution": "bound"}
+    text = explained("receiver.velocity.x", platforms__receiver__motion_error=error)
+    assert "from the look frame (line_of_sight, cross, up): bounds add as magnitudes" in text
+
+
+def test_an_undeclared_row_says_so_and_has_its_allowable() -> None:
+    text = explained("transmitter.velocity.y")
+    assert text.startswith("not decl transmitter.velocity.y of base")
+    assert "no platforms.transmitter.motion_error.velocity[1]" in text
+    assert "allowable = limit/(QPE/unit)" in text
+
+
+def test_names_do_nothing_to_a_terminal() -> None:
+    text = explained("timing.linear", name="a\u200fb")
+    assert "\u200f" not in text
+
+
+class TestCommand:
+    def test_each_mission_that_has_the_row(self, run, tmp_path) -> None:
+        (tmp_path / "a.yaml").write_text(mission_text(name="first", autofocus__n_pull=2))
+        (tmp_path / "b.yaml").write_text(mission_text(name="second"))
+        both = run("check", tmp_path / "a.yaml", tmp_path / "b.yaml", "--explain", "timing.linear")
+        assert both.exit_code == 0
+        assert "of first" in both.stdout
+        assert "of second" in both.stdout
+        one = run("check", tmp_path / "a.yaml", tmp_path / "b.yaml", "--explain", "mission.autofocus_pull_in")
+        assert "of second" not in one.stdout
+
+    @pytest.mark.parametrize(
+        ("row_id", "hint"),
+        [("receiver.velocty.x", "Did you mean 'receiver.velocity.x'?"), ("%", "A check lists them")],
+    )
+    def test_an_unknown_id_is_2_with_a_hint(self, run, row_id, hint) -> None:
+        result = run("check", "-", "--explain", row_id, input=mission_text())
+        assert result.exit_code == 2
+        assert hint in result.stderr
+
+    def test_formats_are_refused(self, run) -> None:
+        result = run("check", "-", "--explain", "timing.linear", "--format", "json", input=mission_text())
+        assert result.exit_code == 2
+        assert "--explain writes text" in result.stderr
+
+    def test_output_file(self, run, tmp_path) -> None:
+        run("check", "-", "--explain", "timing.linear", "-o", tmp_path / "x.txt", input=mission_text())
+        assert "Table I row 1" in (tmp_path / "x.txt").read_text(encoding="utf-8")
