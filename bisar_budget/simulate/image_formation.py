@@ -4,6 +4,7 @@ Both use the measured positions, as a processor must, and give a point scatterer
 """
 
 import math
+from collections.abc import Callable
 from functools import cache
 from typing import Literal
 
@@ -66,16 +67,22 @@ def matched_filter(history: PhaseHistory, points: Floats) -> Complexes:
         Complex image.
     """
     flat = np.reshape(points, (-1, 3))
-    image: Complexes = np.zeros(flat.shape[0], dtype=complex)
+    image = direct_sum(history, flat, lambda part, pulse: differential_range(history, part, pulse))
+    return image.reshape(np.shape(points)[:-1])
+
+
+def direct_sum(history: PhaseHistory, points: Floats, ranges: Callable[[Floats, int], Floats]) -> Complexes:
+    """Sum of (4) over pulses and frequencies, for what `ranges` says ΔR of some points (n, 3) is at a pulse."""
+    image: Complexes = np.zeros(points.shape[0], dtype=complex)
     wavenumber = 2 * math.pi * history.frequency / SPEED_OF_LIGHT
     block = max(1, _BLOCK // max(1, wavenumber.size))
     for pulse in range(history.slow_time.size):
-        samples = history.samples[pulse]
-        for start in range(0, flat.shape[0], block):
-            ranges = differential_range(history, flat[start : start + block], pulse)
-            image[start : start + block] += np.exp(1j * np.outer(ranges, wavenumber)) @ samples
-    image /= history.samples.size
-    return image.reshape(np.shape(points)[:-1])
+        for start in range(0, points.shape[0], block):
+            part = slice(start, start + block)
+            phase = np.outer(ranges(points[part], pulse), wavenumber)
+            image[part] += np.exp(1j * phase) @ history.samples[pulse]
+    image /= max(1, history.samples.size)
+    return image
 
 
 def backprojection(history: PhaseHistory, points: Floats, kernel: Kernel = "auto") -> Complexes:
