@@ -130,8 +130,8 @@ class TestPolarFormat:
             dirichlet = np.where(np.isnan(ratio), f.size, ratio) / f.size
             phase = np.exp(-2j * math.pi / SPEED_OF_LIGHT * away * (2 * f[0] + step * (f.size - 1)))
             want = want * np.expand_dims(dirichlet * phase, 1 - axis)
-        # The largest curvature left over the patch is 2 mm² … 10⁻⁵ m: 0.01 rad.
-        assert np.abs(image - want).max() < 0.02
+        # The point's own ranges bend by 11²/R, 1.4 µm: 3e-4 rad. Interpolation of twelve taps adds less than that.
+        assert np.abs(image - want).max() < 6e-4
 
     @pytest.mark.parametrize("squint", [0, 30, -50])
     def test_near_the_scene_centre_it_is_the_matched_filter(self, squint: int) -> None:
