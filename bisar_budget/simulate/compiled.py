@@ -1,0 +1,426 @@
+"""Backprojection compiled by Numba, in parallel: needs the extra `fast`. Import it only where Numba may be missing.
+
+Profiles are refined to so many samples a range cell that a B-spline of two taps (linear) or four (cubic) reads
+them; its transform is known in closed form and divided out of the spectrum. On a lattice of pixels the range is
+exact at the middle of every 32 pixels of a line and expanded to fourth order along them; elsewhere it is exact
+at every pixel. Whole cycles and whole samples are split off in double precision or integers, so that single
+precision only ever holds fractions, wherever the scene and however short the wave.
+"""
+
+import math
+from collections.abc import Iterator
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numba import njit, prange
+from numpy.polynomial import Chebyshev, Polynomial
+
+from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.simulate.phase_history import Complexes, Floats, PhaseHistory
+from bisar_budget.simulate.range_profile import (
+    carrier_frequency,
+    cells_per_metre,
+    harmonics,
+    kernel,
+    kernel_transform,
+    profile_length,
+    range_profiles,
+)
+
+Spline = Literal["linear", "cubic"]
+
+_LINE = 32  # pixels of one expansion; two or four vectors of a processor
+_ROWS = 32  # lines of one tile, which share what they read of the profiles
+_OVERSAMPLING = 2  # of profiles from the FFT
+_TAPS = 8  # of the kernel that refines them: -140 dB at this oversampling
+_REFINEMENT = {"linear": 16, "cubic": 8}  # samples per sample from the FFT
+_ORDER = {"linear": 1, "cubic": 3}
+_MARGIN = 8  # samples beyond the last pixel on each side
+_BLOCK_BYTES = 24e6  # of profiles held at once; about what a processor's last cache holds
+_PHASE_LIMIT = 1e-6  # rad, of the first neglected order of the expansion
+_OFF_LATTICE = 1e-8  # wavelengths
+
+
+# Multiply-adds are rounded once; nothing is reordered, NaN and infinity stay what they are. Division by zero gives
+# infinity as in NumPy: a check for it would keep loops from being vectorised.
+_compiled = njit(cache=True, fastmath={"contract"}, error_model="numpy")
+_parallel = njit(cache=True, fastmath={"contract"}, error_model="numpy", parallel=True)
+_F = np.float32
+_I = np.int32
+_TURN = 2.0**32  # a whole cycle in 32 bits: integer arithmetic then drops whole cycles by itself
+
+
+class Lattice(NamedTuple):
+    """Evenly spaced pixels: origin + i·across + j·along, vectors (3,) [m]."""
+
+    origin: Floats
+    across: Floats
+    along: Floats
+    shape: tuple[int, int]
+
+    def disc(self) -> tuple[Floats, float]:
+        """Centre and radius of a disc that holds all pixels, lines filled up to whole segments. [m]"""
+        i, j = (self.shape[0] - 1) / 2, (-(-self.shape[1] // _LINE) * _LINE - 1) / 2
+        centre = self.origin + i * self.across + j * self.along
+        corners = (i * self.across + j * self.along, i * self.across - j * self.along)
+        return centre, max(float(np.linalg.norm(corner)) for corner in corners)
+
+
+def lattice_of(points: Floats, tolerance: float) -> Lattice | None:
+    """Recognise evenly spaced pixels.
+
+    Parameters
+    ----------
+    points : (..., 3) ndarray
+        [m]
+    tolerance : float
+        How far a pixel may be off its place. [m]
+
+    Returns
+    -------
+    Lattice or None
+        Of points (n, 3) or (nx, ny, 3); None where they are something else.
+    """
+    if points.ndim not in (2, 3) or points.size == 0:
+        return None
+    grid = points.reshape((-1, *points.shape[-2:]))
+    lines, count = grid.shape[:2]
+    origin = grid[0, 0]
+    across = (grid[-1, 0] - origin) / max(1, lines - 1)
+    along = (grid[0, -1] - origin) / max(1, count - 1)
+    first = origin + np.arange(count)[:, None] * along
+    for line in range(lines):  # one at a time: no second copy of the grid
+        if not np.abs(grid[line] - first - line * across).max() <= tolerance:
+            return None
+    return Lattice(origin, across, along, (lines, count))
+
+
+def backproject(history: PhaseHistory, points: Floats, spline: Spline) -> Complexes:
+    """Image by backprojection, see `image_formation.backprojection`; all inputs finite.
+
+    Parameters
+    ----------
+    history : PhaseHistory
+        Frequencies evenly spaced.
+    points : (..., 3) ndarray
+        Pixels, anywhere; fastest on a lattice. [m]
+    spline : "linear" or "cubic"
+        What reads the profiles.
+
+    Returns
+    -------
+    (...) ndarray
+        Complex image.
+    """
+    shape = points.shape[:-1]
+    image = np.zeros(shape, dtype=complex)
+    if not image.size or not history.samples.size:
+        return image
+    lattice = lattice_of(points, _OFF_LATTICE * SPEED_OF_LIGHT / float(history.frequency.max()))
+    if lattice is not None and lattice.shape[0] > lattice.shape[1]:
+        origin, across, along, (lines, count) = lattice  # long lines fill whole segments
+        lattice = Lattice(origin, along, across, (count, lines))
+        shape = shape[::-1]
+    if lattice is not None and _neglected_phase(history, lattice) < _PHASE_LIMIT:
+        centre, radius = lattice.disc()
+        padded = np.zeros((lattice.shape[0], -(-lattice.shape[1] // _LINE) * _LINE), dtype=complex)
+        for block in _profile_blocks(history, centre, radius, spline):
+            _add_lattice(*block, lattice.origin, lattice.across, lattice.along, spline == "cubic", padded)
+        image = padded[:, : lattice.shape[1]].reshape(shape)
+        image = np.ascontiguousarray(image if shape == points.shape[:-1] else image.T)
+    else:
+        flat = np.ascontiguousarray(points.reshape(-1, 3))
+        low, high = flat.min(axis=0), flat.max(axis=0)
+        for block in _profile_blocks(history, (low + high) / 2, float(np.linalg.norm(high - low)) / 2, spline):
+            _add_points(*block, flat, spline == "cubic", image.reshape(-1))
+    image /= history.samples.size
+    return image
+
+
+def _neglected_phase(history: PhaseHistory, lattice: Lattice) -> float:
+    """Bound of the fifth order of the ranges along half a segment. [rad]
+
+    In units of the distance, |r + x e| has the coefficients (P_{n-2} - P_n)/(2n - 1), P Legendre polynomials.
+    """
+    centre, radius = lattice.disc()
+    half = _LINE / 2 * float(np.linalg.norm(lattice.along))
+    total = 0.0
+    for positions in (history.transmitter, history.receiver):
+        nearest = float(np.linalg.norm(positions - centre, axis=1).min()) - radius
+        if nearest <= 2 * half:  # the orders do not fall off
+            return math.inf
+        total += 2 / 9 * half**5 / nearest**4
+    return 2 * math.pi * float(history.frequency.max()) / SPEED_OF_LIGHT * total
+
+
+class _Block(NamedTuple):
+    """Refined profiles of some pulses, two floats to an integer, and what it takes to read them."""
+
+    profiles: np.ndarray[tuple[int, int], np.dtype[np.int64]]
+    first: Floats  # place of each profile's first sample, in samples
+    transmitter: Floats
+    receiver: Floats
+    reference: Floats
+    cells_per_metre: float
+    cycles_per_metre: float
+
+
+def _profile_blocks(history: PhaseHistory, centre: Floats, radius: float, spline: Spline) -> Iterator[_Block]:
+    """Cut from each profile what pixels in a ball can need, and refine that; as many pulses as fit in a cache."""
+    length, factor, order = profile_length(history, _OVERSAMPLING), _REFINEMENT[spline], _ORDER[spline]
+    coarse = cells_per_metre(history, length)
+    harmonic = harmonics(history)
+    transform = kernel_transform(2 * math.pi * harmonic / length, _TAPS, _OVERSAMPLING)
+    transform = transform * np.sinc(harmonic / (length * factor)) ** (order + 1)
+    # Weights of the taps for each of the places between two samples.
+    offset = np.arange(factor)[:, None] / factor - (np.arange(_TAPS) - _TAPS // 2 + 1)
+    weights = kernel(offset, _TAPS, _OVERSAMPLING)
+    reference = np.linalg.norm(history.transmitter, axis=1) + np.linalg.norm(history.receiver, axis=1)
+    middle = np.linalg.norm(history.transmitter - centre, axis=1) + np.linalg.norm(history.receiver - centre, axis=1)
+    # Neither leg's range changes faster than the pixel moves.
+    first = np.floor((middle - reference - 2 * radius) * coarse).astype(np.int64) - _MARGIN
+    count = math.ceil(4 * radius * coarse) + 2 * _MARGIN
+    pulses = max(1, int(_BLOCK_BYTES / (count * factor * 8)))
+    for start in range(0, history.slow_time.size, pulses):
+        part = slice(start, start + pulses)
+        profiles = range_profiles(history, length, transform, part)
+        refined = np.empty((profiles.shape[0], count * factor), dtype=np.complex64)
+        _refine(profiles, first[part], weights, refined)
+        yield _Block(
+            refined.view(np.int64),
+            first[part] * float(factor),
+            history.transmitter[part],
+            history.receiver[part],
+            reference[part],
+            coarse * factor,
+            carrier_frequency(history) / SPEED_OF_LIGHT,
+        )
+
+
+@_parallel
+def _refine(profiles, first, weights, refined):
+    """Samples between the samples; profiles repeat."""
+    length, factor = profiles.shape[1], weights.shape[0]
+    count = refined.shape[1] // factor
+    for pulse in prange(profiles.shape[0]):
+        cut = np.empty(count + _TAPS, np.complex64)
+        for n in range(cut.size):
+            cut[n] = profiles[pulse, (first[pulse] + n - _TAPS // 2 + 1) % length]
+        real, imag = cut.real.copy(), cut.imag.copy()
+        re, im = np.empty(count, np.float32), np.empty(count, np.float32)
+        for place in range(factor):
+            re[:] = 0
+            im[:] = 0
+            for tap in range(_TAPS):
+                weight = _F(weights[place, tap])
+                for n in range(count):
+                    re[n] += weight * real[n + tap]
+                    im[n] += weight * imag[n + tap]
+            for n in range(count):
+                refined[pulse, n * factor + place] = complex(re[n], im[n])
+
+
+# Half a turn's sine over its angle and cosine, as polynomials of the squared angle in cycles, a bit beyond ±½.
+_SINE = tuple(
+    Chebyshev.interpolate(lambda z: math.pi * np.sinc(np.sqrt(z)), 5, domain=[0, 0.27]).convert(kind=Polynomial).coef
+)
+_COSINE = tuple(
+    Chebyshev.interpolate(lambda z: np.cos(math.pi * np.sqrt(z)), 5, domain=[0, 0.27]).convert(kind=Polynomial).coef
+)
+_S0, _S1, _S2, _S3, _S4, _S5 = (np.float32(c) for c in _SINE)
+_C0, _C1, _C2, _C3, _C4, _C5 = (np.float32(c) for c in _COSINE)
+
+
+@_compiled
+def _phasor(cycles):
+    """exp(2πj·cycles) in single precision for |cycles| up to a bit beyond ½: the square of half the turn."""
+    z = cycles * cycles
+    sine = cycles * (_S0 + z * (_S1 + z * (_S2 + z * (_S3 + z * (_S4 + z * _S5)))))
+    cosine = _C0 + z * (_C1 + z * (_C2 + z * (_C3 + z * (_C4 + z * _C5))))
+    return cosine * cosine - sine * sine, _F(2) * sine * cosine
+
+
+@_compiled
+def _expand(middle, platform, along, ranges):
+    """Add one leg's range at the middle of each segment and its orders along it, per pixel."""
+    px, py, pz = platform[0], platform[1], platform[2]
+    ex, ey, ez = along[0], along[1], along[2]
+    square = ex * ex + ey * ey + ez * ez
+    for i in range(_ROWS):
+        x, y, z = middle[0, i] - px, middle[1, i] - py, middle[2, i] - pz
+        distance = np.sqrt(x * x + y * y + z * z)
+        inverse = 1 / distance
+        g = (x * ex + y * ey + z * ez) * inverse
+        s = (square - g * g) * inverse
+        ranges[0, i] += distance
+        ranges[1, i] += g
+        ranges[2, i] += s / 2
+        ranges[3, i] -= g * s * inverse / 2
+        ranges[4, i] += s * inverse * inverse * (5 * g * g - square) / 8
+
+
+@_compiled
+def _split(ranges, per_metre, first, cycles, whole, fraction, turn, order):
+    """Take whole samples and whole cycles off, in double precision."""
+    for i in range(_ROWS):
+        cell, step = ranges[0, i] * per_metre - first, ranges[1, i] * per_metre
+        whole[0, i], whole[1, i] = _I(np.floor(cell)), _I(np.rint(step))
+        fraction[0, i], fraction[1, i] = _F(cell - np.floor(cell)), _F(step - np.rint(step))
+    for n in range(3):
+        for i in range(_ROWS):
+            c = ranges[n, i] * cycles
+            turn[n, i] = _I(np.int64((c - np.rint(c)) * _TURN))
+            order[n, i] = _F(ranges[n + 2, i] * cycles)
+
+
+@_compiled
+def _places(base, step, place, slope, p2, p3, p4, cells_per_cycle, index, between):
+    """Sample before each pixel of a segment, and how far beyond it the pixel is."""
+    for j in range(_LINE):
+        x = _F(j - _LINE // 2)
+        bend = x * x * (p2 + x * (p3 + x * p4))
+        t = place + x * slope + cells_per_cycle * bend
+        whole = np.floor(t)
+        between[j] = t - whole
+        index[j] = _I(base + _I(j - _LINE // 2) * step + _I(whole))
+
+
+@_compiled
+def _fetch2(profile, index, fetched):
+    # A loop of its own: next to arithmetic, loads from anywhere would keep that from being vectorised.
+    for j in range(_LINE):
+        n = np.uint32(index[j])
+        fetched[2 * j] = profile[n]
+        fetched[2 * j + 1] = profile[n + np.uint32(1)]
+
+
+@_compiled
+def _fetch4(profile, index, fetched):
+    for j in range(_LINE):
+        n = np.uint32(index[j] - _I(1))
+        fetched[4 * j] = profile[n]
+        fetched[4 * j + 1] = profile[n + np.uint32(1)]
+        fetched[4 * j + 2] = profile[n + np.uint32(2)]
+        fetched[4 * j + 3] = profile[n + np.uint32(3)]
+
+
+@_compiled
+def _add2(taps, between, c0, c1, c2, p3, p4, real, imag):
+    """Linear B-spline times the carrier."""
+    for j in range(_LINE):
+        k = _I(j - _LINE // 2)
+        x = _F(k)
+        turned = _I(c0 + k * _I(c1 + k * c2))
+        cosine, sine = _phasor(_F(turned) * _F(1 / _TURN) + x * x * x * (p3 + x * p4))
+        v = between[j]
+        re = taps[4 * j] + v * (taps[4 * j + 2] - taps[4 * j])
+        im = taps[4 * j + 1] + v * (taps[4 * j + 3] - taps[4 * j + 1])
+        real[j] += re * cosine - im * sine
+        imag[j] += re * sine + im * cosine
+
+
+@_compiled
+def _add4(taps, between, c0, c1, c2, p3, p4, real, imag):
+    """Cubic B-spline times the carrier."""
+    for j in range(_LINE):
+        k = _I(j - _LINE // 2)
+        x = _F(k)
+        turned = _I(c0 + k * _I(c1 + k * c2))
+        cosine, sine = _phasor(_F(turned) * _F(1 / _TURN) + x * x * x * (p3 + x * p4))
+        w0, w1, w2, w3 = _cubic(between[j])
+        re = w0 * taps[8 * j] + w1 * taps[8 * j + 2] + w2 * taps[8 * j + 4] + w3 * taps[8 * j + 6]
+        im = w0 * taps[8 * j + 1] + w1 * taps[8 * j + 3] + w2 * taps[8 * j + 5] + w3 * taps[8 * j + 7]
+        real[j] += re * cosine - im * sine
+        imag[j] += re * sine + im * cosine
+
+
+@_compiled
+def _cubic(v):
+    """Weights of the cubic B-spline for the samples -1, 0, 1, 2 around a place v in 0 … 1."""
+    u = _F(1) - v
+    w0, w3 = u * u * u * _F(1 / 6), v * v * v * _F(1 / 6)
+    w1 = _F(2 / 3) - v * v * (_F(1) - _F(0.5) * v)
+    return w0, w1, _F(1) - w0 - w1 - w3, w3
+
+
+@_parallel
+def _add_lattice(
+    profiles, first, transmitter, receiver, reference, per_metre, cycles, origin, across, along, cubic, image
+):
+    """Add some pulses to the pixels of a lattice, in tiles of segments of lines."""
+    segments = image.shape[1] // _LINE
+    groups = (image.shape[0] + _ROWS - 1) // _ROWS
+    cells_per_cycle = _F(per_metre / cycles)
+    for tile in prange(segments * groups):
+        top, left = tile // segments * _ROWS, tile % segments * _LINE
+        rows = min(_ROWS, image.shape[0] - top)
+        real, imag = np.zeros((_ROWS, _LINE), np.float32), np.zeros((_ROWS, _LINE), np.float32)
+        index, between = np.empty(_LINE, np.int32), np.empty(_LINE, np.float32)
+        fetched = np.empty(4 * _LINE, np.int64)
+        taps = fetched.view(np.float32)
+        whole, fraction = np.empty((2, _ROWS), np.int32), np.empty((2, _ROWS), np.float32)
+        turn, order = np.empty((3, _ROWS), np.int32), np.empty((3, _ROWS), np.float32)
+        middle, ranges = np.empty((3, _ROWS)), np.empty((5, _ROWS))
+        for axis in range(3):
+            for i in range(_ROWS):
+                middle[axis, i] = origin[axis] + (top + i) * across[axis] + (left + _LINE // 2) * along[axis]
+        for pulse in range(profiles.shape[0]):
+            ranges[0] = -reference[pulse]
+            ranges[1:] = 0.0
+            _expand(middle, transmitter[pulse], along, ranges)
+            _expand(middle, receiver[pulse], along, ranges)
+            _split(ranges, per_metre, first[pulse], cycles, whole, fraction, turn, order)
+            for i in range(rows):
+                c0, c1, c2 = turn[0, i], turn[1, i], turn[2, i]
+                p2, p3, p4 = order[0, i], order[1, i], order[2, i]
+                _places(
+                    whole[0, i],
+                    whole[1, i],
+                    fraction[0, i],
+                    fraction[1, i],
+                    p2,
+                    p3,
+                    p4,
+                    cells_per_cycle,
+                    index,
+                    between,
+                )
+                if cubic:
+                    _fetch4(profiles[pulse], index, fetched)
+                    _add4(taps, between, c0, c1, c2, p3, p4, real[i], imag[i])
+                else:
+                    _fetch2(profiles[pulse], index, fetched)
+                    _add2(taps, between, c0, c1, c2, p3, p4, real[i], imag[i])
+        for i in range(rows):
+            for j in range(_LINE):
+                image[top + i, left + j] += complex(real[i, j], imag[i, j])
+
+
+@_parallel
+def _add_points(profiles, first, transmitter, receiver, reference, per_metre, cycles, points, cubic, image):
+    """Add some pulses to pixels anywhere, each at its own exact range."""
+    for n in prange(points.shape[0]):
+        total = 0j
+        for pulse in range(profiles.shape[0]):
+            far = -reference[pulse]
+            for leg in range(2):
+                platform = transmitter if leg == 0 else receiver
+                x, y, z = (
+                    points[n, 0] - platform[pulse, 0],
+                    points[n, 1] - platform[pulse, 1],
+                    points[n, 2] - platform[pulse, 2],
+                )
+                far += math.sqrt(x * x + y * y + z * z)
+            cell = far * per_metre - first[pulse]
+            before = np.int64(np.floor(cell))
+            v = _F(cell - np.floor(cell))
+            taps = profiles[pulse].view(np.complex64)
+            if cubic:
+                w0, w1, w2, w3 = _cubic(v)
+                value = w0 * taps[before - 1] + w1 * taps[before] + w2 * taps[before + 1] + w3 * taps[before + 2]
+            else:
+                value = (_F(1) - v) * taps[before] + v * taps[before + 1]
+            turn = far * cycles
+            cosine, sine = _phasor(_F(turn - np.rint(turn)))
+            total += value * complex(cosine, sine)
+        image[n] += total

@@ -1,0 +1,187 @@
+"""Image formation in the far field, plane waves for ranges: the filter (7), (12), and the polar format (13), (14).
+
+Both defocus and displace what lies away from the scene centre; that is the approximation (5), not the code.
+"""
+
+import math
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.simulate.image_formation import direct_sum
+from bisar_budget.simulate.phase_history import Complexes, Floats, PhaseHistory
+
+_TOLERANCE = 1e-8  # asked of the non-uniform FFT
+_STENCIL = 12  # samples per interpolation
+
+
+def look_sum(history: PhaseHistory) -> Floats:
+    """Unit vectors from the scene centre to the measured platforms, added: what stands in (6). (pulses, 3)"""
+    total: Floats = np.zeros(history.transmitter.shape)
+    for positions in (history.transmitter, history.receiver):
+        total += positions / np.linalg.norm(positions, axis=1, keepdims=True)
+    return total
+
+
+def far_field_filter(
+    history: PhaseHistory, points: Floats, method: Literal["auto", "direct", "nufft"] = "auto"
+) -> Complexes:
+    """Image by the far-field filter: (7), which for points on the ground is (12).
+
+    Parameters
+    ----------
+    history : PhaseHistory
+        Any frequencies.
+    points : (..., 3) ndarray
+        Pixels, anywhere. [m]
+    method : "auto", "direct" or "nufft"
+        Direct is the sum as printed. NUFFT is finufft's (extra `fast`), the same numbers to -120 dB and much
+        faster on images; auto takes it where it is installed.
+
+    Returns
+    -------
+    (...) ndarray
+        Complex image.
+
+    Raises
+    ------
+    ValueError
+        A position that is not finite.
+    ImportError
+        The NUFFT is asked for and finufft is missing.
+    """
+    flat = np.reshape(np.asarray(points, dtype=float), (-1, 3))
+    if not np.isfinite(flat).all():
+        raise ValueError("points: positions must be finite numbers of metres")
+    sight = look_sum(history)
+    if method != "direct" and flat.size:
+        try:
+            image = _by_nufft(history, sight, flat)
+            return image.reshape(np.shape(points)[:-1])
+        except ImportError:
+            if method == "nufft":
+                raise ImportError("finufft is missing: pip install 'bisar-budget[fast]'") from None
+    image = direct_sum(history, flat, lambda part, pulse: -part @ sight[pulse])
+    return image.reshape(np.shape(points)[:-1])
+
+
+def _by_nufft(history: PhaseHistory, sight: Floats, points: Floats) -> Complexes:
+    import finufft
+
+    wavenumber = 2 * math.pi * history.frequency / SPEED_OF_LIGHT
+    samples = history.samples.astype(complex)
+    height = points[0, 2]
+    if (points[:, 2] == height).all():  # one dimension less to spread over
+        samples = samples * np.exp(-1j * height * np.outer(sight[:, 2], wavenumber))
+        axes, transform = 2, finufft.nufft2d3
+    else:
+        axes, transform = 3, finufft.nufft3d3
+    sources = [np.outer(sight[:, axis], wavenumber).ravel() for axis in range(axes)]
+    targets = [np.ascontiguousarray(points[:, axis]) for axis in range(axes)]
+    image: Complexes = transform(*sources, samples.ravel(), *targets, isign=-1, eps=_TOLERANCE)
+    return image / history.samples.size
+
+
+class PolarFormat(NamedTuple):
+    """Image (nx, ny), and the grid (13) it was formed from: f′x (Nx,) and f′y (Ny,). [Hz]"""
+
+    image: Complexes
+    frequency_x: Floats
+    frequency_y: Floats
+
+
+def polar_format(
+    history: PhaseHistory, look_azimuth: float, size: tuple[float, float], shape: tuple[int, int]
+) -> PolarFormat:
+    """Image by (14): samples interpolated to the rectangular grid (13) of the rotated frame, then an FFT.
+
+    The grid is the rectangle within what was recorded, so it trims the aperture's corners, the more the
+    larger the relative bandwidth and the squint. Its step is c/(2·size): the image repeats with its size.
+
+    Parameters
+    ----------
+    history : PhaseHistory
+        Frequencies and pulses evenly spaced.
+    look_azimuth : float
+        φ_b of (11). [rad]
+    size : (2,) float
+        Extent along x′ and y′ about the scene centre. [m]
+    shape : (2,) int
+        Pixels along x′ and y′; they are those of `ground_grid((0, 0), look_azimuth, size, shape)`.
+
+    Returns
+    -------
+    PolarFormat
+
+    Raises
+    ------
+    ValueError
+        The line of sight does not turn steadily over the aperture, no rectangle fits into what was recorded,
+        or pixels are coarser than its resolution.
+    """
+    cosine, sine = math.cos(look_azimuth), math.sin(look_azimuth)
+    east, north = look_sum(history)[:, :2].T / 2
+    along, across = east * cosine + north * sine, north * cosine - east * sine  # (9), per hertz
+    slope = across / along
+    samples, turn = history.samples, np.diff(slope)
+    if (turn < 0).all():
+        samples, along, slope = samples[::-1], along[::-1], slope[::-1]
+    elif slope.size < _STENCIL or not (turn > 0).all():
+        raise ValueError(
+            f"polar format needs {_STENCIL} pulses or more ({slope.size} given), the line of sight turning one way"
+        )
+    low, high = float(history.frequency[0]), float(history.frequency[-1])
+    if history.frequency.size < _STENCIL or not (along > 0).all():
+        raise ValueError(f"polar format needs {_STENCIL} frequencies or more, and x′ pointing at the platforms")
+    # (13), f₀ projected. At a squint the projection of one frequency changes over the aperture.
+    fx = _grid(low * along.max(), high * along.min(), SPEED_OF_LIGHT / (2 * size[0]))
+    if not fx.size:
+        raise ValueError(
+            "no rectangle of frequencies fits into the aperture: too much squint for so little bandwidth"
+        )
+    edges = np.outer((slope[0], slope[-1]), (fx[0], fx[-1]))
+    fy = _grid(edges[0].max(), edges[1].min(), SPEED_OF_LIGHT / (2 * size[1]))
+    if not fy.size:
+        raise ValueError("no rectangle of frequencies fits into the aperture: the line of sight turns off x′")
+    for name, count, pixels in (("x′", fx.size, shape[0]), ("y′", fy.size, shape[1])):
+        if pixels < count:
+            raise ValueError(f"{pixels} pixels along {name} are coarser than the resolution; {count} or more are not")
+    step = (high - low) / (history.frequency.size - 1)
+    in_range = _interpolated(samples, (fx / along[:, None] - low) / step)
+    pulse = np.interp(fy / fx[:, None], slope, np.arange(slope.size))
+    rectangle = _interpolated(np.ascontiguousarray(in_range.T), pulse)
+    spectrum = np.zeros(shape, dtype=complex)
+    number_x, number_y = np.rint(fx * 2 * size[0] / SPEED_OF_LIGHT), np.rint(fy * 2 * size[1] / SPEED_OF_LIGHT)
+    spectrum[np.ix_(number_x.astype(np.int64) % shape[0], number_y.astype(np.int64) % shape[1])] = rectangle
+    image = np.fft.fft2(spectrum) / rectangle.size  # (14)
+    return PolarFormat(np.roll(image, (shape[0] // 2, shape[1] // 2), axis=(0, 1)), fx, fy)
+
+
+def _grid(low: float, high: float, step: float) -> Floats:
+    """Multiples of a step within bounds: their FFT needs no carrier taken out."""
+    first, last = math.ceil(low / step), math.floor(high / step)
+    return np.arange(first, last + 1, dtype=float) * step
+
+
+def _interpolated(rows: Complexes, place: Floats) -> Complexes:
+    """Lagrange interpolation of evenly spaced samples, the stencil kept inside at the ends.
+
+    Parameters
+    ----------
+    rows : (rows, samples) ndarray
+        Sampled about twice as finely as they need, or better: scenes half as large as they could be.
+    place : (rows, places) ndarray
+        In samples.
+    """
+    first = np.clip(np.floor(place).astype(np.int64) - _STENCIL // 2 + 1, 0, rows.shape[1] - _STENCIL)
+    offset = place - first
+    line = np.arange(rows.shape[0])[:, None]
+    total = np.zeros(place.shape, dtype=complex)
+    for tap in range(_STENCIL):
+        weight: Floats = np.ones(place.shape)
+        for other in range(_STENCIL):
+            if other != tap:
+                weight *= (offset - other) / (tap - other)
+        total += weight * rows[line, first + tap]
+    return total
