@@ -536,7 +536,12 @@ def diff(
     help="Format of the verdicts.",
 )
 @click.option("-o", "--output", metavar="FILE", help="Write to FILE instead of standard output.")
-@click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Processes to use; default: the cores.")
+@click.option(
+    "--jobs",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Processes to use; default: the cores, or 1 with the extra `fast`, which uses them itself.",
+)
 def verify(missions: Sequence[str], only: str, format_name: str, output: str | None, jobs: int | None) -> None:
     """Form images with each error at its limit and measure whether the limit is true.
 
@@ -563,13 +568,15 @@ def verify(missions: Sequence[str], only: str, format_name: str, output: str | N
 
 def _verified(missions: "Sequence[Mission]", only: str, jobs: int | None) -> "list[VerifiedMission]":
     """Verify missions, with a progress bar where somebody watches."""
+    from bisar_budget.simulate.image_formation import is_compiled
     from bisar_budget.simulate.verify import rows_to_verify, verify_mission
 
     total = sum(len(rows_to_verify(mission, only)) for mission in missions)
     watched = sys.stderr is not None and sys.stderr.isatty()
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    jobs = jobs or (1 if is_compiled() else cores)
     with click.progressbar(length=total, label="Forming images", file=sys.stderr, hidden=not watched) as bar:
-        return [verify_mission(mission, only, jobs or cores, lambda row_id: bar.update(1)) for mission in missions]
+        return [verify_mission(mission, only, jobs, lambda row_id: bar.update(1)) for mission in missions]
 
 
 @cli.command()

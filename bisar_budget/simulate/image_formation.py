@@ -119,10 +119,10 @@ def backprojection(history: PhaseHistory, points: Floats, kernel: Kernel = "auto
         if not np.isfinite(where).all():
             raise ValueError(f"{what}: positions must be finite numbers of metres")
     if kernel == "auto":
-        kernel = "cubic" if _numba_is_usable() else "numpy"
+        kernel = "cubic" if is_compiled() else "numpy"
     if kernel == "numpy":
         return _backprojection(history, points)
-    if not _numba_is_usable():
+    if not is_compiled():
         raise ImportError(f"kernel {kernel} needs Numba, which is missing: pip install 'bisar-budget[fast]'")
     from bisar_budget.simulate.compiled import backproject
 
@@ -130,7 +130,8 @@ def backprojection(history: PhaseHistory, points: Floats, kernel: Kernel = "auto
 
 
 @cache
-def _numba_is_usable() -> bool:
+def is_compiled() -> bool:
+    """Whether images are formed by compiled kernels: Numba is there and can keep what it compiles."""
     try:
         import bisar_budget.simulate.compiled  # noqa: F401
     except (ImportError, RuntimeError):  # not installed, or nowhere to keep what it compiles

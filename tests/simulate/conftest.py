@@ -8,6 +8,7 @@ import pytest
 
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import BistaticGeometry, PlatformState, state_from_angles
+from bisar_budget.simulate.impulse_response import quadratic_phase_error
 from bisar_budget.simulate.phase_history import MotionError, PhaseHistory, cell_centres, path, phase_history
 
 
@@ -50,6 +51,18 @@ class Collection:
             transmitter=transmitter,
             receiver=receiver,
         )
+
+
+def measured_phase(c: Collection, cut, reference, spacing: float) -> float:
+    """Quadratic phase of a cut along y′ at the scene centre, its carrier taken out first."""
+    look = c.geometry.look_azimuth
+    across = np.array([-math.sin(look), math.cos(look), 0.0])
+    flown = (one.actual for one in c.paths())
+    slope = -sum(position @ across / np.linalg.norm(position, axis=1) for position in flown) / c.wavelength
+    carrier = np.interp(0.0, c.slow_time, slope)
+    down = np.exp(-2j * math.pi * carrier * spacing * (np.arange(cut.size) - cut.size // 2))
+    place = c.slow_time / (c.aperture_time / 2)
+    return quadratic_phase_error(cut * down, reference * down, spacing, place, slope - carrier)[0]
 
 
 def platform(slant_range: float, height: float, azimuth: float, speed: float, squint: float) -> PlatformState:

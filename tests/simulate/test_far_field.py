@@ -12,9 +12,8 @@ from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.simulate.far_field import far_field_filter, look_sum, polar_format
 from bisar_budget.simulate.image_formation import backprojection, ground_grid, matched_filter
-from bisar_budget.simulate.impulse_response import quadratic_phase_error
 from bisar_budget.simulate.phase_history import MotionError
-from tests.simulate.conftest import Collection, collection
+from tests.simulate.conftest import Collection, collection, measured_phase
 
 needs_finufft = pytest.mark.skipif(
     importlib.util.find_spec("finufft") is None, reason="the NUFFT needs finufft, extra fast"
@@ -89,7 +88,7 @@ class TestFarFieldFilter:
             line = ground_grid(tuple(shown), broadside.geometry.look_azimuth, (1.0, spacing * 96), (1, 96))[0]
             cut = far_field_filter(broadside.record(at), line)
             clean = far_field_filter(_plane_record(broadside, plane, shown), line)
-            measured, _ = quadratic_phase_error(cut, clean, spacing, 1 / broadside.cross_range_resolution)
+            measured = measured_phase(broadside, cut, clean, spacing)
             assert measured == pytest.approx(predicted, rel=0.05, abs=0.01)
             largest = max(largest, abs(measured))
         assert 0.3 < largest < 0.9
@@ -170,7 +169,7 @@ class TestPolarFormat:
             lambda history: polar_format(history, look, size, (160, n)).image[80],
         ):
             cuts = [form(c.record([0, 0, 0], receiver=e)) for e in (error, MotionError())]
-            measured.append(quadratic_phase_error(*cuts, size[1] / n, 1 / c.cross_range_resolution)[0])
+            measured.append(measured_phase(c, *cuts, size[1] / n))
         assert measured[1] == pytest.approx(measured[0], rel=0.02)
         fine = polar_format(c.record([0, 0, 0]), look, (60.0, 400.0), (160, 1200)).frequency_y
         kept = 2 * np.ptp(fine) / SPEED_OF_LIGHT * c.cross_range_resolution

@@ -4,6 +4,7 @@ import json
 import math
 import re
 from datetime import date
+from functools import partial
 
 import numpy as np
 import pytest
@@ -11,6 +12,8 @@ import pytest
 from bisar_budget.budget.check import check_mission
 from bisar_budget.budget.verdicts import Verdict, with_verdicts
 from bisar_budget.mission.load import load_mission, parse_mission
+from bisar_budget.simulate import collection as collection_module
+from bisar_budget.simulate.image_formation import backprojection
 from bisar_budget.simulate.verify import rows_to_verify, verify_mission
 from tests.conftest import ROOT, findings, mission_text
 from tests.conftest import row as row_of
@@ -380,3 +383,17 @@ class TestCommand:
     def test_output_file(self, run, tmp_path) -> None:
         run("verify", SECTION_V, "--only", "timing.*", "--format", "json", "-o", tmp_path / "v.json")
         assert json.loads((tmp_path / "v.json").read_text())["missions"]
+
+
+def test_compiled_and_numpy_images_give_the_same_verdicts(monkeypatch) -> None:
+    pytest.importorskip("numba", reason="the extra `fast` is not installed")
+    mission = load_mission(str(SECTION_V.with_name("rigling_moses_section_v_autofocus.yaml")))
+    fast = verify_mission(mission, "receiver.*").rows
+    monkeypatch.setattr(collection_module, "backprojection", partial(backprojection, kernel="numpy"))
+    plain = verify_mission(mission, "receiver.*").rows
+    assert [(row.verdict, row.verdict_autofocus) for row in fast] == [
+        (row.verdict, row.verdict_autofocus) for row in plain
+    ]
+    for a, b in zip(fast, plain, strict=True):
+        assert a.measured_qpe_rad == pytest.approx(b.measured_qpe_rad, abs=1e-4)  # images are 118 dB apart
+        assert a.measured_displacement_m == pytest.approx(b.measured_displacement_m, abs=1e-4)
