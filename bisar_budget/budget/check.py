@@ -39,10 +39,11 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
     plane = image_plane(geometry) if mission.allocation.model == "published" else ground.plane
     sources = error_sources(mission, geometry, ground)
     allocation = allocate(mission, sources)
+    errors = list(_error_rows(mission, allocation, sources, plane, FirstOrder(mission, geometry, ground)))
     judged = [
-        *_error_rows(mission, allocation, sources, plane, FirstOrder(mission, geometry, ground)),
+        *errors,
         *_vibration_rows(mission, allocation),
-        *_aggregate_rows(mission, allocation, sources, plane),
+        *_aggregate_rows(mission, allocation, sources, errors, plane),
     ]
     rows, warnings = apply_waivers(judged, mission, today)
     return MissionFindings(
@@ -76,7 +77,7 @@ def _error_rows(
     gain = allocation.autofocus_gain
     owners = ("transmitter", "receiver", "clock", "mission")
     limits = {owner: allocation.qpe_limit(owner) * gain for owner in owners}
-    model = mission.allocation.model
+    model, warn_above = mission.allocation.model, mission.allocation.warn_above
     for source in sources:
         limit = limits[source.owner]
         published = _quotient(limit, abs(source.effect.qpe))
@@ -103,27 +104,31 @@ def _error_rows(
                 f"QPE {qpe:.3g} rad, {limit:.3g} rad allowed ({of_model}); "
                 f"passes with autofocus from n_pull {needed:g}"
             )
-        yield _judged(
-            mission,
-            id=source.id,
-            metric="quadratic_phase_error",
-            unit=source.unit,
-            declared=declared,
-            allowable=_gating(model, published, full),
-            path=source.path,
-            equation=source.equation,
-            gain=gain,
-            no_limit=_no_limit(source, model),
-            info=info,
-            over=over,
-            doubt=doubt,
-            limits=(published, full),
-            qpe=qpe_published,
-            qpe_full=qpe_full,
-            displacement=displacement,
-            evidence=source.evidence,
-            is_independent=source.is_independent,
-            notes=notes,
+        allowable = _gating(model, published, full)
+        utilization, margin, status, reason, notes = _status(
+            warn_above, declared, allowable, gain, over, doubt, _no_limit(source, model), "", info, True, False, notes
+        )
+        yield Row(  # in the order of its fields, as `_judged` has them: there are a dozen in every mission
+            source.id,
+            "quadratic_phase_error",
+            source.unit,
+            declared,
+            allowable,
+            published,
+            full,
+            qpe_published,
+            qpe_full,
+            displacement,
+            utilization,
+            margin,
+            status,
+            mission.line(source.path),
+            reason or None,
+            notes,
+            source.equation,
+            mission.requirement_ids.get(source.id),
+            source.evidence,
+            source.is_independent,
         )
 
 
@@ -264,7 +269,11 @@ def _vibration_allowable(mission: Mission, requirement_db: float | None, split: 
 
 
 def _aggregate_rows(
-    mission: Mission, allocation: Allocation, sources: Sequence[ErrorSource], plane: ImagePlane
+    mission: Mission,
+    allocation: Allocation,
+    sources: Sequence[ErrorSource],
+    errors: Sequence[Row],  # of the sources, in their order
+    plane: ImagePlane,
 ) -> Iterator[Row]:
     combine, model = mission.allocation.combine, mission.allocation.model
     declared = [source for source in sources if source.declared is not None and source.is_independent]
@@ -286,14 +295,14 @@ def _aggregate_rows(
         info="" if mission.requirements.cubic_phase_error is not None else NO_REQUIREMENT,
         over="cubic phase at the aperture edge above the requirement (Table I); autofocus gain does not apply",
     )
-    moves = [_displacement(source, plane, model) for source in motion]
-    known = [move for move in moves if move is not None]
+    counted = {source.id for source in motion}
+    known = [row.displacement_m for row in errors if row.displacement_m is not None and row.id in counted]
     yield _judged(
         mission,
         id="mission.location_error",
         metric="location_error",
         unit="m",
-        declared=combine_displacements(known, combine) if motion and len(known) == len(moves) else None,
+        declared=combine_displacements(known, combine) if motion and len(known) == len(motion) else None,
         allowable=mission.requirements.location_error,
         path=("requirements", "location_error"),
         equation="(25)" if model == "published" else "full model",
@@ -381,11 +390,62 @@ def _judged(
     is_independent: bool = True,
     notes: tuple[str, ...] = (),
 ) -> Row:
-    """Judge what is declared against what is allowed.
+    """Judge one row; see `_status`."""
+    utilization, margin, status, reason, notes = _status(
+        mission.allocation.warn_above,
+        declared,
+        allowable,
+        gain,
+        over,
+        doubt,
+        no_limit,
+        not_evaluated,
+        info,
+        is_declared,
+        never_fails,
+        notes,
+    )
+    return Row(  # in the order of its fields: keywords cost as much as the judgement
+        id,
+        metric,
+        unit,
+        declared,
+        allowable,
+        *(limits or (allowable, None)),
+        qpe,
+        qpe_full,
+        displacement,
+        utilization,
+        margin,
+        status,
+        mission.line(path),
+        reason or None,
+        notes,
+        equation,
+        mission.requirement_ids.get(id),
+        evidence,
+        is_independent,
+    )
+
+
+def _status(
+    warn_above: float,
+    declared: float | None,
+    allowable: float | None,
+    gain: float,
+    over: str,
+    doubt: str,
+    no_limit: str,
+    not_evaluated: str,
+    info: str,
+    is_declared: bool,
+    never_fails: bool,
+    notes: tuple[str, ...],
+) -> tuple[float | None, float | None, str, str, tuple[str, ...]]:
+    """Judge what is declared against what is allowed: utilization, margin, status, reason and notes.
 
     The status is the first that applies, in the order of the contract; waivers come after.
     """
-    warn_above = mission.allocation.warn_above
     utilization = margin = None
     reason = no_limit if allowable is None else ""
     if declared is not None:
@@ -410,31 +470,11 @@ def _judged(
         status, reason = "warn", f"above {100 * warn_above:g} % of the limit"
     else:
         status = "pass"
-    return Row(  # in the order of its fields: keywords cost as much as the judgement
-        id,
-        metric,
-        unit,
-        declared,
-        allowable,
-        *(limits or (allowable, None)),
-        qpe,
-        qpe_full,
-        displacement,
-        utilization,
-        margin,
-        status,
-        mission.line(path),
-        reason or None,
-        notes,
-        equation,
-        mission.requirement_ids.get(id),
-        evidence,
-        is_independent,
-    )
+    return utilization, margin, status, reason, notes
 
 
 def _unknown_requirement_ids(mission: Mission, rows: Sequence[Row]) -> Iterator[FileWarning]:
-    known = {row.id for row in rows}
+    known = {row.id for row in rows} if mission.requirement_ids else set()
     for row_id in mission.requirement_ids:
         if row_id not in known:
             yield FileWarning(
