@@ -86,9 +86,10 @@ class ErrorSource(NamedTuple):
 
     def by(self, model: str) -> Effect:
         """Effect of one unit by a model; by `strictest` that of the larger quadratic phase."""
-        if model == "strictest":
-            model = "full" if abs(self.full.qpe) >= abs(self.effect.qpe) else "published"
-        return self.full if model == "full" else self.effect
+        if model == "published":
+            return self.effect
+        is_full = model == "full" or abs(self.full.qpe) >= abs(self.effect.qpe)
+        return self.full if is_full else self.effect
 
     def qpe(self, model: str) -> float:
         """Quadratic phase error of the declared error by a model, signed; 0 if none is declared. [rad]"""

@@ -28,13 +28,19 @@ class FirstOrder:
         nearest = min(geometry.transmitter.slant_range, geometry.receiver.slant_range)
         # Within this of platform and image the second order cannot reach the floor.
         self._harmless = math.sqrt(FLOOR_RAD * nearest * self.wavelength / (4 * math.pi))
+        (a, b), (c, d) = ground.plane.adjugate
+        determinant = abs(ground.plane.determinant)
+        self._moved_by = (
+            math.hypot(a, c) / determinant,
+            math.hypot(b, d) / determinant,
+        )  # per constant and linear term
 
     def note(self, source: ErrorSource) -> str:
         """Say that a declared error is beyond first order and what the second adds; empty where it is inside."""
-        declared = source.declared or 0.0
-        east, north = self.ground.plane.displacement(source.full, declared) or (0.0, 0.0)
-        if abs(declared) * source.power(self.T / 2) + math.hypot(east, north) < self._harmless:
-            return ""
+        declared, (constant, linear) = source.declared or 0.0, self._moved_by
+        moves = constant * abs(source.full.constant) + linear * abs(source.full.linear)
+        if abs(declared) * (source.power(self.T / 2) + moves) < self._harmless:
+            return ""  # a bound on what follows
         first, added = source.full.qpe * declared, self.second(source, declared).qpe
         if abs(added) <= max(FLOOR_RAD, SHARE * abs(first)):
             return ""
