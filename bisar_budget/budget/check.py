@@ -92,12 +92,16 @@ def _error_rows(
             displacement = _displacement(source, plane, model)
             if displacement is None:
                 notes = (*notes, plane.degeneracy)
-            if note := first_order.note(source):
-                notes = (*notes, note)
         over = doubt = ""
+        beyond = first_order.beyond(source) if source.is_motion else None
+        if beyond is not None:
+            both = f"{qpe_full:.3g} rad becomes {beyond:.3g} rad with the second order"
+            notes = (*notes, f"beyond first order: the full model's {both}")
+            if abs(beyond) > limit * (1 + UTILIZATION_TOLERANCE):
+                doubt = f"beyond first order, where no limit holds: {both}, {limit:.3g} rad allowed"
         if qpe_published > limit or abs(qpe_full) > limit:
             qpe = abs(source.qpe(model))
-            doubt = _doubt(source, model, limit)
+            doubt = _doubt(source, model, limit) or doubt
             needed = allocation.n_pull_needed(qpe, source.owner)
             of_model = "full model" if source.by(model) is source.full else source.equation
             over = (

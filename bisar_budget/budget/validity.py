@@ -35,17 +35,14 @@ class FirstOrder:
             math.hypot(b, d) / determinant,
         )  # per constant and linear term
 
-    def note(self, source: ErrorSource) -> str:
-        """Say that a declared error is beyond first order and what the second adds; empty where it is inside."""
+    def beyond(self, source: ErrorSource) -> float | None:
+        """Quadratic phase of a declared error with the second order, signed; None inside the first. [rad]"""
         declared, (constant, linear) = source.declared or 0.0, self._moved_by
         moves = constant * abs(source.full.constant) + linear * abs(source.full.linear)
         if abs(declared) * (source.power(self.T / 2) + moves) < self._harmless:
-            return ""  # a bound on what follows
+            return None  # a bound on what follows
         first, added = source.full.qpe * declared, self.second(source, declared).qpe
-        if abs(added) <= max(FLOOR_RAD, SHARE * abs(first)):
-            return ""
-        total = first + added
-        return f"beyond first order: the full model's {first:.3g} rad becomes {total:.3g} rad with the second order"
+        return None if abs(added) <= max(FLOOR_RAD, SHARE * abs(first)) else first + added
 
     def second(self, source: ErrorSource, size: float) -> Effect:
         """What the second order adds to an error of a size: displacement and quadratic phase."""

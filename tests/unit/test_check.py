@@ -567,3 +567,20 @@ def test_every_number_is_finite_and_every_row_consistent(velocity, error, rule, 
 def test_the_day_matters_only_to_waivers() -> None:
     mission = parse_mission(mission_text())
     assert check_mission(mission, date(2000, 1, 1)).rows == check_mission(mission, date(2100, 1, 1)).rows
+
+
+class TestBeyondFirstOrder:
+    """A vertical velocity error of metres per second in level flight bends the range itself."""
+
+    def test_a_pass_of_the_first_order_that_the_second_fails_is_a_warning(self) -> None:
+        """Exact ranges say 0.82 rad at 1.97 m/s for the receiver of the paper's example, the first order 0.393."""
+        receiver = {"slant_range": 8500, "azimuth": "45 deg", "elevation": 0.23752, "speed": 60}
+        receiver |= {"motion_azimuth": "135 deg", "motion_error": {"velocity": [0, 0, 1.9]}}
+        found = row(findings(platforms__receiver=receiver, allocation__model="full"), "receiver.velocity.z")
+        assert found.utilization < 1
+        assert found.status == "warn"
+        assert "with the second order" in found.reason
+
+    def test_a_small_error_is_inside(self) -> None:
+        found = row(findings(**{f"{ERROR}__velocity": [0, 0, 0.1]}), "transmitter.velocity.z")
+        assert not any("first order" in note for note in found.notes)
