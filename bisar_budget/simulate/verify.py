@@ -251,6 +251,8 @@ class Study:
         """Form the image at the limit with autofocus and refocus it; hold what is left to the plain budget."""
         try:
             effect = self.collection.effect(errors)
+            if reason := self._beyond_first_order(errors, effect, self.allocation.autofocus_gain * budget):
+                return {"verdict_autofocus": "not_evaluated", "reason_autofocus": reason}
             chip, reference = self._chips(errors, effect)
             focused = Chip(ALGORITHMS[self.mission.autofocus.algorithm](chip.image).image, chip.grid)
             residual = abs(self._phases(focused, reference)[0])

@@ -271,6 +271,23 @@ class TestAutofocus:
         assert row.boundary_autofocus == pytest.approx(16 * row.boundary_error)
         assert row.verdict_autofocus == "confirmed"
 
+    def test_metres_of_error_a_hundred_metres_away_get_no_verdict(self) -> None:
+        """A refocused image of 21 m of error 108 m away: the fit said 56 rad were left, the peak said none."""
+        platforms = {
+            "transmitter": {"position": [80, -60, 40], "velocity": [3, 6, 0.5]},
+            "receiver": {"position": [50, 90, 30], "velocity": [-4, 3, 0]},
+        }
+        row = verdicts(
+            "transmitter.position.x",
+            platforms=platforms,
+            radar={"center_frequency": "94 GHz", "bandwidth": "1 GHz"},
+            collection={"aperture_time": 1},
+            allocation__model="full",
+            autofocus={"n_pull": 3},
+        )["transmitter.position.x"]
+        assert row.verdict_autofocus == "not_evaluated"
+        assert "beyond first order" in row.reason_autofocus
+
     @pytest.mark.parametrize(("n_pull", "verdict"), [(8, "confirmed"), (14, "optimistic")])
     def test_range_walk_bounds_the_pull_in(self, n_pull: float, verdict: str) -> None:
         """1 GHz at 10 GHz: half a cell of walk at n_pull 10."""
