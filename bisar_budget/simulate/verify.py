@@ -178,6 +178,12 @@ class Study:
                 return blank._replace(**_predicted(effect), reason=reason)
             chip, reference = self._chips(errors, effect)
             quadratic, _ = self._phases(chip, reference)
+            if abs(abs(quadratic) - abs(effect.quadratic)) > TOLERANCE * budget:
+                reason = (
+                    f"the image shows {abs(quadratic):.3g} rad where exact ranges give {abs(effect.quadratic):.3g}: "
+                    "this geometry strains the image of a patch, and neither is taken for the truth"
+                )
+                return blank._replace(**_predicted(effect), reason=reason)
             inside, beyond = (self._measured_phase(self._scaled(sizes, scale * f)) for f in (INSIDE, BEYOND))
             clean = impulse_response(reference.cut, self.collection.spacing[1])
             response = impulse_response(chip.cut, self.collection.spacing[1], mask_m=clean.mask_m)

@@ -584,3 +584,35 @@ class TestBeyondFirstOrder:
     def test_a_small_error_is_inside(self) -> None:
         found = row(findings(**{f"{ERROR}__velocity": [0, 0, 0.1]}), "transmitter.velocity.z")
         assert not any("first order" in note for note in found.notes)
+
+
+class TestTheStricterOfBothModels:
+    """A squinted, climbing pair whose displacement (25) overstates and whose cubic phase Table I does not know."""
+
+    PLATFORMS = {
+        "transmitter": {
+            "position": [12e3, -3e3, 5e3], "velocity": [30, 120, 25], "motion_error": {"position": [1, 1, 1]},
+        },
+        "receiver": {"position": [-2e3, 9e3, 2e3], "velocity": [50, 0, -4], "motion_error": {"position": [0, 3, 0]}},
+    }  # fmt: skip
+
+    def found(self, model: str, **requirements):
+        changes = {"platforms": self.PLATFORMS, "collection": {"aperture_time": 5}, "requirements": requirements}
+        return findings(allocation__model=model, **changes)
+
+    def test_location(self) -> None:
+        moved = {
+            model: row(self.found(model, location_error=20), "mission.location_error").declared
+            for model in ("published", "full", "strictest")
+        }
+        assert moved["published"] > 2 * moved["full"]
+        assert moved["strictest"] == pytest.approx(max(moved["published"], moved["full"]))
+
+    def test_cubic_phase_that_only_the_full_model_knows_is_a_warning(self) -> None:
+        known = row(self.found("full"), "mission.cubic_phase_error").declared
+        limit = known / 1.4
+        published = row(self.found("published", cubic_phase_error=limit), "mission.cubic_phase_error")
+        assert (published.status, published.declared) == ("warn", 0)
+        assert "full model says fail" in published.reason
+        assert row(self.found("full", cubic_phase_error=limit), "mission.cubic_phase_error").status == "fail"
+        assert row(self.found("full", cubic_phase_error=1.1 * known), "mission.cubic_phase_error").status != "fail"
