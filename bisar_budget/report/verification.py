@@ -41,6 +41,8 @@ def as_text(missions: Sequence[VerifiedMission], style: Style) -> str:
 def _mission(mission: VerifiedMission, style: Style) -> list[str]:
     found = [row.verdict for row in mission.rows]
     counts = ", ".join(f"{found.count(verdict)} {verdict}" for verdict in _ANSI if verdict in found)
+    refuted = sum(row.verdict_autofocus == "optimistic" for row in mission.rows)
+    counts += f"; {refuted} optimistic with autofocus" if refuted else ""  # they decide the exit code too
     summary = f"{printable(mission.file)}: {counts or 'no row has a limit here'}"
     return [mission.name, "", *evidence(mission.rows, style), "", summary]
 

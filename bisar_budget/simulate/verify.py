@@ -297,7 +297,7 @@ class Study:
         )
 
     def _cubic(self, requirement: float) -> Verdict:
-        """All declared errors scaled together until Table I's cubic column reaches the requirement."""
+        """All declared errors scaled together until the gating model's cubic phase reaches the requirement."""
         blank = Verdict(
             id="mission.cubic_phase_error", model=self.model, boundary_error=requirement, unit="rad",
             budget_rad=requirement,
@@ -305,7 +305,7 @@ class Study:
         sizes = [(s, s.declared or 0.0) for s in self._declared]
         total = abs(math.fsum(s.cubic(self.model) for s, _ in sizes))
         if not total:
-            return blank._replace(reason="no declared error has a cubic phase by Table I")
+            return blank._replace(reason=f"no declared error has a cubic phase by the {self.model} model")
         try:
             errors = self._scaled(sizes, requirement / total)
             effect = self.collection.effect(errors)

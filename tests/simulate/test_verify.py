@@ -249,6 +249,20 @@ class TestTogether:
         assert "many flights" in rows["mission.quadratic_phase_error"].reason
 
 
+def test_an_image_that_exact_ranges_contradict_is_not_taken_for_the_truth() -> None:
+    """A platform within 500 m of a long-wave cut: ranges say 0.400 rad, the patch 20 to 33, not even monotonic."""
+    platforms = {
+        "transmitter": {"position": ["500 km", "20 km", "600 km"], "velocity": [200, 7500, 10]},
+        "receiver": {"position": [300, -400, 60], "velocity": [0, 0, 0]},
+    }
+    radar = {"center_frequency": "1.2575 GHz", "bandwidth": "80 MHz"}
+    changes = {"platforms": platforms, "radar": radar, "collection": {"aperture_time": 8}}
+    row = verdicts("receiver.position.x", **changes, allocation__model="full")["receiver.position.x"]
+    assert (row.verdict, row.measured_qpe_rad) == ("not_evaluated", None)
+    assert row.predicted_qpe_rad == pytest.approx(0.400, abs=0.005)  # computed independently
+    assert "neither is taken for the truth" in row.reason
+
+
 class TestAutofocus:
     @pytest.mark.parametrize("algorithm", ["pga", "map_drift"])
     def test_every_limit_with_autofocus_refocuses_inside_the_plain_budget(self, algorithm: str) -> None:
