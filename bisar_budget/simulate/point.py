@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bisar_budget.budget.sources import PLATFORMS
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vector
 from bisar_budget.mission.model import Mission
@@ -27,7 +28,7 @@ from bisar_budget.simulate.phase_history import (
 
 _MARGIN_CELLS = 16  # of the patch beyond the smear, each way
 _SAMPLES_PER_CELL = 2
-_MIN_PULSES = 256
+_MIN_PULSES, _MAX_PULSES = 256, 1 << 15
 _MAX_BEND = 0.5  # range cells
 _BYTES_PER_PIXEL = 16 * 8  # the images kept, and what their formation holds at once
 
@@ -155,9 +156,28 @@ def simulate_point(mission: Mission) -> PointImages:
 
 
 def _pulses(mission: Mission, cells: int) -> int:
+    """Pulses that sample the patch and every declared vibration twice over."""
     given = mission.collection.pulses
+    lines = [
+        line
+        for name in PLATFORMS
+        for line in getattr(mission.platforms, name).motion_error.vibration.sinusoidal
+        if line.amplitude
+    ]
+    cycles = max((line.frequency for line in lines), default=0.0) * mission.collection.aperture_time
+    if given is not None and given <= 2 * cycles:
+        raise SimulationError(
+            f"collection.pulses is {given}, but a declared vibration makes {cycles:.4g} cycles in the aperture and "
+            f"aliases up to {2 * cycles:.4g} pulses; omit the key to get what it takes"
+        )
     if given is None:
-        return max(_MIN_PULSES, 1 << (2 * cells - 1).bit_length())
+        needed = max(2 * cells, 4 * cycles)
+        if needed > _MAX_PULSES:
+            raise SimulationError(
+                f"a patch of {cells} resolution cells and {cycles:.4g} cycles of vibration take {needed:.3g} pulses, "
+                f"at most {_MAX_PULSES} are simulated unless collection.pulses asks for more"
+            )
+        return max(_MIN_PULSES, 1 << (math.ceil(needed) - 1).bit_length())
     if given < 2 * cells:
         raise SimulationError(
             f"collection.pulses is {given}, but the patch is {cells} resolution cells wide and aliases below "

@@ -166,3 +166,34 @@ class TestCommand:
         assert result.exit_code == 2
         assert "cannot write" in result.stderr
         assert json.dumps(result.stdout) == '""'
+
+
+class TestVibration:
+    """2 mm at 21.3 Hz, λ = 3 cm: a phase of 0.419 rad, of which J₀ leaves 20·log₁₀ J₀ = -0.386 dB at the peak."""
+
+    CYCLES = 128  # an integer of cycles on 256 pulses would be seen at one phase only
+
+    def mission(self, **changes):
+        vibration = {"sinusoidal": [{"amplitude": "2 mm", "frequency": self.CYCLES / 6}]}
+        error = {"platforms__transmitter__motion_error": {"vibration": vibration}}
+        return parse_mission(mission_text(**error, **changes))
+
+    def test_a_fast_one_is_sampled_twice_over(self) -> None:
+        images = simulate_point(self.mission())
+        loss = 20 * math.log10(images.response.peak / images.clean_response.peak)
+        assert loss == pytest.approx(-0.386, abs=0.02)
+
+    @pytest.mark.parametrize(("pulses", "aliases"), [(256, True), (257, False)])
+    def test_pulses_that_alias_it_are_refused(self, pulses: int, aliases: bool) -> None:
+        mission = self.mission(collection={"aperture_time": "6 s", "pulses": pulses})
+        if aliases:
+            with pytest.raises(SimulationError, match="aliases up to 256 pulses"):
+                simulate_point(mission)
+        else:
+            simulate_point(mission)
+
+    def test_one_that_takes_a_million_pulses_is_refused(self) -> None:
+        vibration = {"sinusoidal": [{"amplitude": "2 mm", "frequency": "1 MHz"}]}
+        error = {"platforms__transmitter__motion_error": {"vibration": vibration}}
+        with pytest.raises(SimulationError, match="at most 32768 are simulated"):
+            simulate_point(parse_mission(mission_text(**error)))
