@@ -572,6 +572,8 @@ def _verified(missions: "Sequence[Mission]", only: str, jobs: int | None) -> "li
     from bisar_budget.simulate.verify import rows_to_verify, verify_mission
 
     total = sum(len(rows_to_verify(mission, only)) for mission in missions)
+    if not total and only != "*":
+        raise click.UsageError(f"--only {printable(only)}: no row with a limit has such an id, nothing was verified.")
     watched = sys.stderr is not None and sys.stderr.isatty()
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     jobs = jobs or (1 if is_compiled() else cores)

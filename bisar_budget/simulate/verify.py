@@ -253,6 +253,11 @@ class Study:
             return None
         return (math.fsum(m[0] for m in moves if m), math.fsum(m[1] for m in moves if m))
 
+    def _moves(self, sizes: Sequence[tuple[ErrorSource, float]]) -> GroundVector:
+        """Displacement of errors together by the full model."""
+        moves = [self.ground.plane.displacement(source.full, size) or (0.0, 0.0) for source, size in sizes]
+        return (math.fsum(move[0] for move in moves), math.fsum(move[1] for move in moves))
+
     def _refocused(self, errors: Errors, budget: float) -> dict[str, Any]:
         """Form the image at the limit with autofocus and refocus it; hold what is left to the plain budget."""
         try:
@@ -321,14 +326,15 @@ class Study:
         )
 
     def _location(self, requirement: float) -> Verdict:
-        """All declared errors scaled together until (25) reaches the requirement; the image within half a pixel."""
+        """All declared errors scaled together until they move the image by the requirement; within half a pixel."""
         blank = Verdict(id="mission.location_error", model=self.model, boundary_error=requirement, unit="m")
         sizes = [(s, s.declared or 0.0) for s in self._declared]
-        declared = self._published_displacement(sizes, 1.0)
+        rule = "(25)" if self.model == "published" else "the full model"
+        declared = self._published_displacement(sizes, 1.0) if self.model == "published" else self._moves(sizes)
         if declared is None:
             return blank._replace(reason=self.plane.degeneracy)
         if not math.hypot(*declared):
-            return blank._replace(reason="the declared errors move nothing by (25)")
+            return blank._replace(reason=f"the declared errors move nothing by {rule}")
         scale = requirement / math.hypot(*declared)
         predicted = (declared[0] * scale, declared[1] * scale)
         try:
@@ -349,10 +355,10 @@ class Study:
         longer = math.hypot(*measured) > requirement
         return blank._replace(
             **_predicted(effect),
-            displacement_published_m=predicted,
+            displacement_published_m=self._published_displacement(sizes, scale),
             measured_displacement_m=measured,
             verdict="confirmed" if max(pixels) <= HALF_PIXEL else "optimistic" if longer else "conservative",
-            reason=f"(25) and the image differ by {pixels[0]:.2g} and {pixels[1]:.2g} pixels along x' and y'",
+            reason=f"{rule} and the image differ by {pixels[0]:.2g} and {pixels[1]:.2g} pixels along x' and y'",
         )
 
     def _other(self, source: ErrorSource) -> Verdict:

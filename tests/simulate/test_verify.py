@@ -212,6 +212,20 @@ class TestTogether:
         assert math.hypot(*row.displacement_published_m) == pytest.approx(2.0)
         assert row.measured_displacement_m == pytest.approx(row.displacement_m, abs=0.02)  # 4 % of a cell
 
+    def test_location_by_the_full_model_where_25_is_metres_off(self) -> None:
+        """Climbing and squinted: (25) says more than twice what the image moves by, the full model what it does."""
+        platforms = {
+            "transmitter": {
+                "position": [12e3, -3e3, 5e3], "velocity": [30, 120, 25], "motion_error": {"position": [1, 1, 1]},
+            },
+            "receiver": {"position": [-2e3, 9e3, 2e3], "velocity": [50, 0, -4]},
+        }  # fmt: skip
+        changes = {"platforms": platforms, "collection": {"aperture_time": 3}, "requirements__location_error": 2}
+        by = {m: verdicts("mission.location_error", **changes, allocation__model=m) for m in ("published", "full")}
+        assert by["full"]["mission.location_error"].verdict == "confirmed"
+        assert "the full model and the image" in by["full"]["mission.location_error"].reason
+        assert by["published"]["mission.location_error"].verdict != "confirmed"
+
     def test_location_of_errors_that_defocus_is_not_read(self) -> None:
         rows = verdicts("mission.location_error", requirements__location_error=15, **ERRORS)
         assert rows["mission.location_error"].verdict == "not_evaluated"
@@ -408,8 +422,10 @@ class TestCommand:
         assert result.exit_code == 2
         assert "cannot be read" in result.stderr
 
-    def test_a_glob_without_rows_says_so(self, run) -> None:
-        assert "no row" in run("verify", SECTION_V, "--only", "nothing").stdout
+    def test_a_glob_without_rows_is_wrong_usage(self, run) -> None:
+        result = run("verify", SECTION_V, "--only", "nothing")
+        assert result.exit_code == 2
+        assert "nothing was verified" in result.stderr
 
     def test_output_file(self, run, tmp_path) -> None:
         run("verify", SECTION_V, "--only", "timing.*", "--format", "json", "-o", tmp_path / "v.json")
