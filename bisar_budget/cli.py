@@ -679,8 +679,8 @@ def schema(output: str | None) -> None:
     show_default=True,
     help="How to write it.",
 )
-@click.option("--check", "check_only", is_flag=True, help="Fail if the evaluators are not what the derivation gives.")
-@click.option("--write", is_flag=True, help="Rewrite the evaluators from the derivation.")
+@click.option("--check", "check_only", is_flag=True, help="Fail if a generated file is not what it gives.")
+@click.option("--write", is_flag=True, help="Rewrite the generated files: evaluators and formulas.")
 def derive(table: str, format_name: str, check_only: bool, write: bool) -> None:
     """Derive the tables of Rigling & Moses from the geometry and print them.
 
@@ -699,25 +699,27 @@ def derive(table: str, format_name: str, check_only: bool, write: bool) -> None:
 def _generated(write: bool) -> None:
     import difflib
 
-    from bisar_budget.theory import emit
+    from bisar_budget.theory import emit, emit_catalogue
 
     derived_with = f"(SymPy {emit.SYMPY_VERSION})"
-    today = emit.source()
-    if write:
-        _write(str(emit.TARGET), today)
-        click.echo(f"Wrote {emit.TARGET.name} {derived_with}.")
-        return
-    committed = emit.TARGET.read_text(encoding="utf-8")
-    if committed == today:
-        click.echo(f"{emit.TARGET.name} is what the derivation gives {derived_with}.")
-        return
-    lines = difflib.unified_diff(committed.splitlines(), today.splitlines(), "committed", "derived", lineterm="", n=1)
-    _print("\n".join(lines) + "\n")
-    click.echo(
-        f"{emit.TARGET.name} differs from the derivation {derived_with}; `bisar-budget derive --write` rewrites it.",
-        err=True,
-    )
-    sys.exit(EXIT_BROKEN)
+    is_current = True
+    for generated in (emit, emit_catalogue):
+        name, today = generated.TARGET.name, generated.source()
+        if write:
+            _write(str(generated.TARGET), today)
+            click.echo(f"Wrote {name} {derived_with}.")
+            continue
+        committed = generated.TARGET.read_text(encoding="utf-8")
+        if committed == today:
+            click.echo(f"{name} is what the derivation gives {derived_with}.")
+            continue
+        is_current = False
+        pair = (committed.splitlines(), today.splitlines())
+        _print("\n".join(difflib.unified_diff(*pair, "committed", "derived", lineterm="", n=1)) + "\n")
+        differs = f"{name} differs from the derivation {derived_with}"
+        click.echo(f"{differs}; `bisar-budget derive --write` rewrites it.", err=True)
+    if not is_current:
+        sys.exit(EXIT_BROKEN)
 
 
 def main() -> None:

@@ -10,15 +10,15 @@ from bisar_budget.errors import KeyPath, printable
 from bisar_budget.geometry import FRAME_AXES, PlatformState
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import formulas
-from bisar_budget.report.formulas import equation, number, step, with_unit
+from bisar_budget.report.formulas import Equation, Step, equation, number, step, with_unit
 
 _RATES = ("m", "m/s", "m/s²", "m/s³")  # units of the range error's coefficients
 
 
-def declaration(mission: Mission, source: ErrorSource) -> Iterator[str]:
+def declaration(mission: Mission, source: ErrorSource) -> Iterator[Step]:
     """From the file to `declared`: where it stands, frame, coverage factor."""
     if source.declared is None:
-        yield missing(mission, source.path)
+        yield Step(missing(mission, source.path))
         return
     yield from step(f"Declared in {place(mission, source.path)}", as_written(mission, source.path))
     if source.evidence:
@@ -40,7 +40,7 @@ def declaration(mission: Mission, source: ErrorSource) -> Iterator[str]:
     yield from step("Coverage factor allocation.coverage_factor", *lines)
 
 
-def _turned(mission: Mission, source: ErrorSource, axis: str) -> Iterator[str]:
+def _turned(mission: Mission, source: ErrorSource, axis: str) -> Iterator[Step]:
     """Errors of another frame along one axis of the scene."""
     platform, kind, _ = source.id.split(".")
     error = getattr(mission.platforms, platform).motion_error
@@ -62,7 +62,7 @@ def _turned(mission: Mission, source: ErrorSource, axis: str) -> Iterator[str]:
 
 def effect(
     mission: Mission, found: MissionFindings, source: ErrorSource, sources: Mapping[str, ErrorSource]
-) -> Iterator[str]:
+) -> Iterator[Step]:
     """From `declared` to the quadratic phase error; for one unit where nothing is declared."""
     size = 1.0 if source.declared is None else abs(source.declared)
     each = " of one unit" if source.declared is None else ""
@@ -114,7 +114,7 @@ def _motion_values(
     }
 
 
-def _clock_effect(mission: Mission, source: ErrorSource, size: float, each: str) -> Iterator[str]:
+def _clock_effect(mission: Mission, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
     order = ("constant", "linear", "quadratic", "cubic").index(source.id.split(".")[1])
     values = {
         "c": SPEED_OF_LIGHT,
@@ -137,7 +137,7 @@ def _projected_effect(
     sources: Mapping[str, ErrorSource],
     size: float,
     each: str,
-) -> Iterator[str]:
+) -> Iterator[Step]:
     """Along an axis of another frame: the projection of the effects along the axes of the scene."""
     platform, kind, axis = source.id.split(".")
     state: PlatformState = getattr(found.geometry, platform)
@@ -155,7 +155,7 @@ def _projected_effect(
     yield from step(f"Quadratic phase error{each}", *equation("QPE", "QPE/unit*declared", values, qpe, "rad"))
 
 
-def _full(source: ErrorSource, size: float, each: str) -> Iterator[str]:
+def _full(source: ErrorSource, size: float, each: str) -> Iterator[Step]:
     """What the full model makes of it, signed as declared."""
     size = math.copysign(size, source.declared or 1.0)
     moved = source.full.moved * size
@@ -171,7 +171,7 @@ def plane_and_effect(mission: Mission, found: MissionFindings, source: ErrorSour
     return full_ground(mission, found.geometry).plane, source.full, "Full model"
 
 
-def _displacement(mission: Mission, found: MissionFindings, source: ErrorSource) -> Iterator[str]:
+def _displacement(mission: Mission, found: MissionFindings, source: ErrorSource) -> Iterator[Step]:
     plane, by_model, title = plane_and_effect(mission, found, source)
     if plane.degeneracy or source.declared is None:
         return
@@ -183,7 +183,7 @@ def _displacement(mission: Mission, found: MissionFindings, source: ErrorSource)
         "β̃_1": by_model.linear * source.declared,
         "det Q": plane.determinant,
     }
-    lines: list[str] = []
+    lines: list[Equation] = []
     for symbol, (first, second), result in zip(("x̃", "ỹ"), plane.adjugate, moved, strict=True):
         entries = {"adj_0": first, "adj_1": second}
         lines += equation(symbol, "(adj_0*β̃_0 + adj_1*β̃_1)/(det Q)", values | entries, result, "m")

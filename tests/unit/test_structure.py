@@ -14,7 +14,7 @@ PACKAGE = ROOT / "bisar_budget"
 FLOORS = [
     {"", "constants", "errors", "units", "resources", "settings"},
     {"geometry"},
-    {"theory", "evaluators"},
+    {"theory", "evaluators", "catalogue"},
     {"mission"},
     {"budget"},
     {"simulate"},
