@@ -75,6 +75,8 @@ class MissionFindings(NamedTuple):
     coverage_factor: float
     wavelength: float
     geometry: BistaticGeometry
+    aperture_time: float
+    scene_radius: float | None
     resolution: Resolution
     allocation: Allocation
     rows: tuple[Row, ...]
