@@ -89,20 +89,12 @@ def equation(symbol: str, formula: str, values: Mapping[str, float], result: flo
     return (Equation(symbol, formula, values, result, unit),)
 
 
-def symbols_pattern(names: Mapping[str, object]) -> re.Pattern[str]:
-    """Match symbols within a formula, each whole: v_x is not the start of v_xt.
-
-    A symbol ends where no letter, digit or accent follows.
-    """
-    longest_first = sorted(names, key=len, reverse=True)
-    return re.compile(
-        r"(?<![\w\u0300-\u036f])(?:" + "|".join(map(re.escape, longest_first)) + r")(?![\w\u0300-\u036f])"
-    )
-
-
 def filled(formula: str, values: Mapping[str, float]) -> str:
     """Put numbers for the symbols, six digits each; negative ones in brackets."""
-    return symbols_pattern(values).sub(lambda match: number(values[match[0]]), formula)
+    names = sorted(values, key=len, reverse=True)
+    # A symbol ends where no letter, digit or accent follows: v_x is not the start of v_xt.
+    pattern = re.compile(r"(?<![\w\u0300-\u036f])(?:" + "|".join(map(re.escape, names)) + r")(?![\w\u0300-\u036f])")
+    return pattern.sub(lambda match: number(values[match[0]]), formula)
 
 
 def number(value: float) -> str:
