@@ -3,7 +3,7 @@
 import gc
 import os
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from datetime import UTC, date, datetime
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -15,7 +15,7 @@ from bisar_budget import __version__
 from bisar_budget.errors import printable
 
 if TYPE_CHECKING:
-    from bisar_budget.budget.findings import MissionFindings, Report
+    from bisar_budget.budget.findings import MissionFindings, Option, Report
     from bisar_budget.budget.verdicts import VerifiedMission
     from bisar_budget.mission.model import Mission
     from bisar_budget.report import Style
@@ -104,10 +104,11 @@ class _Gate(click.Command):
     "--format",
     "format_name",
     envvar="BISAR_BUDGET_FORMAT",
-    type=click.Choice(["text", "json", "csv", "junit", "sarif", "github", "needs"]),
+    type=click.Choice(["text", "json", "csv", "junit", "sarif", "github", "needs", "html", "markdown"]),
     default="text",
     show_default=True,
-    help="Format of the report; github: annotations of a pull request, needs: for Sphinx-Needs.",
+    help="Format of the report; github: annotations of a pull request, needs: for Sphinx-Needs, html and "
+    "markdown: a compliance report for a review board.",
 )
 @click.option("-o", "--output", metavar="FILE", help="Write the report to FILE instead of standard output.")
 @click.option(
@@ -116,8 +117,8 @@ class _Gate(click.Command):
     envvar="BISAR_BUDGET_REPORT",
     multiple=True,
     metavar="FILE",
-    help="Also write a report to FILE, in the format of its suffix: .txt, .json, .csv, .xml (JUnit), .sarif "
-    "or .needs.json. Repeatable.",
+    help="Also write a report to FILE, in the format of its suffix: .html, .md, .txt, .json, .csv, .xml (JUnit), "
+    ".sarif or .needs.json. Repeatable.",
 )
 @click.option(
     "--strict/--no-strict",
@@ -139,7 +140,8 @@ class _Gate(click.Command):
     "--date",
     "today",
     type=click.DateTime(["%Y-%m-%d"]),
-    help="Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC).",
+    help="Day on which waivers are judged, shown in .html and .md (default: SOURCE_DATE_EPOCH, else today, UTC, "
+    "and not shown).",
 )
 @click.option("--verify", "verifying", is_flag=True, help="Form images at the limits too and add their verdicts.")
 @click.option("-q", "--quiet", is_flag=True, help="One line per mission.")
@@ -181,9 +183,10 @@ def check(
     Defaults of --format, --report, --strict, --exit-zero, --model and --color: [tool.bisar-budget] in
     the nearest pyproject.toml, and over it the variables BISAR_BUDGET_FORMAT and so on.
     """
-    from bisar_budget.report import Style, render
+    from bisar_budget.report import WITH_MISSION, Style, render
 
     written = [(name, _format_of(name)) for name in reports]
+    formats = {format_name, *(its_format for _, its_format in written)}
     files = _expanded(missions)
     _spare(files, [output, *reports])
     if explain is not None:
@@ -192,25 +195,61 @@ def check(
             raise click.UsageError("--explain writes text: it excludes --format and --report.")
         _explain(files, explain, today.date() if today else _today(), model, output)
         return
-    report = _checked(files, today.date() if today else _today(), model, verifying)
+    report = _checked(
+        files, today.date() if today else _today(), model, verifying, not formats.isdisjoint(WITH_MISSION)
+    )
+    report = report._replace(options=tuple(_options()), day=_given_day(today))
     if format_name != "text" or output is not None or quiet or not _is_terminal():
         _say_faults(report)
     style = Style(verbosity=-1 if quiet else 1 if verbose else 0, root=_repository())
     for path, its_format in written:
-        _write(path, render(its_format, report, style))
+        _write_report(path, its_format, report, style)
     use_color = color == "always" or (color == "auto" and output is None and _wants_color())
-    text = render(format_name, report, style._replace(color=use_color))
+    style = style._replace(color=use_color)
     if output is None:
-        _print(text)
+        _print(render(format_name, report, style))
     else:
-        _write(output, text)
+        _write_report(output, format_name, report, style)
     if format_name == "github":
         _append_step_summary(report, style)
     code = report.exit_code(strict)
     sys.exit(0 if exit_zero and code == EXIT_BROKEN else code)
 
 
-def _checked(files: Sequence[str], today: date, model: str | None, verifying: bool) -> "Report":
+def _options() -> "Iterator[Option]":
+    """Say what the options that bear on the result are, and where each came from."""
+    from bisar_budget.budget.findings import Option
+
+    context = click.get_current_context()
+    origins = {
+        ParameterSource.COMMANDLINE: "command line",
+        ParameterSource.DEFAULT_MAP: "pyproject.toml",
+        ParameterSource.DEFAULT: "default",
+    }
+    for parameter in context.command.params:
+        name, value = str(parameter.name), context.params[str(parameter.name)]
+        source = context.get_parameter_source(name)
+        origin = origins.get(source, f"environment, {parameter.envvar}") if source else "default"
+        if name == "model":
+            yield Option("--model", value or "as each file says", origin)
+        elif name == "today":
+            day = _given_day(value)
+            if value is None and day is not None:
+                origin = "environment, SOURCE_DATE_EPOCH"
+            yield Option("--date", day.isoformat() if day else "the day of the run, which is not recorded", origin)
+        elif name in ("strict", "exit_zero", "verifying"):
+            yield Option(parameter.opts[0], "yes" if value else "no", origin)
+
+
+def _given_day(today: datetime | None) -> date | None:
+    """The day that the command line or the environment gives; a report has no other, so as to be reproducible."""
+    if today is not None:
+        return today.date()
+    return _today() if os.environ.get("SOURCE_DATE_EPOCH") else None
+
+
+def _checked(files: Sequence[str], today: date, model: str | None, verifying: bool, keep: bool) -> "Report":
+    """Check missions; `keep` leaves each with its findings, which for thousands takes memory."""
     from bisar_budget.budget.check import check_mission
     from bisar_budget.budget.findings import Report, UnusableMission
     from bisar_budget.errors import MissionError
@@ -223,19 +262,20 @@ def _checked(files: Sequence[str], today: date, model: str | None, verifying: bo
     for index, file in enumerate(files):
         try:
             mission = load_mission(file, model)
-            missions.append(check_mission(mission, today))
+            found = check_mission(mission, today)
+            missions.append(found if keep else found._replace(mission=None))
             if verifying:
                 usable[index] = mission
         except MissionError as error:
-            missions.append(UnusableMission(file=file, faults=error.faults))
+            missions.append(UnusableMission(file=file, faults=error.faults, data=error.data))
     if usable:
         from bisar_budget.budget.verdicts import with_verdicts
 
         gc.enable()  # images are large
         for index, verified in zip(usable, _verified(list(usable.values()), "*", None), strict=True):
-            found = missions[index]
-            if not isinstance(found, UnusableMission):
-                missions[index] = with_verdicts(found, verified.rows)
+            checked = missions[index]
+            if not isinstance(checked, UnusableMission):
+                missions[index] = with_verdicts(checked, verified.rows)
     return Report(version=__version__, missions=tuple(missions))
 
 
@@ -389,36 +429,43 @@ def _print(text: str) -> None:
             _fail(f"cannot write standard output: {error.strerror}")
 
 
-def _write(path: str, text: str) -> None:
+def _write_report(path: str, format_name: str, report: "Report", style: "Style") -> None:
+    """Write a report to a file, its pictures first: a text never names a picture that is not there."""
+    from bisar_budget.report import WITH_PICTURES, pictures, render
+
+    folder = ""
+    if format_name in WITH_PICTURES and path != "-" and (os.path.isfile(path) or not os.path.exists(path)):
+        folder = f"{os.path.splitext(path)[0]}.assets"
+    style = style._replace(assets=os.path.basename(folder))
+    text = render(format_name, report, style)
+    for name, content in pictures(format_name, report, style).items():
+        _write(os.path.join(folder, name), content)
+    _write(path, text)
+
+
+def _write(path: str, content: str | bytes) -> None:
     """Replace a file whole: written beside it under another name, then renamed. `-` is standard output.
 
     A link keeps pointing where it does; what is no file, a device or a pipe, is written to as it is.
     """
     import tempfile
 
-    if path == "-":
-        _print(text)
+    if path == "-" and isinstance(content, str):
+        _print(content)
         return
+    data = content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
     target = os.path.realpath(path)
     folder, name = os.path.split(target)
     temporary = None
     try:
         if os.path.exists(target) and not os.path.isfile(target):
-            with open(target, "w", encoding="utf-8", errors="backslashreplace") as special:
-                special.write(text)
+            with open(target, "wb") as special:
+                special.write(data)
             return
         os.makedirs(folder, exist_ok=True)
-        with tempfile.NamedTemporaryFile(
-            "w",
-            encoding="utf-8",
-            errors="backslashreplace",
-            newline="\n",
-            dir=folder,
-            prefix=f".{name}.",
-            delete=False,
-        ) as file:
+        with tempfile.NamedTemporaryFile(dir=folder, prefix=f".{name}.", delete=False) as file:
             temporary = file.name
-            file.write(text)
+            file.write(data)
         mask = os.umask(0)
         os.umask(mask)
         os.chmod(temporary, 0o666 & ~mask)  # a temporary file is private, a report is not

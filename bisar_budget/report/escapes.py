@@ -12,8 +12,16 @@ from bisar_budget.errors import printable
 
 _XML = {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "'": "&apos;"}
 _XML_SPECIAL = re.compile("[&<>\"']")
-# What can mean something in Markdown or in the HTML within it, at least at the start of a line.
-_MARKDOWN_SPECIAL = re.compile(r"[\\`*_{}\[\]<>()#|&~!@:$^]")
+# What means something in GitHub's Markdown or in the HTML within it, and only where it does: a report is also read
+# as it is. Within a word an underscore is one, and brackets, escaped, need nothing of the ( and ! beside them.
+_MARKDOWN_SPECIAL = re.compile(
+    r"[\\`*\[\]<>|$~]"
+    r"|(?<![A-Za-z0-9])_|_(?![A-Za-z0-9])"
+    r"|&(?=#|\w+;)|@(?=\w)|#(?=\w)|:(?=//|[\w+-]+:)|(?<=www)\."
+    r"|^[-+#=](?=[-+#= ]|$)|^ ",
+    re.IGNORECASE | re.ASCII,
+)
+_MARKDOWN_NUMBER = re.compile(r"^(\d{1,9})([.)])(?=\s|$)", re.ASCII)  # of a list
 
 
 def xml_text(text: str) -> str:
@@ -23,8 +31,9 @@ def xml_text(text: str) -> str:
 
 
 def markdown_text(text: str) -> str:
-    """Escape for Markdown, also within a table: a character reference is text everywhere."""
-    return _MARKDOWN_SPECIAL.sub(lambda match: f"&#{ord(match[0])};", printable(text))
+    """Escape for Markdown, also in a table or at the start of a line: a character reference is text everywhere."""
+    escaped = _MARKDOWN_SPECIAL.sub(lambda match: f"&#{ord(match[0])};", printable(text))
+    return _MARKDOWN_NUMBER.sub(lambda match: f"{match[1]}&#{ord(match[2])};", escaped)
 
 
 def command_text(text: str) -> str:

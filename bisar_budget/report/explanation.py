@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from bisar_budget.budget.allocation import Allocation
 from bisar_budget.budget.findings import MissionFindings, Row
-from bisar_budget.budget.sources import ErrorSource, error_sources
+from bisar_budget.budget.sources import ErrorSource, error_sources, image_plane
 from bisar_budget.errors import KeyPath, printable
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import formulas
@@ -56,6 +56,25 @@ def chain(mission: Mission, found: MissionFindings, row: Row) -> Iterator[Step]:
     if row.declared is not None and row.allowable is not None and row.utilization is not None:
         values = {"declared": row.declared, "allowable": row.allowable}
         yield from step("Utilization", *equation("utilization", "declared/allowable", values, row.utilization, ""))
+
+
+def collection_chain(found: MissionFindings) -> Iterator[Step]:
+    """Steps to what is true of the collection whatever the errors are: look and smear direction, determinant of Q."""
+    values: dict[str, float] = {}
+    for name, state in (("t", found.geometry.transmitter), ("r", found.geometry.receiver)):
+        (x, y, _), (v_x, v_y, _) = state.position, state.velocity
+        values |= {f"φ̄_{name}": state.azimuth, f"θ̄_{name}": state.elevation, f"R_{name}": state.slant_range}
+        values |= {f"x_{name}": x, f"y_{name}": y, f"v_x{name}": v_x, f"v_y{name}": v_y}
+    look, s = found.geometry.look_azimuth, found.geometry.range_gradient
+    yield from step("(11), bistatic look direction", *equation("φ_b", formulas.LOOK_AZIMUTH, values, look, "rad"))
+    east, north = formulas.SMEAR
+    yield from step(
+        "(31), smear direction",
+        *equation("east", east, values, s[1], ""),
+        *equation("north", north, values, -s[0], ""),
+    )
+    determinant = image_plane(found.geometry).determinant
+    yield from step("(30), range held constant", *equation("det Q", formulas.DETERMINANT, values, determinant, "1/s"))
 
 
 def _budget(allocation: Allocation, owner: str, qpe_per_unit: float, row: Row) -> Iterator[Step]:

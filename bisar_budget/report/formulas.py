@@ -25,6 +25,9 @@ _LETTERS = {"position": "p\u0303", "velocity": "ṽ", "acceleration": "ã"}
 CLOCK_PHASE = "π*T^2*f_0*|t̃_2|/2"
 VIBRATION = {"pslr": "sqrt(PSLR)*λ*sqrt(s)/(2*π)", "islr": "sqrt(ISLR)*λ*sqrt(s)/(2*π)"}
 AUTOFOCUS_GAIN = "π*N_pull/q"
+SMEAR = ("sin(φ̄_r)*cos(θ̄_r) + sin(φ̄_t)*cos(θ̄_t)", "-cos(φ̄_r)*cos(θ̄_r) - cos(φ̄_t)*cos(θ̄_t)")
+LOOK_AZIMUTH = "atan2(sin(φ̄_r)*cos(θ̄_r) + sin(φ̄_t)*cos(θ̄_t), cos(φ̄_r)*cos(θ̄_r) + cos(φ̄_t)*cos(θ̄_t))"
+DETERMINANT = "-(-v_xt/R_t - v_xr/R_r)*(-y_t/R_t - y_r/R_r) + (-v_yt/R_t - v_yr/R_r)*(-x_t/R_t - x_r/R_r)"
 
 
 def motion_symbol(kind: str, axis: str, platform: str) -> str:

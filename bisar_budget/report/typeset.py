@@ -84,9 +84,9 @@ def mathml_number(value: float) -> str:
     is_negative, digits, exponent = _parts(value)
     number = f"<mn>{digits}</mn>"
     if exponent:
-        power = f"<mn>{exponent}</mn>" if exponent > 0 else f"<mrow><mo>-</mo><mn>{-exponent}</mn></mrow>"
+        power = f"<mn>{exponent}</mn>" if exponent > 0 else f"<mrow><mo>−</mo><mn>{-exponent}</mn></mrow>"
         number = f"<mrow>{number}<mo>·</mo><msup><mn>10</mn>{power}</msup></mrow>"
-    return f"<mrow><mo>-</mo>{number}</mrow>" if is_negative else number
+    return f"<mrow><mo>−</mo>{number}</mrow>" if is_negative else number
 
 
 def _mathml_unit(unit: str) -> str:

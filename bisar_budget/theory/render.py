@@ -105,6 +105,9 @@ class _Latex(LatexPrinter):  # type: ignore[misc]
         arguments = ", ".join(self._print(argument) for argument in expr.args)
         return rf"{_Name.of(expr.func.__name__).latex()}\left({arguments}\right)"
 
+    def _print_atan2(self, expr: Basic, exp: str | None = None) -> str:
+        return rf"\operatorname{{atan2}}\left({', '.join(self._print(argument) for argument in expr.args)}\right)"
+
     def _print_Abs(self, expr: Basic, exp: str | None = None) -> str:
         # A bare | would end the cell of a Markdown table.
         inner = rf"\left\lvert {self._print(expr.args[0])} \right\rvert"
@@ -178,7 +181,7 @@ def as_mathml_content(expression: Basic) -> str:
     xml = str(_MathML()._print(expression).toxml())
     for name, character in (("InvisibleTimes", "\u2062"), ("ApplyFunction", "\u2061"), ("pi", "π")):
         xml = xml.replace(f"&{name};", character)  # XML knows no HTML entities
-    return xml
+    return xml.replace("<mo>-</mo>", "<mo>−</mo>")  # a hyphen is no minus
 
 
 def derivation(selection: str, format_name: str) -> str:

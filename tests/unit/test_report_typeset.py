@@ -1,4 +1,4 @@
-"""Formulas of a report as MathML and LaTeX: read back by a reader of their own, the numbers put in give the result."""
+"""Formulas of a report as MathML and LaTeX: read back, the numbers put in give the result."""
 
 import math
 import re
@@ -38,7 +38,7 @@ def python_of_mathml(node: ElementTree.Element) -> str:
         case "mn" | "mi":
             return {"π": "pi"}.get(node.text or "", node.text or "")
         case "mo":
-            return {"·": "*", "|": "|"}.get(node.text or "", node.text or "")
+            return {"·": "*", "−": "-"}.get(node.text or "", node.text or "")
         case "mrow" | "math":
             inner = "".join(children)
             if inner.startswith("|") and inner.endswith("|"):
@@ -61,10 +61,8 @@ def python_of_latex(text: str) -> str:
         if innermost is None:
             return text
         top, bottom, root, power = innermost.groups()
-        if top is not None:
-            new = f"(({top})/({bottom}))"
-        else:
-            new = f"sqrt({root})" if root is not None else f"**({power})"
+        new = f"sqrt({root})" if root is not None else f"**({power})"
+        new = new if top is None else f"(({top})/({bottom}))"
         text = text[: innermost.start()] + new + text[innermost.end() :]
 
 
@@ -117,7 +115,7 @@ def test_a_small_number_as_base_of_a_power_stands_in_brackets() -> None:
 
 @pytest.mark.parametrize("text", [*FORMULAS, *SYMBOLS])
 def test_the_catalogue_is_well_formed(text: str) -> None:
-    latex, mathml = (FORMULAS.get(text) or SYMBOLS[text])
+    latex, mathml = FORMULAS.get(text) or SYMBOLS[text]
     ElementTree.fromstring(typeset.math(mathml))
     assert latex.count("{") == latex.count("}")
     assert "&" not in mathml
