@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from bisar_budget.budget.findings import MissionFindings
 from bisar_budget.geometry import BistaticGeometry, PlatformState, Vector, norm
-from bisar_budget.report.svg import Box, Canvas, Label, Point, round_step, ticks
+from bisar_budget.report.svg import Box, Canvas, Label, Point, axis_number, round_step, ticks
 from bisar_budget.units import format_quantity
 
 Place = tuple[float, float]  # in the plane that is drawn: to the right, up [m]
@@ -313,14 +313,14 @@ def _axes(canvas: Canvas, panel: _Panel, view: _View) -> None:
         if frame.left + 1 < x < frame.right - 1:
             canvas.polyline([(x, frame.top), (x, frame.bottom)], "grid", is_obstacle=False)
         shown = value if view.is_plan else abs(value)
-        canvas.text((x, frame.bottom + 13), [f"{shown / unit + 0.0:.6g}"], "axis", "middle")
+        canvas.text((x, frame.bottom + 13), [axis_number(shown / unit)], "axis", "middle")
     for value in ticks(panel.centre[1] - half[1], panel.centre[1] + half[1], step):
         _, y = panel.pixel((0.0, value))
         if not view.is_plan and value < 0:
             continue
         if frame.top + 1 < y < frame.bottom - 1:
             canvas.polyline([(frame.left, y), (frame.right, y)], "grid", is_obstacle=False)
-        canvas.text((frame.left - 5, y + 3.5), [f"{value / unit + 0.0:.6g}"], "axis", "end")
+        canvas.text((frame.left - 5, y + 3.5), [axis_number(value / unit)], "axis", "end")
     middle = (frame.left + frame.right) / 2
     canvas.text((middle, frame.bottom + 28), [f"{view.axes[0]} [{name}]"], "axis", "middle")
     canvas.upright_text((11, (frame.top + frame.bottom) / 2), f"{view.axes[1]} [{name}]", "axis")
@@ -533,7 +533,7 @@ def _compass(value: float, positive: str, negative: str) -> str:
 
 
 def _degrees(angle: float) -> str:
-    return f"{round(math.degrees(angle), 2) + 0.0:g}°"
+    return f"{axis_number(round(math.degrees(angle), 2))}°"
 
 
 def _rounded(factor: float) -> str:

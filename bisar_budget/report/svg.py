@@ -294,6 +294,11 @@ def _number(value: float) -> str:
     return "0" if text == "-0" else text
 
 
+def axis_number(value: float) -> str:
+    """Number at an axis, with a minus sign."""
+    return f"{value + 0.0:.6g}".replace("-", "−")
+
+
 def ticks(lower: float, upper: float, step: float) -> Iterable[float]:
     """Multiples of a step from one value to another."""
     first, last = math.ceil(lower / step - 1e-9), math.floor(upper / step + 1e-9)

@@ -96,7 +96,9 @@ def pixels_per_metre(root: ElementTree.Element) -> float:
     )
     unit = 1e3 if "[km]" in name else 1.0
     row = next(text.get("y") for text in axis if text.get("text-anchor") == "middle")
-    ticks = sorted((float(t.get("x", "")), float("".join(t.itertext()))) for t in axis if t.get("y") == row)
+    ticks = sorted(
+        (float(t.get("x", "")), float("".join(t.itertext()).replace("−", "-"))) for t in axis if t.get("y") == row
+    )
     (left, first), (right, last) = ticks[-2:]  # from the side the left half counts backwards
     return (right - left) / ((last - first) * unit)
 
