@@ -58,8 +58,9 @@ def rows_worth_showing(findings: MissionFindings, count: int = _ROWS) -> tuple[V
     return tuple((wanted or ordered[:1])[:count])
 
 
-def _urgency(row: Row, verdict: Verdict) -> tuple[int, bool, float]:
-    return (_RANK[row.status], not _is_refuted(verdict), -(row.utilization or 0.0))
+def _urgency(row: Row, verdict: Verdict) -> tuple[int, bool, bool, float]:
+    # Shown again along the scene's axes, an error has the same image as in its own frame.
+    return (_RANK[row.status], not _is_refuted(verdict), not row.is_independent, -(row.utilization or 0.0))
 
 
 def _is_refuted(verdict: Verdict) -> bool:

@@ -39,16 +39,16 @@ def impulse_response_cuts(evidence: ImageEvidence) -> str:
     canvas = Canvas()
     at_limit = evidence.at_limit
     curves = [
-        _Curve("without error", at_limit.error_free_db, "thin dotted"),
         _Curve("at the limit", at_limit.cut_db, "line transmitter"),
+        _Curve("without error", at_limit.error_free_db, "line dotted"),  # last, so that none covers it
     ]
     bottom = _panel(canvas, 0.0, at_limit.step_m, _at_limit(verdict), curves)
     before, after = evidence.before_autofocus, evidence.after_autofocus
     if before and after:
         curves = [
-            _Curve("without error", before.error_free_db, "thin dotted"),
             _Curve("before autofocus", before.cut_db, "line receiver dashed"),
             _Curve("after", after.cut_db, "line transmitter"),
+            _Curve("without error", before.error_free_db, "line dotted"),
         ]
         bottom = _panel(canvas, bottom + 12, before.step_m, _with_autofocus(verdict), curves)
     description = (
@@ -63,13 +63,15 @@ def numbers_in_words(evidence: ImageEvidence) -> Iterator[str]:
     """Say what was predicted and what the images show, a sentence for each limit."""
     verdict = evidence.verdict
     yield f"{_at_limit(verdict)}."
-    peaks = (f"peak {-verdict.peak_loss_db:+.2f} dB",) if verdict.peak_loss_db is not None else ()
-    ratios = (f"width {verdict.irw_ratio:.3f} times that without error",) if verdict.irw_ratio is not None else ()
-    lobes = (f"PSLR {verdict.pslr_db:.1f} dB",) if verdict.pslr_db is not None else ()
-    energy = (f"ISLR {verdict.islr_db:.1f} dB",) if verdict.islr_db is not None else ()
-    measures = (*peaks, *ratios, *lobes, *energy)
-    if measures:
-        yield f"Measured: {', '.join(measures)}."
+    measures = (
+        ("peak {} dB", None if verdict.peak_loss_db is None else f"{-verdict.peak_loss_db:+.2f}"),
+        ("width {} times that without error", None if verdict.irw_ratio is None else f"{verdict.irw_ratio:.3f}"),
+        ("PSLR {} dB", None if verdict.pslr_db is None else f"{verdict.pslr_db:.1f}"),
+        ("ISLR {} dB", None if verdict.islr_db is None else f"{verdict.islr_db:.1f}"),
+    )
+    known = [words.format(value.replace("-", "−")) for words, value in measures if value is not None]
+    if known:
+        yield f"Measured: {', '.join(known)}."
     if evidence.after_autofocus:
         yield f"{_with_autofocus(verdict)}."
 

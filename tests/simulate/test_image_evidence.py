@@ -203,6 +203,12 @@ class TestRowsWorthShowing:
         given = [self.verdict("receiver.velocity.y"), self.verdict("receiver.velocity.x")]
         assert len(self.chosen(*given)) == 1
 
+    def test_an_error_of_another_frame_comes_before_its_own_shadow(self) -> None:
+        """Along the track, along y: the same error, and the same image."""
+        error = {"frame": "track", "velocity": ["1 mm/s", "1 mm/s", "1 mm/s"]}
+        given = [self.verdict("transmitter.velocity.y"), self.verdict("transmitter.velocity.along")]
+        assert self.chosen(*given, platforms__transmitter__motion_error=error)[0] == "transmitter.velocity.along"
+
     def test_a_row_without_image_is_not(self) -> None:
         assert self.chosen(self.verdict(self.FAILING, "not_evaluated", None), **self.DECLARED) == []
 
