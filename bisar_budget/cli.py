@@ -571,7 +571,7 @@ def diff(
     help="Processes to use; default: the cores, or 1 with the extra `fast`, which uses them itself.",
 )
 def verify(missions: Sequence[str], only: str, format_name: str, output: str | None, jobs: int | None) -> None:
-    """Form images with each error at its limit and measure whether the limit is true.
+    """Form images at the limits and measure whether they are true.
 
     The data come from exact ranges, and the phase is measured in the image. A limit is confirmed if the
     image shows its budget within 5 %, optimistic if it shows more, conservative if less. With autofocus
@@ -621,7 +621,7 @@ def simulate(mission: str, plot: str | None, output: str | None) -> None:
     """Form the image of a point with the declared errors.
 
     The data come from exact ranges; the image is formed where the errors move the point, in the scene's
-    axes and, before and after autofocus, rotated so that the smear lies in cross range, and focused by phase gradient autofocus.
+    axes and rotated so that the smear lies in cross range, before and after phase gradient autofocus.
     """
     for name, suffixes in ((plot, (".png", ".svg", ".pdf")), (output, (".npz",))):
         if name is not None and os.path.splitext(name)[1].lower() not in suffixes:
