@@ -36,7 +36,8 @@ SUFFIXES = {
     ".markdown": "markdown",
 }
 
-WITH_MISSION = ("html", "markdown")  # formats that show more of a mission than its findings
+# Formats that show a mission itself, and images of verified limits; for the others neither is kept.
+ILLUSTRATED = frozenset({"html", "markdown"})
 WITH_PICTURES = ("markdown",)
 
 

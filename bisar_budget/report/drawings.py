@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from bisar_budget.budget.findings import MissionFindings
 from bisar_budget.geometry import BistaticGeometry, PlatformState, Vector, norm
-from bisar_budget.report.svg import Box, Canvas, Label, Point, round_step, ticks
+from bisar_budget.report.svg import Box, Canvas, Label, Point, axis_number, round_step, ticks
 from bisar_budget.units import format_quantity
 
 Place = tuple[float, float]  # in the plane that is drawn: to the right, up [m]
@@ -119,8 +119,7 @@ def geometry_plan(findings: MissionFindings) -> str:
         f"The bistatic look direction is {_degrees(look)} from east, counter-clockwise; motion errors smear the "
         f"image along the line at {_degrees(smear)}, perpendicular to it.{_radius_in_words(findings)}"
     )
-    notes = ["Arrows at the platforms show the direction of flight, not the speed."]
-    return _drawing(view, f"plan {findings.file}", f"Geometry from above: {findings.name}", description, notes, T)
+    return _drawing(view, f"plan {findings.file}", f"Geometry from above: {findings.name}", description, [], T)
 
 
 def geometry_elevation(findings: MissionFindings) -> str:
@@ -157,7 +156,7 @@ def geometry_elevation(findings: MissionFindings) -> str:
     )
     how = (
         "Each platform in the vertical plane through it and the scene centre: slant ranges and elevations are true. "
-        f"The planes are {_degrees(turned)} apart in azimuth."
+        f"{_planes_in_words(geometry, turned)}"
     )
     description = (
         "Elevation view to scale, height over ground distance from the scene centre. "
@@ -201,9 +200,19 @@ def _is_on_other_side(geometry: BistaticGeometry, turned: float) -> bool:
     return in_drawing < 0.08 * widest < in_space
 
 
+def _planes_in_words(geometry: BistaticGeometry, turned: float) -> str:
+    overhead = [name for name, state in _named(geometry) if _is_overhead(state)]
+    if overhead:
+        return f"The {overhead[0]} is overhead."
+    return f"The planes are {_degrees(turned)} apart in azimuth."
+
+
+def _is_overhead(state: PlatformState) -> bool:
+    return math.hypot(*state.position[:2]) <= 1e-9 * state.slant_range
+
+
 def _in_own_plane(name: str, state: PlatformState, side: float, look_azimuth: float, T: float) -> _Platform:
-    ground = math.hypot(*state.position[:2])
-    azimuth = state.azimuth if ground > 1e-9 * state.slant_range else look_azimuth  # overhead: any plane holds it
+    azimuth = look_azimuth if _is_overhead(state) else state.azimuth  # overhead: any vertical plane holds it
     outward = (math.cos(azimuth), math.sin(azimuth))
 
     def seen(vector: Vector) -> Place:
@@ -231,18 +240,19 @@ def _drawing(view: _View, key: str, title: str, description: str, notes: list[st
     separation = math.dist(*(p.state.position for p in view.platforms))
     is_pair = not beside and separation * main.scale < _CLOSE and _pixels_apart(main, *view.platforms) < _APART
     enlarged = None
+    smaller = view._replace(heights=(view.heights[0], 0.75 * view.heights[1]))
     top = main.frame.bottom + _AXIS[1] + 26
     if beside:
         reach = max(p.state.slant_range for p in beside)
         shown = [*(place for p in beside for place in (p.at, *p.path)), *_extent(view, _SCENE, _SPREAD * reach)]
         if view.radius <= 2 * reach:
             shown += _extent(view, _SCENE, view.radius)
-        enlarged = _fitted(view, [_SCENE, *shown], top)
+        enlarged = _fitted(smaller, [_SCENE, *shown], top)
     elif is_pair and separation:
         first, second = view.platforms
         middle = ((first.at[0] + second.at[0]) / 2, (first.at[1] + second.at[1]) / 2)
         around = [(middle[0] + _SPREAD * separation * s, middle[1] + _SPREAD * separation * s) for s in (-1, 1)]
-        enlarged = _fitted(view, [first.at, second.at, *around], top)
+        enlarged = _fitted(smaller, [first.at, second.at, *around], top)
     _axes(canvas, main, view)
     _draw_panel(canvas, main, view, is_detail=not beside, enlarged=enlarged)
     bottom = main.frame.bottom + _AXIS[1]
@@ -253,11 +263,13 @@ def _drawing(view: _View, key: str, title: str, description: str, notes: list[st
         _outline(canvas, enlarged, view)
         _draw_panel(canvas, enlarged, view, is_detail=bool(beside), enlarged=None)
         bottom = enlarged.frame.bottom
+    if any(not p.is_still and not _is_end_on(p) for p in view.platforms):
+        notes = [*notes, "Arrows at the platforms: direction of flight, not speed."]
     panels = [main, *([enlarged] if enlarged else [])]
     if any(_shows_path(panel, p) for panel in panels for p in view.platforms):
         notes = [*notes, f"Broad line: path in the aperture of {format_quantity(aperture_time, 's')}."]
     if any(_is_end_on(p) for p in view.platforms):
-        notes = [*notes, "Circle with dot: motion towards the viewer; with cross: away."]
+        notes = [*notes, "Circle with dot: flight towards the viewer; with cross: away."]
     lines = textwrap.wrap(" ".join(notes), _NOTE_COLUMNS)
     for index, line in enumerate(lines):
         canvas.text((main.frame.left, bottom + 18 + 13 * index), [line], "small")
@@ -301,14 +313,14 @@ def _axes(canvas: Canvas, panel: _Panel, view: _View) -> None:
         if frame.left + 1 < x < frame.right - 1:
             canvas.polyline([(x, frame.top), (x, frame.bottom)], "grid", is_obstacle=False)
         shown = value if view.is_plan else abs(value)
-        canvas.text((x, frame.bottom + 13), [f"{shown / unit + 0.0:.6g}"], "axis", "middle")
+        canvas.text((x, frame.bottom + 13), [axis_number(shown / unit)], "axis", "middle")
     for value in ticks(panel.centre[1] - half[1], panel.centre[1] + half[1], step):
         _, y = panel.pixel((0.0, value))
         if not view.is_plan and value < 0:
             continue
         if frame.top + 1 < y < frame.bottom - 1:
             canvas.polyline([(frame.left, y), (frame.right, y)], "grid", is_obstacle=False)
-        canvas.text((frame.left - 5, y + 3.5), [f"{value / unit + 0.0:.6g}"], "axis", "end")
+        canvas.text((frame.left - 5, y + 3.5), [axis_number(value / unit)], "axis", "end")
     middle = (frame.left + frame.right) / 2
     canvas.text((middle, frame.bottom + 28), [f"{view.axes[0]} [{name}]"], "axis", "middle")
     canvas.upright_text((11, (frame.top + frame.bottom) / 2), f"{view.axes[1]} [{name}]", "axis")
@@ -371,7 +383,7 @@ def _draw_panel(canvas: Canvas, panel: _Panel, view: _View, is_detail: bool, enl
         _marker(canvas, panel.pixel(platform.at), platform)
     if has_scene:
         for x, y in ((5, 0), (0, 5)):
-            canvas.polyline([(scene[0] - x, scene[1] - y), (scene[0] + x, scene[1] + y)], "line")
+            canvas.polyline([(scene[0] - x, scene[1] - y), (scene[0] + x, scene[1] + y)], "marker line")
         canvas.obstacles.append(Box(scene[0] - 5, scene[1] - 5, scene[0] + 5, scene[1] + 5))
     canvas.labels([*_labels(panel, view, visible, has_scene, enlarged), *labels])
 
@@ -472,9 +484,9 @@ def _is_end_on(platform: _Platform) -> bool:
 def _marker(canvas: Canvas, at: Point, platform: _Platform) -> None:
     """Triangle for the transmitter, square for the receiver; hollow if it does not move."""
     x, y = at
-    style = f"hollow line {platform.name}" if platform.is_still else f"solid {platform.name}"
+    style = f"marker {'hollow line' if platform.is_still else 'solid'} {platform.name}"
     if platform.name == "transmitter":
-        canvas.polygon([(x, y - 6.5), (x + 6, y + 4.5), (x - 6, y + 4.5)], style)
+        canvas.polygon([(x, y - 7), (x + 6, y + 3.5), (x - 6, y + 3.5)], style)  # its centroid is the place
     else:
         canvas.polygon([(x - 5, y - 5), (x + 5, y - 5), (x + 5, y + 5), (x - 5, y + 5)], style)
 
@@ -521,8 +533,8 @@ def _compass(value: float, positive: str, negative: str) -> str:
 
 
 def _degrees(angle: float) -> str:
-    return f"{round(math.degrees(angle), 2) + 0.0:g}°"
+    return f"{axis_number(round(math.degrees(angle), 2))}°"
 
 
 def _rounded(factor: float) -> str:
-    return f"{float(f'{factor:.2g}'):g}"
+    return f"{float(f'{factor:.2g}'):,.10g}"

@@ -21,24 +21,24 @@ FONT = 12.0  # px
 LINE_HEIGHT = 14.5  # px
 _DARK = "--ink:#e6e6e6;--muted:#a9adb3;--grid:#3a3f46;--paper:#16191d;--transmitter:#7db4f2;--receiver:#f0a06a"
 STYLE = (
-    ".drawing{max-width:100%;height:auto;font:12px system-ui,'Segoe UI',Roboto,'DejaVu Sans',sans-serif}"
-    ".drawing text{fill:var(--ink,#222);paint-order:stroke}"
-    ".drawing text{stroke:var(--paper,#fff);stroke-width:3px;stroke-linejoin:round}"
-    ".drawing .small,.drawing .axis{font-size:10.5px;fill:var(--muted,#595f66)}"
-    ".drawing .name{font-weight:600}"
-    ".drawing .sub{font-size:9px}"
-    ".drawing .line,.drawing .transmitter,.drawing .receiver{fill:none;stroke:var(--ink,#222);stroke-width:1.4}"
-    ".drawing .transmitter{stroke:var(--transmitter,#1f5fa8)}"
-    ".drawing .receiver{stroke:var(--receiver,#a8471a)}"
-    ".drawing .path{stroke-width:4;stroke-opacity:.45;stroke-linecap:round}"
-    ".drawing .solid{fill:var(--ink,#222);stroke:none}"
-    ".drawing .solid.transmitter{fill:var(--transmitter,#1f5fa8)}"
-    ".drawing .solid.receiver{fill:var(--receiver,#a8471a)}"
-    ".drawing .hollow{fill:var(--paper,#fff)}"
-    ".drawing .thin{stroke:var(--muted,#595f66);stroke-width:1;fill:none}"
-    ".drawing .grid{stroke:var(--grid,#e2e5e9);stroke-width:1;fill:none}"
-    ".drawing .dashed{stroke-dasharray:6 4}"
-    ".drawing .dotted{stroke-dasharray:1.5 3}"
+    "svg.drawing{max-width:100%;height:auto;font:12px system-ui,'Segoe UI',Roboto,'DejaVu Sans',sans-serif}"
+    "svg.drawing text{fill:var(--ink,#222);paint-order:stroke}"
+    "svg.drawing text{stroke:var(--paper,#fff);stroke-width:3px;stroke-linejoin:round}"
+    "svg.drawing .small,svg.drawing .axis{font-size:10.5px;fill:var(--muted,#595f66)}"
+    "svg.drawing .name{font-weight:600}"
+    "svg.drawing .sub{font-size:9px}"
+    "svg.drawing :is(.line,.transmitter,.receiver){fill:none;stroke:var(--ink,#222);stroke-width:1.4}"
+    "svg.drawing .transmitter{stroke:var(--transmitter,#1f5fa8)}"
+    "svg.drawing .receiver{stroke:var(--receiver,#a8471a)}"
+    "svg.drawing .path{stroke-width:4;stroke-opacity:.45;stroke-linecap:round}"
+    "svg.drawing .solid{fill:var(--ink,#222);stroke:none}"
+    "svg.drawing .solid.transmitter{fill:var(--transmitter,#1f5fa8)}"
+    "svg.drawing .solid.receiver{fill:var(--receiver,#a8471a)}"
+    "svg.drawing .hollow{fill:var(--paper,#fff)}"
+    "svg.drawing .thin{stroke:var(--muted,#595f66);stroke-width:1;fill:none}"
+    "svg.drawing .grid{stroke:var(--grid,#e2e5e9);stroke-width:1;fill:none}"
+    "svg.drawing .dashed{stroke-dasharray:6 4}"
+    "svg.drawing .dotted{stroke-dasharray:1.5 3}"
     "svg:root.drawing{background:var(--paper,#fff)}"
     f"@media (prefers-color-scheme:dark){{svg:root.drawing{{{_DARK}}}}}"
 )
@@ -292,6 +292,11 @@ def _number(value: float) -> str:
     """A coordinate to a hundredth of a pixel, without trailing zeros; never -0."""
     text = f"{value:.2f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text
+
+
+def axis_number(value: float) -> str:
+    """Number at an axis, with a minus sign."""
+    return f"{value + 0.0:.6g}".replace("-", "−")
 
 
 def ticks(lower: float, upper: float, step: float) -> Iterable[float]:
