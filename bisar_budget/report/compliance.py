@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from bisar_budget.budget.allocation import Allocation
 from bisar_budget.budget.findings import MissionFindings, Option, Report, Row, UnusableMission, worst_first
+from bisar_budget.budget.image_evidence import PointImage
 from bisar_budget.budget.sources import MOTION_UNITS, ErrorSource, error_sources
 from bisar_budget.budget.waivers import waiver_notes
 from bisar_budget.catalogue import EQUATIONS
@@ -23,6 +24,7 @@ from bisar_budget.report.drawings import geometry_elevation, geometry_plan
 from bisar_budget.report.escapes import source_path
 from bisar_budget.report.explanation import chain, collection_chain
 from bisar_budget.report.formulas import Step
+from bisar_budget.report.image_evidence import chip_caption, chip_png, impulse_response_cuts, numbers_in_words
 from bisar_budget.report.sentences import cause, measure
 from bisar_budget.report.text_table import head, percent
 from bisar_budget.units import format_quantity
@@ -195,11 +197,30 @@ class Evidence(NamedTuple):
 
 
 class Picture(NamedTuple):
-    """A drawing: `name` for a file, what it shows, the SVG."""
+    """A drawing: `name` of a file within the mission's, what it shows, the SVG."""
 
     name: str
     title: str
     svg: str
+
+
+class Chip(NamedTuple):
+    """A small image: `name` of a file within the mission's, what it shows, the PNG, its size on a page. [px]"""
+
+    name: str
+    title: str
+    png: bytes
+    size: tuple[int, int]
+
+
+class Illustration(NamedTuple):
+    """The images behind the verdict on one limit."""
+
+    id: str
+    words: tuple[str, ...]
+    chips: tuple[Chip, ...]
+    scale: str
+    cuts: Picture
 
 
 class MissionPage(NamedTuple):
@@ -238,6 +259,7 @@ class MissionPage(NamedTuple):
     evidence: tuple[Evidence, ...] | None = None
     evidence_remarks: tuple[str, ...] = ()
     has_refocused: bool = False
+    illustrations: tuple[Illustration, ...] = ()
 
 
 class Compliance(NamedTuple):
@@ -362,15 +384,48 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
         evidence=None if found.verdicts is None else tuple(_evidence(found)),
         evidence_remarks=tuple(verification.geometry_remarks(found.verdicts or ())),
         has_refocused=any(verdict.verdict_autofocus for verdict in found.verdicts or ()),
+        illustrations=illustrations(found),
     )
 
 
 def drawings(found: MissionFindings) -> tuple[Picture, ...]:
     """Draw a mission."""
     return (
-        Picture("plan", "Plan: the collection from above", geometry_plan(found)),
-        Picture("elevation", "Elevation: the collection from the side", geometry_elevation(found)),
+        Picture("plan.svg", "Plan: the collection from above", geometry_plan(found)),
+        Picture("elevation.svg", "Elevation: the collection from the side", geometry_elevation(found)),
     )
+
+
+def illustrations(found: MissionFindings) -> tuple[Illustration, ...]:
+    """Images at the limits that decide most, where they were formed."""
+    result = []
+    for number, evidence in enumerate(found.image_evidence or (), start=1):
+        row_id = evidence.verdict.id
+        images = [("limit", f"{row_id} at the limit", evidence.at_limit)]
+        if evidence.before_autofocus and evidence.after_autofocus:
+            at = f"{row_id} at the limit with autofocus"
+            images.append(("before", f"{at}, before it", evidence.before_autofocus))
+            images.append(("after", f"{at}, after it", evidence.after_autofocus))
+        result.append(
+            Illustration(
+                id=row_id,
+                words=tuple(numbers_in_words(evidence)),
+                chips=tuple(
+                    Chip(f"chip-{number}-{name}.png", title, chip_png(image), _on_page(image))
+                    for name, title, image in images
+                ),
+                scale=chip_caption(evidence.at_limit),
+                cuts=Picture(f"cuts-{number}.svg", f"Cross-range cuts of {row_id}", impulse_response_cuts(evidence)),
+            )
+        )
+    return tuple(result)
+
+
+def _on_page(image: PointImage) -> tuple[int, int]:
+    """Width and height that show both axes in the same scale, at most 220 px. [px]"""
+    along, across = image.extent_m
+    scale = 220 / max(along, across)
+    return max(1, round(along * scale)), max(1, round(across * scale))
 
 
 def _digest(data: bytes | None) -> str:

@@ -1,6 +1,7 @@
 """The compliance report as one HTML page: no script, nothing from elsewhere, light, dark and on paper."""
 
 import re
+from base64 import b64encode
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
@@ -34,6 +35,7 @@ def render(report: Report, style: Style) -> str:
         equation=_equation,
         general=_general,
         inline=_inline,
+        data_uri=_data_uri,
     )
 
 
@@ -65,6 +67,10 @@ def _equation(part: Equation | str) -> Markup:
 def _general(left: str, right: str) -> Markup:
     content = f"<mrow>{typeset.mathml_of(left)}<mo>=</mo>{typeset.mathml_of(right)}</mrow>"
     return Markup(typeset.math(content))
+
+
+def _data_uri(png: bytes) -> Markup:
+    return Markup(f"data:image/png;base64,{b64encode(png).decode()}")
 
 
 def _inline(svg: str, anchor: str) -> Markup:

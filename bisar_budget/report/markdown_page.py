@@ -1,15 +1,16 @@
 """The compliance report as Markdown for GitHub, which can be read as it is; its drawings are files beside it."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from html import unescape
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from bisar_budget.budget.findings import MissionFindings, Report
+from bisar_budget.errors import printable
 from bisar_budget.report import Style, typeset
-from bisar_budget.report.compliance import STATUS_WORDS, Compliance, compliance, drawings
+from bisar_budget.report.compliance import STATUS_WORDS, Chip, Compliance, compliance, drawings, illustrations
 from bisar_budget.report.escapes import markdown_text, uri
 from bisar_budget.report.formulas import Equation
 from bisar_budget.resources import resource
@@ -38,6 +39,7 @@ def render(report: Report, style: Style) -> str:
         equation=_equation,
         general=_general,
         description=_description,
+        chip=_chip,
     )
     return re.sub(r"\n{3,}", "\n\n", text).rstrip("\n") + "\n"
 
@@ -45,11 +47,19 @@ def render(report: Report, style: Style) -> str:
 def pictures(report: Report, style: Style) -> Mapping[str, bytes]:
     """Return the drawings of every mission, named by its place in the report."""
     return {
-        f"{number}-{picture.name}.svg": picture.svg.encode()
+        f"{number}-{name}": content
         for number, mission in enumerate(report.missions, start=1)
         if isinstance(mission, MissionFindings)
-        for picture in drawings(mission)
+        for name, content in _pictures(mission)
     }
+
+
+def _pictures(mission: MissionFindings) -> Iterator[tuple[str, bytes]]:
+    shown = illustrations(mission)
+    yield from (
+        (picture.name, picture.svg.encode()) for picture in (*drawings(mission), *(one.cuts for one in shown))
+    )
+    yield from ((chip.name, chip.png) for one in shown for chip in one.chips)
 
 
 def _bar(part: float | None) -> Markup:
@@ -70,6 +80,14 @@ def _equation(part: Equation | str) -> Markup:
         return Markup(f"\n```math\n{block}\n```\n\n")
     formula, numbers = typeset.as_text(part)
     return Markup(f"- {markdown_text(f'{formula} {numbers}')}\n")
+
+
+def _chip(chip: Chip, path: str) -> Markup:
+    """An image in the proportions of the ground, which Markdown's own cannot say."""
+    width, height = chip.size
+    return Markup('<img src="{}" alt="{}" width="{}" height="{}">').format(
+        Markup(path), printable(chip.title), width, height
+    )
 
 
 def _general(left: str, right: str) -> Markup:
