@@ -209,6 +209,7 @@ class Chip(NamedTuple):
 
     name: str
     title: str
+    caption: str
     png: bytes
     size: tuple[int, int]
 
@@ -219,7 +220,6 @@ class Illustration(NamedTuple):
     id: str
     words: tuple[str, ...]
     chips: tuple[Chip, ...]
-    scale: str
     cuts: Picture
 
 
@@ -411,10 +411,9 @@ def illustrations(found: MissionFindings) -> tuple[Illustration, ...]:
                 id=row_id,
                 words=tuple(numbers_in_words(evidence)),
                 chips=tuple(
-                    Chip(f"chip-{number}-{name}.png", title, chip_png(image), _on_page(image))
+                    Chip(f"chip-{number}-{name}.png", title, chip_caption(image), chip_png(image), _on_page(image))
                     for name, title, image in images
                 ),
-                scale=chip_caption(evidence.at_limit),
                 cuts=Picture(f"cuts-{number}.svg", f"Cross-range cuts of {row_id}", impulse_response_cuts(evidence)),
             )
         )
@@ -508,7 +507,8 @@ def _gain(allocation: Allocation) -> str:
     if allocation.n_pull is None:
         return "no autofocus is declared"
     gain = f"limits of the quadratic phase × {allocation.autofocus_gain:.3g}"
-    return f"autofocus corrects {allocation.n_pull:g}π rad: {gain}"
+    corrected = f"{allocation.n_pull:g}π" if allocation.n_pull != 1 else "π"
+    return f"autofocus corrects {corrected} rad: {gain}"
 
 
 def _shares(allocation: Allocation) -> Iterator[Share]:

@@ -18,7 +18,7 @@ from bisar_budget.errors import KeyPath, printable
 from bisar_budget.geometry import FRAME_AXES, PlatformState
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import formulas
-from bisar_budget.report.formulas import Equation, Step, equation, number, step, with_unit
+from bisar_budget.report.formulas import Equation, Step, Sum, equation, number, step, with_unit
 
 _RATES = ("m", "m/s", "m/s²", "m/s³")  # units of the range error's coefficients
 
@@ -65,7 +65,7 @@ def _turned(mission: Mission, source: ErrorSource, axis: str) -> Iterator[Step]:
         text = " + ".join(f"|{part}|" for part in parts)
         how = "bounds add as magnitudes"
     title = f"Along {axis} from the {error.frame} frame ({', '.join(FRAME_AXES[error.frame])}): {how}"
-    yield from step(title, f"declared = {text} = {with_unit(abs(source.declared or 0.0), source.unit)}")
+    yield from step(title, Sum(f"declared = {text} = {with_unit(abs(source.declared or 0.0), source.unit)}"))
 
 
 def effect(
@@ -156,7 +156,7 @@ def _projected_effect(
     unit = f"rad per {source.unit}"
     yield from step(
         f"{source.equation}, {unit.replace('^2', '²')} along x, y, z times the {axis} axis",
-        f"QPE/unit = |{terms}| = {with_unit(abs(source.effect.qpe), unit)}",
+        Sum(f"QPE/unit = |{terms}| = {with_unit(abs(source.effect.qpe), unit)}"),
     )
     values = {"QPE/unit": abs(source.effect.qpe), "declared": size}
     qpe = abs(source.effect.qpe) * size

@@ -10,7 +10,7 @@ from bisar_budget.errors import KeyPath, printable
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import formulas
 from bisar_budget.report.explained_error import as_written, declaration, effect, missing, place, plane_and_effect
-from bisar_budget.report.formulas import Step, equation, number, step
+from bisar_budget.report.formulas import Step, Sum, equation, number, step
 from bisar_budget.report.text_table import WORDS, percent
 from bisar_budget.units import format_quantity
 
@@ -198,7 +198,7 @@ def _combined(symbol: str, rule: str, members: Sequence[tuple[str, float]], row:
         text = "sqrt(" + " + ".join(f"{size}^2" for size in sizes) + ")"
     else:
         text = f"max(0, {', '.join(sizes)})"
-    yield from step(title, *_listed(members, "rad"), f"combined = {text} = {row.declared:.6g} rad")
+    yield from step(title, *_listed(members, "rad"), Sum(f"combined = {text} = {row.declared:.6g} rad"))
 
 
 def _listed(members: Sequence[tuple[str, float]], unit: str) -> list[str]:

@@ -68,6 +68,12 @@ class Equation(NamedTuple):
         return f"{self.symbol} = {self.formula}", f"{margin} = {numbers} = {with_unit(self.result, self.unit)}"
 
 
+class Sum(str):
+    """Text that is a sum with its numbers, and nothing of the user's own."""
+
+    __slots__ = ()
+
+
 class Step(NamedTuple):
     """One step of an explanation: what it is or where it stands, and the equations or texts under it."""
 

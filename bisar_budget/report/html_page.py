@@ -10,7 +10,7 @@ from bisar_budget.budget.findings import Report
 from bisar_budget.errors import printable
 from bisar_budget.report import Style, typeset
 from bisar_budget.report.compliance import STATUS_WORDS, compliance
-from bisar_budget.report.formulas import Equation
+from bisar_budget.report.formulas import Equation, Sum
 from bisar_budget.resources import resource
 
 _AFTER = re.compile(r"([._/])(?=\w)")  # where a long name may break
@@ -56,7 +56,8 @@ def _sentence(text: str) -> str:
 def _equation(part: Equation | str) -> Markup:
     """One part of a step: a formula of the derivation as MathML, arithmetic and text as text."""
     if not isinstance(part, Equation):
-        return Markup("<p class=part>{}</p>").format(printable(part))
+        text = typeset.readable(part) if isinstance(part, Sum) else printable(part)
+        return Markup("<p class=part>{}</p>").format(text)
     if typeset.is_derived(part):
         mathml = typeset.as_mathml(part)
         return Markup("<p class=part>{} {}</p>").format(Markup(mathml.formula), Markup(mathml.numbers))

@@ -12,7 +12,7 @@ from bisar_budget.errors import printable
 from bisar_budget.report import Style, typeset
 from bisar_budget.report.compliance import STATUS_WORDS, Chip, Compliance, compliance, drawings, illustrations
 from bisar_budget.report.escapes import markdown_text, uri
-from bisar_budget.report.formulas import Equation
+from bisar_budget.report.formulas import Equation, Sum
 from bisar_budget.resources import resource
 
 _BAR = 20  # characters
@@ -73,7 +73,8 @@ def _bar(part: float | None) -> Markup:
 def _equation(part: Equation | str) -> Markup:
     """One part of a step: a formula of the derivation as a block of LaTeX, arithmetic and text as a line."""
     if not isinstance(part, Equation):
-        return Markup(f"- {markdown_text(part)}\n")
+        text = typeset.readable(part) if isinstance(part, Sum) else part
+        return Markup(f"- {markdown_text(text)}\n")
     if typeset.is_derived(part):
         formula, numbers = typeset.as_latex(part)
         block = f"\\begin{{aligned}}\n{formula} \\\\\n{numbers}\n\\end{{aligned}}"

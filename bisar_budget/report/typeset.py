@@ -30,10 +30,11 @@ def is_derived(equation: Equation) -> bool:
 def as_text(equation: Equation) -> Typeset:
     """For a reader: · between factors, no carets."""
     numbers = f"= {filled(equation.formula, equation.values)} = {with_unit(equation.result, equation.unit)}"
-    return Typeset(_readable(f"{equation.symbol} = {equation.formula}"), _readable(numbers))
+    return Typeset(readable(f"{equation.symbol} = {equation.formula}"), readable(numbers))
 
 
-def _readable(text: str) -> str:
+def readable(text: str) -> str:
+    """Write a sum as people do, not as programs."""
     return _MINUS.sub("−", text.replace("*", " · ").replace("^2", "²").replace("sqrt(", "√("))
 
 
