@@ -48,6 +48,7 @@ _VERDICTS = {
     "pass_with_autofocus": "Complies, with autofocus",
     "pass": "Complies",
 }
+_NOTHING = "Nothing was judged"
 _OWNERS = ("transmitter", "receiver", "clock", "reserve")
 _DRIVERS = 3
 _JUDGED = ("fail", "not_evaluated", "warn", "pass_with_autofocus", "pass", "waived")
@@ -292,9 +293,19 @@ def compliance(report: Report, style: Style) -> Compliance:
         version=report.version,
         day=report.day,
         status=report.status,
-        verdict=_VERDICTS[report.status],
+        verdict=_overall(report.status, pages),
         options=report.options,
         missions=tuple(pages),
+    )
+
+
+def _overall(status: str, pages: Sequence[MissionPage]) -> str:
+    """Verdict on the run: a mission that declares nothing complies with nothing."""
+    empty = sum(page.verdict == _NOTHING for page in pages)
+    if status != "pass" or not empty:
+        return _VERDICTS[status]
+    return (
+        _NOTHING if empty == len(pages) else f"{_VERDICTS[status]}; of {len(pages)} missions {empty} declare no error"
     )
 
 
@@ -327,7 +338,7 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
         file=file,
         sha256=_digest(mission.data),
         status=found.status,
-        verdict=_VERDICTS[found.status] if judged else "Nothing was judged",
+        verdict=_VERDICTS[found.status] if judged else _NOTHING,
         name=found.name,
         counts=", ".join(f"{count} {STATUS_WORDS[status]}" for status, count in found.summary.items()),
         worst=judged[0].id if judged else "",

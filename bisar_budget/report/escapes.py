@@ -17,7 +17,7 @@ _XML_SPECIAL = re.compile("[&<>\"']")
 _MARKDOWN_SPECIAL = re.compile(
     r"[\\`*\[\]<>|$~]"
     r"|(?<![A-Za-z0-9])_|_(?![A-Za-z0-9])"
-    r"|&(?=#|\w+;)|@(?=\w)|#(?=\w)|:(?=//|[\w+-]+:)|(?<=www)\."
+    r"|&(?=#|\w+;)|@(?=\w)|#(?=\w)|:(?=//|(?:[\w+-]*[A-Z+-][\w+-]*|100|1234):)|(?<=www)\."
     r"|^[-+#=](?=[-+#= ]|$)|^ ",
     re.IGNORECASE | re.ASCII,
 )
@@ -30,9 +30,15 @@ def xml_text(text: str) -> str:
     return _XML_SPECIAL.sub(lambda match: _XML[match[0]], text) if _XML_SPECIAL.search(text) else text
 
 
+def _markdown_escape(match: re.Match[str]) -> str:
+    """A backslash can be read past; what it cannot tame everywhere becomes a character reference."""
+    special = match[0]
+    return f"\\{special}" if special in r"\*_[]~" else f"&#{ord(special)};"
+
+
 def markdown_text(text: str) -> str:
-    """Escape for Markdown, also in a table or at the start of a line: a character reference is text everywhere."""
-    escaped = _MARKDOWN_SPECIAL.sub(lambda match: f"&#{ord(match[0])};", printable(text))
+    """Escape for Markdown, also in a table or at the start of a line."""
+    escaped = _MARKDOWN_SPECIAL.sub(_markdown_escape, printable(text))
     return _MARKDOWN_NUMBER.sub(lambda match: f"{match[1]}&#{ord(match[2])};", escaped)
 
 

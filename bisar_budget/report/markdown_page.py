@@ -73,14 +73,18 @@ def _bar(part: float | None) -> Markup:
 def _equation(part: Equation | str) -> Markup:
     """One part of a step: a formula of the derivation as a block of LaTeX, arithmetic and text as a line."""
     if not isinstance(part, Equation):
-        text = typeset.readable(part) if isinstance(part, Sum) else part
-        return Markup(f"- {markdown_text(text)}\n")
+        return _sum(typeset.readable(part)) if isinstance(part, Sum) else Markup(f"- {markdown_text(part)}\n")
     if typeset.is_derived(part):
         formula, numbers = typeset.as_latex(part)
         block = f"\\begin{{aligned}}\n{formula} \\\\\n{numbers}\n\\end{{aligned}}"
         return Markup(f"\n```math\n{block}\n```\n\n")
     formula, numbers = typeset.as_text(part)
-    return Markup(f"- {markdown_text(f'{formula} {numbers}')}\n")
+    return _sum(f"{formula} {numbers}")
+
+
+def _sum(text: str) -> Markup:
+    """Arithmetic as code, in which nothing needs escaping; there is nothing of the user's in it."""
+    return Markup(f"- `{text}`\n")
 
 
 def _chip(chip: Chip, path: str) -> Markup:

@@ -10,7 +10,7 @@ from bisar_budget.budget.check import check_mission
 from bisar_budget.catalogue import FORMULAS, SYMBOLS
 from bisar_budget.mission.load import load_mission
 from bisar_budget.report import typeset
-from bisar_budget.report.explanation import chain
+from bisar_budget.report.explanation import chain, collection_chain
 from bisar_budget.report.formulas import Equation
 from tests.conftest import TODAY
 from tests.unit.test_report_explanation import MISSIONS
@@ -21,13 +21,14 @@ def derived_equations(model: str = "published") -> list[tuple[str, Equation]]:
     for path in MISSIONS:
         mission = load_mission(str(path), model)
         findings = check_mission(mission, TODAY)
-        for row in findings.rows:
-            for step in chain(mission, findings, row):
-                found += [
-                    (f"{path.stem} {row.id}", part)
-                    for part in step.parts
-                    if isinstance(part, Equation) and typeset.is_derived(part)
-                ]
+        chains = {row.id: chain(mission, findings, row) for row in findings.rows}
+        for name, steps in (("collection", collection_chain(findings)), *chains.items()):
+            found += [
+                (f"{path.stem} {name}", part)
+                for step in steps
+                for part in step.parts
+                if isinstance(part, Equation) and typeset.is_derived(part)
+            ]
     return found
 
 
@@ -54,6 +55,9 @@ def python_of_mathml(node: ElementTree.Element) -> str:
 
 
 def python_of_latex(text: str) -> str:
+    text = re.sub(r"\\(sin|cos)\{(\\left\([^()]*\\right\))\}", r"\1\2", text).replace(
+        r"\operatorname{atan2}", "atan2"
+    )
     text = text.replace(r"\left\lvert", "abs(").replace(r"\right\rvert", ")").replace(r"\left(", "(")
     text = text.replace(r"\right)", ")").replace(r"\cdot", "*").replace(r"\pi", "pi")
     while True:
@@ -67,17 +71,19 @@ def python_of_latex(text: str) -> str:
 
 
 def value_of(expression: str) -> float:
-    return float(eval(expression, {"__builtins__": {}}, {"pi": math.pi, "sqrt": math.sqrt, "abs": abs}))
+    functions = {name: getattr(math, name) for name in ("sqrt", "sin", "cos", "atan2")}
+    return float(eval(expression, {"__builtins__": {}}, {"pi": math.pi, "abs": abs, **functions}))
 
 
-# Table I, Table II, the clock, vibration, autofocus.
+KNOWN = ("π", "sin", "cos", "atan2")
+# The collection, Table I, Table II, the clock, vibration, autofocus.
 EQUATIONS = derived_equations()
 
 
 def test_every_kind_of_formula_is_there() -> None:
     formulas = " ".join({equation.formula for _, equation in EQUATIONS})
     assert len({equation.formula for _, equation in EQUATIONS}) > 40
-    for part in ("ã_xt", "ṽ_yr", "p̃_zt", "t̃_2", "PSLR", "ISLR", "N_pull"):
+    for part in ("atan2", "-v_xt/R_t", "ã_xt", "ṽ_yr", "p̃_zt", "t̃_2", "PSLR", "ISLR", "N_pull"):
         assert part in formulas
 
 
@@ -88,7 +94,7 @@ def test_numbers_in_mathml_give_the_result() -> None:
         row = root[0]
         assert [row[0].text, row[2].text] == ["=", "="], name
         numbers, result = row[1], row[3]
-        assert not [symbol.text for symbol in numbers.iter("mi") if symbol.text != "π"], name
+        assert not [symbol.text for symbol in numbers.iter("mi") if symbol.text not in KNOWN], name
         shown = python_of_mathml(result[0])
         want = pytest.approx(equation.result, rel=2e-5, abs=1e-300)
         assert value_of(python_of_mathml(numbers)) == want, (name, equation)
