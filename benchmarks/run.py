@@ -1,7 +1,7 @@
 """Measure what the project promises about speed, as ratios of medians taken in turn within one run.
 
     python benchmarks/run.py            # all
-    python benchmarks/run.py cold       # one of: cold, gate, formats, evaluators
+    python benchmarks/run.py cold       # one of: cold, gate, formats, report, evaluators
 
 Absolute times on a shared machine mean little; each figure is measured side by side with its yardstick,
 A B A B …, and the ratio of the medians is what counts. Accuracy stands beside each figure.
@@ -123,6 +123,25 @@ def formats(runs: int) -> None:
         print(f"  JUnit {sizes[0]:.0f} kB, SARIF {sizes[1]:.0f} kB")
 
 
+def report(runs: int) -> None:
+    """What a compliance report costs, layout and drawings included; one mission without images."""
+    script = str(Path(sys.executable).with_name("bisar-budget"))
+    yardstick = (sys.executable, "-c", "import jinja2, matplotlib.pyplot")
+    every_key = ROOT / "tests" / "acceptance" / "good" / "every_key.yaml"
+    print("HTML report of one mission ÷ python -c 'import jinja2, matplotlib.pyplot', CPU (at most 2.5)")
+    with tempfile.TemporaryDirectory() as folder:
+        page = str(Path(folder) / "report.html")
+        for label, mission in (("Section V", MISSION), ("every key", every_key)):
+            a, b = in_turn(
+                runs,
+                process(script, "check", "--format", "html", "-o", page, str(mission)),
+                process(*yardstick),
+            )
+            print(
+                f"  {label:10} {a * 1e3:5.0f} ms ÷ {b * 1e3:5.0f} ms = {a / b:.2f}   ({os.path.getsize(page) / 1e3:.0f} kB)"
+            )
+
+
 def evaluators(runs: int) -> None:
     import numpy as np
 
@@ -189,7 +208,13 @@ def evaluators(runs: int) -> None:
     print(f"  largest relative difference {error:.1e} ({error / math.ulp(1.0):.1f} last places)")
 
 
-TASKS = {"cold": (cold, 21), "gate": (gate, 5), "formats": (formats, 11), "evaluators": (evaluators, 11)}
+TASKS = {
+    "cold": (cold, 21),
+    "gate": (gate, 5),
+    "formats": (formats, 11),
+    "report": (report, 11),
+    "evaluators": (evaluators, 11),
+}
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)

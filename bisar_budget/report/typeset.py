@@ -39,7 +39,7 @@ def readable(text: str) -> str:
 
 
 def as_mathml(equation: Equation) -> Typeset:
-    """Two `math` elements, so that a narrow page can break between them."""
+    """Three `math` elements, so that a narrow page can break between them."""
     formula = FORMULAS[equation.formula][_MATHML]
     values = {SYMBOLS[name][_MATHML]: value for name, value in equation.values.items() if name in SYMBOLS}
     numbers = _mathml_filled(formula, values)
@@ -47,7 +47,7 @@ def as_mathml(equation: Equation) -> Typeset:
     symbol = SYMBOLS[equation.symbol][_MATHML] if equation.symbol in SYMBOLS else f"<mi>{equation.symbol}</mi>"
     return Typeset(
         math(f"<mrow>{symbol}<mo>=</mo>{formula}</mrow>"),
-        math(f"<mrow><mo>=</mo>{numbers}<mo>=</mo>{result}</mrow>"),
+        f"{math(f'<mrow><mo>=</mo>{numbers}</mrow>')} {math(f'<mrow><mo>=</mo>{result}</mrow>')}",
     )
 
 
