@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from bisar_budget.budget.findings import MissionFindings
 from bisar_budget.geometry import BistaticGeometry, PlatformState, Vector, norm
-from bisar_budget.report.svg import Box, Canvas, Label, Point, axis_number, round_step, ticks
+from bisar_budget.report.svg import Box, Canvas, Label, Point, axis_number, round_step, text_width, ticks
 from bisar_budget.units import format_quantity
 
 Place = tuple[float, float]  # in the plane that is drawn: to the right, up [m]
@@ -22,6 +22,7 @@ _AXIS, _EDGE = (46.0, 34.0), 8.0  # px, beside and below a panel for its axes; e
 _APART = 30.0  # px; nearer than this two things are one spot of the drawing
 _CLOSE = 60.0  # px; what is nearer than this in space too deserves an enlargement
 _SPREAD = 0.15  # of a distance: an enlargement shows at least this much each way, however things line up
+_ENLARGED = 2.0  # times; less is not worth a panel
 _VELOCITY, _LOOK, _SMEAR = 44.0, 62.0, 40.0  # px, lengths of arrows
 _SHORT = 0.3  # of an arrow; less of it in the plane of the drawing is drawn as seen from its end
 _SEEN_PATH = 20.0  # px; shorter paths are hidden by marker and arrow
@@ -253,15 +254,18 @@ def _drawing(view: _View, key: str, title: str, description: str, notes: list[st
         middle = ((first.at[0] + second.at[0]) / 2, (first.at[1] + second.at[1]) / 2)
         around = [(middle[0] + _SPREAD * separation * s, middle[1] + _SPREAD * separation * s) for s in (-1, 1)]
         enlarged = _fitted(smaller, [first.at, second.at, *around], top)
+    if enlarged and enlarged.scale < _ENLARGED * main.scale:
+        enlarged = None
+    is_detailed_below = bool(beside and enlarged)
     _axes(canvas, main, view)
-    _draw_panel(canvas, main, view, is_detail=not beside, enlarged=enlarged)
+    _draw_panel(canvas, main, view, is_detail=not is_detailed_below, enlarged=enlarged)
     bottom = main.frame.bottom + _AXIS[1]
     if enlarged:
         what = "Around the scene" if beside else "Around the platforms"
         factor = enlarged.scale / main.scale
         canvas.text((main.frame.left, top - 8), [f"{what}, enlarged {_rounded(factor)} times"], "small")
         _outline(canvas, enlarged, view)
-        _draw_panel(canvas, enlarged, view, is_detail=bool(beside), enlarged=None)
+        _draw_panel(canvas, enlarged, view, is_detail=is_detailed_below, enlarged=None)
         bottom = enlarged.frame.bottom
     if any(not p.is_still and not _is_end_on(p) for p in view.platforms):
         notes = [*notes, "Arrows at the platforms: direction of flight, not speed."]
@@ -313,7 +317,9 @@ def _axes(canvas: Canvas, panel: _Panel, view: _View) -> None:
         if frame.left + 1 < x < frame.right - 1:
             canvas.polyline([(x, frame.top), (x, frame.bottom)], "grid", is_obstacle=False)
         shown = value if view.is_plan else abs(value)
-        canvas.text((x, frame.bottom + 13), [axis_number(shown / unit)], "axis", "middle")
+        text = axis_number(shown / unit)
+        if x + text_width(text) / 2 < _WIDTH:
+            canvas.text((x, frame.bottom + 13), [text], "axis", "middle")
     for value in ticks(panel.centre[1] - half[1], panel.centre[1] + half[1], step):
         _, y = panel.pixel((0.0, value))
         if not view.is_plan and value < 0:
@@ -462,7 +468,8 @@ def _velocity(canvas: Canvas, panel: _Panel, platform: _Platform) -> None:
         return
     x, y = panel.pixel(platform.at)
     if _is_end_on(platform):
-        centre = (x + math.copysign(14, platform.at[0]), y - 13)
+        side = 14 if platform.name == "transmitter" else -14  # of two on one spot both are seen
+        centre = (x + math.copysign(side, side * platform.at[0]), y - 13)
         canvas.circle(centre, 5.5, f"{platform.name}")
         if platform.toward > 0:
             canvas.circle(centre, 1.6, f"solid {platform.name}")

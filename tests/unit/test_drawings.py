@@ -7,7 +7,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bisar_budget.budget.check import check_mission
@@ -249,6 +249,7 @@ kilometres = st.floats(-5e4, 5e4)
 metres_per_second = st.floats(-300, 300)
 
 
+@settings(deadline=None, max_examples=60)  # a few drawings take tens of ms, more on a busy machine
 @given(
     name=st.text(max_size=40),
     tx=st.tuples(kilometres, kilometres, st.floats(0, 5e4)),
