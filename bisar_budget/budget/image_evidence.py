@@ -18,7 +18,8 @@ class PointImage(NamedTuple):
 
     `chip` holds `columns` × `rows` bytes, row by row from the largest y′ to the smallest, in each from the smallest
     x′ to the largest: 0 is `FLOOR_DB` or less, 255 the peak without error. `pixel_m` are its steps along x′ and y′;
-    along y′ a pixel stands for `thinned` samples, of which a resolution cell has as many as along x′. The cuts are powers over the error-free peak [dB], `step_m` apart, with y′ = 0 at index `len // 2`.
+    along y′ a pixel stands for `thinned` samples, of which a resolution cell has as many as along x′. The cuts are
+    powers over the error-free peak [dB], `step_m` apart, with y′ = 0 at index `len // 2`.
     """
 
     columns: int
