@@ -17,14 +17,16 @@ class PointImage(NamedTuple):
     """Image of the point with an error, its cut along y′, and the cut without error at the same place.
 
     `chip` holds `columns` × `rows` bytes, row by row from the largest y′ to the smallest, in each from the smallest
-    x′ to the largest: 0 is `FLOOR_DB` or less, 255 the peak without error. `pixel_m` are its steps along x′ and y′.
-    The cuts are powers over the error-free peak [dB], `step_m` apart, with y′ = 0 at index `len // 2`.
+    x′ to the largest: 0 is `FLOOR_DB` or less, 255 the peak without error. `pixel_m` are its steps along x′ and y′;
+    along y′ a pixel stands for `thinned` samples, of which a resolution cell has as many as along x′. The cuts are
+    powers over the error-free peak [dB], `step_m` apart, with y′ = 0 at index `len // 2`.
     """
 
     columns: int
     rows: int
     chip: bytes
     pixel_m: tuple[float, float]
+    thinned: int
     step_m: float
     cut_db: tuple[float, ...]
     error_free_db: tuple[float, ...]

@@ -5,77 +5,13 @@ a satellite, or two satellites flying together. The description of each drawing 
 """
 
 import math
-import textwrap
-from collections.abc import Iterator, Sequence
-from itertools import pairwise
-from typing import NamedTuple
 
 from bisar_budget.budget.findings import MissionFindings
 from bisar_budget.geometry import BistaticGeometry, PlatformState, Vector, norm
-from bisar_budget.report.svg import Box, Canvas, Label, Point, axis_number, round_step, ticks
+from bisar_budget.report.collection_view import Place, SeenPlatform, View, degrees, draw
 from bisar_budget.units import format_quantity
 
-Place = tuple[float, float]  # in the plane that is drawn: to the right, up [m]
-
-_WIDTH = 520.0  # px, of a drawing
-_AXIS, _EDGE = (46.0, 34.0), 8.0  # px, beside and below a panel for its axes; elsewhere
-_APART = 30.0  # px; nearer than this two things are one spot of the drawing
-_CLOSE = 60.0  # px; what is nearer than this in space too deserves an enlargement
-_SPREAD = 0.15  # of a distance: an enlargement shows at least this much each way, however things line up
-_VELOCITY, _LOOK, _SMEAR = 44.0, 62.0, 40.0  # px, lengths of arrows
-_SHORT = 0.3  # of an arrow; less of it in the plane of the drawing is drawn as seen from its end
-_SEEN_PATH = 20.0  # px; shorter paths are hidden by marker and arrow
 _PATH_STEPS = 32
-_NOTE_COLUMNS = 88
-
-
-class _Platform(NamedTuple):
-    """One platform in one view. `heading` is the unit velocity in the plane, `toward` its part to the viewer."""
-
-    name: str
-    state: PlatformState
-    at: Place
-    heading: Place
-    toward: float
-    path: tuple[Place, ...]
-
-    @property
-    def is_still(self) -> bool:
-        return norm(self.state.velocity) == 0
-
-    @property
-    def motion(self) -> str:
-        return "fixed" if self.is_still else format_quantity(norm(self.state.velocity), "m/s")
-
-
-class _View(NamedTuple):
-    """What one drawing shows; `margins` are left and right, above, and below the things in a panel. [px]"""
-
-    is_plan: bool
-    axes: tuple[str, str]
-    platforms: tuple[_Platform, _Platform]
-    radius: float
-    look_azimuth: float
-    heights: tuple[float, float]
-    margins: tuple[float, float, float]
-
-
-class _Panel(NamedTuple):
-    """A part of the page and what it shows: `centre` lies in its middle, at `scale`. [px], [m], [px/m]"""
-
-    frame: Box
-    centre: Place
-    scale: float
-
-    def pixel(self, place: Place) -> Point:
-        middle = ((self.frame.left + self.frame.right) / 2, (self.frame.top + self.frame.bottom) / 2)
-        return (
-            middle[0] + (place[0] - self.centre[0]) * self.scale,
-            middle[1] - (place[1] - self.centre[1]) * self.scale,
-        )
-
-
-_SCENE: Place = (0.0, 0.0)
 
 
 def geometry_plan(findings: MissionFindings) -> str:
@@ -93,7 +29,7 @@ def geometry_plan(findings: MissionFindings) -> str:
     """
     geometry, T = findings.geometry, findings.aperture_time
     platforms = tuple(
-        _Platform(
+        SeenPlatform(
             name=name,
             state=state,
             at=state.position[:2],
@@ -103,12 +39,13 @@ def geometry_plan(findings: MissionFindings) -> str:
         )
         for name, state in _named(geometry)
     )
-    view = _View(
+    view = View(
         is_plan=True,
         axes=("east", "north"),
         platforms=(platforms[0], platforms[1]),
         radius=findings.scene_radius or 0.0,
         look_azimuth=geometry.look_azimuth,
+        aperture_time=T,
         heights=(210.0, 400.0),
         margins=(74.0, 66.0, 66.0),
     )
@@ -116,10 +53,11 @@ def geometry_plan(findings: MissionFindings) -> str:
     description = (
         f"Plan view to scale, east to the right and north up, scene centre at the origin. "
         f"{' '.join(_in_words(name, state) for name, state in _named(geometry))} "
-        f"The bistatic look direction is {_degrees(look)} from east, counter-clockwise; motion errors smear the "
-        f"image along the line at {_degrees(smear)}, perpendicular to it.{_radius_in_words(findings)}"
+        f"The bistatic look direction is {degrees(look)} from east, counter-clockwise; motion errors smear the "
+        f"image along the line at {degrees(smear)}, perpendicular to it.{_radius_in_words(findings)}"
     )
-    return _drawing(view, f"plan {findings.file}", f"Geometry from above: {findings.name}", description, [], T)
+    title = f"Geometry from above: {findings.name}"
+    return draw(view, key=f"plan {findings.file}", title=title, description=description)
 
 
 def geometry_elevation(findings: MissionFindings) -> str:
@@ -145,12 +83,13 @@ def geometry_elevation(findings: MissionFindings) -> str:
         _in_own_plane(name, state, side, geometry.look_azimuth, T)
         for (name, state), side in zip(_named(geometry), sides, strict=True)
     )
-    view = _View(
+    view = View(
         is_plan=False,
         axes=("ground distance", "height"),
         platforms=(platforms[0], platforms[1]),
         radius=findings.scene_radius or 0.0,
         look_azimuth=geometry.look_azimuth,
+        aperture_time=T,
         heights=(130.0, 360.0),
         margins=(82.0, 52.0, 34.0),
     )
@@ -164,7 +103,7 @@ def geometry_elevation(findings: MissionFindings) -> str:
         f"{_radius_in_words(findings)}"
     )
     title = f"Geometry from the side: {findings.name}"
-    return _drawing(view, f"elevation {findings.file}", title, description, [how], T)
+    return draw(view, key=f"elevation {findings.file}", title=title, description=description, notes=[how])
 
 
 def _named(geometry: BistaticGeometry) -> tuple[tuple[str, PlatformState], tuple[str, PlatformState]]:
@@ -204,14 +143,14 @@ def _planes_in_words(geometry: BistaticGeometry, turned: float) -> str:
     overhead = [name for name, state in _named(geometry) if _is_overhead(state)]
     if overhead:
         return f"The {overhead[0]} is overhead."
-    return f"The planes are {_degrees(turned)} apart in azimuth."
+    return f"The planes are {degrees(turned)} apart in azimuth."
 
 
 def _is_overhead(state: PlatformState) -> bool:
     return math.hypot(*state.position[:2]) <= 1e-9 * state.slant_range
 
 
-def _in_own_plane(name: str, state: PlatformState, side: float, look_azimuth: float, T: float) -> _Platform:
+def _in_own_plane(name: str, state: PlatformState, side: float, look_azimuth: float, T: float) -> SeenPlatform:
     azimuth = look_azimuth if _is_overhead(state) else state.azimuth  # overhead: any vertical plane holds it
     outward = (math.cos(azimuth), math.sin(azimuth))
 
@@ -219,7 +158,7 @@ def _in_own_plane(name: str, state: PlatformState, side: float, look_azimuth: fl
         return (side * (vector[0] * outward[0] + vector[1] * outward[1]), vector[2])
 
     direction = _direction(state.velocity)
-    return _Platform(
+    return SeenPlatform(
         name=name,
         state=state,
         at=seen(state.position),
@@ -227,277 +166,6 @@ def _in_own_plane(name: str, state: PlatformState, side: float, look_azimuth: fl
         toward=side * (direction[0] * outward[1] - direction[1] * outward[0]),  # right × up points to the viewer
         path=tuple(seen(position) for position in _flown(state, T)),
     )
-
-
-def _drawing(view: _View, key: str, title: str, description: str, notes: list[str], aperture_time: float) -> str:
-    canvas = Canvas()
-    places = [_SCENE, *(p.at for p in view.platforms), *(place for p in view.platforms for place in p.path)]
-    farthest = max(math.hypot(*place) for place in places)
-    if view.radius <= 2 * farthest:
-        places += _extent(view, _SCENE, view.radius)
-    main = _fitted(view, places, _EDGE)
-    beside = [p for p in view.platforms if p.state.slant_range * main.scale < _CLOSE]
-    separation = math.dist(*(p.state.position for p in view.platforms))
-    is_pair = not beside and separation * main.scale < _CLOSE and _pixels_apart(main, *view.platforms) < _APART
-    enlarged = None
-    smaller = view._replace(heights=(view.heights[0], 0.75 * view.heights[1]))
-    top = main.frame.bottom + _AXIS[1] + 26
-    if beside:
-        reach = max(p.state.slant_range for p in beside)
-        shown = [*(place for p in beside for place in (p.at, *p.path)), *_extent(view, _SCENE, _SPREAD * reach)]
-        if view.radius <= 2 * reach:
-            shown += _extent(view, _SCENE, view.radius)
-        enlarged = _fitted(smaller, [_SCENE, *shown], top)
-    elif is_pair and separation:
-        first, second = view.platforms
-        middle = ((first.at[0] + second.at[0]) / 2, (first.at[1] + second.at[1]) / 2)
-        around = [(middle[0] + _SPREAD * separation * s, middle[1] + _SPREAD * separation * s) for s in (-1, 1)]
-        enlarged = _fitted(smaller, [first.at, second.at, *around], top)
-    _axes(canvas, main, view)
-    _draw_panel(canvas, main, view, is_detail=not beside, enlarged=enlarged)
-    bottom = main.frame.bottom + _AXIS[1]
-    if enlarged:
-        what = "Around the scene" if beside else "Around the platforms"
-        factor = enlarged.scale / main.scale
-        canvas.text((main.frame.left, top - 8), [f"{what}, enlarged {_rounded(factor)} times"], "small")
-        _outline(canvas, enlarged, view)
-        _draw_panel(canvas, enlarged, view, is_detail=bool(beside), enlarged=None)
-        bottom = enlarged.frame.bottom
-    if any(not p.is_still and not _is_end_on(p) for p in view.platforms):
-        notes = [*notes, "Arrows at the platforms: direction of flight, not speed."]
-    panels = [main, *([enlarged] if enlarged else [])]
-    if any(_shows_path(panel, p) for panel in panels for p in view.platforms):
-        notes = [*notes, f"Broad line: path in the aperture of {format_quantity(aperture_time, 's')}."]
-    if any(_is_end_on(p) for p in view.platforms):
-        notes = [*notes, "Circle with dot: flight towards the viewer; with cross: away."]
-    lines = textwrap.wrap(" ".join(notes), _NOTE_COLUMNS)
-    for index, line in enumerate(lines):
-        canvas.text((main.frame.left, bottom + 18 + 13 * index), [line], "small")
-    return canvas.document((_WIDTH, bottom + 18 + 13 * len(lines)), key, title, description)
-
-
-def _extent(view: _View, centre: Place, reach: float) -> list[Place]:
-    """Ends of what reaches so far from a point: all round from above, along the ground from the side."""
-    x, y = centre
-    ends = [(x - reach, y), (x + reach, y)]
-    return [*ends, (x, y - reach), (x, y + reach)] if view.is_plan else ends
-
-
-def _fitted(view: _View, places: Sequence[Place], top: float) -> _Panel:
-    """Panel at the largest scale that shows all places and leaves room for what is written beside them."""
-    (lowest, highest), (side, above, below) = view.heights, view.margins
-    xs, ys = zip(*places, strict=True)
-    wide, tall = max(xs) - min(xs), max(ys) - min(ys)
-    width = _WIDTH - _AXIS[0] - _EDGE
-    scale = min(
-        (width - 2 * side) / wide if wide else math.inf,
-        (highest - above - below) / tall if tall else math.inf,
-    )
-    height = min(max(lowest, tall * scale + above + below), highest)
-    slack = (height - tall * scale - above - below) / 2 if view.is_plan else 0.0
-    # The middle of the frame is not that of the places where the margins differ; the ground stays down.
-    low = min(ys) - (below + slack) / scale
-    centre = ((max(xs) + min(xs)) / 2, low + height / 2 / scale)
-    return _Panel(Box(_AXIS[0], top, _AXIS[0] + width, top + height), centre, scale)
-
-
-def _axes(canvas: Canvas, panel: _Panel, view: _View) -> None:
-    """Grid, ticks and names of the axes; the same step both ways, because both are to scale."""
-    frame, scale = panel.frame, panel.scale
-    step = round_step(62 / scale)
-    far = max(abs(panel.centre[0]), abs(panel.centre[1])) + (frame.right - frame.left) / scale
-    unit, name = (1e3, "km") if far >= 2e3 else (1.0, "m")
-    half = ((frame.right - frame.left) / 2 / scale, (frame.bottom - frame.top) / 2 / scale)
-    for value in ticks(panel.centre[0] - half[0], panel.centre[0] + half[0], step):
-        x, _ = panel.pixel((value, 0.0))
-        if frame.left + 1 < x < frame.right - 1:
-            canvas.polyline([(x, frame.top), (x, frame.bottom)], "grid", is_obstacle=False)
-        shown = value if view.is_plan else abs(value)
-        canvas.text((x, frame.bottom + 13), [axis_number(shown / unit)], "axis", "middle")
-    for value in ticks(panel.centre[1] - half[1], panel.centre[1] + half[1], step):
-        _, y = panel.pixel((0.0, value))
-        if not view.is_plan and value < 0:
-            continue
-        if frame.top + 1 < y < frame.bottom - 1:
-            canvas.polyline([(frame.left, y), (frame.right, y)], "grid", is_obstacle=False)
-        canvas.text((frame.left - 5, y + 3.5), [axis_number(value / unit)], "axis", "end")
-    middle = (frame.left + frame.right) / 2
-    canvas.text((middle, frame.bottom + 28), [f"{view.axes[0]} [{name}]"], "axis", "middle")
-    canvas.upright_text((11, (frame.top + frame.bottom) / 2), f"{view.axes[1]} [{name}]", "axis")
-    _frame(canvas, frame)
-
-
-def _outline(canvas: Canvas, panel: _Panel, view: _View) -> None:
-    """Frame of an enlargement, with a bar for its scale."""
-    frame = panel.frame
-    _frame(canvas, frame)
-    length = round_step(40 / panel.scale)
-    right, y = frame.right - 10, frame.top + 22
-    left = right - length * panel.scale
-    for line in ([(left, y), (right, y)], *([(x, y - 3), (x, y + 3)] for x in (left, right))):
-        canvas.polyline(line, "line")
-    canvas.text(((left + right) / 2, y - 6), [format_quantity(length, "m")], "axis", "middle")
-    canvas.obstacles.append(Box(left - 4, frame.top, frame.right, y + 4))
-
-
-def _frame(canvas: Canvas, frame: Box) -> None:
-    corners = [
-        (frame.left, frame.top),
-        (frame.right, frame.top),
-        (frame.right, frame.bottom),
-        (frame.left, frame.bottom),
-    ]
-    canvas.polyline([*corners, corners[0]], "grid", is_obstacle=False)
-
-
-def _draw_panel(canvas: Canvas, panel: _Panel, view: _View, is_detail: bool, enlarged: _Panel | None) -> None:
-    """Lines first, then markers, then labels, which look for what space is left."""
-    frame, scene = panel.frame, panel.pixel(_SCENE)
-    if view.is_plan:
-        if view.radius * panel.scale >= 3:
-            circle = [_on_circle(_SCENE, view.radius, 2 * math.pi * index / 96) for index in range(97)]
-            canvas.polyline([panel.pixel(place) for place in circle], "thin", frame)
-    else:
-        ground = [(frame.left, scene[1]), (frame.right, scene[1])]
-        canvas.polyline(ground, "line", frame)
-        if view.radius * panel.scale >= 3:
-            ends = [panel.pixel((sign * view.radius, 0.0)) for sign in (-1, 1)]
-            canvas.polyline(ends, "line path", frame)
-    for platform in view.platforms:
-        dashes = "dashed" if platform.name == "transmitter" else "dotted"
-        canvas.polyline([scene, panel.pixel(platform.at)], f"{platform.name} {dashes}", frame)
-        if _shows_path(panel, platform):
-            canvas.polyline([panel.pixel(place) for place in platform.path], f"{platform.name} path", frame)
-    has_scene = frame.holds(scene)
-    labels: list[Label] = []
-    if is_detail and has_scene:
-        if view.is_plan:
-            labels += _directions(canvas, panel, view)
-        else:
-            for platform, radius in zip(view.platforms, (30.0, 42.0), strict=True):
-                _arc(canvas, panel, platform, radius)
-    visible = [p for p in view.platforms if frame.holds(panel.pixel(p.at))]
-    for platform in visible:
-        _velocity(canvas, panel, platform)
-    for platform in visible:
-        _marker(canvas, panel.pixel(platform.at), platform)
-    if has_scene:
-        for x, y in ((5, 0), (0, 5)):
-            canvas.polyline([(scene[0] - x, scene[1] - y), (scene[0] + x, scene[1] + y)], "marker line")
-        canvas.obstacles.append(Box(scene[0] - 5, scene[1] - 5, scene[0] + 5, scene[1] + 5))
-    canvas.labels([*_labels(panel, view, visible, has_scene, enlarged), *labels])
-
-
-def _labels(
-    panel: _Panel, view: _View, visible: Sequence[_Platform], has_scene: bool, enlarged: _Panel | None
-) -> Iterator[Label]:
-    """What is written, and where it belongs; things on one spot share a label."""
-    frame, scene = panel.frame, panel.pixel(_SCENE)
-    # From the side, what is written of a platform stays above the ground.
-    above = frame if view.is_plan else frame._replace(bottom=min(frame.bottom, scene[1]))
-    at_scene = [p for p in visible if has_scene and math.dist(panel.pixel(p.at), scene) < _APART]
-    free = [p for p in visible if p not in at_scene]
-    if len(free) == 2 and _pixels_apart(panel, *free) < _APART:
-        distance = math.dist(*(p.state.position for p in free))
-        together = f"{_range(view, free[0])}, {format_quantity(distance, 'm')} apart"
-        below = ("enlarged below",) if enlarged else ()
-        yield Label(panel.pixel(free[0].at), ("transmitter and receiver", together, *below), above)
-    else:
-        for platform in free:
-            lines = platform.name, _range(view, platform) + (f", {platform.motion}" if view.is_plan else "")
-            yield Label(panel.pixel(platform.at), lines, above)
-    if has_scene:
-        if at_scene and enlarged:
-            names = " and ".join(["scene", *(p.name for p in at_scene)])
-            yield Label(scene, (names, "enlarged below"), frame)
-        elif at_scene:
-            names = " and ".join(p.name for p in at_scene)
-            ranges = ", ".join(f"{_range(view, p)}, {p.motion}" for p in at_scene)
-            yield Label(scene, (f"{names} over the scene", ranges), frame)
-        else:
-            radius = f", radius {format_quantity(view.radius, 'm')}" if view.radius else ""
-            yield Label(scene, (f"scene{radius}",), frame)
-    for platform in view.platforms:
-        if platform not in visible and (part := frame.clipped((scene, panel.pixel(platform.at)))):
-            yield Label(part[1], (f"to {platform.name}, {_range(view, platform)}",), above)
-    if not has_scene and visible and (part := frame.clipped((panel.pixel(visible[0].at), scene))):
-        yield Label(part[1], ("to the scene",), frame)
-
-
-def _range(view: _View, platform: _Platform) -> str:
-    slant = format_quantity(platform.state.slant_range, "m")
-    return slant if view.is_plan else f"{slant} at {_degrees(platform.state.elevation)}"
-
-
-def _directions(canvas: Canvas, panel: _Panel, view: _View) -> Iterator[Label]:
-    """φ_b of (11), and across it the line along which errors smear, (31)."""
-    scene, look = panel.pixel(_SCENE), view.look_azimuth
-    tip = _turned(scene, _LOOK, look)
-    ends = [_turned(scene, sign * _SMEAR, look + math.pi / 2) for sign in (-1, 1)]
-    canvas.arrow(scene, tip)
-    canvas.arrow(ends[0], ends[1], both_ends=True)
-    yield Label(tip, (f"look φ_b {_degrees(look)}",), panel.frame)
-    yield Label(max(ends, key=lambda end: end[1]), ("smear",), panel.frame)
-
-
-def _turned(origin: Point, length: float, azimuth: float) -> Point:
-    return (origin[0] + length * math.cos(azimuth), origin[1] - length * math.sin(azimuth))
-
-
-def _on_circle(centre: Place, radius: float, angle: float) -> Place:
-    return (centre[0] + radius * math.cos(angle), centre[1] + radius * math.sin(angle))
-
-
-def _arc(canvas: Canvas, panel: _Panel, platform: _Platform, radius: float) -> None:
-    """Elevation angle at the scene."""
-    scene = panel.pixel(_SCENE)
-    end = math.atan2(platform.at[1], platform.at[0])
-    start = 0.0 if end <= math.pi / 2 else math.pi
-    steps = [start + (end - start) * index / 16 for index in range(17)]
-    canvas.polyline([_turned(scene, radius, angle) for angle in steps], f"{platform.name}", panel.frame)
-
-
-def _velocity(canvas: Canvas, panel: _Panel, platform: _Platform) -> None:
-    if platform.is_still:
-        return
-    x, y = panel.pixel(platform.at)
-    if _is_end_on(platform):
-        centre = (x + math.copysign(14, platform.at[0]), y - 13)
-        canvas.circle(centre, 5.5, f"{platform.name}")
-        if platform.toward > 0:
-            canvas.circle(centre, 1.6, f"solid {platform.name}")
-        else:
-            for slope in (1, -1):
-                canvas.polyline(
-                    [(centre[0] - 3.9, centre[1] - 3.9 * slope), (centre[0] + 3.9, centre[1] + 3.9 * slope)],
-                    platform.name,
-                )
-        return
-    tip = (x + _VELOCITY * platform.heading[0], y - _VELOCITY * platform.heading[1])
-    canvas.arrow((x, y), tip, platform.name)
-
-
-def _is_end_on(platform: _Platform) -> bool:
-    return not platform.is_still and math.hypot(*platform.heading) < _SHORT
-
-
-def _marker(canvas: Canvas, at: Point, platform: _Platform) -> None:
-    """Triangle for the transmitter, square for the receiver; hollow if it does not move."""
-    x, y = at
-    style = f"marker {'hollow line' if platform.is_still else 'solid'} {platform.name}"
-    if platform.name == "transmitter":
-        canvas.polygon([(x, y - 7), (x + 6, y + 3.5), (x - 6, y + 3.5)], style)  # its centroid is the place
-    else:
-        canvas.polygon([(x - 5, y - 5), (x + 5, y - 5), (x + 5, y + 5), (x - 5, y + 5)], style)
-
-
-def _pixels_apart(panel: _Panel, first: _Platform, second: _Platform) -> float:
-    return math.dist(panel.pixel(first.at), panel.pixel(second.at))
-
-
-def _shows_path(panel: _Panel, platform: _Platform) -> bool:
-    length = math.fsum(math.dist(*pair) for pair in pairwise(platform.path))
-    return panel.frame.holds(panel.pixel(platform.at)) and length * panel.scale >= _SEEN_PATH
 
 
 def _in_words(name: str, state: PlatformState) -> str:
@@ -508,7 +176,7 @@ def _in_words(name: str, state: PlatformState) -> str:
         motion = f"it moves vertically at {format_quantity(norm(state.velocity), 'm/s')}"
     else:
         azimuth = math.atan2(state.velocity[1], state.velocity[0])
-        motion = f"it moves at {format_quantity(norm(state.velocity), 'm/s')} towards {_degrees(azimuth)} from east"
+        motion = f"it moves at {format_quantity(norm(state.velocity), 'm/s')} towards {degrees(azimuth)} from east"
     return (
         f"The {name} is {_compass(east, 'east', 'west')} and {_compass(north, 'north', 'south')} of the scene "
         f"centre, slant range {format_quantity(state.slant_range, 'm')}; {motion}."
@@ -519,7 +187,7 @@ def _side_in_words(name: str, state: PlatformState) -> str:
     return (
         f"The {name} is {format_quantity(state.position[2], 'm')} high at a ground distance of "
         f"{format_quantity(math.hypot(*state.position[:2]), 'm')}: slant range "
-        f"{format_quantity(state.slant_range, 'm')}, elevation {_degrees(state.elevation)}."
+        f"{format_quantity(state.slant_range, 'm')}, elevation {degrees(state.elevation)}."
     )
 
 
@@ -530,11 +198,3 @@ def _radius_in_words(findings: MissionFindings) -> str:
 
 def _compass(value: float, positive: str, negative: str) -> str:
     return f"{format_quantity(abs(value), 'm')} {positive if value >= 0 else negative}"
-
-
-def _degrees(angle: float) -> str:
-    return f"{axis_number(round(math.degrees(angle), 2))}°"
-
-
-def _rounded(factor: float) -> str:
-    return f"{float(f'{factor:.2g}'):,.10g}"

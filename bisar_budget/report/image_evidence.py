@@ -99,6 +99,14 @@ def chip_caption(image: PointImage) -> str:
     )
 
 
+def chip_size(image: PointImage, pixels_per_sample: int = 3) -> tuple[int, int]:
+    """Width and height on a page that show resolution cells as squares. [px]
+
+    In metres a cell may be ten times as long as it is wide, and a chip to scale a mere strip.
+    """
+    return image.columns * pixels_per_sample, image.rows * image.thinned * pixels_per_sample
+
+
 def _chunk(kind: bytes, content: bytes) -> bytes:
     return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
 

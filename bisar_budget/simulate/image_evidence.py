@@ -76,6 +76,7 @@ def _point_image(study: Study, chip: Chip, reference: Chip, quadratic: float) ->
         rows=upright.shape[0],
         chip=upright.tobytes(),
         pixel_m=(spacing[0], spacing[1] * stride),
+        thinned=stride,
         step_m=spacing[1] / _FINE,
         cut_db=_levels(cut[fine], peak),
         error_free_db=_levels(clean[fine], peak),

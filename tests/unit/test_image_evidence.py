@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from bisar_budget.budget.image_evidence import ImageEvidence, PointImage
 from bisar_budget.budget.verdicts import Verdict
-from bisar_budget.report.image_evidence import chip_caption, chip_png, impulse_response_cuts
+from bisar_budget.report.image_evidence import chip_caption, chip_png, chip_size, impulse_response_cuts
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -23,7 +23,7 @@ def point_image(peak_db: float = 0.0, columns: int = 3, rows: int = 4) -> PointI
     levels = tuple(peak_db - 2.0 * abs(index - 20) for index in range(41))
     chip = bytes(range(columns * rows))
     return PointImage(
-        columns=columns, rows=rows, chip=chip, pixel_m=(0.5, 0.25), step_m=0.1, cut_db=levels,
+        columns=columns, rows=rows, chip=chip, pixel_m=(0.5, 0.25), thinned=2, step_m=0.1, cut_db=levels,
         error_free_db=tuple(-2.0 * abs(index - 20) for index in range(41)),
     )  # fmt: skip
 
@@ -154,3 +154,8 @@ def test_a_caption_says_size_and_orientation() -> None:
         "−40 dB (black) to 0 dB (white) of the peak without error"
     )
     assert point_image().extent_m == (1.5, 1.0)
+
+
+def test_resolution_cells_are_squares_on_a_page() -> None:
+    """Three samples across, four rows of two samples each."""
+    assert chip_size(point_image(), 10) == (30, 80)
