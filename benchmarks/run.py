@@ -137,9 +137,8 @@ def report(runs: int) -> None:
                 process(script, "check", "--format", "html", "-o", page, str(mission)),
                 process(*yardstick),
             )
-            print(
-                f"  {label:10} {a * 1e3:5.0f} ms ÷ {b * 1e3:5.0f} ms = {a / b:.2f}   ({os.path.getsize(page) / 1e3:.0f} kB)"
-            )
+            size = os.path.getsize(page) / 1e3
+            print(f"  {label:10} {a * 1e3:5.0f} ms ÷ {b * 1e3:5.0f} ms = {a / b:.2f}   ({size:.0f} kB)")
 
 
 def evaluators(runs: int) -> None:
