@@ -166,10 +166,10 @@ class _Gate(click.Command):
     "--date",
     "today",
     type=click.DateTime(["%Y-%m-%d"]),
-    help="Day on which waivers are judged, shown in .html and .md (default: SOURCE_DATE_EPOCH, else today, UTC, "
-    "and not shown).",
+    help="Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC). Only a day that is given "
+    "stands in a compliance report.",
 )
-@click.option("--verify", "verifying", is_flag=True, help="Form images at the limits too and add their verdicts.")
+@click.option("--verify", "verifying", is_flag=True, help="Form images at the limits too and add what they show.")
 @click.option("-q", "--quiet", is_flag=True, help="One line per mission.")
 @click.option("-v", "--verbose", is_flag=True, help="Reason, equation, displacement and evidence of every row.")
 @click.option(

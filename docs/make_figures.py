@@ -99,7 +99,7 @@ def compliance_report() -> None:
     report = Report(version=__version__, missions=(found,))
     with sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
-        page = browser.new_page(viewport={"width": 1000, "height": 1240}, color_scheme="light")
+        page = browser.new_page(viewport={"width": 1120, "height": 1200}, color_scheme="light")
         page.set_content(render("html", report, Style(root=str(HERE.parent))))
         page.screenshot(path=HERE / "compliance-report.png")
         browser.close()

@@ -293,20 +293,26 @@ def compliance(report: Report, style: Style) -> Compliance:
         version=report.version,
         day=report.day,
         status=report.status,
-        verdict=_overall(report.status, pages),
+        verdict=_overall(report, pages),
         options=report.options,
         missions=tuple(pages),
     )
 
 
-def _overall(status: str, pages: Sequence[MissionPage]) -> str:
+def _verdict(status: str, waived: int) -> str:
+    """Verdict on rows, with what it owes to waivers."""
+    rows = f"; {waived} row{'s' if waived != 1 else ''} waived" if waived else ""
+    return f"{_VERDICTS[status]}{rows}"
+
+
+def _overall(report: Report, pages: Sequence[MissionPage]) -> str:
     """Verdict on the run: a mission that declares nothing complies with nothing."""
+    usable = [mission for mission in report.missions if isinstance(mission, MissionFindings)]
+    verdict = _verdict(report.status, sum(mission.summary.get("waived", 0) for mission in usable))
     empty = sum(page.verdict == _NOTHING for page in pages)
-    if status != "pass" or not empty:
-        return _VERDICTS[status]
-    return (
-        _NOTHING if empty == len(pages) else f"{_VERDICTS[status]}; of {len(pages)} missions {empty} declare no error"
-    )
+    if report.status != "pass" or not empty:
+        return verdict
+    return _NOTHING if empty == len(pages) else f"{verdict}; of {len(pages)} missions {empty} declare no error"
 
 
 def _unusable(found: UnusableMission, style: Style, anchor: str) -> MissionPage:
@@ -338,7 +344,7 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
         file=file,
         sha256=_digest(mission.data),
         status=found.status,
-        verdict=_VERDICTS[found.status] if judged else _NOTHING,
+        verdict=_verdict(found.status, found.summary.get("waived", 0)) if judged else _NOTHING,
         name=found.name,
         counts=", ".join(f"{count} {STATUS_WORDS[status]}" for status, count in found.summary.items()),
         worst=judged[0].id if judged else "",
