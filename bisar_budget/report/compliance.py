@@ -24,7 +24,13 @@ from bisar_budget.report.drawings import geometry_elevation, geometry_plan
 from bisar_budget.report.escapes import source_path
 from bisar_budget.report.explanation import chain, collection_chain
 from bisar_budget.report.formulas import Step
-from bisar_budget.report.image_evidence import chip_caption, chip_png, impulse_response_cuts, numbers_in_words
+from bisar_budget.report.image_evidence import (
+    chip_caption,
+    chip_png,
+    chip_size,
+    impulse_response_cuts,
+    numbers_in_words,
+)
 from bisar_budget.report.sentences import cause, measure
 from bisar_budget.report.text_table import head, percent
 from bisar_budget.units import format_quantity
@@ -438,10 +444,10 @@ def illustrations(found: MissionFindings) -> tuple[Illustration, ...]:
 
 
 def _on_page(image: PointImage) -> tuple[int, int]:
-    """Width and height that show both axes in the same scale, at most 220 px. [px]"""
-    along, across = image.extent_m
-    scale = 220 / max(along, across)
-    return max(1, round(along * scale)), max(1, round(across * scale))
+    """Width and height on a page, at most 240 px each. [px]"""
+    width, height = chip_size(image)
+    shrink = max(1.0, width / 240, height / 240)
+    return max(1, round(width / shrink)), max(1, round(height / shrink))
 
 
 def _digest(data: bytes | None) -> str:

@@ -88,7 +88,7 @@ def _sum(text: str) -> Markup:
 
 
 def _chip(chip: Chip, path: str) -> Markup:
-    """An image in the proportions of the ground, which Markdown's own cannot say."""
+    """An image at its size, which Markdown cannot say."""
     width, height = chip.size
     return Markup('<img src="{}" alt="{}" width="{}" height="{}">').format(
         Markup(path), printable(chip.title), width, height
