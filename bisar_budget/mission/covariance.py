@@ -11,7 +11,7 @@ from typing import Annotated, Any, NamedTuple
 from bisar_budget import units
 from bisar_budget.errors import KeyPath, Problem
 from bisar_budget.geometry import FRAME_AXES, Vector
-from bisar_budget.mission.eigen import eigensystem
+from bisar_budget.mission.eigen import eigensystem, exceed
 from bisar_budget.mission.readers import INVALID, Key, OneOf, Quantity, Reader, Report, Section, Triple
 
 KINDS = ("position", "velocity")
@@ -46,10 +46,13 @@ class Covariance(NamedTuple):
 
     def along(self, kind: str, direction: Sequence[float]) -> float:
         """Sigma of position or velocity error along a direction given in the frame's axes: √(dᵀCd)."""
-        first = 3 * KINDS.index(kind)
         parts = [sigma * d for sigma, d in zip(self.of(kind), direction, strict=True)]
-        block = [row[first : first + 3] for row in self.correlation[first : first + 3]]
-        return math.sqrt(correlated_square(block, parts))
+        return math.sqrt(correlated_square(self.block(kind), parts))
+
+    def block(self, kind: str) -> list[tuple[float, ...]]:
+        """Correlations (3, 3) of the errors of a kind among each other."""
+        first = 3 * KINDS.index(kind)
+        return [row[first : first + 3] for row in self.correlation[first : first + 3]]
 
     def path(self, kind: str, axis: int) -> KeyPath:
         """Where the file says the sigma of an error, below `covariance`."""
@@ -68,8 +71,8 @@ def correlated_square(correlation: Sequence[Sequence[float]], parts: Sequence[fl
 
 
 def _problems(correlation: _Matrix) -> Iterator[Problem]:
-    smallest = min(eigensystem(correlation)[0])
-    if smallest < -_EIGENVALUE_TOLERANCE:
+    if not exceed(correlation, -_EIGENVALUE_TOLERANCE):
+        smallest = min(eigensystem(correlation)[0])
         yield Problem(
             f"is not positive semi-definite: the correlation matrix has the eigenvalue {smallest:.3g}",
             "no error has such a covariance",
@@ -77,17 +80,18 @@ def _problems(correlation: _Matrix) -> Iterator[Problem]:
         )
 
 
-def _square(value: Any, path: KeyPath, report: Report) -> bool:
+def _square(value: Any, path: KeyPath, report: Report, otherwise: str) -> bool:
     """Whether a value is a list of six lists of six."""
     if not isinstance(value, list) or len(value) != SIZE:
-        given = f"{len(value)} given" if isinstance(value, list) else "not a list"
-        report(path, Problem(f"must be 6 rows of 6, position before velocity; {given}"))
+        given = f", {len(value)} given" if isinstance(value, list) else ""
+        accepted = f"accepted: x, y, z of position, then of velocity, or {otherwise}"
+        report(path, Problem(f"must be 6 rows of 6 numbers{given}", accepted))
         return False
     is_square = True
     for index, row in enumerate(value):
         if not isinstance(row, list) or len(row) != SIZE:
-            given = f"{len(row)} given" if isinstance(row, list) else "not a list"
-            report((*path, index), Problem(f"must be a row of 6 numbers, {given}"))
+            given = f", {len(row)} given" if isinstance(row, list) else ""
+            report((*path, index), Problem(f"must be a row of 6 numbers{given}"))
             is_square = False
     return is_square
 
@@ -130,7 +134,7 @@ class _MatrixReader(Reader):
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
         """Read the elements and hold them to what a covariance is."""
-        if not _square(value, path, report):
+        if not _square(value, path, report, "a mapping with position, velocity and correlation"):
             return INVALID
         rows = _elements(value, _ELEMENTS, path, report)
         if rows is INVALID:
@@ -165,7 +169,8 @@ def _excesses(rows: Sequence[Sequence[float]], sigmas: Sequence[float]) -> Itera
                     if most
                     else "is a covariance with an error whose variance is 0"
                 )
-                yield Problem(problem, f"accepted: -{most:.4g} to {most:.4g}", at=(i, j))
+                accepted = f"accepted: -{most:.4g} to {most:.4g}" if most else "accepted: 0"
+                yield Problem(problem, accepted, at=(i, j))
 
 
 def _matrix_schema(element: dict[str, Any]) -> dict[str, Any]:
@@ -196,7 +201,7 @@ class _CorrelationReader(Reader):
         return INVALID if faults else read
 
     def _matrix(self, value: Any, path: KeyPath, report: Report) -> Any:
-        if not _square(value, path, report):
+        if not _square(value, path, report, "pairs such as position.x-velocity.x: 0.3"):
             return INVALID
         rows = _elements(value, [[self._NUMBER] * SIZE] * SIZE, path, report)
         if rows is INVALID:

@@ -1,4 +1,4 @@
-"""Eigenvalues of a small symmetric matrix by Jacobi's rotations, without an array library: `check` loads none."""
+"""Eigenvalues of a small symmetric matrix without an array library: `check` loads none."""
 
 import math
 from collections.abc import Sequence
@@ -6,8 +6,29 @@ from collections.abc import Sequence
 _SWEEPS = 30  # convergence is quadratic: a 6 x 6 takes about five
 
 
+def exceed(matrix: Sequence[Sequence[float]], floor: float) -> bool:
+    """Whether all eigenvalues of a symmetric matrix (n, n) are above a floor: the pivots of LDLᵀ, shifted, are.
+
+    A thirtieth of the work of finding them.
+    """
+    n = len(matrix)
+    a = [[x - floor * (i == j) for j, x in enumerate(row)] for i, row in enumerate(matrix)]
+    for k in range(n):
+        pivot = a[k][k]
+        if pivot <= 0:
+            return False
+        for i in range(k + 1, n):
+            factor = a[i][k] / pivot
+            if factor:
+                a[i] = [x - factor * y for x, y in zip(a[i], a[k], strict=True)]
+    return True
+
+
 def eigensystem(matrix: Sequence[Sequence[float]]) -> tuple[list[float], list[list[float]]]:
-    """Eigenvalues of a symmetric matrix (n, n) and, as columns, its unit eigenvectors, in no order."""
+    """Eigenvalues of a symmetric matrix (n, n) and, as columns, its unit eigenvectors, in no order.
+
+    By Jacobi's rotations.
+    """
     n = len(matrix)
     a = [list(row) for row in matrix]
     v = [[float(i == j) for j in range(n)] for i in range(n)]

@@ -1,7 +1,7 @@
 """The first half of an explanation: one error, from its line in the mission file to what it does to the image."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 from bisar_budget.budget.findings import MissionFindings
 from bisar_budget.budget.sources import MOTION_UNITS, Effect, ErrorSource, ImagePlane, full_ground, image_plane
@@ -55,8 +55,8 @@ def _turned(mission: Mission, source: ErrorSource, axis: str) -> Iterator[str]:
         f"{number(k * value)}*{number(direction[formulas.AXES.index(axis)])}"
         for value, direction in zip(error.stated(kind), axes, strict=True)
     ]
-    if covariance is not None and covariance.has_correlations():
-        text = "sqrt(Σ ρ_ij*p_i*p_j) with p = " + ", ".join(parts)
+    if covariance is not None:
+        text = _quadratic_form(parts, covariance.block(kind))
         how = "a covariance turns as AᵀCA"
     elif error.distribution == "normal":
         text = "sqrt(" + " + ".join(f"({part})^2" for part in parts) + ")"
@@ -66,6 +66,18 @@ def _turned(mission: Mission, source: ErrorSource, axis: str) -> Iterator[str]:
         how = "bounds add as magnitudes"
     title = f"Along {axis} from the {error.frame} frame ({', '.join(FRAME_AXES[error.frame])}): {how}"
     yield from step(title, f"declared = {text} = {with_unit(abs(source.declared or 0.0), source.unit)}")
+
+
+def _quadratic_form(parts: Sequence[str], correlation: Sequence[Sequence[float]]) -> str:
+    """Root of Σ ρᵢⱼ pᵢ pⱼ, written out."""
+    terms = [f"({part})^2" for part in parts]
+    terms += [
+        f"2*{number(rho)}*{parts[i]}*{parts[j]}"
+        for i, row in enumerate(correlation)
+        for j, rho in enumerate(row[:i])
+        if rho
+    ]
+    return "sqrt(" + " + ".join(terms) + ")"
 
 
 def effect(
