@@ -29,8 +29,9 @@ class Correlated(NamedTuple):
         return f"{self.platform}.covariance"
 
     def phase(self, members: Sequence[ErrorSource], term: str, model: str) -> float:
-        """√(gᵀCg) of the quadratic (`qpe`) or `cubic` phase; by `strictest` the larger of both models. [rad]"""
-        models = ("published", "full") if model == "strictest" else (model,)
+        """√(gᵀCg) of the quadratic (`qpe`) or `cubic` phase; by `strictest` the largest there is. [rad]"""
+        # The strictest takes the larger phase of each row, and with signs that is not yet the larger of the whole.
+        models = ("published", "full", model) if model == "strictest" else (model,)
         squares = [correlated_square(self.correlation, [getattr(s, term)(of) for s in members]) for of in models]
         return math.sqrt(max(squares))
 
