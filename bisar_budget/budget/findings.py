@@ -8,6 +8,7 @@ from bisar_budget.errors import Fault
 from bisar_budget.geometry import BistaticGeometry, GroundVector
 
 if TYPE_CHECKING:
+    from bisar_budget.budget.monte_carlo import MonteCarlo
     from bisar_budget.budget.verdicts import Verdict
 
 # Worst first. The status of a mission or a run is the worst one found; the last three gate nothing.
@@ -75,6 +76,7 @@ class MissionFindings(NamedTuple):
     warnings: tuple[FileWarning, ...]
     notes: tuple[str, ...]
     verdicts: "tuple[Verdict, ...] | None" = None  # of images, if any were formed
+    monte_carlo: "MonteCarlo | None" = None  # if errors were drawn
 
     @property
     def status(self) -> str:

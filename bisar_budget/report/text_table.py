@@ -79,6 +79,10 @@ def _mission(mission: MissionFindings, style: Style) -> list[str]:
     details = [line for row in explained for line in _details(row, mission, style)]
     lines += ["", *details] if details else []
     lines += [line for text in _asides(mission, style) for line in wrapped(text, "  ")]
+    if mission.monte_carlo is not None:
+        from bisar_budget.report.monte_carlo import probabilities
+
+        lines += ["", *probabilities(mission.monte_carlo)]
     if mission.verdicts is not None:
         from bisar_budget.report.verification import evidence
 

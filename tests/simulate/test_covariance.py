@@ -85,7 +85,7 @@ def test_root_sum_squares_are_those_of_exact_gradients_on_random_geometries() ->
 
 
 def test_root_sum_square_is_the_spread_of_exact_draws() -> None:
-    """2000 draws of a correlated error, each by exact ranges: their rms is known to 1.6 %, three times that is held."""
+    """2000 draws of a correlated error by exact ranges: their rms is known to 1.6 %, three times that is held."""
     rng = np.random.default_rng(2)
     c = random_covariance(rng)
     mission = parse_mission(
