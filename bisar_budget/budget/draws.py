@@ -169,7 +169,7 @@ class _Sums:
 def _second_order(
     mission: Mission, geometry: BistaticGeometry, ground: FullGround, motion: Floats, east: Floats, north: Floats
 ) -> Floats:
-    """Quadratic phase that −Σ|P⊥(r̃_k − x̂)|²/2R_k adds at the displaced point, (draws,), as `validity` has it. [rad]"""
+    """Quadratic phase that −Σ|P⊥(r̃_k − x̂)|²/2R_k adds at the displaced point, (draws,); see `validity`. [rad]"""
     T = mission.collection.aperture_time
     moved = (east, north, 0.0)
     states = (geometry.transmitter, geometry.receiver)

@@ -1,8 +1,8 @@
 """Monte Carlo: errors drawn from their declared distributions, and how often each requirement then holds.
 
-The referee of root-sum-square and worst case. Every declared error is drawn at once, its effects by the full model add,
-and the magnitude of the sum is held to the requirement. The full model is linear in the errors, so a draw is a sum of
-standard variables times effects; a covariance is six of them, along the axes of its correlation matrix.
+The referee of root-sum-square and worst case. All declared errors are drawn at once, their effects by the full model
+add, and the magnitude of the sum is held to the requirement. The full model is linear in the errors, so a draw is a
+sum of standard variables times effects; a covariance is six of them, along the axes of its correlation matrix.
 
 Draws come from the distributions themselves: the coverage factor, which makes bounds of sigmas, has no part in them.
 Vibration is not drawn: its amplitude is declared and its limits are those of echoes.
@@ -333,7 +333,7 @@ def _warnings(counted: Counted, draws: int) -> Iterator[str]:
 def _notes(mission: Mission, declared: Sequence[ErrorSource]) -> Iterator[str]:
     """Say what is drawn by a rule of ours, and what is not drawn."""
     if mission.allocation.model != "full":
-        yield f"by the full model, whatever gates: the rows are judged by allocation.model, {mission.allocation.model}"
+        yield f"drawn by the full model; the rows are judged by allocation.model, {mission.allocation.model}"
     if mission.allocation.combine == "each":
         yield "a draw is the sum of all errors at once; the rows are judged one by one, allocation.combine being each"
     bounds = [source.id for source in declared if source.owner == "mission" and not source.id.startswith("common.")]
@@ -341,6 +341,6 @@ def _notes(mission: Mission, declared: Sequence[ErrorSource]) -> Iterator[str]:
         yield f"{', '.join(bounds)}: drawn as plus or minus the declared value, which has no distribution"
     vibrations = [getattr(mission.platforms, name).motion_error.vibration for name in PLATFORMS]
     if any(one.sinusoidal or one.wideband for one in vibrations):
-        yield "vibration is not drawn: its limits are those of echoes, and what a slow one adds in phase is not in here"
+        yield "vibration is not drawn: its limits are those of echoes; what a slow one adds in phase is not in here"
     if mission.allocation.coverage_factor != 1:
         yield "the coverage factor is in sum and rss, not in the draws"
