@@ -199,7 +199,7 @@ class TestStatistics:
             assert _within(radius, 3.0, 0.6, 1.2) == pytest.approx(share, abs=4 * math.sqrt(0.25 / 400_000))
 
     def test_doubt_needs_a_sure_and_a_material_difference(self) -> None:
-        """Normal errors raise none, whatever the seed; forty declared phases make a lattice that no normal one has."""
+        """Normal errors raise none, whatever the seed; forty declared phases are a lattice, no normal one."""
         for seed in range(20):
             found = drawn(20_000, seed, **{ERROR: {"velocity": "20 mm/s", "acceleration": "30 ug"}})
             assert all(one.warnings == () for one in found.requirements)
