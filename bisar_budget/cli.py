@@ -253,9 +253,7 @@ def check(
         raise click.UsageError("--seed is that of --monte-carlo N: give both.")
     if explain is not None:
         if any(given(name) is ParameterSource.COMMANDLINE for name in ("format_name", "reports", "draws")):
-            raise click.UsageError(
-                "--explain writes the chain of one row: it excludes --format, --report, --monte-carlo."
-            )
+            raise click.UsageError("--explain writes text: it excludes --format, --report and --monte-carlo.")
         _explain(files, explain, today.date() if today else _today(), model, output)
         return
     report = _checked(files, today.date() if today else _today(), model, verifying, draws, seed)

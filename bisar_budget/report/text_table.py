@@ -181,8 +181,9 @@ def percent(ratio: float) -> str:
 
 
 def _cells(status: str, row: str, declared: str, allowable: str, use: str, reference: str) -> str:
-    left = status.ljust(9) + row.ljust(34)
-    return (left + declared.rjust(12) + allowable.rjust(12) + use.rjust(8) + " " + reference).rstrip()
+    # A blank of its own between cells: a wide one shifts the rest, it does not touch its neighbour.
+    left = status.ljust(8) + " " + row.ljust(34)
+    return f"{left} {declared.rjust(11)} {allowable.rjust(11)} {use.rjust(7)} {reference}".rstrip()
 
 
 def _details(row: Row, mission: MissionFindings, style: Style) -> list[str]:
