@@ -12,8 +12,8 @@ from bisar_budget.budget.combine import combine_displacements, combine_phases
 from bisar_budget.budget.sources import PLATFORMS, ErrorSource
 from bisar_budget.errors import Place
 from bisar_budget.geometry import FRAME_AXES, GroundVector
-from bisar_budget.mission.covariance import KINDS, correlated_square
 from bisar_budget.mission.model import Mission, MotionError
+from bisar_budget.mission.symmetric import quadratic_form
 
 
 class Correlated(NamedTuple):
@@ -32,12 +32,12 @@ class Correlated(NamedTuple):
         """√(gᵀCg) of the quadratic (`qpe`) or `cubic` phase; by `strictest` the largest there is. [rad]"""
         # The strictest takes the larger phase of each row, and with signs that is not yet the larger of the whole.
         models = ("published", "full", model) if model == "strictest" else (model,)
-        squares = [correlated_square(self.correlation, [getattr(s, term)(of) for s in members]) for of in models]
+        squares = [quadratic_form(self.correlation, [getattr(s, term)(of) for s in members]) for of in models]
         return math.sqrt(max(squares))
 
     def displacement(self, moves: Sequence[GroundVector]) -> float:
         """Root of the trace of the displacement's covariance on the ground: its rms length. [m]"""
-        return math.sqrt(sum(correlated_square(self.correlation, along) for along in zip(*moves, strict=True)))
+        return math.sqrt(sum(quadratic_form(self.correlation, along) for along in zip(*moves, strict=True)))
 
 
 def correlated_errors(mission: Mission) -> tuple[Correlated, ...]:
@@ -46,7 +46,9 @@ def correlated_errors(mission: Mission) -> tuple[Correlated, ...]:
     for name in PLATFORMS:
         error: MotionError = getattr(mission.platforms, name).motion_error
         if error.covariance is not None:
-            ids = tuple(f"{name}.{kind}.{axis}" for kind in KINDS for axis in FRAME_AXES[error.frame])
+            ids = tuple(
+                f"{name}.{kind}.{axis}" for kind in ("position", "velocity") for axis in FRAME_AXES[error.frame]
+            )
             found.append(Correlated(name, ids, error.covariance.correlation))
     return tuple(found)
 
@@ -130,7 +132,7 @@ def likely_error(group: Correlated, members: Sequence[ErrorSource]) -> tuple[flo
     """
     sizes = [source.declared or 0.0 for source in members]
     phases = [source.full.qpe * size for source, size in zip(members, sizes, strict=True)]
-    total = math.sqrt(correlated_square(group.correlation, phases))
+    total = math.sqrt(quadratic_form(group.correlation, phases))
     if not total:
         return tuple(sizes)
     shares = [math.fsum(rho * phase for rho, phase in zip(row, phases, strict=True)) for row in group.correlation]

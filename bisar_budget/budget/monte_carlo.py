@@ -17,8 +17,8 @@ from bisar_budget.budget.correlation import Correlated, combined_displacement, c
 from bisar_budget.budget.draws import BLOCK, Counted, Judged, Variable, count
 from bisar_budget.budget.sources import PLATFORMS, ErrorSource, FullGround, error_sources, full_ground
 from bisar_budget.constants import MAX_DRAWS
-from bisar_budget.mission.eigen import eigensystem
 from bisar_budget.mission.model import Mission, Simulation
+from bisar_budget.mission.symmetric import eigensystem
 
 CONFIDENCE = 0.95
 DOMINANT = 0.5  # of the variance: beyond, a sum has the shape of that one error, whatever the others are

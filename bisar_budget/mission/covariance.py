@@ -11,8 +11,8 @@ from typing import Annotated, Any, NamedTuple
 from bisar_budget import units
 from bisar_budget.errors import KeyPath, Problem
 from bisar_budget.geometry import FRAME_AXES, Vector
-from bisar_budget.mission.eigen import eigensystem, exceed
 from bisar_budget.mission.readers import INVALID, Key, OneOf, Quantity, Reader, Report, Section, Triple
+from bisar_budget.mission.symmetric import eigensystem, exceed, quadratic_form
 
 KINDS = ("position", "velocity")
 SIZE = 6
@@ -47,7 +47,7 @@ class Covariance(NamedTuple):
     def along(self, kind: str, direction: Sequence[float]) -> float:
         """Sigma of position or velocity error along a direction given in the frame's axes: √(dᵀCd)."""
         parts = [sigma * d for sigma, d in zip(self.of(kind), direction, strict=True)]
-        return math.sqrt(correlated_square(self.block(kind), parts))
+        return math.sqrt(quadratic_form(self.block(kind), parts))
 
     def block(self, kind: str) -> list[tuple[float, ...]]:
         """Correlations (3, 3) of the errors of a kind among each other."""
@@ -62,12 +62,6 @@ class Covariance(NamedTuple):
     def has_correlations(self) -> bool:
         """Whether any two of the errors are correlated."""
         return any(rho for i, row in enumerate(self.correlation) for rho in row[:i])
-
-
-def correlated_square(correlation: Sequence[Sequence[float]], parts: Sequence[float]) -> float:
-    """Σ ρᵢⱼ pᵢ pⱼ of parts (n,) with correlations (n, n); what rounding leaves below zero is zero."""
-    terms = [rho * parts[i] * part for i, row in enumerate(correlation) for rho, part in zip(row, parts, strict=True)]
-    return max(0.0, math.fsum(terms))
 
 
 def _problems(correlation: _Matrix) -> Iterator[Problem]:

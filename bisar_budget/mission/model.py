@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Mapping
 from datetime import date
 from functools import lru_cache
-from typing import Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from bisar_budget import units
 from bisar_budget.constants import SPEED_OF_LIGHT
@@ -18,11 +18,11 @@ from bisar_budget.geometry import (
     norm,
     state_from_angles,
 )
-from bisar_budget.mission.covariance import COVARIANCE, Covariance, misplaced_axes
 from bisar_budget.mission.readers import (
     Choice,
     Day,
     Key,
+    Late,
     ListOf,
     OneOf,
     Quantity,
@@ -35,6 +35,9 @@ from bisar_budget.mission.readers import (
     Version,
     Whole,
 )
+
+if TYPE_CHECKING:
+    from bisar_budget.mission.covariance import Covariance
 
 STILL = 1e-6  # m/s; slower than this no platform flies an aperture
 LATER = "it comes with a later one"
@@ -117,6 +120,12 @@ class Vibration(NamedTuple):
     wideband: Annotated[Wideband | None, Key(Section(Wideband))] = None
 
 
+def _covariance_reader() -> Reader:
+    from bisar_budget.mission.covariance import COVARIANCE
+
+    return COVARIANCE
+
+
 class MotionError(NamedTuple):
     """How wrong the measured motion of one platform may be. A scalar means each axis."""
 
@@ -131,9 +140,10 @@ class MotionError(NamedTuple):
     velocity: Annotated[Vector | None, Key(Triple(VELOCITY, or_scalar=True), "Constant part.")] = None
     acceleration: Annotated[Vector | None, Key(Triple(ACCELERATION, or_scalar=True), "Constant part.")] = None
     covariance: Annotated[
-        Covariance | None,
+        "Covariance | None",
         Key(
-            COVARIANCE, "Of position and velocity, instead of the two: 6 x 6 in m and s, or sigmas with correlations."
+            Late(_covariance_reader),
+            "Of position and velocity, instead of the two: 6 x 6 in m and s, or sigmas with correlations.",
         ),
     ] = None
     distribution: Annotated[str, Key(DISTRIBUTION, DISTRIBUTIONS)] = "normal"
@@ -146,6 +156,8 @@ class MotionError(NamedTuple):
         covariance: Covariance | None = values.get("covariance")
         if covariance is None:
             return
+        from bisar_budget.mission.covariance import misplaced_axes
+
         both = [kind for kind in ("position", "velocity") if values.get(kind) is not None]
         if both:
             yield Problem(

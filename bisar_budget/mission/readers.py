@@ -361,6 +361,21 @@ class OneOf(Reader):
         return {"anyOf": [form.schema(definitions) for form in self.forms]}
 
 
+class Late(Reader):
+    """A reader of a rare key, imported when a file has it."""
+
+    def __init__(self, load: Callable[[], Reader]) -> None:
+        self.load = load
+
+    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
+        """Read by it."""
+        return self.load().read(value, path, report)
+
+    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+        """Write its schema."""
+        return self.load().schema(definitions)
+
+
 def _read(reader: Reader, value: Any, path: KeyPath, report: Report) -> Any:
     return INVALID if value is INVALID else reader.read(value, path, report)
 

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from bisar_budget.errors import MissionError
 from bisar_budget.geometry import FRAME_AXES
-from bisar_budget.mission.eigen import eigensystem, exceed
 from bisar_budget.mission.load import parse_mission
+from bisar_budget.mission.symmetric import eigensystem, exceed
 from tests.conftest import findings, mission_text, row
 
 ERROR = "platforms__receiver__motion_error"

@@ -1,9 +1,15 @@
-"""Eigenvalues of a small symmetric matrix without an array library: `check` loads none."""
+"""Small symmetric matrices without an array library: `check` loads none."""
 
 import math
 from collections.abc import Sequence
 
 _SWEEPS = 30  # convergence is quadratic: a 6 x 6 takes about five
+
+
+def quadratic_form(matrix: Sequence[Sequence[float]], vector: Sequence[float]) -> float:
+    """Σ mᵢⱼ vᵢ vⱼ of a positive semi-definite matrix (n, n); what rounding leaves below zero is zero."""
+    terms = [m * vector[i] * v for i, row in enumerate(matrix) for m, v in zip(row, vector, strict=True)]
+    return max(0.0, math.fsum(terms))
 
 
 def exceed(matrix: Sequence[Sequence[float]], floor: float) -> bool:
