@@ -104,7 +104,11 @@ def test_root_sum_square_is_the_spread_of_exact_draws() -> None:
 
 
 def test_common_errors_are_those_of_exact_ranges() -> None:
-    """40 collections, both platforms wrong by the same: phases and displacement of each axis, signed."""
+    """40 collections, both platforms wrong by the same: phases and displacement of each axis, signed.
+
+    As near as the platforms' own rows come, 2 %; of the cubic phase the fit leaves 5 %. The floors are a
+    millimetre and the phase of half a micrometre.
+    """
     for mission in random_missions(40, seed=22):
         mission = mission._replace(common_motion_error=_common(position=1, velocity=1))
         study = Study(mission)
