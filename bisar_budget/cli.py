@@ -243,7 +243,7 @@ def check(
     Defaults of --format, --report, --strict, --exit-zero, --model, --monte-carlo, --seed and --color:
     [tool.bisar-budget] in the nearest pyproject.toml, and over it the variables BISAR_BUDGET_FORMAT and so on.
     """
-    from bisar_budget.report import Style, render
+    from bisar_budget.report import ILLUSTRATED, Style, render
 
     written = [(name, _format_of(name)) for name in reports]
     files = _expanded(missions)
@@ -256,7 +256,9 @@ def check(
             raise click.UsageError("--explain writes text: it excludes --format, --report and --monte-carlo.")
         _explain(files, explain, today.date() if today else _today(), model, output)
         return
-    report = _checked(files, today.date() if today else _today(), model, verifying, draws, seed)
+    illustrated = any(name in ILLUSTRATED for name in (format_name, *(name for _, name in written)))
+    drawn = None if draws is None else (draws, seed)
+    report = _checked(files, today.date() if today else _today(), model, verifying, illustrated, drawn)
     if format_name != "text" or output is not None or quiet or not _is_terminal():
         _say_faults(report)
     style = Style(verbosity=-1 if quiet else 1 if verbose else 0, root=_repository())
@@ -275,8 +277,17 @@ def check(
 
 
 def _checked(
-    files: Sequence[str], today: date, model: str | None, verifying: bool, draws: int | None, seed: int | None
+    files: Sequence[str],
+    today: date,
+    model: str | None,
+    verifying: bool,
+    illustrated: bool = False,
+    drawn: tuple[int, int | None] | None = None,
 ) -> "Report":
+    """Check every file; `verifying` adds verdicts of images, and `illustrated` the images themselves.
+
+    `drawn` is the number of draws of a Monte Carlo and their seed.
+    """
     from bisar_budget.budget.check import check_mission
     from bisar_budget.budget.findings import Report, UnusableMission
     from bisar_budget.errors import MissionError
@@ -290,10 +301,10 @@ def _checked(
         try:
             mission = load_mission(file, model)
             found = check_mission(mission, today)
-            if draws is not None:
+            if drawn is not None:
                 from bisar_budget.budget.monte_carlo import monte_carlo
 
-                found = found._replace(monte_carlo=monte_carlo(mission, draws, seed))
+                found = found._replace(monte_carlo=monte_carlo(mission, *drawn))
             missions.append(found)
             if verifying:
                 usable[index] = mission
@@ -306,8 +317,16 @@ def _checked(
         for index, verified in zip(usable, _verified(list(usable.values()), "*", None), strict=True):
             judged = missions[index]
             if not isinstance(judged, UnusableMission):
-                missions[index] = with_verdicts(judged, verified.rows)
+                judged = with_verdicts(judged, verified.rows)
+                missions[index] = _illustrated(usable[index], judged) if illustrated else judged
     return Report(version=__version__, missions=tuple(missions))
+
+
+def _illustrated(mission: "Mission", found: "MissionFindings") -> "MissionFindings":
+    """Add the images of the rows that decide most."""
+    from bisar_budget.simulate.image_evidence import form_image_evidence
+
+    return found._replace(image_evidence=form_image_evidence(mission, found))
 
 
 def _explain(files: Sequence[str], row_id: str, today: date, model: str | None, output: str | None) -> None:

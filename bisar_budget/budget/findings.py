@@ -8,6 +8,7 @@ from bisar_budget.errors import Fault
 from bisar_budget.geometry import BistaticGeometry, GroundVector
 
 if TYPE_CHECKING:
+    from bisar_budget.budget.image_evidence import ImageEvidence
     from bisar_budget.budget.monte_carlo import MonteCarlo
     from bisar_budget.budget.verdicts import Verdict
 
@@ -70,12 +71,15 @@ class MissionFindings(NamedTuple):
     coverage_factor: float
     wavelength: float
     geometry: BistaticGeometry
+    aperture_time: float
+    scene_radius: float | None
     resolution: Resolution
     allocation: Allocation
     rows: tuple[Row, ...]
     warnings: tuple[FileWarning, ...]
     notes: tuple[str, ...]
     verdicts: "tuple[Verdict, ...] | None" = None  # of images, if any were formed
+    image_evidence: "tuple[ImageEvidence, ...]" = ()  # a few of those images, where a report shows them
     monte_carlo: "MonteCarlo | None" = None  # if errors were drawn
 
     @property
