@@ -169,6 +169,8 @@ def percent(ratio: float) -> str:
         return ">1e5 %"
     if value < 0.01:
         return "<0.01 %"
+    if value < 0.1:
+        return f"{value:.2g} %"  # as wide as the column
     if value < 99:
         return f"{value:.3g} %"
     side = 0 if abs(value - 100) < 1e-7 else math.copysign(1, value - 100)
