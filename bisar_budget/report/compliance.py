@@ -13,6 +13,7 @@ from typing import NamedTuple
 from bisar_budget.budget.allocation import Allocation
 from bisar_budget.budget.findings import MissionFindings, Option, Report, Row, UnusableMission, worst_first
 from bisar_budget.budget.image_evidence import PointImage
+from bisar_budget.budget.monte_carlo import MonteCarlo
 from bisar_budget.budget.sources import MOTION_UNITS, ErrorSource, error_sources
 from bisar_budget.budget.waivers import waiver_notes
 from bisar_budget.catalogue import EQUATIONS
@@ -31,6 +32,7 @@ from bisar_budget.report.image_evidence import (
     impulse_response_cuts,
     numbers_in_words,
 )
+from bisar_budget.report.monte_carlo import held
 from bisar_budget.report.sentences import cause, measure
 from bisar_budget.report.text_table import head, percent
 from bisar_budget.units import format_quantity
@@ -203,6 +205,14 @@ class Evidence(NamedTuple):
     reasons: tuple[str, ...]
 
 
+class Probability(NamedTuple):
+    """How often a requirement holds over the draws of a Monte Carlo; no cells where all are meant."""
+
+    id: str
+    cells: tuple[str, ...]
+    held: str
+
+
 class Picture(NamedTuple):
     """A drawing: `name` of a file within the mission's, what it shows, the SVG."""
 
@@ -267,6 +277,9 @@ class MissionPage(NamedTuple):
     evidence_remarks: tuple[str, ...] = ()
     has_refocused: bool = False
     illustrations: tuple[Illustration, ...] = ()
+    draws: str = ""
+    probabilities: tuple[Probability, ...] = ()
+    draws_remarks: tuple[str, ...] = ()
 
 
 class Compliance(NamedTuple):
@@ -408,6 +421,9 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
         evidence_remarks=tuple(verification.geometry_remarks(found.verdicts or ())),
         has_refocused=any(verdict.verdict_autofocus for verdict in found.verdicts or ()),
         illustrations=illustrations(found),
+        draws=_draws(found.monte_carlo),
+        probabilities=tuple(_probabilities(found.monte_carlo)),
+        draws_remarks=tuple(_draws_remarks(found.monte_carlo)),
     )
 
 
@@ -448,6 +464,34 @@ def _on_page(image: PointImage) -> tuple[int, int]:
     width, height = chip_size(image)
     shrink = max(1.0, width / 240, height / 240)
     return max(1, round(width / shrink)), max(1, round(height / shrink))
+
+
+def _draws(drawn: MonteCarlo | None) -> str:
+    if drawn is None:
+        return ""
+    return (
+        f"{drawn.draws:,} draws, seed {drawn.seed}, {drawn.model} model; intervals of {100 * drawn.confidence:.0f} %"
+    )
+
+
+def _probabilities(drawn: MonteCarlo | None) -> Iterator[Probability]:
+    for one in drawn.requirements if drawn else ():
+        limit = format_quantity(one.limit, one.unit, 3, "down")
+        sizes = (format_quantity(size, one.unit) for size in (one.sum, one.rss, one.sigma))
+        yield Probability(one.id, (limit, *sizes), held(one.probability, one.probability_low, one.probability_high))
+    if drawn and drawn.probability is not None and len(drawn.requirements) > 1:
+        ends = (drawn.probability_low or 0.0, drawn.probability_high or 1.0)
+        yield Probability("all at once", ("–",) * 4, held(drawn.probability, *ends))
+
+
+def _draws_remarks(drawn: MonteCarlo | None) -> Iterator[str]:
+    if drawn is None:
+        return
+    yield from (f"{one.id}: {text}" for one in drawn.requirements for text in one.warnings)
+    yield from drawn.warnings
+    yield from drawn.notes
+    if drawn.probability is None:
+        yield "nothing is declared that a requirement here is about"
 
 
 def _digest(data: bytes | None) -> str:
@@ -578,7 +622,7 @@ def _kind(source: ErrorSource) -> tuple[str, str, str]:
     """Owner, kind and axis of an error."""
     first, kind, axis = (*source.id.split(".", 2), "", "")[:3]
     if kind in MOTION_UNITS:
-        return first, kind, axis.replace("_", " ")
+        return "both platforms" if first == "common" else first, kind, axis.replace("_", " ")
     if first == "timing":
         return "clock", "timing", kind
     return ("mission", "terrain", "height") if source.is_motion else ("mission", "other", source.id.partition(".")[2])
@@ -596,9 +640,14 @@ def _validity(mission: Mission, found: MissionFindings) -> Iterator[tuple[str, s
     yield "Declared", f"for position, velocity, acceleration and clock {factor}"
     for name in ("transmitter", "receiver"):
         error = getattr(mission.platforms, name).motion_error
-        if error.position or error.velocity or error.acceleration:
+        if any(error.stated(kind) for kind in MOTION_UNITS):
             said = _DISTRIBUTIONS[error.distribution]
+            said += ", position and velocity by their covariance" if error.covariance is not None else ""
             yield f"Errors of the {name}", f"along the axes of the frame “{error.frame}”; {said}"
+    common = mission.common_motion_error
+    if common is not None:
+        said = _DISTRIBUTIONS[common.distribution]
+        yield "Errors of both platforms alike", f"along the axes of the scene; {said}"
     yield (
         "Autofocus",
         _gain(found.allocation) + ("" if found.allocation.n_pull is None else f" ({mission.autofocus.algorithm})"),

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 
 from bisar_budget.budget.allocation import Allocation
+from bisar_budget.budget.correlation import correlated_errors, displacement_parts, phase_parts
 from bisar_budget.budget.findings import MissionFindings, Row
 from bisar_budget.budget.sources import ErrorSource, error_sources, image_plane
 from bisar_budget.errors import KeyPath, printable
@@ -48,9 +49,9 @@ def chain(mission: Mission, found: MissionFindings, row: Row) -> Iterator[Step]:
     elif ".vibration." in row.id:
         yield from _vibration(mission, found.allocation, row)
     elif row.id.endswith(".quadratic_phase_error") or row.id == "mission.autofocus_pull_in":
-        yield from _phase_aggregate(found, row, sources.values())
+        yield from _phase_aggregate(mission, found, row, sources.values())
     elif row.id == "mission.cubic_phase_error":
-        yield from _cubic_aggregate(found, row, sources.values())
+        yield from _cubic_aggregate(mission, found, row, sources.values())
     elif row.id == "mission.location_error":
         yield from _location_aggregate(mission, found, row, sources.values())
     if row.declared is not None and row.allowable is not None and row.utilization is not None:
@@ -137,7 +138,9 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[S
     yield from step(f"{row.equation}, s is the {platform}’s share of power", *lines)
 
 
-def _phase_aggregate(found: MissionFindings, row: Row, sources: Iterable[ErrorSource]) -> Iterator[Step]:
+def _phase_aggregate(
+    mission: Mission, found: MissionFindings, row: Row, sources: Iterable[ErrorSource]
+) -> Iterator[Step]:
     owner = {"timing": "clock"}.get(row.id.split(".")[0], row.id.split(".")[0])
     members = [
         source
@@ -147,7 +150,8 @@ def _phase_aggregate(found: MissionFindings, row: Row, sources: Iterable[ErrorSo
         and (owner == "mission" or found.allocation.qpe.includes(source.owner, owner))
     ]
     rule = "sum" if row.id == "mission.autofocus_pull_in" else found.combine
-    yield from _combined("QPE", rule, [(source.id, abs(source.qpe(found.model))) for source in members], row)
+    parts = phase_parts(members, "qpe", found.model, rule, correlated_errors(mission))
+    yield from _combined("QPE", rule, [(name, abs(size)) for name, size in parts], row)
     if row.id == "mission.autofocus_pull_in":
         values = {"N_pull": found.allocation.n_pull or 0.0}
         lines = equation("allowable", "π*N_pull", values, row.allowable or 0.0, "rad")
@@ -156,13 +160,16 @@ def _phase_aggregate(found: MissionFindings, row: Row, sources: Iterable[ErrorSo
         yield from _limit(found.allocation, owner, row.allowable or 0.0)
 
 
-def _cubic_aggregate(found: MissionFindings, row: Row, sources: Iterable[ErrorSource]) -> Iterator[Step]:
+def _cubic_aggregate(
+    mission: Mission, found: MissionFindings, row: Row, sources: Iterable[ErrorSource]
+) -> Iterator[Step]:
     members = [
-        (source.id, abs(source.cubic(found.model)))
+        source
         for source in sources
         if source.declared is not None and source.is_motion and (source.is_independent or found.combine == "each")
     ]
-    yield from _combined("cubic phase", found.combine, members, row)
+    parts = phase_parts(members, "cubic", found.model, found.combine, correlated_errors(mission))
+    yield from _combined("cubic phase", found.combine, [(name, abs(size)) for name, size in parts], row)
     if row.allowable is not None:
         yield from step("Allowable", f"requirements.cubic_phase_error = {row.allowable:.6g} rad")
 
@@ -177,10 +184,12 @@ def _location_aggregate(
         plane, by_model, title = plane_and_effect(mission, found, source)
         moved = plane.displacement(by_model, source.declared)
         if moved is not None and (source.is_independent or found.combine == "each"):
-            members.append((source.id, math.hypot(*moved)))
+            members.append((source.id, moved))
     rule = "the longest sum over all signs of the vectors" if found.combine == "sum" else _RULES[found.combine]
+    parts = displacement_parts(members, found.combine, correlated_errors(mission))
+    sizes = [(name, math.hypot(*moved)) for name, moved in parts]
     combined = [] if row.declared is None else [f"combined = {row.declared:.6g} m"]
-    yield from step(f"{title}: displacements, {rule}", *_listed(members, "m"), *combined)
+    yield from step(f"{title}: displacements, {rule}", *_listed(sizes, "m"), *combined)
     if row.allowable is not None:
         where = place(mission, ("requirements", "location_error"))
         yield from step("Allowable", f"requirements.location_error = {row.allowable:.6g} m, {where}")
