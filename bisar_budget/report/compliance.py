@@ -8,12 +8,11 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from datetime import date
 from hashlib import sha256
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from bisar_budget.budget.allocation import Allocation
 from bisar_budget.budget.findings import MissionFindings, Option, Report, Row, UnusableMission, worst_first
 from bisar_budget.budget.image_evidence import PointImage
-from bisar_budget.budget.monte_carlo import MonteCarlo
 from bisar_budget.budget.sources import MOTION_UNITS, ErrorSource, error_sources
 from bisar_budget.budget.waivers import waiver_notes
 from bisar_budget.catalogue import EQUATIONS
@@ -32,10 +31,12 @@ from bisar_budget.report.image_evidence import (
     impulse_response_cuts,
     numbers_in_words,
 )
-from bisar_budget.report.monte_carlo import held
 from bisar_budget.report.sentences import cause, measure
 from bisar_budget.report.text_table import head, percent
 from bisar_budget.units import format_quantity
+
+if TYPE_CHECKING:
+    from bisar_budget.budget.monte_carlo import MonteCarlo
 
 STATUS_WORDS = {
     "error": "unusable",
@@ -466,7 +467,7 @@ def _on_page(image: PointImage) -> tuple[int, int]:
     return max(1, round(width / shrink)), max(1, round(height / shrink))
 
 
-def _draws(drawn: MonteCarlo | None) -> str:
+def _draws(drawn: "MonteCarlo | None") -> str:
     if drawn is None:
         return ""
     return (
@@ -474,17 +475,21 @@ def _draws(drawn: MonteCarlo | None) -> str:
     )
 
 
-def _probabilities(drawn: MonteCarlo | None) -> Iterator[Probability]:
-    for one in drawn.requirements if drawn else ():
+def _probabilities(drawn: "MonteCarlo | None") -> Iterator[Probability]:
+    if drawn is None:
+        return
+    from bisar_budget.report.monte_carlo import held
+
+    for one in drawn.requirements:
         limit = format_quantity(one.limit, one.unit, 3, "down")
         sizes = (format_quantity(size, one.unit) for size in (one.sum, one.rss, one.sigma))
         yield Probability(one.id, (limit, *sizes), held(one.probability, one.probability_low, one.probability_high))
-    if drawn and drawn.probability is not None and len(drawn.requirements) > 1:
+    if drawn.probability is not None and len(drawn.requirements) > 1:
         ends = (drawn.probability_low or 0.0, drawn.probability_high or 1.0)
         yield Probability("all at once", ("–",) * 4, held(drawn.probability, *ends))
 
 
-def _draws_remarks(drawn: MonteCarlo | None) -> Iterator[str]:
+def _draws_remarks(drawn: "MonteCarlo | None") -> Iterator[str]:
     if drawn is None:
         return
     yield from (f"{one.id}: {text}" for one in drawn.requirements for text in one.warnings)

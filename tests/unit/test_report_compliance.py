@@ -18,6 +18,7 @@ from markdown_it import MarkdownIt
 from bisar_budget.budget.check import check_mission
 from bisar_budget.budget.findings import MissionFindings, Option, Report, UnusableMission
 from bisar_budget.budget.image_evidence import ImageEvidence, PointImage
+from bisar_budget.budget.monte_carlo import monte_carlo
 from bisar_budget.budget.verdicts import Verdict
 from bisar_budget.errors import Fault, MissionError, printable
 from bisar_budget.mission.load import load_mission
@@ -203,7 +204,7 @@ class TestBothLanguages:
         text = squeezed(page_of(language, found_in(EVERY_KEY)).text)
         assert "SYS-NAV-012" in text
         assert "INS data sheet, rev. C" in text
-        assert "The file names no source for receiver.velocity.line_of_sight" in text
+        assert re.search(r"The file names no source for [\w., ]*receiver\.acceleration\.line_of_sight", text)
 
     def test_sections(self, language: str) -> None:
         page = page_of(language, illustrated())
@@ -222,6 +223,20 @@ class TestBothLanguages:
         refocused = table_with(page, "id", "limit", "residual", "peak loss")[0]
         assert refocused[1:4] == ["6.79 mm/s²", "0.393", "0.012"]
         assert "a reason of its own" in squeezed(page.text)
+
+    def test_monte_carlo(self, language: str) -> None:
+        path = ROOT / "specs" / "missions" / "drones_same_gnss.yaml"
+        drawn = monte_carlo(load_mission(str(path)), 2000, 1)
+        page = page_of(language, found_in(path)._replace(monte_carlo=drawn))
+        rows = {row[0]: row for row in table_with(page, "requirement", "limit", "sum", "rss", "sigma")}
+        location = next(one for one in drawn.requirements if one.id == "mission.location_error")
+        shown = rows["mission.location_error"]
+        assert shown[1] == "2 m"
+        assert float(re.search(r"holds in ([\d.]+) %", shown[-1])[1]) == pytest.approx(
+            100 * location.probability, abs=0.1
+        )
+        assert "2,000 draws, seed 1" in squeezed(page.text)
+        assert "both platforms" in [row[0] for row in table_with(page, "owner", "kind", "axis or term")]
 
     def test_without_verification_there_is_no_such_section(self, language: str) -> None:
         assert "image evidence" not in page_of(language).text.lower()
