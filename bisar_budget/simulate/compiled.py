@@ -173,8 +173,8 @@ def _profile_blocks(history: PhaseHistory, centre: Floats, radius: float, spline
     transform = kernel_transform(2 * math.pi * harmonic / length, _TAPS, _OVERSAMPLING)
     transform = transform * np.sinc(harmonic / (length * factor)) ** (order + 1)
     # Weights of the taps for each of the places between two samples.
-    offset = np.arange(factor)[:, None] / factor - (np.arange(_TAPS) - _TAPS // 2 + 1)
-    weights = kernel(offset, _TAPS, _OVERSAMPLING)
+    offset = np.arange(factor) / factor - (np.arange(_TAPS)[:, None] - _TAPS // 2 + 1)
+    weights = kernel(offset, _TAPS, _OVERSAMPLING).astype(np.float32)
     reference = np.linalg.norm(history.transmitter, axis=1) + np.linalg.norm(history.receiver, axis=1)
     middle = np.linalg.norm(history.transmitter - centre, axis=1) + np.linalg.norm(history.receiver - centre, axis=1)
     # Neither leg's range changes faster than the pixel moves.
@@ -184,7 +184,7 @@ def _profile_blocks(history: PhaseHistory, centre: Floats, radius: float, spline
     for start in range(0, history.slow_time.size, pulses):
         part = slice(start, start + pulses)
         profiles = range_profiles(history, length, transform, part)
-        refined = np.empty((profiles.shape[0], count * factor), dtype=np.complex64)
+        refined = np.empty((profiles.shape[0], 2 * count * factor), dtype=np.float32)
         _refine(profiles, first[part], weights, refined)
         yield _Block(
             refined.view(np.int64),
@@ -199,25 +199,22 @@ def _profile_blocks(history: PhaseHistory, centre: Floats, radius: float, spline
 
 @_parallel
 def _refine(profiles, first, weights, refined):
-    """Samples between the samples; profiles repeat."""
-    length, factor = profiles.shape[1], weights.shape[0]
-    count = refined.shape[1] // factor
+    """Samples between the samples, as real and imaginary parts; profiles repeat."""
+    length, factor = profiles.shape[1], weights.shape[1]
+    count = refined.shape[1] // (2 * factor)
     for pulse in prange(profiles.shape[0]):
-        cut = np.empty(count + _TAPS, np.complex64)
-        for n in range(cut.size):
-            cut[n] = profiles[pulse, (first[pulse] + n - _TAPS // 2 + 1) % length]
-        real, imag = cut.real.copy(), cut.imag.copy()
-        re, im = np.empty(count, np.float32), np.empty(count, np.float32)
-        for place in range(factor):
-            re[:] = 0
-            im[:] = 0
-            for tap in range(_TAPS):
-                weight = _F(weights[place, tap])
-                for n in range(count):
-                    re[n] += weight * real[n + tap]
-                    im[n] += weight * imag[n + tap]
-            for n in range(count):
-                refined[pulse, n * factor + place] = complex(re[n], im[n])
+        real, imag = np.empty(count + _TAPS, np.float32), np.empty(count + _TAPS, np.float32)
+        for n in range(count + _TAPS):
+            sample = profiles[pulse, (first[pulse] + n - _TAPS // 2 + 1) % length]
+            real[n], imag[n] = _F(sample.real), _F(sample.imag)
+        for n in range(count):
+            for place in range(factor):
+                re = im = _F(0)
+                for tap in range(_TAPS):
+                    re += real[n + tap] * weights[tap, place]
+                    im += imag[n + tap] * weights[tap, place]
+                refined[pulse, 2 * (n * factor + place)] = re
+                refined[pulse, 2 * (n * factor + place) + 1] = im
 
 
 # Half a turn's sine over its angle and cosine, as polynomials of the squared angle in cycles, a bit beyond ±½.
