@@ -15,6 +15,8 @@ from bisar_budget import __version__
 from bisar_budget.errors import printable
 
 if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
+
     from bisar_budget.budget.findings import MissionFindings, Report
     from bisar_budget.budget.verdicts import VerifiedMission
     from bisar_budget.mission.model import Mission
@@ -54,7 +56,28 @@ def cli() -> None:
 
     How large may the motion errors of transmitter and receiver be before the image breaks its
     requirements, and are the declared ones inside? After Rigling & Moses.
+
+    Start with: bisar-budget init mission.yaml, then bisar-budget check mission.yaml
     """
+
+
+class _FileName(click.ParamType[str]):
+    """Name of a file, which a shell completes; what can be read is seen when it is."""
+
+    name = "file"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Take the text as it is."""
+        return str(value)
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> "list[CompletionItem]":
+        """Leave it to the shell, which knows the files."""
+        from click.shell_completion import CompletionItem
+
+        return [CompletionItem(incomplete, type="file")]
+
+
+FILE = _FileName()
 
 
 class _Gate(click.Command):
@@ -99,7 +122,7 @@ class _Gate(click.Command):
 
 
 @cli.command(cls=_Gate)
-@click.argument("missions", nargs=-1, required=True, metavar="MISSION...")
+@click.argument("missions", type=FILE, nargs=-1, required=True, metavar="MISSION...")
 @click.option(
     "--format",
     "format_name",
@@ -109,11 +132,14 @@ class _Gate(click.Command):
     show_default=True,
     help="Format of the report; github: annotations of a pull request, needs: for Sphinx-Needs.",
 )
-@click.option("-o", "--output", metavar="FILE", help="Write the report to FILE instead of standard output.")
+@click.option(
+    "-o", "--output", type=FILE, metavar="FILE", help="Write the report to FILE instead of standard output."
+)
 @click.option(
     "--report",
     "reports",
     envvar="BISAR_BUDGET_REPORT",
+    type=FILE,
     multiple=True,
     metavar="FILE",
     help="Also write a report to FILE, in the format of its suffix: .txt, .json, .csv, .xml (JUnit), .sarif "
@@ -181,7 +207,7 @@ def check(
     Defaults of --format, --report, --strict, --exit-zero, --model and --color: [tool.bisar-budget] in
     the nearest pyproject.toml, and over it the variables BISAR_BUDGET_FORMAT and so on.
     """
-    from bisar_budget.report import Style, render
+    from bisar_budget.report import ILLUSTRATED, Style, render
 
     written = [(name, _format_of(name)) for name in reports]
     files = _expanded(missions)
@@ -192,7 +218,8 @@ def check(
             raise click.UsageError("--explain writes text: it excludes --format and --report.")
         _explain(files, explain, today.date() if today else _today(), model, output)
         return
-    report = _checked(files, today.date() if today else _today(), model, verifying)
+    illustrated = any(name in ILLUSTRATED for name in (format_name, *(name for _, name in written)))
+    report = _checked(files, today.date() if today else _today(), model, verifying, illustrated)
     if format_name != "text" or output is not None or quiet or not _is_terminal():
         _say_faults(report)
     style = Style(verbosity=-1 if quiet else 1 if verbose else 0, root=_repository())
@@ -210,7 +237,10 @@ def check(
     sys.exit(0 if exit_zero and code == EXIT_BROKEN else code)
 
 
-def _checked(files: Sequence[str], today: date, model: str | None, verifying: bool) -> "Report":
+def _checked(
+    files: Sequence[str], today: date, model: str | None, verifying: bool, illustrated: bool = False
+) -> "Report":
+    """Check every file; `verifying` adds verdicts of images, and `illustrated` the images themselves."""
     from bisar_budget.budget.check import check_mission
     from bisar_budget.budget.findings import Report, UnusableMission
     from bisar_budget.errors import MissionError
@@ -235,8 +265,16 @@ def _checked(files: Sequence[str], today: date, model: str | None, verifying: bo
         for index, verified in zip(usable, _verified(list(usable.values()), "*", None), strict=True):
             found = missions[index]
             if not isinstance(found, UnusableMission):
-                missions[index] = with_verdicts(found, verified.rows)
+                found = with_verdicts(found, verified.rows)
+                missions[index] = _illustrated(usable[index], found) if illustrated else found
     return Report(version=__version__, missions=tuple(missions))
+
+
+def _illustrated(mission: "Mission", found: "MissionFindings") -> "MissionFindings":
+    """Add the images of the rows that decide most."""
+    from bisar_budget.simulate.image_evidence import form_image_evidence
+
+    return found._replace(image_evidence=form_image_evidence(mission, found))
 
 
 def _explain(files: Sequence[str], row_id: str, today: date, model: str | None, output: str | None) -> None:
@@ -453,7 +491,7 @@ class _Part(click.ParamType[float]):
 
 
 @cli.command()
-@click.argument("files", nargs=-1, required=True, metavar="OLD NEW | MISSION...")
+@click.argument("files", type=FILE, nargs=-1, required=True, metavar="OLD NEW | MISSION...")
 @click.option("--base", metavar="REV", help="Compare each MISSION with itself in this git revision.")
 @click.option(
     "--fail-on-erosion",
@@ -470,7 +508,7 @@ class _Part(click.ParamType[float]):
     show_default=True,
     help="Format of the comparison.",
 )
-@click.option("-o", "--output", metavar="FILE", help="Write to FILE instead of standard output.")
+@click.option("-o", "--output", type=FILE, metavar="FILE", help="Write to FILE instead of standard output.")
 @click.option(
     "--date",
     "today",
@@ -485,7 +523,9 @@ def diff(
     output: str | None,
     today: datetime | None,
 ) -> None:
-    """Compare the findings of two mission files, or of one before and after a change.
+    """Show what a change to a mission does to every margin.
+
+    Compares two mission files, or each with itself in a git revision.
 
     Rows are sorted by erosion: the part of what was left of a limit that the change uses up, (u2 - u1)/(1 - u1)
     with the utilizations before and after. Exit code: 0, or 1 with --fail-on-erosion, 2 for wrong usage,
@@ -525,7 +565,7 @@ def diff(
 
 
 @cli.command()
-@click.argument("missions", nargs=-1, required=True, metavar="MISSION...")
+@click.argument("missions", type=FILE, nargs=-1, required=True, metavar="MISSION...")
 @click.option("--only", default="*", metavar="GLOB", help="Verify only the rows whose id matches.")
 @click.option(
     "--format",
@@ -535,7 +575,7 @@ def diff(
     show_default=True,
     help="Format of the verdicts.",
 )
-@click.option("-o", "--output", metavar="FILE", help="Write to FILE instead of standard output.")
+@click.option("-o", "--output", type=FILE, metavar="FILE", help="Write to FILE instead of standard output.")
 @click.option(
     "--jobs",
     type=click.IntRange(min=1),
@@ -543,7 +583,7 @@ def diff(
     help="Processes to use; default: the cores, or 1 with the extra `fast`, which uses them itself.",
 )
 def verify(missions: Sequence[str], only: str, format_name: str, output: str | None, jobs: int | None) -> None:
-    """Form images with each error at its limit and measure whether the limit is true.
+    """Form images at the limits and measure whether they are true.
 
     The data come from exact ranges, and the phase is measured in the image. A limit is confirmed if the
     image shows its budget within 5 %, optimistic if it shows more, conservative if less. With autofocus
@@ -582,14 +622,18 @@ def _verified(missions: "Sequence[Mission]", only: str, jobs: int | None) -> "li
 
 
 @cli.command()
-@click.argument("mission")
-@click.option("--plot", metavar="FILE", help="Draw Figures 3 to 7 of the paper for this mission: .png, .svg or .pdf.")
-@click.option("-o", "--output", metavar="FILE.npz", help="Save the images and what explains them for NumPy.")
+@click.argument("mission", type=FILE)
+@click.option(
+    "--plot", type=FILE, metavar="FILE", help="Draw Figures 3 to 7 of the paper for this mission: .png, .svg or .pdf."
+)
+@click.option(
+    "-o", "--output", type=FILE, metavar="FILE.npz", help="Save the images and what explains them for NumPy."
+)
 def simulate(mission: str, plot: str | None, output: str | None) -> None:
-    """Form the image of a point with the declared errors, before and after autofocus.
+    """Form the image of a point with the declared errors.
 
     The data come from exact ranges; the image is formed where the errors move the point, in the scene's
-    axes and rotated so that the smear lies in cross range, and focused by phase gradient autofocus.
+    axes and rotated so that the smear lies in cross range, before and after phase gradient autofocus.
     """
     for name, suffixes in ((plot, (".png", ".svg", ".pdf")), (output, (".npz",))):
         if name is not None and os.path.splitext(name)[1].lower() not in suffixes:
@@ -614,7 +658,7 @@ def simulate(mission: str, plot: str | None, output: str | None) -> None:
 
 
 @cli.command()
-@click.argument("file", default="mission.yaml")
+@click.argument("file", type=FILE, default="mission.yaml")
 @click.option("--name", default="My bistatic mission", show_default=True, help="Name of the mission.")
 @click.option("--force", is_flag=True, help="Replace an existing file.")
 def init(file: str, name: str, force: bool) -> None:
@@ -649,7 +693,7 @@ def init(file: str, name: str, force: bool) -> None:
 
 
 @cli.command()
-@click.option("-o", "--output", metavar="FILE", help="Write to FILE instead of standard output.")
+@click.option("-o", "--output", type=FILE, metavar="FILE", help="Write to FILE instead of standard output.")
 def schema(output: str | None) -> None:
     """Print the JSON Schema of the mission file, for editors."""
     import json
@@ -682,8 +726,9 @@ def schema(output: str | None) -> None:
 @click.option("--check", "check_only", is_flag=True, help="Fail if the evaluators are not what the derivation gives.")
 @click.option("--write", is_flag=True, help="Rewrite the evaluators from the derivation.")
 def derive(table: str, format_name: str, check_only: bool, write: bool) -> None:
-    """Derive the tables of Rigling & Moses from the geometry and print them.
+    """Derive the paper's tables from the geometry and print them.
 
+    Rigling & Moses, Tables I and II, the equations before them, vibration limits; and the full model.
     Equation and table numbers are the paper's.
     """
     if check_only and write:

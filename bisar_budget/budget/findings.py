@@ -8,6 +8,7 @@ from bisar_budget.errors import Fault
 from bisar_budget.geometry import BistaticGeometry, GroundVector
 
 if TYPE_CHECKING:
+    from bisar_budget.budget.image_evidence import ImageEvidence
     from bisar_budget.budget.verdicts import Verdict
 
 # Worst first. The status of a mission or a run is the worst one found; the last three gate nothing.
@@ -69,12 +70,15 @@ class MissionFindings(NamedTuple):
     coverage_factor: float
     wavelength: float
     geometry: BistaticGeometry
+    aperture_time: float
+    scene_radius: float | None
     resolution: Resolution
     allocation: Allocation
     rows: tuple[Row, ...]
     warnings: tuple[FileWarning, ...]
     notes: tuple[str, ...]
     verdicts: "tuple[Verdict, ...] | None" = None  # of images, if any were formed
+    image_evidence: "tuple[ImageEvidence, ...]" = ()  # a few of those images, where a report shows them
 
     @property
     def status(self) -> str:
@@ -84,8 +88,10 @@ class MissionFindings(NamedTuple):
     @property
     def summary(self) -> dict[str, int]:
         """Number of rows of each status that occurs."""
-        found = [row.status for row in self.rows]
-        return {status: found.count(status) for status in STATUSES if status in found}
+        found: dict[str, int] = {}
+        for row in self.rows:
+            found[row.status] = found.get(row.status, 0) + 1
+        return {status: found[status] for status in STATUSES if status in found}
 
 
 class UnusableMission(NamedTuple):
