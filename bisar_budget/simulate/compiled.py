@@ -89,8 +89,10 @@ def lattice_of(points: Floats, tolerance: float) -> Lattice | None:
     across = (grid[-1, 0] - origin) / max(1, lines - 1)
     along = (grid[0, -1] - origin) / max(1, count - 1)
     first = origin + np.arange(count)[:, None] * along
-    for line in range(lines):  # one at a time: no second copy of the grid
-        if not np.abs(grid[line] - first - line * across).max() <= tolerance:
+    for top in range(0, lines, _ROWS):  # a few at a time: no second copy of the grid
+        part = grid[top : top + _ROWS]
+        line = np.arange(top, top + part.shape[0])[:, None, None]
+        if not np.abs(part - first - line * across).max() <= tolerance:
             return None
     return Lattice(origin, across, along, (lines, count))
 
