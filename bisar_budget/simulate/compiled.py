@@ -30,7 +30,7 @@ from bisar_budget.simulate.range_profile import (
 Spline = Literal["linear", "cubic"]
 
 _LINE = 32  # pixels of one expansion; two or four vectors of a processor
-_ROWS = 16  # lines of one tile; all it needs of a pulse stays in a first cache of 32 kB
+_ROWS = 16  # lines of one tile; what it needs of a pulse stays in a processor's first cache
 _OVERSAMPLING = 2  # of profiles from the FFT
 _TAPS = 8  # of the kernel that refines them: -140 dB at this oversampling
 _REFINEMENT = {"linear": 16, "cubic": 8}  # samples per sample from the FFT
