@@ -6,7 +6,14 @@ from datetime import date
 
 from bisar_budget import evaluators
 from bisar_budget.budget.allocation import Allocation, Split, allocate
-from bisar_budget.budget.combine import combine_displacements, combine_phases
+from bisar_budget.budget.correlation import (
+    Correlated,
+    combined_displacement,
+    combined_phase,
+    correlated_errors,
+    correlation_notes,
+    unused_correlations,
+)
 from bisar_budget.budget.findings import FileWarning, MissionFindings, Resolution, Row
 from bisar_budget.budget.sources import (
     ErrorSource,
@@ -69,7 +76,12 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
         ),
         allocation=allocation,
         rows=tuple(rows),
-        warnings=(*_unknown_requirement_ids(mission, rows), *warnings, *_nothing_declared(rows)),
+        warnings=(
+            *_unknown_requirement_ids(mission, rows),
+            *warnings,
+            *_unused_correlations(mission),
+            *_nothing_declared(rows),
+        ),
         notes=(*collection_notes(mission, geometry), *_unused_keys(mission)),
     )
 
@@ -289,16 +301,18 @@ def _aggregate_rows(
     plane: ImagePlane,
 ) -> Iterator[Row]:
     combine, model = mission.allocation.combine, mission.allocation.model
+    groups = correlated_errors(mission)
+    notes = correlation_notes(combine, groups) if combine != "each" else ()
     stated = [source for source in sources if source.declared is not None]
     declared = [source for source in stated if source.is_independent]
     if combine != "each":
-        yield from _qpe_aggregates(mission, allocation, declared)
+        yield from _qpe_aggregates(mission, allocation, declared, groups)
     # `each` looks at single rows, those along the scene's axes included.
     motion = [source for source in (stated if combine == "each" else declared) if source.is_motion]
     cubic_limit, cubic_doubt = mission.requirements.cubic_phase_error, ""
     other = {"published": "full", "full": "published"}.get(model)
     if cubic_limit is not None and other is not None and motion:
-        cubic = combine_phases([s.cubic(other) for s in motion], combine)
+        cubic = combined_phase(motion, "cubic", other, combine, groups)
         if cubic > cubic_limit * (1 + UTILIZATION_TOLERANCE):
             cubic_doubt = f"the {other} model says fail: {cubic:.3g} rad, {cubic_limit:.3g} rad allowed"
     yield _judged(
@@ -306,7 +320,7 @@ def _aggregate_rows(
         id="mission.cubic_phase_error",
         metric="cubic_phase_error",
         unit="rad",
-        declared=combine_phases([s.cubic(model) for s in motion], combine) if motion else None,
+        declared=combined_phase(motion, "cubic", model, combine, groups) if motion else None,
         allowable=mission.requirements.cubic_phase_error,
         path=("requirements", "cubic_phase_error"),
         equation="Table I, cubic column" if model == "published" else "full model",
@@ -314,14 +328,16 @@ def _aggregate_rows(
         info="" if mission.requirements.cubic_phase_error is not None else NO_REQUIREMENT,
         over="cubic phase at the aperture edge above the requirement; autofocus gain does not apply",
         doubt=cubic_doubt,
+        notes=notes,
     )
     counted = {source.id for source in motion}
-    known = [row.displacement_m for row in errors if row.displacement_m is not None and row.id in counted]
-    moved = combine_displacements(known, combine) if motion and len(known) == len(motion) else None
+    known = [(row.id, row.displacement_m) for row in errors if row.displacement_m is not None and row.id in counted]
+    moved = combined_displacement(known, combine, groups) if motion and len(known) == len(motion) else None
     if model == "strictest" and moved is not None:
         by_25 = image_plane(mission.geometry)
-        published = [by_25.displacement(s.effect, s.declared or 0.0) for s in motion]
-        moved = max(moved, combine_displacements([move for move in published if move is not None], combine))
+        published = [(s.id, by_25.displacement(s.effect, s.declared or 0.0)) for s in motion]
+        moves = [(row_id, move) for row_id, move in published if move is not None]
+        moved = max(moved, combined_displacement(moves, combine, groups))
     yield _judged(
         mission,
         id="mission.location_error",
@@ -336,6 +352,7 @@ def _aggregate_rows(
         is_declared=bool(motion),
         info="" if mission.requirements.location_error is not None else NO_REQUIREMENT,
         over="displacement of the image above the requirement",
+        notes=notes,
     )
     if allocation.n_pull is not None:
         yield _judged(
@@ -352,7 +369,9 @@ def _aggregate_rows(
         )
 
 
-def _qpe_aggregates(mission: Mission, allocation: Allocation, declared: Sequence[ErrorSource]) -> Iterator[Row]:
+def _qpe_aggregates(
+    mission: Mission, allocation: Allocation, declared: Sequence[ErrorSource], groups: Sequence[Correlated]
+) -> Iterator[Row]:
     combine, model, gain = mission.allocation.combine, mission.allocation.model, allocation.autofocus_gain
     owners = ["transmitter", "receiver", "mission"]
     if allocation.qpe.clock is not None:
@@ -360,7 +379,7 @@ def _qpe_aggregates(mission: Mission, allocation: Allocation, declared: Sequence
     for owner in owners:
         members = [s for s in declared if owner == "mission" or allocation.qpe.includes(s.owner, owner)]
         qpe, published, full = (
-            combine_phases([s.qpe(of) for s in members], combine) if members else None
+            combined_phase(members, "qpe", of, combine, groups) if members else None
             for of in (model, "published", "full")
         )
         limit = allocation.qpe_limit(owner) * gain
@@ -386,6 +405,7 @@ def _qpe_aggregates(mission: Mission, allocation: Allocation, declared: Sequence
             limits=(limit, limit),
             qpe=published,
             qpe_full=full,
+            notes=correlation_notes(combine, [g for g in groups if owner in (g.platform, "mission")]),
         )
 
 
@@ -511,6 +531,10 @@ def _unknown_requirement_ids(mission: Mission, rows: Sequence[Row]) -> Iterator[
 def _nothing_declared(rows: Sequence[Row]) -> Iterator[FileWarning]:
     if all(row.status == "not_declared" for row in rows):
         yield FileWarning(line=None, message="no error is declared: nothing was judged")
+
+
+def _unused_correlations(mission: Mission) -> Iterator[FileWarning]:
+    return (FileWarning(line, message) for line, message in unused_correlations(mission))
 
 
 def _unused_keys(mission: Mission) -> Iterator[str]:

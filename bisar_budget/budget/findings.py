@@ -9,6 +9,7 @@ from bisar_budget.geometry import BistaticGeometry, GroundVector
 
 if TYPE_CHECKING:
     from bisar_budget.budget.image_evidence import ImageEvidence
+    from bisar_budget.budget.monte_carlo import MonteCarlo
     from bisar_budget.budget.verdicts import Verdict
 
 # Worst first. The status of a mission or a run is the worst one found; the last three gate nothing.
@@ -79,6 +80,7 @@ class MissionFindings(NamedTuple):
     notes: tuple[str, ...]
     verdicts: "tuple[Verdict, ...] | None" = None  # of images, if any were formed
     image_evidence: "tuple[ImageEvidence, ...]" = ()  # a few of those images, where a report shows them
+    monte_carlo: "MonteCarlo | None" = None  # if errors were drawn
 
     @property
     def status(self) -> str:
