@@ -1,7 +1,7 @@
 """Measure what the project promises about speed, as ratios of medians taken in turn within one run.
 
     python benchmarks/run.py            # all
-    python benchmarks/run.py cold       # one of: cold, gate, formats, evaluators, montecarlo
+    python benchmarks/run.py cold       # one of: cold, gate, formats, report, evaluators, montecarlo
 
 Absolute times on a shared machine mean little; each figure is measured side by side with its yardstick,
 A B A B …, and the ratio of the medians is what counts. Accuracy stands beside each figure.
@@ -121,6 +121,24 @@ def formats(runs: int) -> None:
         print(f"  {machine * 1e3:6.0f} ms ÷ {text * 1e3:6.0f} ms = {machine / text:.2f}")
         sizes = [os.path.getsize(path) / 1e3 for path in (junit, sarif)]
         print(f"  JUnit {sizes[0]:.0f} kB, SARIF {sizes[1]:.0f} kB")
+
+
+def report(runs: int) -> None:
+    """What a compliance report costs, layout and drawings included; one mission without images."""
+    script = str(Path(sys.executable).with_name("bisar-budget"))
+    yardstick = (sys.executable, "-c", "import jinja2, matplotlib.pyplot")
+    every_key = ROOT / "tests" / "acceptance" / "good" / "every_key.yaml"
+    print("HTML report of one mission ÷ python -c 'import jinja2, matplotlib.pyplot', CPU (at most 2.5)")
+    with tempfile.TemporaryDirectory() as folder:
+        page = str(Path(folder) / "report.html")
+        for label, mission in (("Section V", MISSION), ("every key", every_key)):
+            a, b = in_turn(
+                runs,
+                process(script, "check", "--format", "html", "-o", page, str(mission)),
+                process(*yardstick),
+            )
+            size = os.path.getsize(page) / 1e3
+            print(f"  {label:10} {a * 1e3:5.0f} ms ÷ {b * 1e3:5.0f} ms = {a / b:.2f}   ({size:.0f} kB)")
 
 
 def evaluators(runs: int) -> None:
@@ -282,6 +300,7 @@ TASKS = {
     "cold": (cold, 21),
     "gate": (gate, 5),
     "formats": (formats, 11),
+    "report": (report, 11),
     "evaluators": (evaluators, 11),
     "montecarlo": (montecarlo, 7),
 }

@@ -3,7 +3,7 @@
 import gc
 import os
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from datetime import UTC, date, datetime
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -18,7 +18,7 @@ from bisar_budget.errors import printable
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
-    from bisar_budget.budget.findings import MissionFindings, Report
+    from bisar_budget.budget.findings import MissionFindings, Option, Report
     from bisar_budget.budget.verdicts import VerifiedMission
     from bisar_budget.mission.model import Mission
     from bisar_budget.report import Style
@@ -146,10 +146,11 @@ class _Draws(click.ParamType[int]):
     "--format",
     "format_name",
     envvar="BISAR_BUDGET_FORMAT",
-    type=click.Choice(["text", "json", "csv", "junit", "sarif", "github", "needs"]),
+    type=click.Choice(["text", "json", "csv", "junit", "sarif", "github", "needs", "html", "markdown"]),
     default="text",
     show_default=True,
-    help="Format of the report; github: annotations of a pull request, needs: for Sphinx-Needs.",
+    help="Format of the report; github: annotations of a pull request, needs: for Sphinx-Needs, html and "
+    "markdown: a compliance report for a review board.",
 )
 @click.option(
     "-o", "--output", type=FILE, metavar="FILE", help="Write the report to FILE instead of standard output."
@@ -161,8 +162,8 @@ class _Draws(click.ParamType[int]):
     type=FILE,
     multiple=True,
     metavar="FILE",
-    help="Also write a report to FILE, in the format of its suffix: .txt, .json, .csv, .xml (JUnit), .sarif "
-    "or .needs.json. Repeatable.",
+    help="Also write a report to FILE, in the format of its suffix: .html, .md, .txt, .json, .csv, .xml (JUnit), "
+    ".sarif or .needs.json. Repeatable.",
 )
 @click.option(
     "--strict/--no-strict",
@@ -184,9 +185,10 @@ class _Draws(click.ParamType[int]):
     "--date",
     "today",
     type=click.DateTime(["%Y-%m-%d"]),
-    help="Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC).",
+    help="Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC). Only a day that is given "
+    "stands in a compliance report.",
 )
-@click.option("--verify", "verifying", is_flag=True, help="Form images at the limits too and add their verdicts.")
+@click.option("--verify", "verifying", is_flag=True, help="Form images at the limits too and add what they show.")
 @click.option(
     "--monte-carlo",
     "draws",
@@ -259,21 +261,58 @@ def check(
     illustrated = any(name in ILLUSTRATED for name in (format_name, *(name for _, name in written)))
     drawn = None if draws is None else (draws, seed)
     report = _checked(files, today.date() if today else _today(), model, verifying, illustrated, drawn)
+    report = report._replace(options=tuple(_options()), day=_given_day(today))
     if format_name != "text" or output is not None or quiet or not _is_terminal():
         _say_faults(report)
     style = Style(verbosity=-1 if quiet else 1 if verbose else 0, root=_repository())
     for path, its_format in written:
-        _write(path, render(its_format, report, style))
+        _write_report(path, its_format, report, style)
     use_color = color == "always" or (color == "auto" and output is None and _wants_color())
-    text = render(format_name, report, style._replace(color=use_color))
+    style = style._replace(color=use_color)
     if output is None:
-        _print(text)
+        _print(render(format_name, report, style))
     else:
-        _write(output, text)
+        _write_report(output, format_name, report, style)
     if format_name == "github":
         _append_step_summary(report, style)
     code = report.exit_code(strict)
     sys.exit(0 if exit_zero and code == EXIT_BROKEN else code)
+
+
+def _options() -> "Iterator[Option]":
+    """Say what the options that bear on the result are, and where each came from."""
+    from bisar_budget.budget.findings import Option
+
+    context = click.get_current_context()
+    origins = {
+        ParameterSource.COMMANDLINE: "command line",
+        ParameterSource.DEFAULT_MAP: "pyproject.toml",
+        ParameterSource.DEFAULT: "default",
+    }
+    for parameter in context.command.params:
+        name, value = str(parameter.name), context.params[str(parameter.name)]
+        source = context.get_parameter_source(name)
+        origin = origins.get(source, f"environment, {parameter.envvar}") if source else "default"
+        if name == "model":
+            yield Option("--model", value or "as each file says", origin)
+        elif name == "today":
+            day = _given_day(value)
+            if value is None and day is not None:
+                origin = "environment, SOURCE_DATE_EPOCH"
+            yield Option("--date", day.isoformat() if day else "the day of the run, which is not recorded", origin)
+        elif name == "draws":
+            yield Option("--monte-carlo", "no" if value is None else f"{value:,} draws", origin)
+        elif name == "seed" and context.params["draws"] is not None:
+            yield Option("--seed", "of each file" if value is None else str(value), origin)
+        elif name in ("strict", "exit_zero", "verifying"):
+            yield Option(parameter.opts[0], "yes" if value else "no", origin)
+
+
+def _given_day(today: datetime | None) -> date | None:
+    """The day that the command line or the environment gives; a report has no other, so as to be reproducible."""
+    if today is not None:
+        return today.date()
+    return _today() if os.environ.get("SOURCE_DATE_EPOCH") else None
 
 
 def _checked(
@@ -284,7 +323,7 @@ def _checked(
     illustrated: bool = False,
     drawn: tuple[int, int | None] | None = None,
 ) -> "Report":
-    """Check every file; `verifying` adds verdicts of images, and `illustrated` the images themselves.
+    """Check every file; `verifying` adds verdicts of images. `illustrated` keeps the missions, and the images.
 
     `drawn` is the number of draws of a Monte Carlo and their seed.
     """
@@ -305,11 +344,11 @@ def _checked(
                 from bisar_budget.budget.monte_carlo import monte_carlo
 
                 found = found._replace(monte_carlo=monte_carlo(mission, *drawn))
-            missions.append(found)
+            missions.append(found if illustrated else found._replace(mission=None))
             if verifying:
                 usable[index] = mission
         except MissionError as error:
-            missions.append(UnusableMission(file=file, faults=error.faults))
+            missions.append(UnusableMission(file=file, faults=error.faults, data=error.data))
     if usable:
         from bisar_budget.budget.verdicts import with_verdicts
 
@@ -479,36 +518,43 @@ def _print(text: str) -> None:
             _fail(f"cannot write standard output: {error.strerror}")
 
 
-def _write(path: str, text: str) -> None:
+def _write_report(path: str, format_name: str, report: "Report", style: "Style") -> None:
+    """Write a report to a file, its pictures first: a text never names a picture that is not there."""
+    from bisar_budget.report import WITH_PICTURES, pictures, render
+
+    folder = ""
+    if format_name in WITH_PICTURES and path != "-" and (os.path.isfile(path) or not os.path.exists(path)):
+        folder = f"{os.path.splitext(path)[0]}.assets"
+    style = style._replace(assets=os.path.basename(folder))
+    text = render(format_name, report, style)
+    for name, content in pictures(format_name, report, style).items():
+        _write(os.path.join(folder, name), content)
+    _write(path, text)
+
+
+def _write(path: str, content: str | bytes) -> None:
     """Replace a file whole: written beside it under another name, then renamed. `-` is standard output.
 
     A link keeps pointing where it does; what is no file, a device or a pipe, is written to as it is.
     """
     import tempfile
 
-    if path == "-":
-        _print(text)
+    if path == "-" and isinstance(content, str):
+        _print(content)
         return
+    data = content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
     target = os.path.realpath(path)
     folder, name = os.path.split(target)
     temporary = None
     try:
         if os.path.exists(target) and not os.path.isfile(target):
-            with open(target, "w", encoding="utf-8", errors="backslashreplace") as special:
-                special.write(text)
+            with open(target, "wb") as special:
+                special.write(data)
             return
         os.makedirs(folder, exist_ok=True)
-        with tempfile.NamedTemporaryFile(
-            "w",
-            encoding="utf-8",
-            errors="backslashreplace",
-            newline="\n",
-            dir=folder,
-            prefix=f".{name}.",
-            delete=False,
-        ) as file:
+        with tempfile.NamedTemporaryFile(dir=folder, prefix=f".{name}.", delete=False) as file:
             temporary = file.name
-            file.write(text)
+            file.write(data)
         mask = os.umask(0)
         os.umask(mask)
         os.chmod(temporary, 0o666 & ~mask)  # a temporary file is private, a report is not
@@ -775,8 +821,8 @@ def schema(output: str | None) -> None:
     show_default=True,
     help="How to write it.",
 )
-@click.option("--check", "check_only", is_flag=True, help="Fail if the evaluators are not what the derivation gives.")
-@click.option("--write", is_flag=True, help="Rewrite the evaluators from the derivation.")
+@click.option("--check", "check_only", is_flag=True, help="Fail if a generated file is not what it gives.")
+@click.option("--write", is_flag=True, help="Rewrite the generated files: evaluators and formulas.")
 def derive(table: str, format_name: str, check_only: bool, write: bool) -> None:
     """Derive the paper's tables from the geometry and print them.
 
@@ -796,25 +842,27 @@ def derive(table: str, format_name: str, check_only: bool, write: bool) -> None:
 def _generated(write: bool) -> None:
     import difflib
 
-    from bisar_budget.theory import emit
+    from bisar_budget.theory import emit, emit_catalogue
 
     derived_with = f"(SymPy {emit.SYMPY_VERSION})"
-    today = emit.source()
-    if write:
-        _write(str(emit.TARGET), today)
-        click.echo(f"Wrote {emit.TARGET.name} {derived_with}.")
-        return
-    committed = emit.TARGET.read_text(encoding="utf-8")
-    if committed == today:
-        click.echo(f"{emit.TARGET.name} is what the derivation gives {derived_with}.")
-        return
-    lines = difflib.unified_diff(committed.splitlines(), today.splitlines(), "committed", "derived", lineterm="", n=1)
-    _print("\n".join(lines) + "\n")
-    click.echo(
-        f"{emit.TARGET.name} differs from the derivation {derived_with}; `bisar-budget derive --write` rewrites it.",
-        err=True,
-    )
-    sys.exit(EXIT_BROKEN)
+    is_current = True
+    for generated in (emit, emit_catalogue):
+        name, today = generated.TARGET.name, generated.source()
+        if write:
+            _write(str(generated.TARGET), today)
+            click.echo(f"Wrote {name} {derived_with}.")
+            continue
+        committed = generated.TARGET.read_text(encoding="utf-8")
+        if committed == today:
+            click.echo(f"{name} is what the derivation gives {derived_with}.")
+            continue
+        is_current = False
+        pair = (committed.splitlines(), today.splitlines())
+        _print("\n".join(difflib.unified_diff(*pair, "committed", "derived", lineterm="", n=1)) + "\n")
+        differs = f"{name} differs from the derivation {derived_with}"
+        click.echo(f"{differs}; `bisar-budget derive --write` rewrites it.", err=True)
+    if not is_current:
+        sys.exit(EXIT_BROKEN)
 
 
 def main() -> None:

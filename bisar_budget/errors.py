@@ -100,12 +100,16 @@ class Fault(NamedTuple):
 
 
 class MissionError(Exception):
-    """A mission file that cannot be used, with every fault found in it, in file order."""
+    """A mission file that cannot be used, with every fault found in it, in file order.
+
+    `data` is the file as read, byte for byte; None where there is none, or more of it than was read.
+    """
 
     def __init__(self, file: str, faults: tuple[Fault, ...]) -> None:
         super().__init__(f"{file}: {len(faults)} fault(s)")
         self.file = file
         self.faults = faults
+        self.data: bytes | None = None
 
     def lines(self) -> list[str]:
         """Write one `file:line:column: fault` per fault."""

@@ -4,6 +4,7 @@ python docs/make_figures.py
 """
 
 import math
+import shutil
 from pathlib import Path
 
 import matplotlib
@@ -83,5 +84,27 @@ def section_v() -> None:
     figure.savefig(HERE / "section-v.svg", metadata={"Date": None})
 
 
+def compliance_report() -> None:
+    """Photograph the first screen of the compliance report of Section V; needs a Chromium."""
+    from datetime import date
+
+    from playwright.sync_api import sync_playwright
+
+    from bisar_budget import __version__
+    from bisar_budget.budget.check import check_mission
+    from bisar_budget.budget.findings import Report
+    from bisar_budget.report import Style, render
+
+    found = check_mission(load_mission(str(MISSION)), date(2026, 11, 21))
+    report = Report(version=__version__, missions=(found,))
+    with sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
+        page = browser.new_page(viewport={"width": 1120, "height": 1200}, color_scheme="light")
+        page.set_content(render("html", report, Style(root=str(HERE.parent))))
+        page.screenshot(path=HERE / "compliance-report.png")
+        browser.close()
+
+
 if __name__ == "__main__":
     section_v()
+    compliance_report()

@@ -9,11 +9,16 @@ from typing import Any
 import pytest
 import yaml
 from click.testing import CliRunner, Result
+from hypothesis import settings
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.budget.findings import MissionFindings, Row
 from bisar_budget.cli import cli
 from bisar_budget.mission.load import parse_mission
+
+# Shared machines: how long an example takes says nothing.
+settings.register_profile("shared", deadline=None)
+settings.load_profile("shared")
 
 ROOT = Path(__file__).resolve().parent.parent
 TODAY = date(2026, 11, 21)

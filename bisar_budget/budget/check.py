@@ -61,6 +61,7 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
     ]
     rows, warnings = apply_waivers(judged, mission, today)
     return MissionFindings(
+        mission=mission,
         file=mission.file,
         name=mission.name,
         model=mission.allocation.model,

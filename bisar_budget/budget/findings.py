@@ -1,11 +1,13 @@
 """What a check finds, as frozen data. Field names and order are those of the JSON contract."""
 
 from collections.abc import Iterable, Sequence
+from datetime import date
 from typing import TYPE_CHECKING, NamedTuple
 
 from bisar_budget.budget.allocation import Allocation
 from bisar_budget.errors import Fault
 from bisar_budget.geometry import BistaticGeometry, GroundVector
+from bisar_budget.mission.model import Mission
 
 if TYPE_CHECKING:
     from bisar_budget.budget.image_evidence import ImageEvidence
@@ -62,8 +64,12 @@ class Resolution(NamedTuple):
 
 
 class MissionFindings(NamedTuple):
-    """What was found about one mission file that can be used."""
+    """What was found about one mission file that can be used.
 
+    `mission` is what was checked; None where nothing after the check needs it and a thousand would fill memory.
+    """
+
+    mission: Mission | None
     file: str
     name: str
     model: str
@@ -97,18 +103,32 @@ class MissionFindings(NamedTuple):
 
 
 class UnusableMission(NamedTuple):
-    """A mission file that cannot be used, with its faults."""
+    """A mission file that cannot be used, with its faults; `data` is the file as read, where it was."""
 
     file: str
     faults: tuple[Fault, ...]
     status: str = "error"
+    data: bytes | None = None
+
+
+class Option(NamedTuple):
+    """An option of the run that bears on what is found, and where its value came from."""
+
+    name: str
+    value: str
+    origin: str
 
 
 class Report(NamedTuple):
-    """The findings about every mission file of a run."""
+    """The findings about every mission file of a run.
+
+    `day` is the date that somebody gave it; None where it is the day of the run.
+    """
 
     version: str
     missions: tuple[MissionFindings | UnusableMission, ...]
+    options: tuple[Option, ...] = ()
+    day: date | None = None
 
     @property
     def status(self) -> str:

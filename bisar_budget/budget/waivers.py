@@ -7,6 +7,13 @@ from fnmatch import fnmatchcase
 from bisar_budget.budget.findings import FileWarning, Row
 from bisar_budget.mission.model import Mission
 
+_WORDS, _EXPIRED = "waiver of line", "expired "
+
+
+def waiver_notes(row: Row) -> tuple[str, ...]:
+    """Those of the notes of a row that are about waivers, valid or expired."""
+    return tuple(note for note in row.notes if note.removeprefix(_EXPIRED).startswith(_WORDS))
+
 
 def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> tuple[list[Row], list[FileWarning]]:
     """Waive failing rows that a valid waiver names.
@@ -36,9 +43,9 @@ def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> tuple[l
         expired = today > waiver.until
         for position in failing:
             row = result[position]
-            words = f"waiver of line {line}, until {waiver.until}: {waiver.reason}"
+            words = f"{_WORDS} {line}, until {waiver.until}: {waiver.reason}"
             if expired:
-                result[position] = row._replace(notes=(*row.notes, f"expired {words}"))
+                result[position] = row._replace(notes=(*row.notes, f"{_EXPIRED}{words}"))
             elif row.status == "fail":
                 result[position] = row._replace(status="waived", notes=(*row.notes, words))
         if not named:

@@ -42,7 +42,11 @@ def load_mission(path: str, model: str | None = None) -> Mission:
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         reason = getattr(error, "strerror", None) or str(error)
         raise MissionError(path, (_file_fault(f"cannot be read: {reason}"),)) from None
-    return parse_mission(data, path, model)
+    try:
+        return parse_mission(data, path, model)
+    except MissionError as error:
+        error.data = data if len(data) <= MAX_BYTES else None
+        raise
 
 
 def _bounded(file: BinaryIO) -> bytes:
@@ -75,7 +79,8 @@ def parse_mission(data: bytes | str, file: str = "-", model: str | None = None) 
     if tree.faults:
         ordered = sorted(dict.fromkeys(tree.faults), key=lambda fault: (fault.line or 0, fault.column or 0))
         raise MissionError(file, tuple(ordered))
-    read = cast(Mission, mission._replace(file=file, places=tree.values))
+    as_bytes = data.encode("utf-8", "surrogatepass") if isinstance(data, str) else data
+    read = cast(Mission, mission._replace(file=file, places=tree.values, data=as_bytes))
     return read if model is None else read._replace(allocation=read.allocation._replace(model=model))
 
 

@@ -439,7 +439,8 @@ class Waiver(NamedTuple):
 class Mission(NamedTuple):
     """A mission file that can be used.
 
-    `file` and `places` say where it stands: the path of each value to the parser's event.
+    `file` and `places` say where it stands: the path of each value to the parser's event. `data` is the file as
+    read, byte for byte.
     """
 
     schema_version: Annotated[int, Key(Version())]
@@ -461,6 +462,7 @@ class Mission(NamedTuple):
     waivers: Annotated[tuple[Waiver, ...], Key(ListOf(Waiver))] = ()
     file: str = ""
     places: Mapping[KeyPath, Any] = {}
+    data: bytes = b""
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:

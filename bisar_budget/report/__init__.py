@@ -1,5 +1,9 @@
-"""Findings as text: one pure function `render(report, style) -> str` per format, found here by name."""
+"""Findings as text: one pure function `render(report, style) -> str` per format, found here by name.
 
+A format that has pictures beside its text has a function `pictures(report, style)` too.
+"""
+
+from collections.abc import Mapping
 from importlib import import_module
 from typing import NamedTuple
 
@@ -14,6 +18,8 @@ FORMATS = {
     "sarif": "bisar_budget.report.sarif_log",
     "github": "bisar_budget.report.github",
     "needs": "bisar_budget.report.needs_json",
+    "html": "bisar_budget.report.html_page",
+    "markdown": "bisar_budget.report.markdown_page",
 }
 # How the name of a file ends, to its format; the first that fits. GitHub's commands are no file.
 SUFFIXES = {
@@ -24,10 +30,15 @@ SUFFIXES = {
     ".json": "json",
     ".csv": "csv",
     ".xml": "junit",
+    ".html": "html",
+    ".htm": "html",
+    ".md": "markdown",
+    ".markdown": "markdown",
 }
 
-# Formats that show images of verified limits; for the others none is kept.
+# Formats that show a mission itself, and images of verified limits; for the others neither is kept.
 ILLUSTRATED = frozenset({"html", "markdown"})
+WITH_PICTURES = ("markdown",)
 
 
 def format_of(name: str) -> str | None:
@@ -40,14 +51,26 @@ def format_of(name: str) -> str | None:
 
 
 class Style(NamedTuple):
-    """How much to say, and whether in colour; formats for machines ignore both and name files below `root`."""
+    """How much to say, and whether in colour; formats for machines ignore both and name files below `root`.
+
+    Pictures lie in the folder `assets` beside the report; empty: nowhere, and the text has none.
+    """
 
     color: bool = False
     verbosity: int = 0  # -1: verdicts only; 0: the table; 1: every row's reason, source and displacement
     root: str = ""  # absolute path of the repository; empty: files are named as given
+    assets: str = ""
 
 
 def render(format_name: str, report: Report, style: Style) -> str:
     """Write a report in a format of `FORMATS`; the text ends with a newline."""
     text: str = import_module(FORMATS[format_name]).render(report, style)
     return text
+
+
+def pictures(format_name: str, report: Report, style: Style) -> Mapping[str, bytes]:
+    """Content of the files that belong beside a report, by their names within `style.assets`."""
+    if format_name not in WITH_PICTURES or not style.assets:
+        return {}
+    files: Mapping[str, bytes] = import_module(FORMATS[format_name]).pictures(report, style)
+    return files

@@ -12,8 +12,16 @@ from bisar_budget.errors import printable
 
 _XML = {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "'": "&apos;"}
 _XML_SPECIAL = re.compile("[&<>\"']")
-# What can mean something in Markdown or in the HTML within it, at least at the start of a line.
-_MARKDOWN_SPECIAL = re.compile(r"[\\`*_{}\[\]<>()#|&~!@:$^]")
+# What means something in GitHub's Markdown or in the HTML within it, and only where it does: a report is also read
+# as it is. Within a word an underscore is one, and brackets, escaped, need nothing of the ( and ! beside them.
+_MARKDOWN_SPECIAL = re.compile(
+    r"[\\`*\[\]<>|$~]"
+    r"|(?<![A-Za-z0-9])_|_(?![A-Za-z0-9])"
+    r"|&(?=#|\w+;)|@(?=\w)|#(?=\w)|:(?=//|(?:[\w+-]*[A-Z+-][\w+-]*|100|1234):)|(?<=www)\."
+    r"|^[-+#=](?=[-+#= ]|$)|^ ",
+    re.IGNORECASE | re.ASCII,
+)
+_MARKDOWN_NUMBER = re.compile(r"^(\d{1,9})([.)])(?=\s|$)", re.ASCII)  # of a list
 
 
 def xml_text(text: str) -> str:
@@ -22,9 +30,16 @@ def xml_text(text: str) -> str:
     return _XML_SPECIAL.sub(lambda match: _XML[match[0]], text) if _XML_SPECIAL.search(text) else text
 
 
+def _markdown_escape(match: re.Match[str]) -> str:
+    """A backslash can be read past; what it cannot tame everywhere becomes a character reference."""
+    special = match[0]
+    return f"\\{special}" if special in r"\*_[]~" else f"&#{ord(special)};"
+
+
 def markdown_text(text: str) -> str:
-    """Escape for Markdown, also within a table: a character reference is text everywhere."""
-    return _MARKDOWN_SPECIAL.sub(lambda match: f"&#{ord(match[0])};", printable(text))
+    """Escape for Markdown, also in a table or at the start of a line."""
+    escaped = _MARKDOWN_SPECIAL.sub(_markdown_escape, printable(text))
+    return _MARKDOWN_NUMBER.sub(lambda match: f"{match[1]}&#{ord(match[2])};", escaped)
 
 
 def command_text(text: str) -> str:

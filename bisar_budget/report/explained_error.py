@@ -18,15 +18,15 @@ from bisar_budget.errors import KeyPath, printable
 from bisar_budget.geometry import FRAME_AXES, PlatformState
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import formulas
-from bisar_budget.report.formulas import equation, number, step, with_unit
+from bisar_budget.report.formulas import Equation, Step, Sum, equation, number, step, with_unit
 
 _RATES = ("m", "m/s", "m/s²", "m/s³")  # units of the range error's coefficients
 
 
-def declaration(mission: Mission, source: ErrorSource) -> Iterator[str]:
+def declaration(mission: Mission, source: ErrorSource) -> Iterator[Step]:
     """From the file to `declared`: where it stands, frame, coverage factor."""
     if source.declared is None:
-        yield missing(mission, source.path)
+        yield Step(missing(mission, source.path))
         return
     yield from step(f"Declared in {place(mission, source.path)}", as_written(mission, source.path))
     if source.evidence:
@@ -52,7 +52,7 @@ def declaration(mission: Mission, source: ErrorSource) -> Iterator[str]:
     yield from step("Coverage factor allocation.coverage_factor", *lines)
 
 
-def _turned(mission: Mission, source: ErrorSource, axis: str) -> Iterator[str]:
+def _turned(mission: Mission, source: ErrorSource, axis: str) -> Iterator[Step]:
     """Errors of another frame along one axis of the scene."""
     platform, kind, _ = source.id.split(".")
     error = getattr(mission.platforms, platform).motion_error
@@ -73,7 +73,7 @@ def _turned(mission: Mission, source: ErrorSource, axis: str) -> Iterator[str]:
         text = " + ".join(f"|{part}|" for part in parts)
         how = "bounds add as magnitudes"
     title = f"Along {axis} from the {error.frame} frame ({', '.join(FRAME_AXES[error.frame])}): {how}"
-    yield from step(title, f"declared = {text} = {with_unit(abs(source.declared or 0.0), source.unit)}")
+    yield from step(title, Sum(f"declared = {text} = {with_unit(abs(source.declared or 0.0), source.unit)}"))
 
 
 def _quadratic_form(parts: Sequence[str], correlation: Sequence[Sequence[float]]) -> str:
@@ -90,7 +90,7 @@ def _quadratic_form(parts: Sequence[str], correlation: Sequence[Sequence[float]]
 
 def effect(
     mission: Mission, found: MissionFindings, source: ErrorSource, sources: Mapping[str, ErrorSource]
-) -> Iterator[str]:
+) -> Iterator[Step]:
     """From `declared` to the quadratic phase error; for one unit where nothing is declared."""
     size = 1.0 if source.declared is None else abs(source.declared)
     each = " of one unit" if source.declared is None else ""
@@ -144,7 +144,7 @@ def _motion_values(
     }
 
 
-def _clock_effect(mission: Mission, source: ErrorSource, size: float, each: str) -> Iterator[str]:
+def _clock_effect(mission: Mission, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
     order = ("constant", "linear", "quadratic", "cubic").index(source.id.split(".")[1])
     values = {
         "c": SPEED_OF_LIGHT,
@@ -160,7 +160,7 @@ def _clock_effect(mission: Mission, source: ErrorSource, size: float, each: str)
         yield from step(f"{source.equation}{each}", *equation("QPE", formulas.CLOCK_PHASE, values, qpe, "rad"))
 
 
-def _common_effect(source: ErrorSource, sources: Mapping[str, ErrorSource], size: float, each: str) -> Iterator[str]:
+def _common_effect(source: ErrorSource, sources: Mapping[str, ErrorSource], size: float, each: str) -> Iterator[Step]:
     """The effects of both platforms, added with their signs."""
     legs = [sources[source.id.replace("common", platform)] for platform in ("transmitter", "receiver")]
     values = {"φ_t": legs[0].effect.qpe * size, "φ_r": legs[1].effect.qpe * size}
@@ -175,7 +175,7 @@ def _projected_effect(
     sources: Mapping[str, ErrorSource],
     size: float,
     each: str,
-) -> Iterator[str]:
+) -> Iterator[Step]:
     """Along an axis of another frame: the projection of the effects along the axes of the scene."""
     platform, kind, axis = source.id.split(".")
     state: PlatformState = getattr(found.geometry, platform)
@@ -186,14 +186,14 @@ def _projected_effect(
     unit = f"rad per {source.unit}"
     yield from step(
         f"{source.equation}, {unit.replace('^2', '²')} along x, y, z times the {axis} axis",
-        f"QPE/unit = |{terms}| = {with_unit(abs(source.effect.qpe), unit)}",
+        Sum(f"QPE/unit = |{terms}| = {with_unit(abs(source.effect.qpe), unit)}"),
     )
     values = {"QPE/unit": abs(source.effect.qpe), "declared": size}
     qpe = abs(source.effect.qpe) * size
     yield from step(f"Quadratic phase error{each}", *equation("QPE", "QPE/unit*declared", values, qpe, "rad"))
 
 
-def _full(ground: FullGround, source: ErrorSource, size: float, each: str) -> Iterator[str]:
+def _full(ground: FullGround, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
     """What the full model makes of it, signed as declared."""
     size = math.copysign(size, source.declared or 1.0)
     moved = ground.moved(source.full) * size
@@ -209,7 +209,7 @@ def plane_and_effect(mission: Mission, found: MissionFindings, source: ErrorSour
     return full_ground(mission, found.geometry).plane, source.full, "Full model"
 
 
-def _displacement(mission: Mission, found: MissionFindings, source: ErrorSource) -> Iterator[str]:
+def _displacement(mission: Mission, found: MissionFindings, source: ErrorSource) -> Iterator[Step]:
     plane, by_model, title = plane_and_effect(mission, found, source)
     if plane.degeneracy or source.declared is None:
         return
@@ -221,7 +221,7 @@ def _displacement(mission: Mission, found: MissionFindings, source: ErrorSource)
         "β̃_1": by_model.linear * source.declared,
         "det Q": plane.determinant,
     }
-    lines: list[str] = []
+    lines: list[Equation] = []
     for symbol, (first, second), result in zip(("x̃", "ỹ"), plane.adjugate, moved, strict=True):
         entries = {"adj_0": first, "adj_1": second}
         lines += equation(symbol, "(adj_0*β̃_0 + adj_1*β̃_1)/(det Q)", values | entries, result, "m")

@@ -6,12 +6,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from bisar_budget.budget.allocation import Allocation
 from bisar_budget.budget.correlation import correlated_errors, displacement_parts, phase_parts
 from bisar_budget.budget.findings import MissionFindings, Row
-from bisar_budget.budget.sources import ErrorSource, error_sources
+from bisar_budget.budget.sources import ErrorSource, error_sources, image_plane
 from bisar_budget.errors import KeyPath, printable
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import formulas
 from bisar_budget.report.explained_error import as_written, declaration, effect, missing, place, plane_and_effect
-from bisar_budget.report.formulas import equation, number, step
+from bisar_budget.report.formulas import Step, Sum, equation, number, step
 from bisar_budget.report.text_table import WORDS, percent
 from bisar_budget.units import format_quantity
 
@@ -33,25 +33,52 @@ def explain(mission: Mission, found: MissionFindings, row_id: str) -> str:
     row = next(row for row in found.rows if row.id == row_id)
     own_id = f" [{printable(row.requirement_id)}]" if row.requirement_id else ""
     lines = [f"{WORDS[row.status]} {printable(row.id)}{own_id} of {printable(mission.name)}", ""]
-    sources = {source.id: source for source in error_sources(mission, found.geometry)}
-    source = sources.get(row.id)
-    if source is not None:
-        lines += declaration(mission, source)
-        lines += effect(mission, found, source, sources)
-        lines += _budget(found.allocation, source.owner, source.by(mission.allocation.model).qpe, row)
-    elif ".vibration." in row.id:
-        lines += _vibration(mission, found.allocation, row)
-    elif row.id.endswith(".quadratic_phase_error") or row.id == "mission.autofocus_pull_in":
-        lines += _phase_aggregate(mission, found, row, sources.values())
-    elif row.id == "mission.cubic_phase_error":
-        lines += _cubic_aggregate(mission, found, row, sources.values())
-    elif row.id == "mission.location_error":
-        lines += _location_aggregate(mission, found, row, sources.values())
+    lines += [line for step in chain(mission, found, row) for line in step.lines]
     lines += _verdict(row)
     return "\n".join(lines) + "\n"
 
 
-def _budget(allocation: Allocation, owner: str, qpe_per_unit: float, row: Row) -> Iterator[str]:
+def chain(mission: Mission, found: MissionFindings, row: Row) -> Iterator[Step]:
+    """Steps from the line of the mission file to how much of the allowable a row uses."""
+    sources = {source.id: source for source in error_sources(mission, found.geometry)}
+    source = sources.get(row.id)
+    if source is not None:
+        yield from declaration(mission, source)
+        yield from effect(mission, found, source, sources)
+        yield from _budget(found.allocation, source.owner, source.by(mission.allocation.model).qpe, row)
+    elif ".vibration." in row.id:
+        yield from _vibration(mission, found.allocation, row)
+    elif row.id.endswith(".quadratic_phase_error") or row.id == "mission.autofocus_pull_in":
+        yield from _phase_aggregate(mission, found, row, sources.values())
+    elif row.id == "mission.cubic_phase_error":
+        yield from _cubic_aggregate(mission, found, row, sources.values())
+    elif row.id == "mission.location_error":
+        yield from _location_aggregate(mission, found, row, sources.values())
+    if row.declared is not None and row.allowable is not None and row.utilization is not None:
+        values = {"declared": row.declared, "allowable": row.allowable}
+        yield from step("Utilization", *equation("utilization", "declared/allowable", values, row.utilization, ""))
+
+
+def collection_chain(found: MissionFindings) -> Iterator[Step]:
+    """Steps to what is true of the collection whatever the errors are: look and smear direction, determinant of Q."""
+    values: dict[str, float] = {}
+    for name, state in (("t", found.geometry.transmitter), ("r", found.geometry.receiver)):
+        (x, y, _), (v_x, v_y, _) = state.position, state.velocity
+        values |= {f"φ̄_{name}": state.azimuth, f"θ̄_{name}": state.elevation, f"R_{name}": state.slant_range}
+        values |= {f"x_{name}": x, f"y_{name}": y, f"v_x{name}": v_x, f"v_y{name}": v_y}
+    look, s = found.geometry.look_azimuth, found.geometry.range_gradient
+    yield from step("(11), bistatic look direction", *equation("φ_b", formulas.LOOK_AZIMUTH, values, look, "rad"))
+    east, north = formulas.SMEAR
+    yield from step(
+        "(31), smear direction",
+        *equation("east", east, values, s[1], ""),
+        *equation("north", north, values, -s[0], ""),
+    )
+    determinant = image_plane(found.geometry).determinant
+    yield from step("(30), range held constant", *equation("det Q", formulas.DETERMINANT, values, determinant, "1/s"))
+
+
+def _budget(allocation: Allocation, owner: str, qpe_per_unit: float, row: Row) -> Iterator[Step]:
     limit = allocation.qpe_limit(owner) * allocation.autofocus_gain
     yield from _limit(allocation, owner, limit)
     if row.allowable is None:
@@ -61,7 +88,7 @@ def _budget(allocation: Allocation, owner: str, qpe_per_unit: float, row: Row) -
     yield from step("Allowable", *equation("allowable", "limit/(QPE/unit)", values, row.allowable, row.unit))
 
 
-def _limit(allocation: Allocation, owner: str, limit: float) -> Iterator[str]:
+def _limit(allocation: Allocation, owner: str, limit: float) -> Iterator[Step]:
     """Budget times share times gain."""
     total, share, gain = allocation.qpe_total, allocation.qpe.of(owner), allocation.autofocus_gain
     whose = {
@@ -74,7 +101,7 @@ def _limit(allocation: Allocation, owner: str, limit: float) -> Iterator[str]:
     yield from step(title, *equation("limit", "total*share*gain", values, limit, "rad"))
 
 
-def _autofocus_gain(allocation: Allocation) -> Iterator[str]:
+def _autofocus_gain(allocation: Allocation) -> Iterator[Step]:
     if allocation.n_pull is None:
         yield from step("No autofocus (autofocus.n_pull): gain = 1")
         return
@@ -84,13 +111,13 @@ def _autofocus_gain(allocation: Allocation) -> Iterator[str]:
     yield from step("Autofocus, Section VI" + (", never below 1" if raw < 1 else ""), *lines)
 
 
-def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[str]:
+def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
     platform = row.id.split(".")[0]
     is_sinusoid = row.metric == "pslr"
     key = "sinusoidal" if is_sinusoid else "wideband"
     path: KeyPath = ("platforms", platform, "motion_error", "vibration", key)
     if row.declared is None:
-        yield missing(mission, path)
+        yield Step(missing(mission, path))
     else:
         path = (*path, int(row.id.rsplit(".", 1)[1]), "amplitude") if is_sinusoid else (*path, "rms")
         yield from step(f"Declared in {place(mission, path)}", as_written(mission, path))
@@ -113,7 +140,7 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[s
 
 def _phase_aggregate(
     mission: Mission, found: MissionFindings, row: Row, sources: Iterable[ErrorSource]
-) -> Iterator[str]:
+) -> Iterator[Step]:
     owner = {"timing": "clock"}.get(row.id.split(".")[0], row.id.split(".")[0])
     members = [
         source
@@ -135,7 +162,7 @@ def _phase_aggregate(
 
 def _cubic_aggregate(
     mission: Mission, found: MissionFindings, row: Row, sources: Iterable[ErrorSource]
-) -> Iterator[str]:
+) -> Iterator[Step]:
     members = [
         source
         for source in sources
@@ -149,7 +176,7 @@ def _cubic_aggregate(
 
 def _location_aggregate(
     mission: Mission, found: MissionFindings, row: Row, sources: Iterable[ErrorSource]
-) -> Iterator[str]:
+) -> Iterator[Step]:
     members, title = [], "(25), (30)"
     for source in sources:
         if source.declared is None or not source.is_motion:
@@ -161,17 +188,17 @@ def _location_aggregate(
     rule = "the longest sum over all signs of the vectors" if found.combine == "sum" else _RULES[found.combine]
     parts = displacement_parts(members, found.combine, correlated_errors(mission))
     sizes = [(name, math.hypot(*moved)) for name, moved in parts]
-    yield from step(f"{title}: displacements, {rule}", *_listed(sizes, "m"))
-    if row.declared is not None:
-        yield f"    combined = {row.declared:.6g} m"
+    combined = [] if row.declared is None else [f"combined = {row.declared:.6g} m"]
+    yield from step(f"{title}: displacements, {rule}", *_listed(sizes, "m"), *combined)
     if row.allowable is not None:
         where = place(mission, ("requirements", "location_error"))
         yield from step("Allowable", f"requirements.location_error = {row.allowable:.6g} m, {where}")
 
 
-def _combined(symbol: str, rule: str, members: Sequence[tuple[str, float]], row: Row) -> Iterator[str]:
-    yield from step(f"{symbol} of the declared errors, {_RULES[rule]}", *_listed(members, "rad"))
+def _combined(symbol: str, rule: str, members: Sequence[tuple[str, float]], row: Row) -> Iterator[Step]:
+    title = f"{symbol} of the declared errors, {_RULES[rule]}"
     if row.declared is None or not members:
+        yield from step(title, *_listed(members, "rad"))
         return
     sizes = [number(size) for _, size in members if size] or ["0"]
     if rule == "sum":
@@ -180,7 +207,7 @@ def _combined(symbol: str, rule: str, members: Sequence[tuple[str, float]], row:
         text = "sqrt(" + " + ".join(f"{size}^2" for size in sizes) + ")"
     else:
         text = f"max(0, {', '.join(sizes)})"
-    yield f"    combined = {text} = {row.declared:.6g} rad"
+    yield from step(title, *_listed(members, "rad"), Sum(f"combined = {text} = {row.declared:.6g} rad"))
 
 
 def _listed(members: Sequence[tuple[str, float]], unit: str) -> list[str]:
@@ -190,9 +217,7 @@ def _listed(members: Sequence[tuple[str, float]], unit: str) -> list[str]:
 
 def _verdict(row: Row) -> Iterator[str]:
     if row.declared is not None and row.allowable is not None and row.utilization is not None:
-        values = {"declared": row.declared, "allowable": row.allowable}
-        formula, numbers = equation("utilization", "declared/allowable", values, row.utilization, "")
-        yield from step("Utilization", formula, f"{numbers} = {percent(row.utilization)}")
+        yield f"                = {percent(row.utilization)}"  # under the sum of the last step
     yield ""
     texts = [text for text in (row.reason, *row.notes) if text]
     declared = "" if row.declared is None else f", declared {format_quantity(row.declared, row.unit)}"

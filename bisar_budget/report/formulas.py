@@ -6,6 +6,7 @@ SymPy itself stays out of a check.
 
 import re
 from collections.abc import Iterator, Mapping
+from typing import NamedTuple
 from unicodedata import combining
 
 AXES = "xyz"
@@ -24,6 +25,9 @@ _LETTERS = {"position": "p\u0303", "velocity": "ṽ", "acceleration": "ã"}
 CLOCK_PHASE = "π*T^2*f_0*|t̃_2|/2"
 VIBRATION = {"pslr": "sqrt(PSLR)*λ*sqrt(s)/(2*π)", "islr": "sqrt(ISLR)*λ*sqrt(s)/(2*π)"}
 AUTOFOCUS_GAIN = "π*N_pull/q"
+SMEAR = ("sin(φ̄_r)*cos(θ̄_r) + sin(φ̄_t)*cos(θ̄_t)", "-cos(φ̄_r)*cos(θ̄_r) - cos(φ̄_t)*cos(θ̄_t)")
+LOOK_AZIMUTH = "atan2(sin(φ̄_r)*cos(θ̄_r) + sin(φ̄_t)*cos(θ̄_t), cos(φ̄_r)*cos(θ̄_r) + cos(φ̄_t)*cos(θ̄_t))"
+DETERMINANT = "-(-v_xt/R_t - v_xr/R_r)*(-y_t/R_t - y_r/R_r) + (-v_yt/R_t - v_yr/R_r)*(-x_t/R_t - x_r/R_r)"
 
 
 def motion_symbol(kind: str, axis: str, platform: str) -> str:
@@ -47,6 +51,53 @@ def clock_coefficient(order: int) -> str:
     return f"c*t̃_{order}"
 
 
+class Equation(NamedTuple):
+    """A formula as text, and what it gives for values of its symbols."""
+
+    symbol: str
+    formula: str
+    values: Mapping[str, float]
+    result: float
+    unit: str
+
+    @property
+    def lines(self) -> tuple[str, str]:
+        """The formula, and under it the same with numbers; their equals signs stand above each other."""
+        margin = " " * sum(not combining(letter) for letter in self.symbol)
+        numbers = filled(self.formula, self.values)
+        return f"{self.symbol} = {self.formula}", f"{margin} = {numbers} = {with_unit(self.result, self.unit)}"
+
+
+class Sum(str):
+    """Text that is a sum with its numbers, and nothing of the user's own."""
+
+    __slots__ = ()
+
+
+class Step(NamedTuple):
+    """One step of an explanation: what it is or where it stands, and the equations or texts under it."""
+
+    title: str
+    parts: tuple[Equation | str, ...] = ()
+
+    @property
+    def lines(self) -> Iterator[str]:
+        """The title, what belongs to it indented."""
+        yield self.title
+        for part in self.parts:
+            yield from (f"    {line}" for line in (part.lines if isinstance(part, Equation) else (part,)))
+
+
+def step(title: str, *parts: Equation | str) -> Iterator[Step]:
+    """One step of an explanation, to be yielded from."""
+    yield Step(title, parts)
+
+
+def equation(symbol: str, formula: str, values: Mapping[str, float], result: float, unit: str) -> tuple[Equation]:
+    """Make the one part of a step."""
+    return (Equation(symbol, formula, values, result, unit),)
+
+
 def filled(formula: str, values: Mapping[str, float]) -> str:
     """Put numbers for the symbols, six digits each; negative ones in brackets."""
     names = sorted(values, key=len, reverse=True)
@@ -57,22 +108,15 @@ def filled(formula: str, values: Mapping[str, float]) -> str:
 
 def number(value: float) -> str:
     """Six digits, so that a reader can repeat the sum."""
-    text = f"{value:.6g}"
+    text = six_digits(value)
     return f"({text})" if text.startswith("-") else text
 
 
-def step(title: str, *equations: str) -> Iterator[str]:
-    """One step of an explanation: a title, its equations indented under it."""
-    yield title
-    yield from (f"    {equation}" for equation in equations)
-
-
-def equation(symbol: str, formula: str, values: Mapping[str, float], result: float, unit: str) -> tuple[str, str]:
-    """Write the formula, and under it the same with numbers; their equals signs stand above each other."""
-    margin = " " * sum(not combining(letter) for letter in symbol)
-    return f"{symbol} = {formula}", f"{margin} = {filled(formula, values)} = {with_unit(result, unit)}"
+def six_digits(value: float) -> str:
+    """Six digits; a zero has no sign."""
+    return f"{value + 0.0:.6g}"
 
 
 def with_unit(value: float, unit: str) -> str:
     """Six digits and the unit."""
-    return f"{value + 0.0:.6g} {unit.replace('^2', '²')}".rstrip()  # + 0.0 takes the sign from a zero
+    return f"{six_digits(value)} {unit.replace('^2', '²')}".rstrip()

@@ -23,7 +23,7 @@ def probabilities(drawn: MonteCarlo) -> list[str]:
     for requirement in drawn.requirements:
         lines += _requirement(requirement)
     if len(drawn.requirements) > 1:
-        lines += ["all at once", f"  {_held(drawn.probability, drawn.probability_low, drawn.probability_high)}"]
+        lines += ["all at once", f"  {held(drawn.probability, drawn.probability_low, drawn.probability_high)}"]
     texts = [f"warning: {one.id}: {text}" for one in drawn.requirements for text in one.warnings]
     texts += [f"warning: {text}" for text in drawn.warnings]
     texts += [f"note: {text}" for text in drawn.notes]
@@ -35,7 +35,7 @@ def _requirement(one: Requirement) -> Iterator[str]:
     yield _cells(one.id, limit, *(format_quantity(size, one.unit) for size in (one.sum, one.rss, one.sigma)))
     decimals = _decimals(one.probability_low, one.probability_high)
     yield (
-        f"  {_held(one.probability, one.probability_low, one.probability_high)}, "
+        f"  {held(one.probability, one.probability_low, one.probability_high)}, "
         f"normal with sigma {format_quantity(one.sigma_rss, one.unit)}: {_percent(one.probability_normal, decimals)}"
     )
 
@@ -44,7 +44,7 @@ def _cells(name: str, *cells: str) -> str:
     return f"{name:<{_WIDTH}}" + "".join(f"{cell:>11}" for cell in cells)
 
 
-def _held(probability: float, low: float, high: float) -> str:
+def held(probability: float, low: float, high: float) -> str:
     """Probability and its interval, to the digits that the interval leaves."""
     decimals = _decimals(low, high)
     ends = f"{_percent(low, decimals)} to {_percent(high, decimals)}".replace(" % to", " to")

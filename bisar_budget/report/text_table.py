@@ -69,7 +69,7 @@ def _mission(mission: MissionFindings, style: Style) -> list[str]:
     if style.verbosity < 0:
         return [_summary(mission, style)]
     lines = [mission.name, ""]
-    lines += [line for key, text in _head(mission) for line in wrapped(f"{key:<12} {text}", " " * 13)]
+    lines += [line for key, text in head(mission) for line in wrapped(f"{key:<12} {text}", " " * 13)]
     rows = worst_first(mission.rows)
     lines += ["", _cells("status", "row", "declared", "allowable", "use", "from")]
     lines += [line for row in rows for line in _row(row, style)]
@@ -88,7 +88,8 @@ def _mission(mission: MissionFindings, style: Style) -> list[str]:
     return [*lines, "", _summary(mission, style)]
 
 
-def _head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
+def head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
+    """Say in a few lines what was checked: geometry, resolution, budget, model."""
     geometry, allocation = mission.geometry, mission.allocation
     yield "Transmitter", _platform(geometry.transmitter)
     yield "Receiver", _platform(geometry.receiver)

@@ -52,7 +52,7 @@ def evidence(rows: Sequence[Verdict], style: Style) -> list[str]:
     width = max((len(row.id) for row in rows), default=0)
     lines = [f"{'row':<{width}}      limit   budget     full    exact    image verdict"]
     lines += [
-        f"{row.id:<{width}} {_limit(row):>11} {' '.join(f'{cell:>8}' for cell in _numbers(row))} "
+        f"{row.id:<{width}} {limit(row):>11} {' '.join(f'{cell:>8}' for cell in numbers(row))} "
         + _word(row.verdict, style)
         for row in rows
     ]
@@ -60,18 +60,18 @@ def evidence(rows: Sequence[Verdict], style: Style) -> list[str]:
     if refocused:
         lines += ["", "At the limit with autofocus, refocused:", ""]
         lines += [f"{'row':<{width}}      limit   budget residual     loss verdict"]
-        lines += [
-            f"{row.id:<{width}} {_quantity(row.boundary_autofocus, row.unit):>11} {_phase(row.budget_rad):>8} "
-            f"{_phase(row.measured_residual_qpe_rad):>8} {_decibel(row.refocused_loss_db):>8} "
-            + _word(row.verdict_autofocus or "", style)
-            for row in refocused
-        ]
+        for row in refocused:
+            limit_refocused, *cells, verdict = refocused_cells(row)
+            lines.append(
+                f"{row.id:<{width}} {limit_refocused:>11} {' '.join(f'{cell:>8}' for cell in cells)} "
+                + _word(verdict, style)
+            )
     reasons = [f"{row.id}: {reason}" for row in rows for reason in (row.reason, row.reason_autofocus) if reason]
-    asides = [line for text in (*_geometry(rows), *reasons) for line in wrapped(f"  {text}", "    ")]
+    asides = [line for text in (*geometry_remarks(rows), *reasons) for line in wrapped(f"  {text}", "    ")]
     return [*lines, "", *asides] if asides else lines
 
 
-def _geometry(rows: Sequence[Verdict]) -> Iterator[str]:
+def geometry_remarks(rows: Sequence[Verdict]) -> Iterator[str]:
     """Say how far displacement and smear of the images are from (25) and (31), at worst."""
     apart = [
         (math.dist(row.measured_displacement_m, row.displacement_published_m), row.id)
@@ -92,23 +92,35 @@ def _geometry(rows: Sequence[Verdict]) -> Iterator[str]:
         yield f"smear of the images: within {math.degrees(angle):.2g} deg of (31), farthest {row_id}"
 
 
-def _limit(row: Verdict) -> str:
+def limit(row: Verdict) -> str:
+    """The error that the image was formed with."""
     return format_quantity(row.boundary_error, row.unit)
 
 
-def _numbers(row: Verdict) -> tuple[str, str, str, str]:
+def numbers(row: Verdict) -> tuple[str, str, str, str]:
     """Budget, what the full model and exact ranges predict, what the image shows; phases in rad."""
     if row.requirement_db is not None:
         return _decibel(row.requirement_db), "-", "-", _decibel(row.measured_db)
     if row.unit == "m" and row.budget_rad is None:
         moves = (row.displacement_m, row.measured_displacement_m)
         exact, image = ("-" if move is None else format_quantity(math.hypot(*move), "m") for move in moves)
-        return _limit(row), "-", exact, image
+        return limit(row), "-", exact, image
     if row.measured_cubic_rad is not None:
         return _phase(row.budget_rad), "-", _phase(row.predicted_cubic_rad), _phase(row.measured_cubic_rad)
     phases = (row.budget_rad, row.full_qpe_rad, row.predicted_qpe_rad, row.measured_qpe_rad)
     budget, full, exact, image = (_phase(phase) for phase in phases)
     return budget, full, exact, image
+
+
+def refocused_cells(row: Verdict) -> tuple[str, str, str, str, str]:
+    """Limit with autofocus, budget, residual phase, loss of the refocused peak, verdict."""
+    return (
+        _quantity(row.boundary_autofocus, row.unit),
+        _phase(row.budget_rad),
+        _phase(row.measured_residual_qpe_rad),
+        _decibel(row.refocused_loss_db),
+        row.verdict_autofocus or "",
+    )
 
 
 def _quantity(value: float | None, unit: str) -> str:

@@ -123,7 +123,7 @@ def equations() -> tuple[Equation, ...]:
     )
     grown = (Equation("", "Growth of the squared range", d, value) for d, value in growth(platform).items())
     names = ("u", "udot", "uddot", "udddot")
-    titles = ("Line of sight", "Its first derivative", "Its second derivative", "Its third derivative")
+    titles = ("Line of sight", *(f"Line of sight, {order} derivative" for order in ("first", "second", "third")))
     looks = zip(names, titles, look_series(platform), strict=True)
     return (
         *grown,

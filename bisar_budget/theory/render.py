@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from html import escape
 
-from sympy import Basic, MatrixBase, Symbol
+from sympy import Basic, MatrixBase, Symbol, atan2
 from sympy.printing.latex import LatexPrinter
 from sympy.printing.mathml import MathMLPresentationPrinter
 from sympy.printing.str import StrPrinter
@@ -105,6 +105,9 @@ class _Latex(LatexPrinter):  # type: ignore[misc]
         arguments = ", ".join(self._print(argument) for argument in expr.args)
         return rf"{_Name.of(expr.func.__name__).latex()}\left({arguments}\right)"
 
+    def _print_atan2(self, expr: Basic, exp: str | None = None) -> str:
+        return rf"\operatorname{{atan2}}\left({', '.join(self._print(argument) for argument in expr.args)}\right)"
+
     def _print_Abs(self, expr: Basic, exp: str | None = None) -> str:
         # A bare | would end the cell of a Markdown table.
         inner = rf"\left\lvert {self._print(expr.args[0])} \right\rvert"
@@ -116,13 +119,20 @@ class _MathML(MathMLPresentationPrinter):  # type: ignore[misc]
         return self._name(sym.name)
 
     def _print_Function(self, expr: Basic) -> object:
+        if expr.func is atan2:  # SymPy writes arctan, which loses the quadrant
+            return self._call(self._leaf("mi", "atan2"), expr)
         if expr.func.__module__ is not None:
             return super()._print_Function(expr)
+        return self._call(self._name(expr.func.__name__), expr)
+
+    def _call(self, name: object, expr: Basic) -> object:
         row = self.dom.createElement("mrow")
-        row.appendChild(self._name(expr.func.__name__))
+        row.appendChild(name)
         fence = self.dom.createElement("mrow")
         fence.appendChild(self._leaf("mo", "("))
-        for argument in expr.args:
+        for index, argument in enumerate(expr.args):
+            if index:
+                fence.appendChild(self._leaf("mo", ","))
             fence.appendChild(self._print(argument))
         fence.appendChild(self._leaf("mo", ")"))
         row.appendChild(fence)
@@ -130,10 +140,11 @@ class _MathML(MathMLPresentationPrinter):  # type: ignore[misc]
 
     def _name(self, name: str) -> object:
         parts = _Name.of(name)
-        letter = parts.letter.replace("Delta", "Δ")
+        letter = parts.letter.replace("Delta", "Δ").replace("det", "det ").replace("adj", "adj ")
         head = self._leaf("mi", _GREEK.get(letter, letter))
         if parts.accent:
             over = self.dom.createElement("mover")
+            over.setAttribute("accent", "true")
             over.appendChild(head)
             over.appendChild(self._leaf("mo", _ABOVE[parts.accent]))
             head = over
@@ -155,18 +166,22 @@ def as_text(expression: Basic) -> str:
     return str(_Text().doprint(expression)).replace("**", "^")
 
 
-def as_latex(expression: Basic) -> str:
-    """LaTeX without delimiters."""
-    return str(_Latex().doprint(expression))
+def as_latex(expression: Basic, times: str = " ") -> str:
+    """LaTeX without delimiters; `times` stands between factors."""
+    return str(_Latex({"mul_symbol": times}).doprint(expression))
 
 
 def as_mathml(expression: Basic) -> str:
     """Presentation MathML, one `math` element."""
-    printer = _MathML()
-    xml = str(printer._print(expression).toxml())
-    for name, character in (("InvisibleTimes", "\u2062"), ("pi", "π")):  # XML knows no HTML entities
-        xml = xml.replace(f"&{name};", character)
-    return f'<math xmlns="http://www.w3.org/1998/Math/MathML">{xml}</math>'
+    return f'<math xmlns="http://www.w3.org/1998/Math/MathML">{as_mathml_content(expression)}</math>'
+
+
+def as_mathml_content(expression: Basic) -> str:
+    """Presentation MathML without the `math` element around it."""
+    xml = str(_MathML()._print(expression).toxml())
+    for name, character in (("InvisibleTimes", "\u2062"), ("ApplyFunction", "\u2061"), ("pi", "π")):
+        xml = xml.replace(f"&{name};", character)  # XML knows no HTML entities
+    return xml.replace("<mo>-</mo>", "<mo>−</mo>")  # a hyphen is no minus
 
 
 def derivation(selection: str, format_name: str) -> str:

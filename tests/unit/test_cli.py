@@ -319,14 +319,18 @@ class TestDerive:
         assert run("derive", "--check").exit_code == 0
 
     def test_check_fails_on_a_changed_file_and_shows_where(self, run, tmp_path, monkeypatch) -> None:
-        from bisar_budget.theory import emit
+        from bisar_budget.theory import emit, emit_catalogue
 
-        changed = tmp_path / "evaluators.py"
-        changed.write_text(emit.TARGET.read_text().replace("0.25*shared_1", "0.26*shared_1"))
-        monkeypatch.setattr(emit, "TARGET", changed)
+        for generated, old, new in ((emit, "0.25*shared_1", "0.26*shared_1"), (emit_catalogue, "{4", "{5")):
+            changed = tmp_path / generated.TARGET.name
+            text = generated.TARGET.read_text(encoding="utf-8")
+            assert old in text
+            changed.write_text(text.replace(old, new), encoding="utf-8")
+            monkeypatch.setattr(generated, "TARGET", changed)
         result = run("derive", "--check")
         assert result.exit_code == 1
         assert "0.26*shared_1" in result.stdout
+        assert "frac{5" in result.stdout
         assert run("derive", "--write").exit_code == 0
         assert run("derive", "--check").exit_code == 0
 

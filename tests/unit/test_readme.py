@@ -5,6 +5,8 @@ import shlex
 
 import pytest
 
+from bisar_budget.cli import check
+from bisar_budget.report import FORMATS, format_of
 from tests.conftest import ROOT
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -67,6 +69,27 @@ def test_every_option_of_check_is_in_the_readme(run) -> None:
     for option in options:
         if option != "--help":
             assert f"`{option}" in README or f"{option}`" in README, option
+
+
+def test_the_commands_of_the_readme_are_those_of_the_help(run) -> None:
+    listed = re.search(r"(?s)Commands:\n(.*)", run("--help").stdout)[1]
+    commands = re.findall(r"(?m)^  (\w+) ", listed)
+    assert commands
+    assert set(re.findall(r"(?m)^\| `bisar-budget (\w+)", README)) == set(commands)
+
+
+def test_the_formats_of_the_readme_are_those_of_check() -> None:
+    (row,) = re.findall(r"(?m)^\| `--format text`.*?\|", README)
+    assert set(re.findall(r"`(?:--format )?(\w+)`", row)) == FORMATS.keys()
+    (row,) = re.findall(r"(?m)^\| `--report FILE`.*$", README)
+    assert {format_of(f"a{suffix}") for suffix in re.findall(r"(?<=[( ])\.[\w.]+", row)} == FORMATS.keys() - {
+        "github"
+    }
+
+
+def test_the_formats_of_the_command_are_those_of_the_registry() -> None:
+    (choice,) = [option.type for option in check.params if option.name == "format_name"]
+    assert set(choice.choices) == FORMATS.keys()
 
 
 def test_links_inside_the_repository_exist() -> None:

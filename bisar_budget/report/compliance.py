@@ -1,0 +1,734 @@
+"""What a compliance report shows, as plain data: computed once from the findings, one template per language.
+
+Every number is one that the check found or an explanation shows; nothing is computed a second time. Text is
+unescaped: each language escapes for itself.
+"""
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from datetime import date
+from hashlib import sha256
+from typing import TYPE_CHECKING, NamedTuple
+
+from bisar_budget.budget.allocation import Allocation
+from bisar_budget.budget.findings import MissionFindings, Option, Report, Row, UnusableMission, worst_first
+from bisar_budget.budget.image_evidence import PointImage
+from bisar_budget.budget.sources import MOTION_UNITS, ErrorSource, error_sources
+from bisar_budget.budget.waivers import waiver_notes
+from bisar_budget.catalogue import EQUATIONS
+from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.errors import KeyPath
+from bisar_budget.mission.model import Mission
+from bisar_budget.report import Style, verification
+from bisar_budget.report.drawings import geometry_elevation, geometry_plan
+from bisar_budget.report.escapes import source_path
+from bisar_budget.report.explanation import chain, collection_chain
+from bisar_budget.report.formulas import Step
+from bisar_budget.report.image_evidence import (
+    chip_caption,
+    chip_png,
+    chip_size,
+    impulse_response_cuts,
+    numbers_in_words,
+)
+from bisar_budget.report.sentences import cause, measure
+from bisar_budget.report.text_table import head, percent
+from bisar_budget.units import format_quantity
+
+if TYPE_CHECKING:
+    from bisar_budget.budget.monte_carlo import MonteCarlo
+
+STATUS_WORDS = {
+    "error": "unusable",
+    "fail": "fail",
+    "not_evaluated": "not evaluated",
+    "warn": "warning",
+    "pass_with_autofocus": "pass with autofocus",
+    "pass": "pass",
+    "waived": "waived",
+    "info": "info",
+    "not_declared": "not declared",
+}
+_VERDICTS = {
+    "error": "Cannot be judged",
+    "fail": "Does not comply",
+    "not_evaluated": "Not shown to comply",
+    "warn": "Complies, with warnings",
+    "pass_with_autofocus": "Complies, with autofocus",
+    "pass": "Complies",
+}
+_NOTHING = "Nothing was judged"
+_OWNERS = ("transmitter", "receiver", "clock", "reserve")
+_DRIVERS = 3
+_JUDGED = ("fail", "not_evaluated", "warn", "pass_with_autofocus", "pass", "waived")
+_DISTRIBUTIONS = {
+    "normal": "one-sigma values",
+    "uniform": "uniform within the values given",
+    "bound": "values that are not exceeded",
+}
+_VALIDITY = {
+    "published": (
+        "Rigling & Moses, Tables I and II: first order in the errors, the slant ranges held constant over the "
+        "aperture. True near broadside; at a squint its velocity rows can be a third too generous or several times "
+        "too strict. A row that the full model fails is a warning."
+    ),
+    "full": (
+        "Every first-order term of the range error: lines of sight that turn, and the phase that the displaced "
+        "response has of its own. A row that the published model fails is a warning."
+    ),
+    "strictest": "Of the published model (Rigling & Moses, Tables I and II) and the full one the stricter, by row.",
+}
+_RULES = {
+    "each": "each error alone is held to its share of the budget",
+    "sum": "the errors of a platform are added at their worst and held to its share",
+    "rss": "the errors of a platform are taken for independent, and their root-sum-square is held to its share",
+}
+
+
+class Driver(NamedTuple):
+    """A row that the verdict rests on."""
+
+    id: str
+    requirement_id: str
+    status: str
+    measure: str
+    cause: str
+    use: float | None
+
+
+class MatrixRow(NamedTuple):
+    """A line of the compliance matrix. `use` is the utilization; None where there is none to show."""
+
+    id: str
+    requirement_id: str
+    requirement: str
+    method: str
+    allowable: str
+    declared: str
+    use: float | None
+    use_text: str
+    margin: str
+    status: str
+    waiver: str
+    line: int | None
+    remarks: tuple[str, ...]
+
+
+class Share(NamedTuple):
+    """What an owner may use of the quadratic phase error, before and after autofocus. [rad]
+
+    `start` and `part` place it in a bar of length 1 for the whole budget.
+    """
+
+    owner: str
+    share: str
+    before: str
+    after: str
+    start: float
+    part: float
+
+
+class PowerShare(NamedTuple):
+    """Shares of the power that vibration may add."""
+
+    metric: str
+    requirement: str
+    transmitter: str
+    receiver: str
+
+
+class Contribution(NamedTuple):
+    """Quadratic phase error of one declared error; `part` is that of the largest, `of_sum` of all together."""
+
+    id: str
+    owner: str
+    kind: str
+    axis: str
+    qpe: str
+    published: str
+    full: str
+    part: float
+    of_sum: str
+
+
+class Input(NamedTuple):
+    """A value that everything rests on, and whether the file gives it."""
+
+    name: str
+    value: str
+    origin: str
+
+
+class Undeclared(NamedTuple):
+    """An error that the file does not declare, and what it may be."""
+
+    id: str
+    allowable: str
+    equation: str
+
+
+class Source(NamedTuple):
+    """Where values come from, as the file says, and for which rows."""
+
+    text: str
+    rows: tuple[str, ...]
+
+
+class Derivation(NamedTuple):
+    """How one row comes to its status."""
+
+    id: str
+    status: str
+    line: int | None
+    steps: tuple[Step, ...]
+
+
+class General(NamedTuple):
+    """A formula that no single row has, by its name in the catalogue."""
+
+    number: str
+    title: str
+    left: str
+    right: str
+
+
+class Evidence(NamedTuple):
+    """What an image says of one limit."""
+
+    id: str
+    limit: str
+    budget: str
+    full: str
+    exact: str
+    image: str
+    verdict: str
+    refocused: tuple[str, ...]
+    reasons: tuple[str, ...]
+
+
+class Probability(NamedTuple):
+    """How often a requirement holds over the draws of a Monte Carlo; no cells where all are meant."""
+
+    id: str
+    cells: tuple[str, ...]
+    held: str
+
+
+class Picture(NamedTuple):
+    """A drawing: `name` of a file within the mission's, what it shows, the SVG."""
+
+    name: str
+    title: str
+    svg: str
+
+
+class Chip(NamedTuple):
+    """A small image: `name` of a file within the mission's, what it shows, the PNG, its size on a page. [px]"""
+
+    name: str
+    title: str
+    caption: str
+    png: bytes
+    size: tuple[int, int]
+
+
+class Illustration(NamedTuple):
+    """The images behind the verdict on one limit."""
+
+    id: str
+    words: tuple[str, ...]
+    chips: tuple[Chip, ...]
+    cuts: Picture
+
+
+class MissionPage(NamedTuple):
+    """Everything about one mission; `faults` of an unusable one, which has nothing else but its head."""
+
+    anchor: str
+    file: str
+    sha256: str
+    status: str
+    verdict: str
+    name: str
+    counts: str = ""
+    worst: str = ""
+    worst_use: str = ""
+    faults: tuple[tuple[str, str], ...] = ()
+    head: tuple[tuple[str, str], ...] = ()
+    drivers: tuple[Driver, ...] = ()
+    matrix: tuple[MatrixRow, ...] = ()
+    pictures: tuple[Picture, ...] = ()
+    total: str = ""
+    gain: float = 1.0
+    gain_text: str = ""
+    shares: tuple[Share, ...] = ()
+    power_shares: tuple[PowerShare, ...] = ()
+    contributions: tuple[Contribution, ...] = ()
+    validity: tuple[tuple[str, str], ...] = ()
+    inputs: tuple[Input, ...] = ()
+    undeclared: tuple[Undeclared, ...] = ()
+    notes: tuple[str, ...] = ()
+    warnings: tuple[tuple[str, str], ...] = ()
+    sources: tuple[Source, ...] = ()
+    unsourced: tuple[str, ...] = ()
+    collection: tuple[Step, ...] = ()
+    general: tuple[General, ...] = ()
+    derivations: tuple[Derivation, ...] = ()
+    evidence: tuple[Evidence, ...] | None = None
+    evidence_remarks: tuple[str, ...] = ()
+    has_refocused: bool = False
+    illustrations: tuple[Illustration, ...] = ()
+    draws: str = ""
+    probabilities: tuple[Probability, ...] = ()
+    draws_remarks: tuple[str, ...] = ()
+
+
+class Compliance(NamedTuple):
+    """A whole report."""
+
+    version: str
+    day: date | None
+    status: str
+    verdict: str
+    options: tuple[Option, ...]
+    missions: tuple[MissionPage, ...]
+
+
+def compliance(report: Report, style: Style) -> Compliance:
+    """Arrange the findings of a run for a report that people read.
+
+    Raises
+    ------
+    ValueError
+        Findings that do not carry their mission.
+    """
+    pages = []
+    for number, mission in enumerate(report.missions, start=1):
+        anchor = f"m{number}"
+        if isinstance(mission, UnusableMission):
+            pages.append(_unusable(mission, style, anchor))
+        else:
+            pages.append(_page(mission, style, anchor))
+    return Compliance(
+        version=report.version,
+        day=report.day,
+        status=report.status,
+        verdict=_overall(report, pages),
+        options=report.options,
+        missions=tuple(pages),
+    )
+
+
+def _verdict(status: str, waived: int) -> str:
+    """Verdict on rows, with what it owes to waivers."""
+    rows = f"; {waived} row{'s' if waived != 1 else ''} waived" if waived else ""
+    return f"{_VERDICTS[status]}{rows}"
+
+
+def _overall(report: Report, pages: Sequence[MissionPage]) -> str:
+    """Verdict on the run: a mission that declares nothing complies with nothing."""
+    usable = [mission for mission in report.missions if isinstance(mission, MissionFindings)]
+    verdict = _verdict(report.status, sum(mission.summary.get("waived", 0) for mission in usable))
+    empty = sum(page.verdict == _NOTHING for page in pages)
+    if report.status != "pass" or not empty:
+        return verdict
+    return _NOTHING if empty == len(pages) else f"{verdict}; of {len(pages)} missions {empty} declare no error"
+
+
+def _unusable(found: UnusableMission, style: Style, anchor: str) -> MissionPage:
+    count = len(found.faults)
+    return MissionPage(
+        anchor=anchor,
+        file=source_path(found.file, style.root),
+        sha256=_digest(found.data),
+        status="error",
+        verdict=_VERDICTS["error"],
+        name=source_path(found.file, style.root),
+        counts=f"{count} fault{'s' if count != 1 else ''}",
+        faults=tuple((f"{fault.line or '–'}:{fault.column or '–'}", str(fault)) for fault in found.faults),
+    )
+
+
+def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
+    mission = found.mission
+    if mission is None:
+        raise ValueError("a compliance report needs findings that carry their mission")
+    sources = {source.id: source for source in error_sources(mission, found.geometry)}
+    rows = worst_first(found.rows)
+    judged = [row for row in rows if row.status in _JUDGED]
+    evidence = {verdict.id: verdict for verdict in found.verdicts or ()}
+    file = source_path(found.file, style.root)
+    allocation = found.allocation
+    return MissionPage(
+        anchor=anchor,
+        file=file,
+        sha256=_digest(mission.data),
+        status=found.status,
+        verdict=_verdict(found.status, found.summary.get("waived", 0)) if judged else _NOTHING,
+        name=found.name,
+        counts=", ".join(f"{count} {STATUS_WORDS[status]}" for status, count in found.summary.items()),
+        worst=judged[0].id if judged else "",
+        worst_use=_use(judged[0]) if judged else "",
+        head=tuple(head(found)),
+        drivers=tuple(
+            _driver(row) for row in judged[:_DRIVERS] if row.status not in ("pass", "waived") or row.utilization
+        ),
+        matrix=tuple(
+            MatrixRow(
+                id=row.id,
+                requirement_id=row.requirement_id or "",
+                requirement=_requirement(mission, found, row, sources.get(row.id)),
+                method=_method(found, row, evidence[row.id].verdict if row.id in evidence else None),
+                allowable=_allowable(row),
+                declared=_quantity(row.declared, row.unit),
+                use=None if row.status == "not_evaluated" or row.allowable is None else row.utilization,
+                use_text=_use(row),
+                margin=_margin(row.margin),
+                status=row.status,
+                waiver="; ".join(waiver_notes(row)),
+                line=row.line,
+                remarks=_remarks(row),
+            )
+            for row in rows
+            if row.status != "not_declared"
+        ),
+        pictures=drawings(found),
+        total=_quantity(allocation.qpe_total, "rad"),
+        gain=allocation.autofocus_gain,
+        gain_text=_gain(allocation),
+        shares=tuple(_shares(allocation)),
+        power_shares=tuple(_power_shares(mission, allocation)),
+        contributions=_contributions(found, sources.values()),
+        validity=tuple(_validity(mission, found)),
+        inputs=tuple(_inputs(mission, found, file)),
+        undeclared=tuple(
+            Undeclared(row.id, _allowable(row), row.equation) for row in found.rows if row.status == "not_declared"
+        ),
+        notes=found.notes,
+        warnings=tuple(
+            (f"{file}:{warning.line}" if warning.line is not None else file, warning.message)
+            for warning in found.warnings
+        ),
+        sources=_sources(found.rows),
+        unsourced=tuple(row.id for row in found.rows if _may_have_a_source(row) and not row.evidence),
+        collection=tuple(collection_chain(found)),
+        general=tuple(General(*equation) for equation in EQUATIONS if equation[0] not in ("(11)", "(31)")),
+        derivations=tuple(
+            Derivation(row.id, row.status, row.line, tuple(chain(mission, found, row)))
+            for row in rows
+            if row.status != "not_declared"
+        ),
+        evidence=None if found.verdicts is None else tuple(_evidence(found)),
+        evidence_remarks=tuple(verification.geometry_remarks(found.verdicts or ())),
+        has_refocused=any(verdict.verdict_autofocus for verdict in found.verdicts or ()),
+        illustrations=illustrations(found),
+        draws=_draws(found.monte_carlo),
+        probabilities=tuple(_probabilities(found.monte_carlo)),
+        draws_remarks=tuple(_draws_remarks(found.monte_carlo)),
+    )
+
+
+def drawings(found: MissionFindings) -> tuple[Picture, ...]:
+    """Draw a mission."""
+    return (
+        Picture("plan.svg", "Plan: the collection from above", geometry_plan(found)),
+        Picture("elevation.svg", "Elevation: the collection from the side", geometry_elevation(found)),
+    )
+
+
+def illustrations(found: MissionFindings) -> tuple[Illustration, ...]:
+    """Images at the limits that decide most, where they were formed."""
+    result = []
+    for number, evidence in enumerate(found.image_evidence or (), start=1):
+        row_id = evidence.verdict.id
+        images = [("limit", f"{row_id} at the limit", evidence.at_limit)]
+        if evidence.before_autofocus and evidence.after_autofocus:
+            at = f"{row_id} at the limit with autofocus"
+            images.append(("before", f"{at}, before it", evidence.before_autofocus))
+            images.append(("after", f"{at}, after it", evidence.after_autofocus))
+        result.append(
+            Illustration(
+                id=row_id,
+                words=tuple(numbers_in_words(evidence)),
+                chips=tuple(
+                    Chip(f"chip-{number}-{name}.png", title, chip_caption(image), chip_png(image), _on_page(image))
+                    for name, title, image in images
+                ),
+                cuts=Picture(f"cuts-{number}.svg", f"Cross-range cuts of {row_id}", impulse_response_cuts(evidence)),
+            )
+        )
+    return tuple(result)
+
+
+def _on_page(image: PointImage) -> tuple[int, int]:
+    """Width and height on a page, at most 240 px each. [px]"""
+    width, height = chip_size(image)
+    shrink = max(1.0, width / 240, height / 240)
+    return max(1, round(width / shrink)), max(1, round(height / shrink))
+
+
+def _draws(drawn: "MonteCarlo | None") -> str:
+    if drawn is None:
+        return ""
+    return (
+        f"{drawn.draws:,} draws, seed {drawn.seed}, {drawn.model} model; intervals of {100 * drawn.confidence:.0f} %"
+    )
+
+
+def _probabilities(drawn: "MonteCarlo | None") -> Iterator[Probability]:
+    if drawn is None:
+        return
+    from bisar_budget.report.monte_carlo import held
+
+    for one in drawn.requirements:
+        limit = format_quantity(one.limit, one.unit, 3, "down")
+        sizes = (format_quantity(size, one.unit) for size in (one.sum, one.rss, one.sigma))
+        yield Probability(one.id, (limit, *sizes), held(one.probability, one.probability_low, one.probability_high))
+    if drawn.probability is not None and len(drawn.requirements) > 1:
+        ends = (drawn.probability_low or 0.0, drawn.probability_high or 1.0)
+        yield Probability("all at once", ("–",) * 4, held(drawn.probability, *ends))
+
+
+def _draws_remarks(drawn: "MonteCarlo | None") -> Iterator[str]:
+    if drawn is None:
+        return
+    yield from (f"{one.id}: {text}" for one in drawn.requirements for text in one.warnings)
+    yield from drawn.warnings
+    yield from drawn.notes
+    if drawn.probability is None:
+        yield "nothing is declared that a requirement here is about"
+
+
+def _digest(data: bytes | None) -> str:
+    return "" if data is None else sha256(data).hexdigest()
+
+
+def _quantity(value: float | None, unit: str) -> str:
+    return "–" if value is None else format_quantity(value, unit)
+
+
+def _allowable(row: Row) -> str:
+    if row.allowable is not None:
+        return format_quantity(row.allowable, row.unit, 3, "down")
+    is_open = row.status in ("not_evaluated", "info") or row.metric in ("pslr", "islr")
+    return "–" if is_open else "no limit"
+
+
+def _use(row: Row) -> str:
+    has_none = row.utilization is None or row.allowable is None or row.status == "not_evaluated"
+    return "–" if has_none else percent(row.utilization or 0.0)
+
+
+def _margin(margin: float | None) -> str:
+    """Write allowable over declared less one, rounded down: no margin is larger than it is."""
+    if margin is None:
+        return "–"
+    value = 100 * margin
+    if value >= 1e6:
+        return "> 1e6 %"
+    size = abs(value)
+    step = 2 - math.floor(math.log10(size)) if size else 0
+    down = math.floor(value * 10.0**step * (1 + math.copysign(1e-12, value))) / 10.0**step if step < 300 else value
+    text = f"{down:+.0f}" if size >= 100 else f"{down:+.3g}"
+    return ("0" if down == 0 else text).replace("-", "−") + " %"
+
+
+def _driver(row: Row) -> Driver:
+    use = None if row.status == "not_evaluated" or row.allowable is None else row.utilization
+    return Driver(row.id, row.requirement_id or "", row.status, measure(row), cause(row), use)
+
+
+def _remarks(row: Row) -> tuple[str, ...]:
+    waivers = waiver_notes(row)
+    return tuple(text for text in (row.reason, *row.notes) if text and text not in waivers)
+
+
+def _requirement(mission: Mission, found: MissionFindings, row: Row, source: ErrorSource | None) -> str:
+    """Say what the row is held to."""
+    allocation, requirements = found.allocation, mission.requirements
+    if row.metric in ("pslr", "islr"):
+        value = requirements.pslr if row.metric == "pslr" else requirements.islr
+        what = "paired echoes" if row.metric == "pslr" else "power spread"
+        split = allocation.pslr if row.metric == "pslr" else allocation.islr
+        if value is None:
+            return "none stated"
+        return f"{what} ≤ {value:g} dB, {split.of(row.id.split('.')[0]):.3g} of the power"
+    if row.metric == "cubic_phase_error":
+        value = requirements.cubic_phase_error
+        return "none stated" if value is None else f"cubic phase ≤ {format_quantity(value, 'rad')}"
+    if row.metric == "location_error":
+        value = requirements.location_error
+        return "none stated" if value is None else f"displacement ≤ {format_quantity(value, 'm')}"
+    if row.id == "mission.autofocus_pull_in":
+        return "all QPE together within what autofocus corrects, π·N_pull"
+    owner = {"timing": "clock"}.get(row.id.split(".")[0], row.id.split(".")[0]) if source is None else source.owner
+    limit = allocation.qpe_limit(owner) * allocation.autofocus_gain
+    share = "" if owner == "mission" else f", {allocation.qpe.of(owner):.3g} of the budget"
+    return f"QPE ≤ {format_quantity(limit, 'rad')}{share}"
+
+
+def _method(found: MissionFindings, row: Row, verdict: str | None) -> str:
+    """Say how the row is verified: by analysis, and by the image where one was formed."""
+    by_model = {"published": row.equation, "full": "full model", "strictest": f"{row.equation} and full model"}
+    is_of_model = row.metric in ("quadratic_phase_error",) and row.unit != "rad"
+    analysis = f"analysis: {by_model[found.model] if is_of_model else row.equation}"
+    return analysis if verdict is None else f"{analysis}; simulation: {STATUS_WORDS.get(verdict, verdict)}"
+
+
+def _gain(allocation: Allocation) -> str:
+    if allocation.n_pull is None:
+        return "no autofocus is declared"
+    gain = f"limits of the quadratic phase × {allocation.autofocus_gain:.3g}"
+    corrected = f"{allocation.n_pull:g}π" if allocation.n_pull != 1 else "π"
+    return f"autofocus corrects {corrected} rad: {gain}"
+
+
+def _shares(allocation: Allocation) -> Iterator[Share]:
+    start, gain = 0.0, allocation.autofocus_gain
+    for owner in _OWNERS:
+        part = getattr(allocation.qpe, owner)
+        if not part:
+            if owner == "clock":
+                limit = allocation.qpe_limit(owner)
+                held = "held to the receiver’s"
+                yield Share(owner, held, _quantity(limit, "rad"), _quantity(limit * gain, "rad"), start, 0.0)
+            continue
+        limit = part * allocation.qpe_total
+        yield Share(owner, f"{part:.3g}", _quantity(limit, "rad"), _quantity(limit * gain, "rad"), start, part)
+        start += part
+
+
+def _power_shares(mission: Mission, allocation: Allocation) -> Iterator[PowerShare]:
+    for name, value, split in (
+        ("PSLR", mission.requirements.pslr, allocation.pslr),
+        ("ISLR", mission.requirements.islr, allocation.islr),
+    ):
+        if value is not None:
+            yield PowerShare(name, f"{value:g} dB", f"{split.transmitter:.3g}", f"{split.receiver:.3g}")
+
+
+def _contributions(found: MissionFindings, sources: Iterable[ErrorSource]) -> tuple[Contribution, ...]:
+    """Errors as the file states them, the largest quadratic phase error first."""
+    declared = [source for source in sources if source.declared is not None and source.is_independent]
+    sizes = {source.id: abs(source.qpe(found.model)) for source in declared}
+    declared = sorted((source for source in declared if sizes[source.id]), key=lambda source: -sizes[source.id])
+    total, largest = math.fsum(sizes.values()), max(sizes.values(), default=0.0)
+    result = []
+    for source in declared:
+        owner, kind, axis = _kind(source)
+        published, full = (_phase(abs(source.qpe(model))) for model in ("published", "full"))
+        qpe = sizes[source.id]
+        part, of_sum = qpe / largest, percent(qpe / total)
+        result.append(Contribution(source.id, owner, kind, axis, _phase(qpe), published, full, part, of_sum))
+    return tuple(result)
+
+
+def _kind(source: ErrorSource) -> tuple[str, str, str]:
+    """Owner, kind and axis of an error."""
+    first, kind, axis = (*source.id.split(".", 2), "", "")[:3]
+    if kind in MOTION_UNITS:
+        return "both platforms" if first == "common" else first, kind, axis.replace("_", " ")
+    if first == "timing":
+        return "clock", "timing", kind
+    return ("mission", "terrain", "height") if source.is_motion else ("mission", "other", source.id.partition(".")[2])
+
+
+def _phase(value: float) -> str:
+    return format_quantity(value, "rad")
+
+
+def _validity(mission: Mission, found: MissionFindings) -> Iterator[tuple[str, str]]:
+    yield "Model", _VALIDITY[found.model]
+    yield "Combination", _RULES[found.combine]
+    yield "Phases", f"at the centre frequency, c = {SPEED_OF_LIGHT / 1e3:.3f} km/s; at the aperture edge, ±T/2"
+    factor = f"{found.coverage_factor:g} times the file’s value" if found.coverage_factor != 1 else "the file’s value"
+    yield "Declared", f"for position, velocity, acceleration and clock {factor}"
+    for name in ("transmitter", "receiver"):
+        error = getattr(mission.platforms, name).motion_error
+        if any(error.stated(kind) for kind in MOTION_UNITS):
+            said = _DISTRIBUTIONS[error.distribution]
+            said += ", position and velocity by their covariance" if error.covariance is not None else ""
+            yield f"Errors of the {name}", f"along the axes of the frame “{error.frame}”; {said}"
+    common = mission.common_motion_error
+    if common is not None:
+        said = _DISTRIBUTIONS[common.distribution]
+        yield "Errors of both platforms alike", f"along the axes of the scene; {said}"
+    yield (
+        "Autofocus",
+        _gain(found.allocation) + ("" if found.allocation.n_pull is None else f" ({mission.autofocus.algorithm})"),
+    )
+    yield (
+        "Sidelobes",
+        "PSLR and ISLR bound what vibration adds along the line of sight, not the sidelobes of the window",
+    )
+
+
+def _inputs(mission: Mission, found: MissionFindings, file: str) -> Iterator[Input]:
+    """Values that the findings rest on, with the line of the file or `default`."""
+
+    def given(name: str, value: str, path: KeyPath) -> Input:
+        is_in_file = path in mission.places
+        return Input(name, value, f"{file}:{mission.line(path)}" if is_in_file else "default")
+
+    requirements = mission.requirements
+    yield given(
+        "centre frequency", format_quantity(mission.radar.center_frequency, "Hz", 6), ("radar", "center_frequency")
+    )
+    yield given("bandwidth", format_quantity(mission.radar.bandwidth, "Hz", 6), ("radar", "bandwidth"))
+    yield given(
+        "aperture time", format_quantity(mission.collection.aperture_time, "s", 6), ("collection", "aperture_time")
+    )
+    total = requirements.quadratic_phase_error
+    yield given(
+        "quadratic phase error, total", f"{format_quantity(total, 'rad')} ({math.degrees(total):.4g}°)",
+        ("requirements", "quadratic_phase_error"),
+    )  # fmt: skip
+    optional = (
+        ("cubic phase error", requirements.cubic_phase_error, "rad", "cubic_phase_error"),
+        ("PSLR", requirements.pslr, "dB", "pslr"),
+        ("ISLR", requirements.islr, "dB", "islr"),
+        ("location error", requirements.location_error, "m", "location_error"),
+    )
+    for name, value, unit, key in optional:
+        if value is None:
+            yield Input(
+                name, "none: computed, not judged" if unit != "dB" else "none: not evaluated", "not in the file"
+            )
+        else:
+            yield given(
+                name, f"{value:g} dB" if unit == "dB" else format_quantity(value, unit), ("requirements", key)
+            )
+    allocation = mission.allocation
+    split = allocation.split
+    yield given("split", split if isinstance(split, str) else "shares of the file", ("allocation", "split"))
+    yield given("combination", allocation.combine, ("allocation", "combine"))
+    model = given("model", allocation.model, ("allocation", "model"))
+    yield model
+    yield given("coverage factor", f"{allocation.coverage_factor:g}", ("allocation", "coverage_factor"))
+    yield given("warning above", f"{100 * allocation.warn_above:g} % of a limit", ("allocation", "warn_above"))
+
+
+def _may_have_a_source(row: Row) -> bool:
+    parts = row.id.split(".")
+    return (
+        row.declared is not None
+        and row.is_independent
+        and (parts[1] in (*MOTION_UNITS, "vibration") or parts[0] == "other")
+    )
+
+
+def _sources(rows: Sequence[Row]) -> tuple[Source, ...]:
+    ids: dict[str, list[str]] = {}
+    for row in rows:
+        if row.evidence and row.declared is not None and row.is_independent:
+            ids.setdefault(row.evidence, []).append(row.id)
+    return tuple(Source(text, tuple(named)) for text, named in ids.items())
+
+
+def _evidence(found: MissionFindings) -> Iterator[Evidence]:
+    for verdict in found.verdicts or ():
+        limit, *numbers = (verification.limit(verdict), *verification.numbers(verdict))
+        refocused = verification.refocused_cells(verdict) if verdict.verdict_autofocus else ()
+        reasons = tuple(reason for reason in (verdict.reason, verdict.reason_autofocus) if reason)
+        budget, full, exact, image = numbers
+        yield Evidence(verdict.id, limit, budget, full, exact, image, verdict.verdict, refocused, reasons)

@@ -1,0 +1,194 @@
+"""The compliance report in a real browser: layout at two widths, dark and light, on paper, and what axe-core says.
+
+Skipped where no Chromium or no driver for it is installed; CI installs both.
+"""
+
+import re
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from bisar_budget.budget.findings import Report, UnusableMission
+from bisar_budget.report import Style, render
+from tests.conftest import ROOT, findings
+from tests.unit.test_report_compliance import EVERY_KEY, FAULT, SECTION_V, found_in, illustrated
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+if CHROMIUM is None:
+    pytest.skip("no Chromium is installed", allow_module_level=True)
+playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe-playwright-python is not installed")
+
+FLAGS = [
+    "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
+    "--disable-component-update", "--disable-sync", "--no-sandbox",
+]  # fmt: skip
+WIDTHS = (1280, 390)
+SCHEMES = ("light", "dark")
+LONG = "a-name-that-has-no-place-to-break-" * 4
+REPORTS: dict[str, Callable[[], Report]] = {
+    "section_v": lambda: Report("1.2.3", (found_in(SECTION_V),)),
+    "images": lambda: Report("1.2.3", (illustrated(),)),
+    "everything": lambda: Report(
+        "1.2.3",
+        (
+            found_in(EVERY_KEY, "strictest"),
+            UnusableMission(file=f"{LONG}.yaml", faults=(FAULT,)),
+            findings(name=LONG, other_errors=[{"name": LONG, "quadratic_phase_error": 0.3}]),
+            found_in(ROOT / "tests" / "acceptance" / "good" / "waived.yaml"),
+            findings(),
+        ),
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator["playwright.Browser"]:
+    with playwright.sync_playwright() as driver:
+        chromium = driver.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    folder = tmp_path_factory.mktemp("reports")
+    written = {}
+    for name, report in REPORTS.items():
+        written[name] = folder / f"{name}.html"
+        written[name].write_text(render("html", report(), Style()), encoding="utf-8")
+    return written
+
+
+@pytest.fixture
+def show(browser, files) -> Iterator[Callable[..., "playwright.Page"]]:
+    """Open a report; anything that it asks for beyond itself, and any complaint of the browser, fails the test."""
+    contexts = []
+
+    def opened(name: str, width: int = 1280, scheme: str = "light") -> "playwright.Page":
+        context = browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme)
+        contexts.append(context)
+        page = context.new_page()
+        requests, complaints = [], []
+        page.on("request", lambda request: requests.append(request.url))
+        page.on("console", lambda message: complaints.append(message.text))
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.goto(files[name].as_uri())
+        assert [url for url in requests if not url.startswith(("file:", "data:"))] == []
+        assert len([url for url in requests if url.startswith("file:")]) == 1
+        assert complaints == []
+        return page
+
+    yield opened
+    for context in contexts:
+        context.close()
+
+
+@pytest.mark.parametrize(
+    ("name", "width", "scheme"),
+    [
+        *(("section_v", width, scheme) for width in WIDTHS for scheme in SCHEMES),
+        ("images", 390, "light"),
+        ("everything", 390, "dark"),
+    ],
+)
+def test_axe_finds_nothing_serious(show, name: str, width: int, scheme: str) -> None:
+    results = axe.Axe().run(show(name, width, scheme))
+    serious = [
+        (found["id"], found["impact"], [node["html"][:200] for node in found["nodes"][:3]])
+        for found in results.response["violations"]
+        if found["impact"] in ("serious", "critical")
+    ]
+    assert serious == []
+    checked = {found["id"] for found in results.response["passes"]}
+    assert {"color-contrast", "heading-order", "image-alt", "document-title", "html-has-lang"} <= checked | {
+        "image-alt"
+    }
+
+
+@pytest.mark.parametrize("width", [*WIDTHS, 320])
+@pytest.mark.parametrize("name", REPORTS)
+def test_nothing_overflows_the_page(show, name: str, width: int) -> None:
+    """What is wider scrolls in a container that the keyboard reaches; no text is cut."""
+    page = show(name, width)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    beyond = page.evaluate(
+        """width => [...document.querySelectorAll("body *")]
+            .filter(e => e.getBoundingClientRect().right > width + 1 && !e.closest(".scroll"))
+            .map(e => e.tagName + "." + e.className)""",
+        width,
+    )
+    assert beyond == []
+    unreachable = page.evaluate(
+        """[...document.querySelectorAll("body *")]
+            .filter(e => e.scrollWidth > e.clientWidth + 1 && getComputedStyle(e).overflowX === "auto")
+            .filter(e => e.tabIndex !== 0 || !e.getAttribute("aria-label")).length"""
+    )
+    assert unreachable == 0
+
+
+def test_dark_is_dark_and_light_is_light(show) -> None:
+    brightness = {}
+    for scheme in SCHEMES:
+        color = show("section_v", scheme=scheme).evaluate("getComputedStyle(document.body).backgroundColor")
+        brightness[scheme] = sum(map(int, re.findall(r"\d+", color)[:3])) / 3
+    assert brightness["light"] > 240
+    assert brightness["dark"] < 40
+
+
+@pytest.mark.parametrize("name", REPORTS)
+def test_mathml_has_height(show, name: str) -> None:
+    sizes = show(name).evaluate(
+        """[...document.querySelectorAll("math")].map(e => {
+            const box = e.getBoundingClientRect(); return [box.width, box.height, e.textContent]})"""
+    )
+    assert len(sizes) > 20
+    assert [text for width, height, text in sizes if width < 5 or height < 8] == []
+    fractions = show(name).evaluate(
+        """[...document.querySelectorAll("mfrac")].map(e => {
+            const [top, bottom] = [...e.children].map(c => c.getBoundingClientRect());
+            return bottom.top - top.bottom})"""
+    )
+    assert min(fractions) > -1  # the denominator stands below
+
+
+@pytest.mark.parametrize("name", REPORTS)
+def test_every_link_leads_to_something_that_is_seen(show, name: str) -> None:
+    page = show(name)
+    targets = page.evaluate(
+        """[...document.querySelectorAll("a")].map(a => {
+            const target = document.getElementById(decodeURIComponent(a.hash.slice(1)));
+            return [a.getAttribute("href"), target ? target.getBoundingClientRect().height : -1]})"""
+    )
+    assert targets
+    assert [href for href, height in targets if not href.startswith("#") or height <= 0] == []
+
+
+def test_drawings_and_images_are_seen(show) -> None:
+    sizes = show("images").evaluate(
+        """[...document.querySelectorAll("figure svg, img")].map(e => {
+            const box = e.getBoundingClientRect(); return [e.tagName, box.width, box.height, e.naturalWidth]})"""
+    )
+    assert len(sizes) == 2 + 3 + 1
+    assert all(width > 50 and height > 50 for _, width, height, _ in sizes)
+    assert all(natural == 2 for tag, _, _, natural in sizes if tag == "IMG")
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("name", REPORTS)
+def test_prints_to_a4_in_light_colours(show, name: str, scheme: str) -> None:
+    page = show(name, scheme=scheme)
+    pdf = page.pdf(prefer_css_page_size=True)
+    boxes = {tuple(map(float, box.split())) for box in re.findall(rb"/MediaBox\s*\[([^\]]*)\]", pdf)}
+    (box,) = boxes
+    # 210 mm × 297 mm in points, rounded by the browser to pixels of 0.75 pt.
+    assert box[2] - box[0] == pytest.approx(595.28, abs=0.8)
+    assert box[3] - box[1] == pytest.approx(841.89, abs=0.8)
+    page.emulate_media(media="print")
+    page.set_viewport_size({"width": 688, "height": 1000})  # 182 mm between the margins
+    assert page.evaluate("document.documentElement.scrollWidth") <= 690
+    color = page.evaluate("getComputedStyle(document.body).color")
+    assert sum(map(int, re.findall(r"\d+", color)[:3])) < 200
+    assert page.evaluate("getComputedStyle(document.querySelector('thead')).display") == "table-header-group"

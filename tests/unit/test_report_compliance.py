@@ -1,0 +1,524 @@
+"""The compliance report: what it says, that it is the same every time, and that no name does anything to it."""
+
+import hashlib
+import math
+import os
+import re
+import subprocess
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+import yaml
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from markdown_it import MarkdownIt
+
+from bisar_budget.budget.check import check_mission
+from bisar_budget.budget.findings import MissionFindings, Option, Report, UnusableMission
+from bisar_budget.budget.image_evidence import ImageEvidence, PointImage
+from bisar_budget.budget.monte_carlo import monte_carlo
+from bisar_budget.budget.verdicts import Verdict
+from bisar_budget.errors import Fault, MissionError, printable
+from bisar_budget.mission.load import load_mission
+from bisar_budget.report import Style, pictures, render
+from bisar_budget.report.compliance import compliance
+from tests.conftest import ROOT, TODAY, findings, mission_text
+from tests.page import Element, read_page
+
+SECTION_V = ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml"
+WITH_AUTOFOCUS = ROOT / "specs" / "missions" / "rigling_moses_section_v_autofocus.yaml"
+EVERY_KEY = ROOT / "tests" / "acceptance" / "good" / "every_key.yaml"
+FAULT = Fault(line=3, column=7, key="radar.bandwidth", problem="is missing")
+LANGUAGES = ("html", "markdown")
+
+
+def found_in(path: Path, model: str | None = None) -> MissionFindings:
+    return check_mission(load_mission(str(path), model), TODAY)
+
+
+def report(*missions, **fields) -> Report:
+    return Report(version="1.2.3", missions=missions or (found_in(SECTION_V),), **fields)
+
+
+def html(*missions, **fields) -> Element:
+    return read_page(render("html", report(*missions, **fields), Style()))
+
+
+def markdown(*missions, style: Style | None = None, **fields) -> str:
+    return render("markdown", report(*missions, **fields), style or Style())
+
+
+def as_page(text: str) -> Element:
+    """Markdown as CommonMark has it, with GitHub's tables, as a page."""
+    return read_page(MarkdownIt("commonmark").enable(["table", "strikethrough"]).render(text).replace(" />", ">"))
+
+
+def page_of(language: str, *missions, **fields) -> Element:
+    return html(*missions, **fields) if language == "html" else as_page(markdown(*missions, **fields))
+
+
+def squeezed(text: str) -> str:
+    return " ".join(text.split())
+
+
+def table_with(page: Element, *heads: str) -> list[list[str]]:
+    """Rows of the table whose head holds these words, in lower case."""
+    for table in page.all("table"):
+        head, *rows = list(table.all("tr"))
+        named = [squeezed(cell.text).lower() for cell in head.all("th")]
+        if all(word in named for word in heads):
+            return [[squeezed(cell.text) for cell in row.all("th", "td")] for row in rows]
+    raise AssertionError(heads)
+
+
+# Of a row and an image that nobody needs to form: the report shows what it is given.
+VERDICT = Verdict(
+    id="transmitter.acceleration.x", model="published", boundary_error=4.244e-4, unit="m/s^2", budget_rad=0.3927,
+    full_qpe_rad=0.393, predicted_qpe_rad=0.394, measured_qpe_rad=0.395, verdict="confirmed",
+    boundary_autofocus=6.79e-3, measured_residual_qpe_rad=0.012, refocused_loss_db=-0.01,
+    verdict_autofocus="confirmed", reason="a reason of its own",
+)  # fmt: skip
+IMAGE = PointImage(
+    columns=2, rows=3, chip=bytes(range(6)), pixel_m=(0.5, 0.25), thinned=1, step_m=0.1,
+    cut_db=(-40.0, -3.0, 0.0, -3.0, -40.0), error_free_db=(-50.0, -4.0, 0.0, -4.0, -50.0),
+)  # fmt: skip
+
+
+def illustrated() -> MissionFindings:
+    found = found_in(WITH_AUTOFOCUS)
+    evidence = ImageEvidence(found.file, VERDICT, 0.39, IMAGE, IMAGE, IMAGE)
+    return found._replace(verdicts=(VERDICT,), image_evidence=(evidence,))
+
+
+class TestView:
+    @pytest.mark.parametrize("model", ["published", "full", "strictest"])
+    @pytest.mark.parametrize("path", sorted((ROOT / "specs" / "missions").glob("*.yaml")), ids=lambda path: path.stem)
+    def test_every_row_stands_once_with_its_numbers(self, path: Path, model: str) -> None:
+        found = found_in(path, model)
+        (page,) = compliance(report(found), Style()).missions
+        shown = {row.id: row for row in page.matrix}
+        silent = {row.id for row in page.undeclared}
+        assert len(page.matrix) + len(page.undeclared) == len(found.rows)
+        assert {row.id for row in found.rows} == shown.keys() | silent
+        for row in found.rows:
+            if row.id in silent:
+                assert row.status == "not_declared"
+                continue
+            line = shown[row.id]
+            assert (line.status, line.line) == (row.status, row.line)
+            if row.allowable is not None and row.status != "not_evaluated":
+                assert line.use == row.utilization
+            if row.margin is not None and abs(row.margin) < 1e4:
+                percent = float(line.margin.replace("−", "-").removesuffix(" %"))
+                # Three digits, rounded down.
+                size = abs(100 * row.margin)
+                assert 100 * row.margin - max(0.01 * size, 1e-9) <= percent <= 100 * row.margin + 1e-9 * size
+        assert [d.id for d in page.derivations] == [row.id for row in page.matrix]
+
+    def test_the_rows_that_drive_the_verdict_are_the_worst(self) -> None:
+        (page,) = compliance(report(found_in(EVERY_KEY)), Style()).missions
+        assert [d.id.split(".")[1] for d in page.drivers] == ["acceleration"] * 3
+        assert page.drivers[0].id == "receiver.acceleration.line_of_sight"
+        assert page.drivers[0].use >= page.drivers[1].use >= page.drivers[2].use > 1
+
+    def test_a_row_that_uses_nothing_drives_nothing(self) -> None:
+        (page,) = compliance(report(), Style()).missions
+        assert [d.id for d in page.drivers] == ["transmitter.acceleration.x"]
+
+    def test_contributions_are_sorted_and_counted_once(self) -> None:
+        """By hand: Table II row 2 for 150 m/s at 30.594 km gives 0.02277 rad for 5 mm/s, and 5 deg are 0.0873 rad."""
+        found = findings(
+            platforms__transmitter__motion_error={"velocity": "5 mm/s"},
+            other_errors=[{"name": "troposphere", "quadratic_phase_error": "5 deg"}],
+        )
+        (page,) = compliance(report(found), Style()).missions
+        assert [(c.owner, c.kind, c.axis) for c in page.contributions] == [
+            ("mission", "other", "troposphere"),
+            ("transmitter", "velocity", "y"),
+        ]
+        wavelength, R = 299792458 / 10e9, math.hypot(30e3, 6e3)
+        qpe = math.pi * 36 * 150 * 0.005 / (2 * R * wavelength)
+        assert page.contributions[1].part == pytest.approx(qpe / math.radians(5), rel=1e-9)
+        assert page.contributions[1].qpe == f"{1e3 * qpe:.3g} mrad"
+
+    def test_an_error_in_another_frame_contributes_along_its_own_axes(self) -> None:
+        found = findings(platforms__receiver__motion_error={"frame": "track", "velocity": "5 mm/s"})
+        (page,) = compliance(report(found), Style()).missions
+        assert {c.axis for c in page.contributions} <= {"along", "cross", "up"}
+        assert page.contributions
+
+    def test_budget_before_and_after_autofocus(self) -> None:
+        """π/8 per platform; autofocus of 4π multiplies by 16."""
+        (page,) = compliance(report(found_in(WITH_AUTOFOCUS)), Style()).missions
+        transmitter, receiver, clock = page.shares
+        assert (transmitter.before, transmitter.after) == ("393 mrad", "6.28 rad")
+        assert (receiver.start, receiver.part) == (0.5, 0.5)
+        assert clock.part == 0
+        assert page.gain == pytest.approx(16)
+
+    def test_the_method_names_analysis_and_simulation(self) -> None:
+        (page,) = compliance(report(illustrated()), Style()).missions
+        methods = {row.id: row.method for row in page.matrix}
+        assert methods["transmitter.acceleration.x"] == "analysis: Table II row 4; simulation: confirmed"
+        assert methods["transmitter.acceleration.y"] == "analysis: Table II row 5"
+
+    def test_what_the_file_gives_and_what_is_default(self) -> None:
+        (page,) = compliance(report(), Style()).missions
+        origins = {i.name: i.origin for i in page.inputs}
+        assert origins["aperture time"].endswith("rigling_moses_section_v.yaml:17")
+        assert origins["coverage factor"] == "default"
+        assert origins["PSLR"] == "not in the file"
+
+    def test_findings_without_their_mission_are_refused(self) -> None:
+        with pytest.raises(ValueError, match="carry their mission"):
+            compliance(report(found_in(SECTION_V)._replace(mission=None)), Style())
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+class TestBothLanguages:
+    def test_verdict_and_driver(self, language: str) -> None:
+        text = squeezed(page_of(language).text)
+        assert "Does not comply" in text
+        assert "1178 % of it used" in text
+        assert "passes with autofocus from n_pull 2.95" in text
+
+    def test_matrix(self, language: str) -> None:
+        rows = table_with(page_of(language), "id", "requirement", "verified by", "margin", "waiver", "line")
+        worst = rows[0]
+        assert worst[0] == "transmitter.acceleration.x"
+        assert {"QPE ≤ 393 mrad, 0.5 of the budget", "analysis: Table II row 4"} <= set(worst)
+        assert {"424 µm/s²", "5 mm/s²", "fail", "23"} <= set(worst)
+        assert any("1178 %" in cell for cell in worst)
+        assert "−91.6 %" in worst
+
+    def test_waiver(self, language: str) -> None:
+        found = found_in(ROOT / "tests" / "acceptance" / "good" / "waived.yaml")
+        rows = table_with(page_of(language, found), "id", "waiver")
+        waived = next(row for row in rows if "waived" in row)
+        assert "Complies; 1 row waived" in squeezed(page_of(language, found).text)
+        assert any("until 2026-11-21: last day" in cell for cell in waived)
+
+    def test_requirement_id_and_source(self, language: str) -> None:
+        text = squeezed(page_of(language, found_in(EVERY_KEY)).text)
+        assert "SYS-NAV-012" in text
+        assert "INS data sheet, rev. C" in text
+        assert re.search(r"The file names no source for [\w., ]*receiver\.acceleration\.line_of_sight", text)
+
+    def test_sections(self, language: str) -> None:
+        page = page_of(language, illustrated())
+        heads = [squeezed(head.text).lower() for head in page.all("h2", "h3")]
+        for section in (
+            "verdict", "compliance matrix", "geometry", "allocation", "where the quadratic phase error comes from",
+            "assumptions and validity", "sources", "image evidence", "formulas, with the numbers put in",
+            "how this report was made", "approval",
+        ):  # fmt: skip
+            assert section in heads
+
+    def test_image_evidence(self, language: str) -> None:
+        page = page_of(language, illustrated())
+        row = table_with(page, "id", "limit", "exact ranges", "image", "verdict")[0]
+        assert row == ["transmitter.acceleration.x", "424 µm/s²", "0.393", "0.393", "0.394", "0.395", "confirmed"]
+        refocused = table_with(page, "id", "limit", "residual", "peak loss")[0]
+        assert refocused[1:4] == ["6.79 mm/s²", "0.393", "0.012"]
+        assert "a reason of its own" in squeezed(page.text)
+
+    def test_monte_carlo(self, language: str) -> None:
+        path = ROOT / "specs" / "missions" / "drones_same_gnss.yaml"
+        drawn = monte_carlo(load_mission(str(path)), 2000, 1)
+        page = page_of(language, found_in(path)._replace(monte_carlo=drawn))
+        rows = {row[0]: row for row in table_with(page, "requirement", "limit", "sum", "rss", "sigma")}
+        location = next(one for one in drawn.requirements if one.id == "mission.location_error")
+        shown = rows["mission.location_error"]
+        assert shown[1] == "2 m"
+        assert float(re.search(r"holds in ([\d.]+) %", shown[-1])[1]) == pytest.approx(
+            100 * location.probability, abs=0.1
+        )
+        assert "2,000 draws, seed 1" in squeezed(page.text)
+        assert "both platforms" in [row[0] for row in table_with(page, "owner", "kind", "axis or term")]
+
+    def test_without_verification_there_is_no_such_section(self, language: str) -> None:
+        assert "image evidence" not in page_of(language).text.lower()
+
+    def test_formulas_have_their_row_and_their_numbers(self, language: str) -> None:
+        text = squeezed(page_of(language).text)
+        assert "Table II row 4" in text
+        assert "4.62648" in text
+        assert "(11), bistatic look direction" in text
+
+    def test_an_unusable_file_appears_with_its_faults(self, language: str) -> None:
+        bad = UnusableMission(file="a.yaml", faults=(FAULT,), data=b"x")
+        page = page_of(language, bad, found_in(SECTION_V))
+        text = squeezed(page.text)
+        assert "radar.bandwidth: is missing" in text
+        assert "3:7" in text
+        assert hashlib.sha256(b"x").hexdigest() in text
+        summary = table_with(page, "mission", "file", "status", "worst row")
+        assert [row[2] for row in summary] == ["unusable", "fail"]
+
+    def test_a_file_that_cannot_be_read_has_no_digest(self, language: str) -> None:
+        text = page_of(language, UnusableMission(file="a.yaml", faults=(FAULT,))).text
+        assert "not read" in text
+
+    def test_nothing_declared_is_no_compliance(self, language: str) -> None:
+        text = squeezed(page_of(language, findings()).text)
+        assert "Nothing was judged" in text
+        assert "Complies" not in text
+
+    def test_the_same_mission_twice(self, language: str) -> None:
+        page = page_of(language, found_in(SECTION_V), found_in(SECTION_V))
+        ids = [e.attributes["id"] for e in page.all() if "id" in e.attributes]
+        assert len(ids) == len(set(ids))
+
+    def test_options_stand_with_their_origin(self, language: str) -> None:
+        options = (Option("--model", "full", "environment, BISAR_BUDGET_MODEL"),)
+        rows = table_with(page_of(language, options=options), "option", "value", "from")
+        assert rows == [["--model", "full", "environment, BISAR_BUDGET_MODEL"]]
+
+
+class TestHtml:
+    def test_is_one_file_without_script(self) -> None:
+        text = render("html", report(illustrated()), Style())
+        assert "<script" not in text
+        assert not re.search(r"(?i)@import|url\(|javascript:| on\w+=", text)
+        page = read_page(text)
+        for element in page.all():
+            for name in ("src", "href", "data", "action", "poster", "srcset"):
+                link = element.attributes.get(name, "#")
+                assert link.startswith(("#", "data:image/png;base64,")), link
+
+    def test_structure(self) -> None:
+        page = html(illustrated(), UnusableMission(file="a.yaml", faults=(FAULT,)), findings())
+        assert len(list(page.all("h1"))) == 1
+        levels = [int(head.tag[1]) for head in page.all("h1", "h2", "h3", "h4", "h5", "h6")]
+        assert all(after <= before + 1 for before, after in pairwise(levels))
+        ids = [element.attributes["id"] for element in page.all() if "id" in element.attributes]
+        assert len(ids) == len(set(ids))
+        for element in page.all():
+            for name in ("aria-labelledby", "aria-describedby"):
+                assert element.attributes.get(name, ids[0]) in ids
+        targets = [link.attributes["href"].removeprefix("#") for link in page.all("a")]
+        assert targets
+        assert set(targets) <= set(ids)
+        for table in page.all("table"):
+            assert list(table.all("caption"))
+            assert all("scope" in head.attributes for head in table.all("th"))
+        for image in page.all("img"):
+            assert image.attributes["alt"]
+
+    def test_mathml_is_that_of_the_derivation(self) -> None:
+        from bisar_budget.theory import published
+        from bisar_budget.theory.render import as_mathml_content
+
+        formula = as_mathml_content(published.table_2().rows[3].cells[0])
+        assert formula in render("html", report(), Style())
+
+    def test_bars_have_the_length_of_the_utilization(self) -> None:
+        found = found_in(WITH_AUTOFOCUS)
+        use = next(row for row in found.rows if row.id == "transmitter.acceleration.x").utilization
+        row = next(row for row in html(found).all("tr") if "transmitter.acceleration.x" in row.text)
+        fill = next(rect for rect in row.all("rect") if rect.has_class("fill"))
+        limit = next(path for path in row.all("path") if path.has_class("limit"))
+        at_limit = float(re.match(r"M(\d+)", limit.attributes["d"])[1])
+        assert float(fill.attributes["width"]) == pytest.approx(at_limit * use, abs=0.01)
+
+    def test_stacked_bars_say_what_they_show(self) -> None:
+        bars = [e for e in html(found_in(WITH_AUTOFOCUS)).all("div") if e.has_class("stack")]
+        assert [bar.attributes["aria-label"] for bar in bars] == [
+            "Before autofocus: transmitter 393 mrad, receiver 393 mrad",
+            "With autofocus: transmitter 6.28 rad, receiver 6.28 rad",
+        ]
+        widths = [span.attributes["style"] for bar in bars for span in bar.all("span")]
+        assert widths == ["width:3.125%"] * 2 + ["width:50.000%"] * 2
+
+
+class TestMarkdown:
+    def test_without_a_folder_there_are_no_images(self) -> None:
+        text = markdown(illustrated())
+        assert "![" not in text
+        assert "<img" not in text
+        assert pictures("markdown", report(illustrated()), Style()) == {}
+
+    def test_with_a_folder_every_image_is_there_and_every_file_is_shown(self) -> None:
+        style = Style(assets="my report.assets")
+        named = report(illustrated(), UnusableMission(file="a.yaml", faults=(FAULT,)), found_in(SECTION_V))
+        text = render("markdown", named, style)
+        shown = {image.attributes["src"] for image in as_page(text).all("img")}
+        shown |= set(re.findall(r'<img src="([^"]+)"', text))
+        files = pictures("markdown", named, style)
+        assert shown == {f"my%20report.assets/{name}" for name in files}
+        assert {name for name in files if name.startswith("3-")} == {"3-plan.svg", "3-elevation.svg"}
+        assert files["1-chip-1-after.png"].startswith(b"\x89PNG")
+        assert all(content.startswith(b"<svg") for name, content in files.items() if name.endswith(".svg"))
+
+    def test_formulas_are_blocks_that_github_typesets(self) -> None:
+        blocks = re.findall(r"(?ms)^```math\n(.*?)\n```$", markdown())
+        assert len(blocks) > 20
+        for block in blocks:
+            assert "```" not in block
+            assert block.count(r"\begin") == block.count(r"\end")
+
+    def test_can_be_read_as_it_is(self) -> None:
+        assert not re.search(r"&#?\w+;", markdown())
+
+    def test_tables_have_one_width(self) -> None:
+        lines = markdown(found_in(EVERY_KEY)).splitlines()
+        for before, line in pairwise(lines):
+            if before.startswith("|") and line.startswith("|"):
+                assert before.count("|") == line.count("|"), line
+
+
+# What could close a tag, end a cell, start markup, or turn the reading direction.
+NASTY = st.text(
+    st.sampled_from("ab1 <>&\"'`|*_[]()#~$\\{}:;@!-+=.^/%,\u202e\u2066\u200b\u00a0\t\nß") | st.characters(),
+    min_size=1,
+    max_size=25,
+)
+
+
+def nasty_findings(name: str, source: str) -> MissionFindings:
+    """A mission with such texts wherever the file has text of its own."""
+    try:
+        return findings(
+            name=name,
+            platforms__transmitter__motion_error={"velocity": [0, "2 m/s", 0], "source": source},
+            other_errors=[{"name": name, "quadratic_phase_error": 0.1, "source": source}],
+            requirement_ids={"transmitter.velocity.y": source},
+            waivers=[{"id": "transmitter.velocity.y", "until": "2027-01-01", "reason": source}],
+        )
+    except (MissionError, yaml.YAMLError):
+        assume(False)
+        raise
+
+
+PLAIN_TAGS = {}
+
+
+class TestNoNameDoesAnything:
+    @settings(max_examples=40)
+    @given(NASTY, NASTY)
+    def test_html(self, name: str, source: str) -> None:
+        found = nasty_findings(name, source)._replace(file=name)
+        text = render("html", report(found), Style())
+        assert not re.search("[\u202a-\u202e\u2066-\u2069\x00-\x08\x0b-\x1f]", text)
+        page = read_page(text)
+        tags = [element.tag for element in page.all() if element.tag != "wbr"]
+        PLAIN_TAGS.setdefault("html", tags)
+        assert tags == PLAIN_TAGS["html"]
+        heading = next(head for head in page.all("h2") if head.attributes["id"] == "m1-h")
+        assert heading.text == printable(found.name)
+
+    @settings(max_examples=40)
+    @given(NASTY, NASTY)
+    def test_markdown(self, name: str, source: str) -> None:
+        found = nasty_findings(name, source)._replace(file=name)
+        text = markdown(found)
+        page = as_page(text)
+        tags = [element.tag for element in page.all()]
+        PLAIN_TAGS.setdefault("markdown", tags)
+        assert tags == PLAIN_TAGS["markdown"]
+        heading = next(head for head in page.all("h2") if head.text.startswith("Mission:"))
+        assert squeezed(heading.text) == squeezed(f"Mission: {printable(found.name)}")
+        cell = next(row for row in table_with(page, "id", "waiver") if row[0].startswith("transmitter.velocity.y"))
+        # Markdown takes spaces at the ends of a cell and of a line.
+        own_id = next(row.requirement_id for row in found.rows if row.id == "transmitter.velocity.y")
+        assert "".join(cell[0].split()) == "".join(f"transmitter.velocity.y({printable(own_id)})".split())
+
+    def test_the_names_of_the_issue(self) -> None:
+        for name in ("<script>alert(1)</script>", "a | b", "`code`", "[x](y)", "$x$", "**b**", "__b__"):
+            found = findings(name=name)
+            assert f'<h2 id="m1-h">{name}' not in render("html", report(found), Style()) or "<" not in name
+            head = next(h for h in as_page(markdown(found)).all("h2") if h.text.startswith("Mission:"))
+            assert head.text == f"Mission: {printable(name)}"
+            assert not list(head.all())
+
+
+class TestCommand:
+    @pytest.fixture
+    def mission(self, tmp_path, monkeypatch) -> Path:
+        (tmp_path / "m.yaml").write_text(mission_text(), encoding="utf-8")
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.delenv("SOURCE_DATE_EPOCH", raising=False)
+        return tmp_path
+
+    def test_all_suffixes_in_one_run(self, run, mission) -> None:
+        names = ("a.html", "b.htm", "out/c.md", "d.markdown")
+        assert run("check", "m.yaml", *(part for name in names for part in ("--report", name))).exit_code == 0
+        assert Path("a.html").read_bytes() == Path("b.htm").read_bytes()
+        assert Path("a.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+        assert sorted(os.listdir("out")) == ["c.assets", "c.md"]
+        assert sorted(os.listdir("out/c.assets")) == ["1-elevation.svg", "1-plan.svg"]
+        assert "](c.assets/1-plan.svg)" in Path("out/c.md").read_text(encoding="utf-8")
+        assert sorted(os.listdir(".")) == ["a.html", "b.htm", "d.assets", "d.markdown", "m.yaml", "out"]
+
+    def test_the_same_bytes_by_either_option_and_in_any_process(self, run, mission) -> None:
+        run("check", "m.yaml", "--report", "a.html", "--report", "a.md")
+        first = Path("a.html").read_bytes()
+        for seed in ("1", "2"):
+            subprocess.run(
+                [sys.executable, "-m", "bisar_budget", "check", "m.yaml", "--format", "html", "-o", "b.html"],
+                env={**os.environ, "PYTHONHASHSEED": seed, "PYTHONPATH": str(ROOT)},
+                check=True,
+            )
+            assert Path("b.html").read_bytes() == first
+        text = Path("a.md").read_bytes()
+        run("check", "m.yaml", "--format", "markdown", "-o", "a.md")
+        assert Path("a.md").read_bytes() == text
+
+    @pytest.mark.parametrize("language", LANGUAGES)
+    def test_markdown_and_html_to_standard_output(self, run, mission, language) -> None:
+        result = run("check", "m.yaml", "--format", language)
+        assert result.exit_code == 0
+        assert "1-plan.svg" not in result.stdout
+        assert os.listdir(".") == ["m.yaml"]
+
+    def test_a_special_file_gets_no_folder(self, run, mission) -> None:
+        result = run("check", "m.yaml", "--format", "markdown", "-o", os.devnull)
+        assert result.exit_code == 0
+        assert os.listdir(".") == ["m.yaml"]
+
+    def test_a_report_that_cannot_have_its_pictures_is_not_written(self, run, mission) -> None:
+        Path("r.md").write_text("before")
+        Path("r.assets").write_text("in the way")
+        result = run("check", "m.yaml", "--report", "r.md")
+        assert result.exit_code == 2
+        assert "cannot write r.assets" in result.stderr
+        assert Path("r.md").read_text() == "before"
+
+    @pytest.mark.parametrize("content", [b"\xef\xbb\xbf", b"", b"# caf\xc3\xa9\r\n"])
+    def test_the_digest_is_of_the_bytes_read(self, run, mission, content) -> None:
+        data = content + mission_text().encode().replace(b"\n", b"\r\n")
+        Path("m.yaml").write_bytes(data)
+        digest = hashlib.sha256(data).hexdigest()
+        assert digest in run("check", "m.yaml", "--format", "html").stdout
+        assert digest in run("check", "-", "--format", "markdown", input=data).stdout
+
+    def test_an_unusable_file_has_its_digest_and_exits_with_2(self, run, mission) -> None:
+        Path("m.yaml").write_bytes(b"nonsense: [")
+        for language in LANGUAGES:
+            result = run("check", "m.yaml", "--format", language)
+            assert result.exit_code == 2
+            assert hashlib.sha256(b"nonsense: [").hexdigest() in result.stdout
+
+    def options(self, run, *arguments: str, **more) -> dict[str, tuple[str, str]]:
+        page = read_page(run("check", "m.yaml", "--format", "html", *arguments, **more).stdout)
+        return {name: (value, origin) for name, value, origin in table_with(page, "option", "value", "from")}
+
+    def test_each_option_says_where_it_came_from(self, run, mission) -> None:
+        Path("pyproject.toml").write_text("[tool.bisar-budget]\nstrict = true\nmodel = 'full'\n")
+        found = self.options(run, "--exit-zero", env={"BISAR_BUDGET_MODEL": "strictest"})
+        assert found["--strict"] == ("yes", "pyproject.toml")
+        assert found["--exit-zero"] == ("yes", "command line")
+        assert found["--model"] == ("strictest", "environment, BISAR_BUDGET_MODEL")
+        assert found["--verify"] == ("no", "default")
+        assert found["--date"][1] == "default"
+
+    def test_no_date_unless_somebody_gives_it(self, run, mission) -> None:
+        from datetime import UTC, datetime
+
+        without = run("check", "m.yaml", "--format", "html").stdout
+        assert str(datetime.now(UTC).year) not in without.replace("m.yaml", "")
+        assert self.options(run, "--date", "2026-11-21")["--date"] == ("2026-11-21", "command line")
+        epoch = self.options(run, env={"SOURCE_DATE_EPOCH": "1795219200"})["--date"]
+        assert epoch == ("2026-11-21", "environment, SOURCE_DATE_EPOCH")

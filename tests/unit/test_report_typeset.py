@@ -1,0 +1,134 @@
+"""Formulas of a report as MathML and LaTeX: read back, the numbers put in give the result."""
+
+import math
+import re
+from xml.etree import ElementTree
+
+import pytest
+
+from bisar_budget.budget.check import check_mission
+from bisar_budget.catalogue import FORMULAS, SYMBOLS
+from bisar_budget.mission.load import load_mission
+from bisar_budget.report import typeset
+from bisar_budget.report.explanation import chain, collection_chain
+from bisar_budget.report.formulas import Equation
+from tests.conftest import TODAY
+from tests.unit.test_report_explanation import MISSIONS
+
+
+def derived_equations(model: str = "published") -> list[tuple[str, Equation]]:
+    found = []
+    for path in MISSIONS:
+        mission = load_mission(str(path), model)
+        findings = check_mission(mission, TODAY)
+        chains = {row.id: chain(mission, findings, row) for row in findings.rows}
+        for name, steps in (("collection", collection_chain(findings)), *chains.items()):
+            found += [
+                (f"{path.stem} {name}", part)
+                for step in steps
+                for part in step.parts
+                if isinstance(part, Equation) and typeset.is_derived(part)
+            ]
+    return found
+
+
+def python_of_mathml(node: ElementTree.Element) -> str:
+    """Presentation MathML, as far as the catalogue uses it, as an expression of Python."""
+    children = [python_of_mathml(child) for child in node]
+    match node.tag:
+        case "mn" | "mi":
+            return {"π": "pi"}.get(node.text or "", node.text or "")
+        case "mo":
+            return {"·": "*", "−": "-"}.get(node.text or "", node.text or "")
+        case "mrow" | "math":
+            inner = "".join(children)
+            if inner.startswith("|") and inner.endswith("|"):
+                return f"abs({inner[1:-1]})"
+            is_fenced = len(node) > 1 and (node[0].text, node[-1].text) == ("(", ")")
+            return f"({inner})" if node.tag == "mrow" and not is_fenced else inner
+        case "mfrac":
+            return f"(({children[0]})/({children[1]}))"
+        case "msup":
+            return f"(({children[0]})**({children[1]}))"
+        case "msqrt":
+            return f"sqrt({''.join(children)})"
+    raise AssertionError(node.tag)
+
+
+def python_of_latex(text: str) -> str:
+    text = text.replace(r"\operatorname{atan2}", "atan2")
+    text = text.replace(r"\left\lvert", "abs(").replace(r"\right\rvert", ")").replace(r"\left(", "(")
+    text = text.replace(r"\right)", ")").replace(r"\cdot", "*").replace(r"\pi", "pi")
+    while True:
+        innermost = re.search(
+            r"\\frac\{([^{}]*)\}\{([^{}]*)\}|\\sqrt\{([^{}]*)\}|\^\{([^{}]*)\}|\\(sin|cos)\{([^{}]*)\}", text
+        )
+        if innermost is None:
+            return text
+        top, bottom, root, power, function, argument = innermost.groups()
+        new = f"sqrt({root})" if root is not None else f"**({power})"
+        new = new if function is None else f"{function}({argument})"
+        new = new if top is None else f"(({top})/({bottom}))"
+        text = text[: innermost.start()] + new + text[innermost.end() :]
+
+
+def value_of(expression: str) -> float:
+    functions = {name: getattr(math, name) for name in ("sqrt", "sin", "cos", "atan2")}
+    return float(eval(expression, {"__builtins__": {}}, {"pi": math.pi, "abs": abs, **functions}))
+
+
+KNOWN = ("π", "sin", "cos", "atan2")
+# The collection, Table I, Table II, the clock, vibration, autofocus.
+EQUATIONS = derived_equations()
+
+
+def test_every_kind_of_formula_is_there() -> None:
+    formulas = " ".join({equation.formula for _, equation in EQUATIONS})
+    assert len({equation.formula for _, equation in EQUATIONS}) > 40
+    for part in ("atan2", "-v_xt/R_t", "ã_xt", "ṽ_yr", "p̃_zt", "t̃_2", "PSLR", "ISLR", "N_pull"):
+        assert part in formulas
+
+
+def test_numbers_in_mathml_give_the_result() -> None:
+    """Six digits are put in and shown."""
+    for name, equation in EQUATIONS:
+        root = ElementTree.fromstring(f"<p>{typeset.as_mathml(equation).numbers}</p>")
+        (equals, numbers), (equals_again, result) = (element[0] for element in root)
+        assert [equals.text, equals_again.text] == ["=", "="], name
+        assert not [symbol.text for symbol in numbers.iter("mi") if symbol.text not in KNOWN], name
+        shown = python_of_mathml(result[0])
+        want = pytest.approx(equation.result, rel=2e-5, abs=1e-300)
+        assert value_of(python_of_mathml(numbers)) == want, (name, equation)
+        assert value_of(shown) == want, name
+
+
+def test_numbers_in_latex_give_the_result() -> None:
+    for name, equation in EQUATIONS:
+        _, numbers, result = typeset.as_latex(equation).numbers.split("= ")
+        want = pytest.approx(equation.result, rel=2e-5, abs=1e-300)
+        assert value_of(python_of_latex(numbers)) == want, (name, numbers)
+        assert value_of(python_of_latex(result.partition(r"\,")[0])) == want, name
+
+
+def test_a_small_number_as_base_of_a_power_stands_in_brackets() -> None:
+    formula = "π*T^2*|v_xt*ṽ_xt|/(2*R_t*λ)"
+    values = {"T": 2e-5, "v_xt": -7e3, "ṽ_xt": 1e-3, "R_t": 7e5, "λ": 0.03}
+    equation = Equation("QPE", formula, values, math.pi * 4e-10 * 7 / (2 * 7e5 * 0.03), "rad")
+    root = ElementTree.fromstring(f"<p>{typeset.as_mathml(equation).numbers}</p>")
+    assert value_of(python_of_mathml(root[0][0][1])) == pytest.approx(equation.result, rel=1e-12)
+    numbers = typeset.as_latex(equation).numbers.split("= ")[1]
+    assert value_of(python_of_latex(numbers)) == pytest.approx(equation.result, rel=1e-12)
+
+
+@pytest.mark.parametrize("text", [*FORMULAS, *SYMBOLS])
+def test_the_catalogue_is_well_formed(text: str) -> None:
+    latex, mathml = FORMULAS.get(text) or SYMBOLS[text]
+    ElementTree.fromstring(typeset.math(mathml))
+    assert latex.count("{") == latex.count("}")
+    assert "&" not in mathml
+
+
+def test_atan2_is_no_arctan() -> None:
+    _, mathml = next(value for key, value in FORMULAS.items() if key.startswith("atan2"))
+    assert "<mi>atan2</mi>" in mathml
+    assert "<mo>,</mo>" in mathml
