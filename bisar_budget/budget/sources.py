@@ -75,6 +75,11 @@ class ErrorSource(NamedTuple):
         """Whether it moves platforms, or the clock: what only is a phase displaces nothing."""
         return self.unit != "rad"
 
+    @property
+    def is_position(self) -> bool:
+        """Whether it is an error of a platform's measured path, or of both."""
+        return self.direction != _NOWHERE
+
     def moves(self, platform: str) -> bool:
         """Whether it is an error of a platform's position; one of the mission's own is of both."""
         return self.owner in (platform, "mission")

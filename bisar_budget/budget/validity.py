@@ -1,26 +1,73 @@
-"""Where the first order of the range error ends: the next order in closed form, and collections that strain it.
+"""Where the first order of the range error ends, and exact ranges beside it.
 
 Of two platforms at R_k the range error has −Σ|P⊥(r̃_k − x̂)|²/2R_k in second order, P⊥ being the part across the line
 of sight. Against exact ranges on 500 random collections every row whose second-order phase stays below 2 % or
 0.02 rad agrees with the full model within 2 % or 0.02 rad, and beyond it this phase is the difference
-(`tests/simulate/test_full_model.py`). Derived here.
+(`tests/simulate/test_full_model.py`). A declared error beyond that, or that moves the image by more than 10 m, or
+in a collection whose gradients are nearly parallel or whose lines of sight turn far, gets its phase from exact
+ranges. Derived here.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
+from typing import NamedTuple
 
+from bisar_budget.budget.exact_ranges import ExactPhases, ExactRanges
 from bisar_budget.budget.sources import Effect, ErrorSource, FullGround
-from bisar_budget.geometry import STRAIGHT, BistaticGeometry, dot, norm
+from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
+from bisar_budget.geometry import STRAIGHT, BistaticGeometry, GroundVector, dot, norm
 from bisar_budget.mission.model import Mission
+from bisar_budget.units import format_quantity
 
 FLOOR_RAD = 0.02
 SHARE = 0.02  # of the first-order phase
-_LONG_APERTURE_RAD = 0.1  # half the turn of a line of sight; the quartic term is 1 % of the quadratic there
+FAR_M = 10.0  # of displacement; beyond, 5 % of random geometries are off by more than 0.15 rad
+LONG_APERTURE_RAD = 0.3  # half the turn of a line of sight; beyond, sixth powers show
+_TURNING_RAD = 0.1  # the quartic term is 1 % of the quadratic there
 _NARROW_SINE = 0.2  # between range and Doppler gradient; displacements grow as its inverse
+_COARSE_CELL_RAD = 1.0  # of phase between points a range cell apart; beyond, a response spreads over cells
+_ABSORBED_RAD = 6.1  # of the same, where the image shows half; measured, uniform window, 8 to 300 MHz
+
+
+class Beyond(NamedTuple):
+    """Why an error is beyond first order, and its phases by exact ranges; None where they have no solution."""
+
+    cause: str
+    exact: ExactPhases | None
+
+    @property
+    def qpe(self) -> float:
+        """Quadratic phase by exact ranges, signed; not a number where they have no solution. [rad]"""
+        return math.nan if self.exact is None else self.exact.quadratic
+
+    @property
+    def cubic(self) -> float:
+        """Cubic phase by exact ranges, likewise. [rad]"""
+        return math.nan if self.exact is None else self.exact.cubic
+
+    @property
+    def displacement(self) -> GroundVector:
+        """Displacement by exact ranges, likewise. [m]"""
+        return (math.nan, math.nan) if self.exact is None else self.exact.displacement
+
+    def against(self, qpe_full: float) -> str:
+        """Say the phase of both."""
+        if self.exact is None:
+            return f"beyond first order ({self.cause}): by exact ranges no ground point has this range history"
+        by_both = f"the full model's {qpe_full:.3g} rad is {self.qpe:.3g} rad by exact ranges"
+        return f"beyond first order ({self.cause}): {by_both}"
+
+    def doubt(self, qpe_full: float, limit: float) -> str:
+        """Say that exact ranges fail what first order may pass; else nothing."""
+        if self.exact is None:
+            return self.against(qpe_full)
+        is_over = abs(self.qpe) > limit * (1 + UTILIZATION_TOLERANCE)
+        return f"{self.against(qpe_full)}, {limit:.3g} rad allowed" if is_over else ""
 
 
 class FirstOrder:
-    """The first order of one mission's range error, and what the second adds to it."""
+    """The first order of one mission's range error, and what lies beyond it."""
 
     def __init__(self, mission: Mission, geometry: BistaticGeometry, ground: FullGround) -> None:
         self.geometry, self.ground = geometry, ground
@@ -34,15 +81,55 @@ class FirstOrder:
             math.hypot(a, c) / determinant,
             math.hypot(b, d) / determinant,
         )  # per constant and linear term
+        self._strain = _strain(geometry, self.T)
+        self.found: dict[str, Beyond] = {}  # by row id, of the errors asked about
 
-    def beyond(self, source: ErrorSource) -> float | None:
-        """Quadratic phase of a declared error with the second order, signed; None inside the first. [rad]"""
-        declared, (constant, linear) = source.declared or 0.0, self._moved_by
+    @cached_property
+    def exact(self) -> ExactRanges:
+        """Exact paths, sampled when the first error asks for them."""
+        return ExactRanges(self.geometry, self.wavelength, self.T)
+
+    def beyond(self, source: ErrorSource) -> Beyond | None:
+        """Phases of a declared error by exact ranges; None inside first order, and for no error."""
+        declared = source.declared
+        if not declared:
+            return None
+        cause = self._cause(source, declared)
+        if not cause:
+            return None
+        self.found[source.id] = beyond = Beyond(cause, self.exact.phases([(source, declared)]))
+        return beyond
+
+    def _cause(self, source: ErrorSource, declared: float) -> str:
+        if self._strain and (source.full.qpe or source.is_position):
+            return self._strain
+        constant, linear = self._moved_by
         moves = constant * abs(source.full.constant) + linear * abs(source.full.linear)
         if abs(declared) * (source.power(self.T / 2) + moves) < self._harmless:
-            return None  # a bound on what follows
+            return ""  # a bound on what follows
+        moved = math.hypot(*(self.ground.plane.displacement(source.full, declared) or (0.0, 0.0)))
+        if moved > FAR_M:
+            return f"it moves the image by {moved:.3g} m"
         first, added = source.full.qpe * declared, self.second(source, declared).qpe
-        return None if abs(added) <= max(FLOOR_RAD, SHARE * abs(first)) else first + added
+        return "" if abs(added) <= max(FLOOR_RAD, SHARE * abs(first)) else f"the second order adds {added:.2g} rad"
+
+    def allowable_note(self, source: ErrorSource, allowable: float | None, limit: float) -> str:
+        """Say that an allowable, which has a phase of `limit`, lies beyond first order; else nothing."""
+        if allowable is None or not source.is_motion:
+            return ""
+        constant, linear = self._moved_by
+        moves = constant * abs(source.full.constant) + linear * abs(source.full.linear)
+        if allowable * (abs(source.power(self.T / 2)) + moves) < self._harmless:
+            return ""
+        moved = math.hypot(*(self.ground.plane.displacement(source.full, allowable) or (0.0, 0.0)))
+        if moved <= FAR_M and allowable * abs(source.power(self.T / 2)) <= self._harmless:
+            return ""  # the second order of what stays that near is a constant and a slope
+        # The second order grows with the square of the error.
+        bend = math.sqrt(abs(self.second(source, 1.0).qpe) / max(FLOOR_RAD, SHARE * limit))
+        if allowable * bend <= 1:
+            return ""
+        size, held = (format_quantity(value, source.unit, 2) for value in (allowable, 1 / bend))
+        return f"the allowable of {size} speaks of the first order alone, which holds to about {held}"
 
     def second(self, source: ErrorSource, size: float) -> Effect:
         """What the second order adds to an error of a size: displacement and quadratic phase."""
@@ -65,20 +152,70 @@ class FirstOrder:
         return self.ground.effective(middle, (after - before) / T, quadratic, 0.0)
 
 
-def collection_notes(mission: Mission, geometry: BistaticGeometry) -> Iterator[str]:
+def of_members(
+    found: Mapping[str, Beyond], members: Sequence[ErrorSource], total: float, limit: float | None, unit: str
+) -> tuple[tuple[str, ...], str]:
+    """Notes of an aggregate some of whose members are beyond first order, and its doubt if exact ranges fail it.
+
+    `total` is the aggregate with the members' exact values; of no account where one has none.
+    """
+    names = [source.id for source in members if source.id in found]
+    if not names:
+        return (), ""
+    shown = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
+    if any(beyond.exact is None for beyond in (found.get(source.id) for source in members) if beyond):
+        note = f"holds errors beyond first order ({shown}); by exact ranges one has no image of a point"
+        return (note,), "" if limit is None else note
+    note = f"holds errors beyond first order ({shown}); with exact ranges it is {format_quantity(total, unit)}"
+    if limit is None or total <= limit * (1 + UTILIZATION_TOLERANCE):
+        return (note,), ""
+    return (note,), f"{note}, {format_quantity(limit, unit, 3, 'down')} allowed"
+
+
+def _turn(state_rate: float, aperture_time_s: float) -> float:
+    """Half of what a line of sight turns by over the aperture. [rad]"""
+    return state_rate * aperture_time_s / 2
+
+
+def _strain(geometry: BistaticGeometry, aperture_time_s: float) -> str:
+    """Say what takes every error of a collection beyond first order; else nothing."""
+    if math.sin(geometry.gradient_angle) < _NARROW_SINE:
+        return f"range and Doppler gradients are {math.degrees(geometry.gradient_angle):.3g} deg apart"
+    for name, state in (("transmitter", geometry.transmitter), ("receiver", geometry.receiver)):
+        turn = _turn(norm(state.look_rate), aperture_time_s)
+        if turn > LONG_APERTURE_RAD:
+            return f"the {name}'s line of sight turns by ±{turn:.2g} rad"
+    return ""
+
+
+def collection_notes(mission: Mission, geometry: BistaticGeometry, ground: FullGround) -> Iterator[str]:
     """Say where the collection itself strains the expansion."""
     sine = math.sin(geometry.gradient_angle)
     if sine < _NARROW_SINE:
         yield (
             f"range and Doppler gradients on the ground are {math.degrees(geometry.gradient_angle):.3g} deg apart: "
-            f"displacements are {1 / sine:.2g} times those at right angles, and first order ends earlier"
+            f"displacements are {1 / sine:.2g} times those at right angles, and first order ends earlier; declared "
+            "errors carry exact ranges, allowables do not"
         )
     for name, state in (("transmitter", geometry.transmitter), ("receiver", geometry.receiver)):
         if state.acceleration != STRAIGHT:
             yield f"the {name}'s path curves: the published model takes it for straight, the full model does not"
-        turn = norm(state.look_rate) * mission.collection.aperture_time / 2
-        if turn > _LONG_APERTURE_RAD:
+        turn = _turn(norm(state.look_rate), mission.collection.aperture_time)
+        if turn > LONG_APERTURE_RAD:
             yield (
-                f"the {name}'s line of sight turns by ±{turn:.2g} rad: the phase is no longer a quadratic alone, its "
-                f"quartic term is about {100 * turn**2:.2g} % of it"
+                f"the {name}'s line of sight turns by ±{turn:.2g} rad: beyond ±{LONG_APERTURE_RAD:g} the full "
+                "model's quartic term does not hold; declared errors carry exact ranges, allowables do not"
             )
+        elif turn > _TURNING_RAD:
+            yield (
+                f"the {name}'s line of sight turns by ±{turn:.2g} rad: the phase is no longer a quadratic alone; the "
+                f"full model counts the quartic term, about {100 * turn**2:.2g} % of it, the published one does not"
+            )
+    # A range cell as a constant term displaces by a cell, and so has a phase.
+    cell = abs(ground.quadratic[0]) * SPEED_OF_LIGHT / mission.radar.bandwidth
+    if cell > _COARSE_CELL_RAD:
+        shown = 100 / (1 + (cell / _ABSORBED_RAD) ** 2)
+        yield (
+            f"points a range cell apart differ by {cell:.3g} rad of quadratic phase: a defocused response spreads "
+            f"over range cells instead, an image shows about {shown:.2g} % of it, and the limits are conservative"
+        )
