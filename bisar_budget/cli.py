@@ -15,6 +15,8 @@ from bisar_budget import __version__
 from bisar_budget.errors import printable
 
 if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
+
     from bisar_budget.budget.findings import MissionFindings, Report
     from bisar_budget.budget.verdicts import VerifiedMission
     from bisar_budget.mission.model import Mission
@@ -55,6 +57,25 @@ def cli() -> None:
     How large may the motion errors of transmitter and receiver be before the image breaks its
     requirements, and are the declared ones inside? After Rigling & Moses.
     """
+
+
+class _FileName(click.ParamType[str]):
+    """Name of a file, which a shell completes; what can be read is seen when it is."""
+
+    name = "file"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Take the text as it is."""
+        return str(value)
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> "list[CompletionItem]":
+        """Leave it to the shell, which knows the files."""
+        from click.shell_completion import CompletionItem
+
+        return [CompletionItem(incomplete, type="file")]
+
+
+FILE = _FileName()
 
 
 class _Gate(click.Command):
@@ -99,7 +120,7 @@ class _Gate(click.Command):
 
 
 @cli.command(cls=_Gate)
-@click.argument("missions", nargs=-1, required=True, metavar="MISSION...")
+@click.argument("missions", type=FILE, nargs=-1, required=True, metavar="MISSION...")
 @click.option(
     "--format",
     "format_name",
@@ -109,11 +130,14 @@ class _Gate(click.Command):
     show_default=True,
     help="Format of the report; github: annotations of a pull request, needs: for Sphinx-Needs.",
 )
-@click.option("-o", "--output", metavar="FILE", help="Write the report to FILE instead of standard output.")
+@click.option(
+    "-o", "--output", type=FILE, metavar="FILE", help="Write the report to FILE instead of standard output."
+)
 @click.option(
     "--report",
     "reports",
     envvar="BISAR_BUDGET_REPORT",
+    type=FILE,
     multiple=True,
     metavar="FILE",
     help="Also write a report to FILE, in the format of its suffix: .txt, .json, .csv, .xml (JUnit), .sarif "
@@ -453,7 +477,7 @@ class _Part(click.ParamType[float]):
 
 
 @cli.command()
-@click.argument("files", nargs=-1, required=True, metavar="OLD NEW | MISSION...")
+@click.argument("files", type=FILE, nargs=-1, required=True, metavar="OLD NEW | MISSION...")
 @click.option("--base", metavar="REV", help="Compare each MISSION with itself in this git revision.")
 @click.option(
     "--fail-on-erosion",
@@ -470,7 +494,7 @@ class _Part(click.ParamType[float]):
     show_default=True,
     help="Format of the comparison.",
 )
-@click.option("-o", "--output", metavar="FILE", help="Write to FILE instead of standard output.")
+@click.option("-o", "--output", type=FILE, metavar="FILE", help="Write to FILE instead of standard output.")
 @click.option(
     "--date",
     "today",
@@ -525,7 +549,7 @@ def diff(
 
 
 @cli.command()
-@click.argument("missions", nargs=-1, required=True, metavar="MISSION...")
+@click.argument("missions", type=FILE, nargs=-1, required=True, metavar="MISSION...")
 @click.option("--only", default="*", metavar="GLOB", help="Verify only the rows whose id matches.")
 @click.option(
     "--format",
@@ -535,7 +559,7 @@ def diff(
     show_default=True,
     help="Format of the verdicts.",
 )
-@click.option("-o", "--output", metavar="FILE", help="Write to FILE instead of standard output.")
+@click.option("-o", "--output", type=FILE, metavar="FILE", help="Write to FILE instead of standard output.")
 @click.option(
     "--jobs",
     type=click.IntRange(min=1),
@@ -582,9 +606,13 @@ def _verified(missions: "Sequence[Mission]", only: str, jobs: int | None) -> "li
 
 
 @cli.command()
-@click.argument("mission")
-@click.option("--plot", metavar="FILE", help="Draw Figures 3 to 7 of the paper for this mission: .png, .svg or .pdf.")
-@click.option("-o", "--output", metavar="FILE.npz", help="Save the images and what explains them for NumPy.")
+@click.argument("mission", type=FILE)
+@click.option(
+    "--plot", type=FILE, metavar="FILE", help="Draw Figures 3 to 7 of the paper for this mission: .png, .svg or .pdf."
+)
+@click.option(
+    "-o", "--output", type=FILE, metavar="FILE.npz", help="Save the images and what explains them for NumPy."
+)
 def simulate(mission: str, plot: str | None, output: str | None) -> None:
     """Form the image of a point with the declared errors, before and after autofocus.
 
@@ -614,7 +642,7 @@ def simulate(mission: str, plot: str | None, output: str | None) -> None:
 
 
 @cli.command()
-@click.argument("file", default="mission.yaml")
+@click.argument("file", type=FILE, default="mission.yaml")
 @click.option("--name", default="My bistatic mission", show_default=True, help="Name of the mission.")
 @click.option("--force", is_flag=True, help="Replace an existing file.")
 def init(file: str, name: str, force: bool) -> None:
@@ -649,7 +677,7 @@ def init(file: str, name: str, force: bool) -> None:
 
 
 @cli.command()
-@click.option("-o", "--output", metavar="FILE", help="Write to FILE instead of standard output.")
+@click.option("-o", "--output", type=FILE, metavar="FILE", help="Write to FILE instead of standard output.")
 def schema(output: str | None) -> None:
     """Print the JSON Schema of the mission file, for editors."""
     import json

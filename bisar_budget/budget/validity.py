@@ -77,10 +77,8 @@ class FirstOrder:
         self._harmless = math.sqrt(FLOOR_RAD * nearest * self.wavelength / (4 * math.pi))
         (a, b), (c, d) = ground.plane.adjugate
         determinant = abs(ground.plane.determinant)
-        self._moved_by = (
-            math.hypot(a, c) / determinant,
-            math.hypot(b, d) / determinant,
-        )  # per constant and linear term
+        self._by_constant, self._by_linear = math.hypot(a, c) / determinant, math.hypot(b, d) / determinant
+        self._edge = {"m": 1.0, "m/s": self.T / 2, "m/s^2": self.T**2 / 8}  # of a unit of it at the aperture edge
         self._strain = _strain(geometry, self.T)
         self.found: dict[str, Beyond] = {}  # by row id, of the errors asked about
 
@@ -100,12 +98,15 @@ class FirstOrder:
         self.found[source.id] = beyond = Beyond(cause, self.exact.phases([(source, declared)]))
         return beyond
 
+    def _reach(self, source: ErrorSource) -> float:
+        """Bound of how far a unit of an error takes platform and image, over the aperture. [m/unit]"""
+        moves = self._by_constant * abs(source.full.constant) + self._by_linear * abs(source.full.linear)
+        return self._edge.get(source.unit, 0.0) + moves
+
     def _cause(self, source: ErrorSource, declared: float) -> str:
         if self._strain and (source.full.qpe or source.is_position):
             return self._strain
-        constant, linear = self._moved_by
-        moves = constant * abs(source.full.constant) + linear * abs(source.full.linear)
-        if abs(declared) * (source.power(self.T / 2) + moves) < self._harmless:
+        if abs(declared) * self._reach(source) < self._harmless:
             return ""  # a bound on what follows
         moved = math.hypot(*(self.ground.plane.displacement(source.full, declared) or (0.0, 0.0)))
         if moved > FAR_M:
@@ -117,12 +118,7 @@ class FirstOrder:
         """Say that an allowable, which has a phase of `limit`, lies beyond first order; else nothing."""
         if allowable is None or not source.is_motion:
             return ""
-        constant, linear = self._moved_by
-        moves = constant * abs(source.full.constant) + linear * abs(source.full.linear)
-        if allowable * (abs(source.power(self.T / 2)) + moves) < self._harmless:
-            return ""
-        moved = math.hypot(*(self.ground.plane.displacement(source.full, allowable) or (0.0, 0.0)))
-        if moved <= FAR_M and allowable * abs(source.power(self.T / 2)) <= self._harmless:
+        if allowable * self._reach(source) < FAR_M and allowable * self._edge.get(source.unit, 0.0) < self._harmless:
             return ""  # the second order of what stays that near is a constant and a slope
         # The second order grows with the square of the error.
         bend = math.sqrt(abs(self.second(source, 1.0).qpe) / max(FLOOR_RAD, SHARE * limit))
@@ -149,7 +145,7 @@ class FirstOrder:
 
         before, middle, after = range_error(-T / 2), range_error(0.0), range_error(T / 2)
         quadratic = 2 * math.pi / self.wavelength * ((before + after) / 2 - middle)
-        return self.ground.effective(middle, (after - before) / T, quadratic, 0.0)
+        return self.ground.effective([(middle, (after - before) / T, quadratic, 0.0)])[0]
 
 
 def of_members(
