@@ -9,15 +9,18 @@ has it; quadratic and cubic phase are those of the cubic fitted to what remains,
 import math
 from collections.abc import Iterable
 from functools import cache
+from operator import mul
 from typing import NamedTuple
 
 from bisar_budget.budget.sources import ErrorSource
 from bisar_budget.geometry import BistaticGeometry, GroundVector
 
-_NODES = 16  # a range history over a turn of ±1 rad is a polynomial of that degree to micrometres
-_ORDER = 6  # of the projection: higher terms at the midpoint are rounding for a satellite
+_NODES = 16  # more change nothing, up to turns of ±1 rad
+_ORDER = 6  # of the projection, of which value and slope at the midpoint are taken
 _ITERATIONS = 20
 _SETTLED_M = 1e-6
+
+Weights = tuple[float, ...]
 
 
 class ExactPhases(NamedTuple):
@@ -63,6 +66,8 @@ class ExactRanges:
         return self._settled(recorded, *measured.values())
 
     def _settled(self, recorded: list[float], *tracks: list[list[float]]) -> ExactPhases | None:
+        """Newton's method for the point; the slope of a track's range is minus its direction."""
+        _, at_midpoint, per_half, quadratic, cubic = _quadrature()
         east = north = 0.0
         for _ in range(_ITERATIONS):
             left, by_east, by_north = list(recorded), [0.0] * _NODES, [0.0] * _NODES
@@ -75,9 +80,9 @@ class ExactRanges:
                     left[index] -= distance
                     by_east[index] -= dx / distance
                     by_north[index] -= dy / distance
-            projected = _projected(left)
-            constant, linear = _at_midpoint(projected)
-            (a, c), (b, d) = _at_midpoint(_projected(by_east)), _at_midpoint(_projected(by_north))
+            a, b = _sum(at_midpoint, by_east), _sum(at_midpoint, by_north)
+            c, d = _sum(per_half, by_east), _sum(per_half, by_north)
+            constant, linear = _sum(at_midpoint, left), _sum(per_half, left)
             determinant = a * d - b * c
             if not determinant or not math.isfinite(determinant):
                 return None
@@ -88,28 +93,18 @@ class ExactRanges:
             east, north = east + step_east, north + step_north
             if math.hypot(step_east, step_north) < _SETTLED_M:
                 scale = 2 * math.pi / self.wavelength
-                # P₂ = (3x² - 1)/2 and P₃ = (5x³ - 3x)/2: the highest powers of the fitted cubic.
-                return ExactPhases((east, north), scale * 1.5 * projected[2], scale * 2.5 * projected[3])
+                return ExactPhases((east, north), scale * _sum(quadratic, left), scale * _sum(cubic, left))
         return None
 
 
-def _projected(samples: list[float]) -> list[float]:
-    """Coefficients of the Legendre polynomials up to the order, of samples at the nodes."""
-    return [sum([w * s for w, s in zip(weights, samples, strict=True)]) for weights in _quadrature()[1]]
-
-
-def _at_midpoint(legendre: list[float]) -> tuple[float, float]:
-    """Value and slope, per half aperture, at the midpoint: P₂ₙ(0) and P′₂ₙ₊₁(0)."""
-    even, odd = legendre[0::2], legendre[1::2]
-    return (
-        even[0] - even[1] / 2 + 3 * even[2] / 8 - 5 * even[3] / 16,
-        odd[0] - 3 * odd[1] / 2 + 15 * odd[2] / 8,
-    )
+def _sum(weights: Weights, samples: list[float]) -> float:
+    total: float = sum(map(mul, weights, samples))
+    return total
 
 
 @cache
-def _quadrature() -> tuple[tuple[float, ...], tuple[tuple[float, ...], ...]]:
-    """Nodes in -1 to 1, and for each Legendre polynomial the weights that project on it."""
+def _quadrature() -> tuple[Weights, Weights, Weights, Weights, Weights]:
+    """Nodes in -1 to 1, and the weights that give, of samples there: value and slope at 0, x² and x³ of the fit."""
     nodes: list[float] = []
     weights: list[float] = []
     for k in range(_NODES):
@@ -122,10 +117,20 @@ def _quadrature() -> tuple[tuple[float, ...], tuple[tuple[float, ...], ...]]:
             x -= at / slope
         nodes.append(x)
         weights.append(2 / ((1 - x * x) * slope * slope))
-    rows: list[tuple[float, ...]] = []
+    legendre: list[Weights] = []  # the weights that project on each polynomial
     last, this = [0.0] * _NODES, [1.0] * _NODES
     for n in range(_ORDER + 1):
-        rows.append(tuple((2 * n + 1) / 2 * w * p for w, p in zip(weights, this, strict=True)))
+        legendre.append(tuple((2 * n + 1) / 2 * w * p for w, p in zip(weights, this, strict=True)))
         recurred = [((2 * n + 1) * x * p - n * q) / (n + 1) for x, p, q in zip(nodes, this, last, strict=True)]
         last, this = this, recurred
-    return tuple(nodes), tuple(rows)
+
+    def combined(*factors: float) -> Weights:
+        return tuple(sum(f * w for f, w in zip(factors, row, strict=True)) for row in zip(*legendre, strict=True))
+
+    return (
+        tuple(nodes),
+        combined(1, 0, -1 / 2, 0, 3 / 8, 0, -5 / 16),  # Pₙ(0)
+        combined(0, 1, 0, -3 / 2, 0, 15 / 8, 0),  # P′ₙ(0)
+        combined(0, 0, 3 / 2, 0, 0, 0, 0),  # P₂ = (3x² - 1)/2
+        combined(0, 0, 0, 5 / 2, 0, 0, 0),  # P₃ = (5x³ - 3x)/2
+    )

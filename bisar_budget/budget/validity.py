@@ -16,7 +16,7 @@ from typing import NamedTuple
 from bisar_budget.budget.exact_ranges import ExactPhases, ExactRanges
 from bisar_budget.budget.sources import Effect, ErrorSource, FullGround
 from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
-from bisar_budget.geometry import STRAIGHT, BistaticGeometry, GroundVector, dot, norm
+from bisar_budget.geometry import STRAIGHT, BistaticGeometry, GroundVector, Vector, norm, unit
 from bisar_budget.mission.model import Mission
 from bisar_budget.units import format_quantity
 
@@ -120,32 +120,45 @@ class FirstOrder:
             return ""
         if allowable * self._reach(source) < FAR_M and allowable * self._edge.get(source.unit, 0.0) < self._harmless:
             return ""  # the second order of what stays that near is a constant and a slope
-        # The second order grows with the square of the error.
-        bend = math.sqrt(abs(self.second(source, 1.0).qpe) / max(FLOOR_RAD, SHARE * limit))
+        constant, linear, quadratic = self._second(source, 1.0)  # it grows with the square of the error
+        added = quadratic + self.ground.quadratic[0] * constant + self.ground.quadratic[1] * linear
+        bend = math.sqrt(abs(added) / max(FLOOR_RAD, SHARE * limit))
         if allowable * bend <= 1:
             return ""
         size, held = (format_quantity(value, source.unit, 2) for value in (allowable, 1 / bend))
         return f"the allowable of {size} speaks of the first order alone, which holds to about {held}"
 
+    @cached_property
+    def _aperture(self) -> tuple[tuple[tuple[str, Vector, float], ...], ...]:
+        """Of start, middle and end: each platform's name, line of sight and range."""
+        states = (("transmitter", self.geometry.transmitter), ("receiver", self.geometry.receiver))
+        tracks = [[(name, state.at(tau)[0]) for name, state in states] for tau in (-self.T / 2, 0.0, self.T / 2)]
+        return tuple([tuple([(name, unit(at), norm(at)) for name, at in track]) for track in tracks])
+
     def second(self, source: ErrorSource, size: float) -> Effect:
         """What the second order adds to an error of a size: displacement and quadratic phase."""
-        T = self.T
+        return self.ground.effective([(*self._second(source, size), 0.0)])[0]
+
+    def _second(self, source: ErrorSource, size: float) -> tuple[float, float, float]:
+        """Constant and linear term of the second order, and its quadratic phase, before they move the image."""
         east, north = self.ground.plane.displacement(source.full, size) or (0.0, 0.0)
-
-        def range_error(tau: float) -> float:
+        x, y, z = source.direction
+        edge = size * self._edge.get(source.unit, 0.0)
+        own = (-edge if source.unit == "m/s" else edge, edge if source.unit == "m" else 0.0, edge)
+        errors = []
+        for power, platforms in zip(own, self._aperture, strict=True):
             total = 0.0
-            for name, state in (("transmitter", self.geometry.transmitter), ("receiver", self.geometry.receiver)):
-                own = size * source.power(tau) if source.moves(name) else 0.0
-                d, at = source.direction, state.at(tau)[0]
-                off = (own * d[0] - east, own * d[1] - north, own * d[2])
-                R = norm(at)
-                along = dot(off, at) / R
-                total -= (dot(off, off) - along * along) / (2 * R)
-            return total
-
-        before, middle, after = range_error(-T / 2), range_error(0.0), range_error(T / 2)
+            for name, (u, v, w), R in platforms:
+                if source.moves(name):
+                    a, b, c = power * x - east, power * y - north, power * z
+                else:
+                    a, b, c = -east, -north, 0.0
+                along = a * u + b * v + c * w
+                total -= (a * a + b * b + c * c - along * along) / (2 * R)
+            errors.append(total)
+        before, middle, after = errors
         quadratic = 2 * math.pi / self.wavelength * ((before + after) / 2 - middle)
-        return self.ground.effective([(middle, (after - before) / T, quadratic, 0.0)])[0]
+        return middle, (after - before) / self.T, quadratic
 
 
 def of_members(
