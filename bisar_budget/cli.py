@@ -56,6 +56,8 @@ def cli() -> None:
 
     How large may the motion errors of transmitter and receiver be before the image breaks its
     requirements, and are the declared ones inside? After Rigling & Moses.
+
+    Start with: bisar-budget init mission.yaml, then bisar-budget check mission.yaml
     """
 
 
@@ -509,7 +511,9 @@ def diff(
     output: str | None,
     today: datetime | None,
 ) -> None:
-    """Compare the findings of two mission files, or of one before and after a change.
+    """Show what a change to a mission does to every margin.
+
+    Compares two mission files, or each with itself in a git revision.
 
     Rows are sorted by erosion: the part of what was left of a limit that the change uses up, (u2 - u1)/(1 - u1)
     with the utilizations before and after. Exit code: 0, or 1 with --fail-on-erosion, 2 for wrong usage,
@@ -567,7 +571,7 @@ def diff(
     help="Processes to use; default: the cores, or 1 with the extra `fast`, which uses them itself.",
 )
 def verify(missions: Sequence[str], only: str, format_name: str, output: str | None, jobs: int | None) -> None:
-    """Form images with each error at its limit and measure whether the limit is true.
+    """Form images at the limits and measure whether they are true.
 
     The data come from exact ranges, and the phase is measured in the image. A limit is confirmed if the
     image shows its budget within 5 %, optimistic if it shows more, conservative if less. With autofocus
@@ -614,10 +618,10 @@ def _verified(missions: "Sequence[Mission]", only: str, jobs: int | None) -> "li
     "-o", "--output", type=FILE, metavar="FILE.npz", help="Save the images and what explains them for NumPy."
 )
 def simulate(mission: str, plot: str | None, output: str | None) -> None:
-    """Form the image of a point with the declared errors, before and after autofocus.
+    """Form the image of a point with the declared errors.
 
     The data come from exact ranges; the image is formed where the errors move the point, in the scene's
-    axes and rotated so that the smear lies in cross range, and focused by phase gradient autofocus.
+    axes and rotated so that the smear lies in cross range, before and after phase gradient autofocus.
     """
     for name, suffixes in ((plot, (".png", ".svg", ".pdf")), (output, (".npz",))):
         if name is not None and os.path.splitext(name)[1].lower() not in suffixes:
@@ -710,8 +714,9 @@ def schema(output: str | None) -> None:
 @click.option("--check", "check_only", is_flag=True, help="Fail if the evaluators are not what the derivation gives.")
 @click.option("--write", is_flag=True, help="Rewrite the evaluators from the derivation.")
 def derive(table: str, format_name: str, check_only: bool, write: bool) -> None:
-    """Derive the tables of Rigling & Moses from the geometry and print them.
+    """Derive the paper's tables from the geometry and print them.
 
+    Rigling & Moses, Tables I and II, the equations before them, vibration limits; and the full model.
     Equation and table numbers are the paper's.
     """
     if check_only and write:
