@@ -4,8 +4,8 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import date
 
-from bisar_budget import evaluators
-from bisar_budget.budget.allocation import Allocation, Split, allocate
+from bisar_budget.budget import vibration
+from bisar_budget.budget.allocation import Allocation, allocate
 from bisar_budget.budget.combine import combine_displacements, combine_phases
 from bisar_budget.budget.findings import FileWarning, MissionFindings, Resolution, Row
 from bisar_budget.budget.sources import (
@@ -233,66 +233,28 @@ def _quotient(numerator: float, denominator: float) -> float | None:
 
 
 def _vibration_rows(mission: Mission, allocation: Allocation) -> Iterator[Row]:
-    T = mission.collection.aperture_time
-    for name in ("transmitter", "receiver"):
-        error = getattr(mission.platforms, name).motion_error
-        path: KeyPath = ("platforms", name, "motion_error", "vibration")
-        allowable = _vibration_allowable(mission, mission.requirements.pslr, allocation.pslr, name)
-        missing = "" if mission.requirements.pslr is not None else "no requirements.pslr to hold it to"
-        for index, sinusoid in enumerate(error.vibration.sinusoidal or (None,)):
-            cycles = math.inf if sinusoid is None else sinusoid.frequency * T
-            slow = ""
-            if cycles < 1:
-                slow = (
-                    f"{cycles:.2g} cycles per aperture: slower than one, it acts as a quadratic and cubic phase "
-                    "error, not as paired echoes"
-                )
-            notes: tuple[str, ...] = ()
-            if 1 <= cycles < 3:
-                notes = (
-                    f"{cycles:.3g} cycles per aperture: below three it also acts as a quadratic phase error, "
-                    "which this row does not count",
-                )
-            yield _judged(
-                mission,
-                id=f"{name}.vibration.sinusoidal.{index}",
-                metric="pslr",
-                unit="m",
-                declared=None if sinusoid is None else sinusoid.amplitude,
-                allowable=allowable,
-                path=(*path, "sinusoidal", index, "amplitude"),
-                equation="Section V, sinusoidal",
-                no_limit=missing,
-                not_evaluated=missing or slow,
-                is_declared=sinusoid is not None,
-                over="paired echoes above the platform's share of PSLR (Section V)",
-                evidence=error.source,
-                notes=notes,
-            )
-        wideband = error.vibration.wideband
-        missing = "" if mission.requirements.islr is not None else "no requirements.islr to hold it to"
+    model = mission.allocation.model
+    for case in vibration.cases(mission, allocation):
+        allowed = case.limits
         yield _judged(
             mission,
-            id=f"{name}.vibration.wideband",
-            metric="islr",
+            id=case.id,
+            metric=case.metric,
             unit="m",
-            declared=None if wideband is None else wideband.rms,
-            allowable=_vibration_allowable(mission, mission.requirements.islr, allocation.islr, name),
-            path=(*path, "wideband", "rms"),
-            equation="Section V, wideband",
-            no_limit=missing,
-            not_evaluated=missing,
-            is_declared=wideband is not None,
-            over="power spread above the platform's share of ISLR (Section V)",
-            evidence=error.source,
-        )
-
-
-def _vibration_allowable(mission: Mission, requirement_db: float | None, split: Split, name: str) -> float | None:
-    if requirement_db is None:
-        return None
-    power = 10 ** (requirement_db / 10)  # -30 dB is 10⁻³: PSLR and ISLR are power ratios
-    return evaluators.vibration_limit(mission.radar.wavelength, math.sqrt(power * split.of(name)))
+            declared=case.declared,
+            allowable=None if allowed is None else allowed.by(model),
+            path=case.path,
+            equation=case.equation,
+            no_limit=case.missing,
+            not_evaluated=case.not_evaluated,
+            is_declared=case.declared is not None,
+            over=case.over,
+            doubt=case.doubt,
+            limits=allowed or (None, None),
+            qpe_full=case.qpe,
+            evidence=case.evidence,
+            notes=case.notes,
+        )._replace(published_margin_db=None if allowed is None else allowed.margin_db)
 
 
 def _aggregate_rows(

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from bisar_budget.budget.allocation import Allocation
 from bisar_budget.budget.findings import MissionFindings, Row
 from bisar_budget.budget.sources import ErrorSource, error_sources
+from bisar_budget.budget.vibration import amplitude_share, echo_phase, lines_of, quadratic_part, shared_frequencies
 from bisar_budget.errors import KeyPath, printable
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import formulas
@@ -84,19 +85,31 @@ def _autofocus_gain(allocation: Allocation) -> Iterator[str]:
 
 
 def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[str]:
-    platform = row.id.split(".")[0]
-    is_sinusoid = row.metric == "pslr"
-    key = "sinusoidal" if is_sinusoid else "wideband"
-    path: KeyPath = ("platforms", platform, "motion_error", "vibration", key)
+    """From the file to the limits of both models, for one line, lines that share a frequency, or noise."""
+    platform, _, _, *rest = row.id.split(".")
+    is_sinusoid, is_sum = row.metric == "pslr", rest[:1] == ["sum"]
+    path: KeyPath = ("platforms", platform, "motion_error", "vibration", "sinusoidal" if is_sinusoid else "wideband")
     if row.declared is None:
         yield missing(mission, path)
+    elif is_sum:
+        yield from _shared_frequency(mission, platform, int(rest[1]), row.declared)
     else:
-        path = (*path, int(row.id.rsplit(".", 1)[1]), "amplitude") if is_sinusoid else (*path, "rms")
+        path = (*path, int(rest[0]), "amplitude") if is_sinusoid else (*path, "rms")
         yield from step(f"Declared in {place(mission, path)}", as_written(mission, path))
     if row.evidence:
         yield from step("Evidence", printable(row.evidence))
+    wavelength = mission.radar.wavelength
+    if row.qpe_full_rad is not None and row.declared is not None:
+        line = lines_of(mission, platform)[int(rest[0])]
+        values = {
+            "A": row.declared,
+            "λ": wavelength,
+            "q": quadratic_part(line.frequency * mission.collection.aperture_time),
+        }
+        lines = equation("QPE_full", "2*π*A*q/λ", values, row.qpe_full_rad, "rad")
+        yield from step("Worst-phase quadratic phase, q = 7.5*j_2(π*f*T)", *lines)
     requirement = mission.requirements.pslr if is_sinusoid else mission.requirements.islr
-    if requirement is None or row.allowable is None:
+    if requirement is None or row.allowable_published is None or row.allowable_full is None:
         return
     name = row.metric.upper()
     ratio = 10 ** (requirement / 10)
@@ -105,9 +118,41 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[s
         *equation(name, "10^(dB/10)", {"dB": requirement}, ratio, ""),
     )
     split = allocation.pslr if is_sinusoid else allocation.islr
-    values = {name: ratio, "λ": mission.radar.wavelength, "s": split.of(platform)}
-    lines = equation("allowable", formulas.VIBRATION[row.metric], values, row.allowable, "m")
+    share = split.of(platform)
+    values = {name: ratio, "λ": wavelength, "s": share}
+    lines = equation("published", formulas.VIBRATION[row.metric], values, row.allowable_published, "m")
     yield from step(f"{row.equation}, s is the {platform}’s share of power", *lines)
+    if is_sinusoid:
+        part = amplitude_share(split, platform)
+        shares = {"s_k": share, "s_t": split.transmitter, "s_r": split.receiver}
+        yield from step(
+            "Both platforms at one frequency: echoes add in amplitude, its part a",
+            *equation("a", formulas.AMPLITUDE_SHARE, shares, part, ""),
+        )
+        values = {
+            "a": part,
+            "λ": wavelength,
+            "φ": echo_phase(math.sqrt(ratio * (split.transmitter + split.receiver))),
+        }
+        title = "First principles, φ from J_1(φ)/J_0(φ) = sqrt(PSLR*(s_t + s_r)), about 2*sqrt(PSLR)"
+    else:
+        title = "First principles, independent on both platforms: exp(σ^2) - 1 is the ISLR of a phase σ"
+    lines = equation("full", formulas.FULL_VIBRATION[row.metric], values, row.allowable_full, "m")
+    yield from step(title, *lines)
+    limits = {"published": row.allowable_published, "full": row.allowable_full}
+    model = mission.allocation.model
+    chosen = "min(published, full)" if model == "strictest" else model
+    yield from step(
+        f"Allowable, allocation.model {model}", *equation("allowable", chosen, limits, row.allowable or 0.0, "m")
+    )
+
+
+def _shared_frequency(mission: Mission, platform: str, index: int, total: float) -> Iterator[str]:
+    lines = lines_of(mission, platform)
+    members = shared_frequencies(lines, mission.collection.aperture_time)[index]
+    sizes = " + ".join(number(lines[member].amplitude) for member in members)
+    title = f"Entries {', '.join(map(str, members))}, less than one cycle per aperture apart: amplitudes add"
+    yield from step(title, f"declared = {sizes} = {total:.6g} m")
 
 
 def _phase_aggregate(found: MissionFindings, row: Row, sources: Iterable[ErrorSource]) -> Iterator[str]:
