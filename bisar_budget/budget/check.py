@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import date
+from typing import TYPE_CHECKING
 
 from bisar_budget.budget import vibration
 from bisar_budget.budget.allocation import Allocation, allocate
@@ -22,6 +23,9 @@ from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
 from bisar_budget.errors import KeyPath
 from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.model import Mission
+
+if TYPE_CHECKING:
+    from bisar_budget.budget.scene import SceneEdge
 
 NO_REQUIREMENT = "no requirement in the file: computed, not judged"
 
@@ -53,6 +57,10 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
         *_vibration_rows(mission, allocation),
         *_aggregate_rows(mission, allocation, sources, errors, plane, first_order),
     ]
+    scene = None
+    if mission.scene.radius is not None:
+        scene, row = _scene_row(mission, allocation, sources)
+        judged.append(row)
     rows, warnings = apply_waivers(judged, mission, today)
     return MissionFindings(
         file=mission.file,
@@ -69,6 +77,7 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
         allocation=allocation,
         rows=tuple(rows),
         warnings=(*_unknown_requirement_ids(mission, rows), *warnings, *_nothing_declared(rows)),
+        scene=scene,
         notes=(*collection_notes(mission, geometry, ground), *_unused_keys(mission)),
     )
 
@@ -363,6 +372,44 @@ def _moved_exactly(source: ErrorSource, found: Mapping[str, Beyond], plane: Imag
     return plane.displacement(source.full, source.declared or 0.0) or (0.0, 0.0)
 
 
+def _scene_row(
+    mission: Mission, allocation: Allocation, sources: Sequence[ErrorSource]
+) -> tuple["SceneEdge | None", Row]:
+    """Row of the scene's edge; to the published model an error is the same all over the scene."""
+    from bisar_budget.budget.scene import scene_edge
+
+    combine, total = mission.allocation.combine, allocation.qpe_total
+    single = [s for s in sources if combine == "each" or s.is_independent]
+    edge = scene_edge(mission, mission.geometry, allocation, single)
+    is_published = mission.allocation.model == "published"
+    difference: float | None = None
+    doubt, notes = "", tuple[str, ...]()
+    if edge is not None and not edge.degeneracy:
+        difference, doubt, notes = edge.difference, edge.doubt, edge.notes(total)
+        if is_published and difference > total * (1 + UTILIZATION_TOLERANCE):
+            doubt = f"the full model says fail: {difference:.3g} rad, {total:.3g} rad allowed"
+    row = _judged(
+        mission,
+        id="mission.spatial_variance",
+        metric="quadratic_phase_error",
+        unit="rad",
+        declared=difference,
+        allowable=None if is_published else total,
+        path=("scene", "radius"),
+        equation="full model",
+        no_limit="to the published model an error is the same all over the scene",
+        not_evaluated="" if edge is None else edge.degeneracy,
+        is_declared=edge is not None,
+        over="quadratic phase at the scene's edge and at its centre differ by more than the total budget",
+        doubt=doubt,
+        limits=(None, total),
+        qpe=None if difference is None else 0.0,
+        qpe_full=difference,
+        notes=notes,
+    )
+    return edge, row
+
+
 def _qpe_aggregates(
     mission: Mission, allocation: Allocation, declared: Sequence[ErrorSource], found: Mapping[str, Beyond]
 ) -> Iterator[Row]:
@@ -533,7 +580,6 @@ def _nothing_declared(rows: Sequence[Row]) -> Iterator[FileWarning]:
 def _unused_keys(mission: Mission) -> Iterator[str]:
     """Say which keys that the file gives have no part in this check."""
     keys = {
-        "scene.radius": mission.scene.radius is not None,
         "collection.pulses": mission.collection.pulses is not None,
         "simulation": mission.simulation is not None,
     }

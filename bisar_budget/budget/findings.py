@@ -8,6 +8,7 @@ from bisar_budget.errors import Fault
 from bisar_budget.geometry import BistaticGeometry, GroundVector
 
 if TYPE_CHECKING:
+    from bisar_budget.budget.scene import SceneEdge
     from bisar_budget.budget.verdicts import Verdict
 
 # Worst first. The status of a mission or a run is the worst one found; the last three gate nothing.
@@ -78,6 +79,7 @@ class MissionFindings(NamedTuple):
     rows: tuple[Row, ...]
     warnings: tuple[FileWarning, ...]
     notes: tuple[str, ...]
+    scene: "SceneEdge | None" = None  # of missions with a scene.radius and declared errors
     verdicts: "tuple[Verdict, ...] | None" = None  # of images, if any were formed
 
     @property

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from bisar_budget.budget.allocation import Allocation
 from bisar_budget.budget.findings import MissionFindings, Row
+from bisar_budget.budget.scene import EdgePhases, at
 from bisar_budget.budget.sources import ErrorSource, error_sources
 from bisar_budget.budget.vibration import amplitude_share, echo_phase, lines_of, quadratic_part, shared_frequencies
 from bisar_budget.errors import KeyPath, printable
@@ -45,6 +46,8 @@ def explain(mission: Mission, found: MissionFindings, row_id: str) -> str:
         lines += _phase_aggregate(found, row, sources.values())
     elif row.id == "mission.cubic_phase_error":
         lines += _cubic_aggregate(found, row, sources.values())
+    elif row.id == "mission.spatial_variance":
+        lines += _spatial_variance(mission, found, row, sources.values())
     elif row.id == "mission.location_error":
         lines += _location_aggregate(mission, found, row, sources.values())
     lines += _verdict(row)
@@ -183,6 +186,28 @@ def _cubic_aggregate(found: MissionFindings, row: Row, sources: Iterable[ErrorSo
     yield from _combined("cubic phase", found.combine, members, row)
     if row.allowable is not None:
         yield from step("Allowable", f"requirements.cubic_phase_error = {row.allowable:.6g} rad")
+
+
+def _spatial_variance(
+    mission: Mission, found: MissionFindings, row: Row, sources: Iterable[ErrorSource]
+) -> Iterator[str]:
+    """Phases at the centre and at the worst place of the scene's edge, and the largest difference."""
+    scene = found.scene
+    if scene is None or scene.degeneracy or row.declared is None:
+        return
+    members = [
+        source
+        for source in sources
+        if source.declared is not None and source.is_motion and (source.is_independent or found.combine == "each")
+    ]
+    edge = EdgePhases(mission, found.geometry, members)
+    east, north = at(scene.radius, scene.azimuth)
+    sizes = [(s.id, abs(d)) for s, d in zip(members, edge.differences((east, north)), strict=True)]
+    yield from step(
+        f"Full model at the scene’s edge, {east:.6g} m east, {north:.6g} m north of the centre, less there"
+    )
+    yield from _combined("Difference of QPE", found.combine, sizes, row)
+    yield from step("Budget of what one autofocus correction leaves", f"total = {found.allocation.qpe_total:.6g} rad")
 
 
 def _location_aggregate(

@@ -113,6 +113,9 @@ def _mission(mission: MissionFindings) -> dict[str, Any]:
             "pslr_share": _shares(allocation.pslr),
             "islr_share": _shares(allocation.islr),
         },
+        "scene": None
+        if mission.scene is None
+        else {"radius_m": mission.scene.radius, "autofocus_radius_m": mission.scene.autofocus_radius},
         "summary": mission.summary,
         "rows": [row._asdict() for row in mission.rows],
         "warnings": [{"line": warning.line, "message": warning.message} for warning in mission.warnings],
