@@ -207,7 +207,7 @@ def check(
     Defaults of --format, --report, --strict, --exit-zero, --model and --color: [tool.bisar-budget] in
     the nearest pyproject.toml, and over it the variables BISAR_BUDGET_FORMAT and so on.
     """
-    from bisar_budget.report import Style, render
+    from bisar_budget.report import ILLUSTRATED, Style, render
 
     written = [(name, _format_of(name)) for name in reports]
     files = _expanded(missions)
@@ -218,7 +218,8 @@ def check(
             raise click.UsageError("--explain writes text: it excludes --format and --report.")
         _explain(files, explain, today.date() if today else _today(), model, output)
         return
-    report = _checked(files, today.date() if today else _today(), model, verifying)
+    illustrated = any(name in ILLUSTRATED for name in (format_name, *(name for _, name in written)))
+    report = _checked(files, today.date() if today else _today(), model, verifying, illustrated)
     if format_name != "text" or output is not None or quiet or not _is_terminal():
         _say_faults(report)
     style = Style(verbosity=-1 if quiet else 1 if verbose else 0, root=_repository())
@@ -236,7 +237,10 @@ def check(
     sys.exit(0 if exit_zero and code == EXIT_BROKEN else code)
 
 
-def _checked(files: Sequence[str], today: date, model: str | None, verifying: bool) -> "Report":
+def _checked(
+    files: Sequence[str], today: date, model: str | None, verifying: bool, illustrated: bool = False
+) -> "Report":
+    """Check every file; `verifying` adds verdicts of images, and `illustrated` the images themselves."""
     from bisar_budget.budget.check import check_mission
     from bisar_budget.budget.findings import Report, UnusableMission
     from bisar_budget.errors import MissionError
@@ -261,8 +265,16 @@ def _checked(files: Sequence[str], today: date, model: str | None, verifying: bo
         for index, verified in zip(usable, _verified(list(usable.values()), "*", None), strict=True):
             found = missions[index]
             if not isinstance(found, UnusableMission):
-                missions[index] = with_verdicts(found, verified.rows)
+                found = with_verdicts(found, verified.rows)
+                missions[index] = _illustrated(usable[index], found) if illustrated else found
     return Report(version=__version__, missions=tuple(missions))
+
+
+def _illustrated(mission: "Mission", found: "MissionFindings") -> "MissionFindings":
+    """Add the images of the rows that decide most."""
+    from bisar_budget.simulate.image_evidence import form_image_evidence
+
+    return found._replace(image_evidence=form_image_evidence(mission, found))
 
 
 def _explain(files: Sequence[str], row_id: str, today: date, model: str | None, output: str | None) -> None:

@@ -70,6 +70,8 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
         coverage_factor=mission.allocation.coverage_factor,
         wavelength=mission.radar.wavelength,
         geometry=geometry,
+        aperture_time=mission.collection.aperture_time,
+        scene_radius=mission.scene.radius,
         resolution=Resolution(
             range=geometry.range_resolution(mission.radar.bandwidth, SPEED_OF_LIGHT),
             cross_range=geometry.cross_range_resolution(mission.radar.wavelength, mission.collection.aperture_time),

@@ -8,6 +8,7 @@ from bisar_budget.errors import Fault
 from bisar_budget.geometry import BistaticGeometry, GroundVector
 
 if TYPE_CHECKING:
+    from bisar_budget.budget.image_evidence import ImageEvidence
     from bisar_budget.budget.scene import SceneEdge
     from bisar_budget.budget.verdicts import Verdict
 
@@ -74,6 +75,8 @@ class MissionFindings(NamedTuple):
     coverage_factor: float
     wavelength: float
     geometry: BistaticGeometry
+    aperture_time: float
+    scene_radius: float | None
     resolution: Resolution
     allocation: Allocation
     rows: tuple[Row, ...]
@@ -81,6 +84,7 @@ class MissionFindings(NamedTuple):
     notes: tuple[str, ...]
     scene: "SceneEdge | None" = None  # of missions with a scene.radius and declared errors
     verdicts: "tuple[Verdict, ...] | None" = None  # of images, if any were formed
+    image_evidence: "tuple[ImageEvidence, ...]" = ()  # a few of those images, where a report shows them
 
     @property
     def status(self) -> str:
