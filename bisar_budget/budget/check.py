@@ -9,6 +9,7 @@ from bisar_budget.budget import vibration
 from bisar_budget.budget.allocation import Allocation, allocate
 from bisar_budget.budget.combine import combine_displacements, combine_phases
 from bisar_budget.budget.findings import FileWarning, MissionFindings, Resolution, Row
+from bisar_budget.budget.pull_in import pull_in_caps
 from bisar_budget.budget.sources import (
     ErrorSource,
     FullGround,
@@ -62,6 +63,10 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
         scene, row = _scene_row(mission, allocation, sources)
         judged.append(row)
     rows, warnings = apply_waivers(judged, mission, today)
+    resolution = Resolution(
+        range=geometry.range_resolution(mission.radar.bandwidth, SPEED_OF_LIGHT),
+        cross_range=geometry.cross_range_resolution(mission.radar.wavelength, mission.collection.aperture_time),
+    )
     return MissionFindings(
         file=mission.file,
         name=mission.name,
@@ -72,13 +77,15 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
         geometry=geometry,
         aperture_time=mission.collection.aperture_time,
         scene_radius=mission.scene.radius,
-        resolution=Resolution(
-            range=geometry.range_resolution(mission.radar.bandwidth, SPEED_OF_LIGHT),
-            cross_range=geometry.cross_range_resolution(mission.radar.wavelength, mission.collection.aperture_time),
-        ),
+        resolution=resolution,
         allocation=allocation,
         rows=tuple(rows),
-        warnings=(*_unknown_requirement_ids(mission, rows), *warnings, *_nothing_declared(rows)),
+        warnings=(
+            *_unknown_requirement_ids(mission, rows),
+            *warnings,
+            *pull_in_caps(mission, resolution),
+            *_nothing_declared(rows),
+        ),
         scene=scene,
         notes=(*collection_notes(mission, geometry, ground), *_unused_keys(mission)),
     )
