@@ -54,7 +54,7 @@ class SceneEdge(NamedTuple):
         return (
             f"largest between the centre and azimuth {math.degrees(self.azimuth):.0f} deg, "
             f"{format_quantity(self.radius, 'm')} away",
-            f"one autofocus correction leaves less than {total:.3g} rad {self.served}",
+            f"one autofocus correction serves {self.served}, by the total of {total:.3g} rad",
         )
 
     @property
@@ -126,7 +126,7 @@ class EdgePhases:
         return self.combined(self.phases(at(radius, azimuth)))
 
     def rim(self, radius: float) -> "Rim":
-        """Evaluate a circle evenly, and at the vertex of the parabola through the worst point and its neighbours.
+        """Evaluate a circle evenly, and around the worst point at the vertex of the parabola through it, twice.
 
         Linear in the radius, a difference is a cosine of the azimuth, whose vertex that is to a few degrees.
         """
@@ -134,12 +134,19 @@ class EdgePhases:
         phases = [self.phases(at(radius, step * k)) for k in range(RIM_POINTS)]
         sizes = [self.combined(there) for there in phases]
         top = max(range(RIM_POINTS), key=sizes.__getitem__)
+        best = (sizes[top], step * top)
         before, size, after = sizes[top - 1], sizes[top], sizes[(top + 1) % RIM_POINTS]
-        bend = before - 2 * size + after
-        vertex = step * (top + ((before - after) / (2 * bend) if bend < 0 else 0.0))
-        there = self.combined(self.phases(at(radius, vertex)))
-        azimuth, size = (vertex % (2 * math.pi), there) if there > size else (step * top, size)
-        return Rim(azimuth, size, phases)
+        vertex = step * top
+        for _ in range(2):
+            bend = before - 2 * size + after
+            if bend >= 0:
+                break
+            vertex += step * (before - after) / (2 * bend)
+            step /= 4
+            before, size, after = (self.difference(radius, vertex + side * step) for side in (-1, 0, 1))
+            best = max(best, (before, vertex - step), (size, vertex), (after, vertex + step))
+        size, azimuth = best
+        return Rim(azimuth % (2 * math.pi), size, phases)
 
 
 class Rim(NamedTuple):

@@ -324,11 +324,8 @@ def _margin(allowed: VibrationLimits | None) -> tuple[str, ...]:
     """How far the published rule stays inside first principles, said of every limit."""
     if allowed is None:
         return ()
-    return (f"the published rule is {_decibels(allowed.margin_db)} inside first principles",)
-
-
-def _decibels(value: float) -> str:
-    return f"{value:.2f} dB".replace("-0.00", "0.00")
+    side = "inside" if allowed.margin_db >= 0 else "beyond"
+    return (f"the published rule is {abs(allowed.margin_db):.2f} dB {side} first principles",)
 
 
 def _projected(value: float | Vector, error: MotionError, along: float) -> tuple[str, ...]:
