@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING
 
 from bisar_budget.budget import vibration
 from bisar_budget.budget.allocation import Allocation, allocate
-from bisar_budget.budget.combine import combine_displacements, combine_phases
+from bisar_budget.budget.correlation import (
+    Correlated,
+    combined_displacement,
+    combined_phase,
+    correlated_errors,
+    correlation_notes,
+    unused_correlations,
+)
 from bisar_budget.budget.findings import FileWarning, MissionFindings, Resolution, Row
 from bisar_budget.budget.pull_in import pull_in_caps
 from bisar_budget.budget.sources import (
@@ -83,6 +90,7 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
         warnings=(
             *_unknown_requirement_ids(mission, rows),
             *warnings,
+            *_unused_correlations(mission),
             *pull_in_caps(mission, resolution),
             *_nothing_declared(rows),
         ),
@@ -284,30 +292,32 @@ def _aggregate_rows(
     first_order: FirstOrder,
 ) -> Iterator[Row]:
     combine, model = mission.allocation.combine, mission.allocation.model
+    groups = correlated_errors(mission)
+    notes = correlation_notes(combine, groups) if combine != "each" else ()
     stated = [source for source in sources if source.declared is not None]
     declared = [source for source in stated if source.is_independent]
     if combine != "each":
-        yield from _qpe_aggregates(mission, allocation, declared, first_order.found)
+        yield from _qpe_aggregates(mission, allocation, declared, groups, first_order.found)
     # `each` looks at single rows, those along the scene's axes included.
     motion = [source for source in (stated if combine == "each" else declared) if source.is_motion]
     cubic_limit, cubic_doubt = mission.requirements.cubic_phase_error, ""
     other = {"published": "full", "full": "published"}.get(model)
     if cubic_limit is not None and other is not None and motion:
-        cubic = combine_phases([s.cubic(other) for s in motion], combine)
+        cubic = combined_phase(motion, "cubic", other, combine, groups)
         if cubic > cubic_limit * (1 + UTILIZATION_TOLERANCE):
             cubic_doubt = f"the {other} model says fail: {cubic:.3g} rad, {cubic_limit:.3g} rad allowed"
     found = first_order.found
     cubic_notes: tuple[str, ...] = ()
     if found and motion:
-        by_exact = [found[s.id].cubic if s.id in found else s.full.cubic * (s.declared or 0.0) for s in motion]
-        cubic_notes, exact_doubt = of_members(found, motion, combine_phases(by_exact, combine), cubic_limit, "rad")
+        by_exact = combined_phase(_with_exact(motion, found), "cubic", "full", combine, groups)
+        cubic_notes, exact_doubt = of_members(found, motion, by_exact, cubic_limit, "rad")
         cubic_doubt = cubic_doubt or exact_doubt
     yield _judged(
         mission,
         id="mission.cubic_phase_error",
         metric="cubic_phase_error",
         unit="rad",
-        declared=combine_phases([s.cubic(model) for s in motion], combine) if motion else None,
+        declared=combined_phase(motion, "cubic", model, combine, groups) if motion else None,
         allowable=mission.requirements.cubic_phase_error,
         path=("requirements", "cubic_phase_error"),
         equation="Table I, cubic column" if model == "published" else "full model",
@@ -315,21 +325,26 @@ def _aggregate_rows(
         info="" if mission.requirements.cubic_phase_error is not None else NO_REQUIREMENT,
         over="cubic phase at the aperture edge above the requirement; autofocus gain does not apply",
         doubt=cubic_doubt,
-        notes=cubic_notes,
+        notes=(*notes, *cubic_notes),
     )
     counted = {source.id for source in motion}
-    known = [row.displacement_m for row in errors if row.displacement_m is not None and row.id in counted]
-    moved = combine_displacements(known, combine) if motion and len(known) == len(motion) else None
+    known = [(row.id, row.displacement_m) for row in errors if row.displacement_m is not None and row.id in counted]
+    moved = combined_displacement(known, combine, groups) if motion and len(known) == len(motion) else None
     if model == "strictest" and moved is not None:
         by_25 = image_plane(mission.geometry)
-        published = [by_25.displacement(s.effect, s.declared or 0.0) for s in motion]
-        moved = max(moved, combine_displacements([move for move in published if move is not None], combine))
+        published = [(s.id, by_25.displacement(s.effect, s.declared or 0.0)) for s in motion]
+        moves = [(row_id, move) for row_id, move in published if move is not None]
+        moved = max(moved, combined_displacement(moves, combine, groups))
     location_notes: tuple[str, ...] = ()
     location_doubt = ""
     if found and motion:
-        moves = [_moved_exactly(s, found, first_order.ground.plane) for s in motion]
+        exact_moves = [(s.id, _moved_exactly(s, found, first_order.ground.plane)) for s in motion]
         location_notes, location_doubt = of_members(
-            found, motion, combine_displacements(moves, combine), mission.requirements.location_error, "m"
+            found,
+            motion,
+            combined_displacement(exact_moves, combine, groups),
+            mission.requirements.location_error,
+            "m",
         )
     yield _judged(
         mission,
@@ -346,13 +361,12 @@ def _aggregate_rows(
         info="" if mission.requirements.location_error is not None else NO_REQUIREMENT,
         over="displacement of the image above the requirement",
         doubt=location_doubt,
-        notes=location_notes,
+        notes=(*notes, *location_notes),
     )
     if allocation.n_pull is not None:
         pull_in = math.pi * allocation.n_pull
-        pull_in_notes, pull_in_doubt = of_members(
-            found, declared, combine_phases(_exact_phases(declared, found), "sum"), pull_in, "rad"
-        )
+        by_exact = math.fsum(abs(s.qpe("full")) for s in _with_exact(declared, found))
+        pull_in_notes, pull_in_doubt = of_members(found, declared, by_exact, pull_in, "rad")
         yield _judged(
             mission,
             id="mission.autofocus_pull_in",
@@ -369,9 +383,9 @@ def _aggregate_rows(
         )
 
 
-def _exact_phases(members: Sequence[ErrorSource], found: Mapping[str, Beyond]) -> list[float]:
-    """Quadratic phases by the full model, of members beyond first order by exact ranges. [rad]"""
-    return [found[s.id].qpe if s.id in found else s.qpe("full") for s in members]
+def _with_exact(members: Sequence[ErrorSource], found: Mapping[str, Beyond]) -> list[ErrorSource]:
+    """The errors, those beyond first order with effects that give what exact ranges give."""
+    return [found[s.id].in_place_of(s) if s.id in found else s for s in members]
 
 
 def _moved_exactly(source: ErrorSource, found: Mapping[str, Beyond], plane: ImagePlane) -> GroundVector:
@@ -420,7 +434,11 @@ def _scene_row(
 
 
 def _qpe_aggregates(
-    mission: Mission, allocation: Allocation, declared: Sequence[ErrorSource], found: Mapping[str, Beyond]
+    mission: Mission,
+    allocation: Allocation,
+    declared: Sequence[ErrorSource],
+    groups: Sequence[Correlated],
+    found: Mapping[str, Beyond],
 ) -> Iterator[Row]:
     combine, model, gain = mission.allocation.combine, mission.allocation.model, allocation.autofocus_gain
     owners = ["transmitter", "receiver", "mission"]
@@ -429,7 +447,7 @@ def _qpe_aggregates(
     for owner in owners:
         members = [s for s in declared if owner == "mission" or allocation.qpe.includes(s.owner, owner)]
         qpe, published, full = (
-            combine_phases([s.qpe(of) for s in members], combine) if members else None
+            combined_phase(members, "qpe", of, combine, groups) if members else None
             for of in (model, "published", "full")
         )
         limit = allocation.qpe_limit(owner) * gain
@@ -438,9 +456,8 @@ def _qpe_aggregates(
         doubt = ""
         if other is not None and other[1] is not None and other[1] > limit * (1 + UTILIZATION_TOLERANCE):
             doubt = f"the {other[0]} model says fail: {other[1]:.3g} rad, {limit:.3g} rad allowed"
-        notes, exact_doubt = of_members(
-            found, members, combine_phases(_exact_phases(members, found), combine), limit, "rad"
-        )
+        by_exact = combined_phase(_with_exact(members, found), "qpe", "full", combine, groups)
+        notes, exact_doubt = of_members(found, members, by_exact, limit, "rad")
         yield _judged(
             mission,
             id=f"{'timing' if owner == 'clock' else owner}.quadratic_phase_error",
@@ -455,10 +472,10 @@ def _qpe_aggregates(
             gain=gain,
             over=over,
             doubt=doubt or exact_doubt,
-            notes=notes,
             limits=(limit, limit),
             qpe=published,
             qpe_full=full,
+            notes=(*correlation_notes(combine, [g for g in groups if owner in (g.platform, "mission")]), *notes),
         )
 
 
@@ -584,6 +601,10 @@ def _unknown_requirement_ids(mission: Mission, rows: Sequence[Row]) -> Iterator[
 def _nothing_declared(rows: Sequence[Row]) -> Iterator[FileWarning]:
     if all(row.status == "not_declared" for row in rows):
         yield FileWarning(line=None, message="no error is declared: nothing was judged")
+
+
+def _unused_correlations(mission: Mission) -> Iterator[FileWarning]:
+    return (FileWarning(line, message) for line, message in unused_correlations(mission))
 
 
 def _unused_keys(mission: Mission) -> Iterator[str]:

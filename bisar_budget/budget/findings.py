@@ -9,6 +9,7 @@ from bisar_budget.geometry import BistaticGeometry, GroundVector
 
 if TYPE_CHECKING:
     from bisar_budget.budget.image_evidence import ImageEvidence
+    from bisar_budget.budget.monte_carlo import MonteCarlo
     from bisar_budget.budget.scene import SceneEdge
     from bisar_budget.budget.verdicts import Verdict
 
@@ -85,6 +86,7 @@ class MissionFindings(NamedTuple):
     scene: "SceneEdge | None" = None  # of missions with a scene.radius and declared errors
     verdicts: "tuple[Verdict, ...] | None" = None  # of images, if any were formed
     image_evidence: "tuple[ImageEvidence, ...]" = ()  # a few of those images, where a report shows them
+    monte_carlo: "MonteCarlo | None" = None  # if errors were drawn
 
     @property
     def status(self) -> str:

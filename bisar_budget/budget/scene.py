@@ -17,6 +17,7 @@ from typing import NamedTuple
 from bisar_budget import evaluators
 from bisar_budget.budget.allocation import Allocation
 from bisar_budget.budget.combine import combine_phases
+from bisar_budget.budget.correlation import correlated_errors, phase_parts
 from bisar_budget.budget.sources import MOTION_UNITS, PLATFORMS, Effect, ErrorSource, full_ground
 from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
 from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState
@@ -72,6 +73,7 @@ class EdgePhases:
         self.mission, self.geometry, self.members = mission, geometry, members
         self.combine = mission.allocation.combine
         self.centre = [source.qpe("full") for source in members]
+        self.groups = correlated_errors(mission) if self.combine == "rss" else ()
 
     def geometry_at(self, point: GroundVector) -> BistaticGeometry:
         """Both platforms as a point of the ground has them."""
@@ -119,7 +121,23 @@ class EdgePhases:
 
     def combined(self, phases: Sequence[float]) -> float:
         """Differences of phases to the centre's, combined: the largest, their sum or root-sum-square. [rad]"""
-        return combine_phases([there - c for there, c in zip(phases, self.centre, strict=True)], self.combine)
+        return self.together([there - c for there, c in zip(phases, self.centre, strict=True)])
+
+    def together(self, phases: Sequence[float], indices: Sequence[int] | None = None) -> float:
+        """Phases of the errors, or of some of them, combined; those of a covariance with their correlations. [rad]"""
+        if not self.groups:
+            return combine_phases(phases if indices is None else [phases[i] for i in indices], self.combine)
+        return combine_phases([phase for _, phase in self.parts(phases, indices)], self.combine)
+
+    def parts(self, phases: Sequence[float], indices: Sequence[int] | None = None) -> list[tuple[str, float]]:
+        """What they combine from: ids and phases, of a covariance one under `rss`. [rad]"""
+        chosen = range(len(self.members)) if indices is None else indices
+        members = []
+        for i in chosen:
+            source = self.members[i]
+            per_unit = phases[i] / (source.declared or 1.0)
+            members.append(source._replace(full=source.full._replace(qpe=per_unit)))
+        return phase_parts(members, "qpe", "full", self.combine, self.groups)
 
     def difference(self, radius: float, azimuth: float) -> float:
         """The same at one point. [rad]"""
@@ -262,9 +280,9 @@ def _over_at_the_edge(edge: EdgePhases, allocation: Allocation, rim: Rim) -> str
         ]
     worst = ("", 0.0, 0.0)
     for name, indices, limit in groups:
-        if combine_phases([edge.centre[i] for i in indices], rule) > limit * (1 + UTILIZATION_TOLERANCE):
+        if edge.together(edge.centre, indices) > limit * (1 + UTILIZATION_TOLERANCE):
             continue  # its own row says so
-        phase = max(combine_phases([there[i] for i in indices], rule) for there in rim.phases)
+        phase = max(edge.together(there, indices) for there in rim.phases)
         if phase > limit * (1 + UTILIZATION_TOLERANCE) and phase > worst[1]:
             worst = (name, phase, limit)
     name, phase, limit = worst

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 
 from bisar_budget.budget.allocation import Allocation
+from bisar_budget.budget.correlation import correlated_errors, displacement_parts, phase_parts
 from bisar_budget.budget.findings import MissionFindings, Row
 from bisar_budget.budget.scene import EdgePhases, at
 from bisar_budget.budget.sources import ErrorSource, error_sources
@@ -43,9 +44,9 @@ def explain(mission: Mission, found: MissionFindings, row_id: str) -> str:
     elif ".vibration." in row.id:
         lines += _vibration(mission, found.allocation, row)
     elif row.id.endswith(".quadratic_phase_error") or row.id == "mission.autofocus_pull_in":
-        lines += _phase_aggregate(found, row, sources.values())
+        lines += _phase_aggregate(mission, found, row, sources.values())
     elif row.id == "mission.cubic_phase_error":
-        lines += _cubic_aggregate(found, row, sources.values())
+        lines += _cubic_aggregate(mission, found, row, sources.values())
     elif row.id == "mission.spatial_variance":
         lines += _spatial_variance(mission, found, row, sources.values())
     elif row.id == "mission.location_error":
@@ -158,7 +159,9 @@ def _shared_frequency(mission: Mission, platform: str, index: int, total: float)
     yield from step(title, f"declared = {sizes} = {total:.6g} m")
 
 
-def _phase_aggregate(found: MissionFindings, row: Row, sources: Iterable[ErrorSource]) -> Iterator[str]:
+def _phase_aggregate(
+    mission: Mission, found: MissionFindings, row: Row, sources: Iterable[ErrorSource]
+) -> Iterator[str]:
     owner = {"timing": "clock"}.get(row.id.split(".")[0], row.id.split(".")[0])
     members = [
         source
@@ -168,7 +171,8 @@ def _phase_aggregate(found: MissionFindings, row: Row, sources: Iterable[ErrorSo
         and (owner == "mission" or found.allocation.qpe.includes(source.owner, owner))
     ]
     rule = "sum" if row.id == "mission.autofocus_pull_in" else found.combine
-    yield from _combined("QPE", rule, [(source.id, abs(source.qpe(found.model))) for source in members], row)
+    parts = phase_parts(members, "qpe", found.model, rule, correlated_errors(mission))
+    yield from _combined("QPE", rule, [(name, abs(size)) for name, size in parts], row)
     if row.id == "mission.autofocus_pull_in":
         values = {"N_pull": found.allocation.n_pull or 0.0}
         lines = equation("allowable", "π*N_pull", values, row.allowable or 0.0, "rad")
@@ -177,13 +181,16 @@ def _phase_aggregate(found: MissionFindings, row: Row, sources: Iterable[ErrorSo
         yield from _limit(found.allocation, owner, row.allowable or 0.0)
 
 
-def _cubic_aggregate(found: MissionFindings, row: Row, sources: Iterable[ErrorSource]) -> Iterator[str]:
+def _cubic_aggregate(
+    mission: Mission, found: MissionFindings, row: Row, sources: Iterable[ErrorSource]
+) -> Iterator[str]:
     members = [
-        (source.id, abs(source.cubic(found.model)))
+        source
         for source in sources
         if source.declared is not None and source.is_motion and (source.is_independent or found.combine == "each")
     ]
-    yield from _combined("cubic phase", found.combine, members, row)
+    parts = phase_parts(members, "cubic", found.model, found.combine, correlated_errors(mission))
+    yield from _combined("cubic phase", found.combine, [(name, abs(size)) for name, size in parts], row)
     if row.allowable is not None:
         yield from step("Allowable", f"requirements.cubic_phase_error = {row.allowable:.6g} rad")
 
@@ -202,7 +209,7 @@ def _spatial_variance(
     ]
     edge = EdgePhases(mission, found.geometry, members)
     east, north = at(scene.radius, scene.azimuth)
-    sizes = [(s.id, abs(d)) for s, d in zip(members, edge.differences((east, north)), strict=True)]
+    sizes = [(name, abs(phase)) for name, phase in edge.parts(edge.differences((east, north)))]
     yield from step(
         f"Full model at the scene’s edge, {east:.6g} m east, {north:.6g} m north of the centre, less there"
     )
@@ -220,9 +227,11 @@ def _location_aggregate(
         plane, by_model, title = plane_and_effect(mission, found, source)
         moved = plane.displacement(by_model, source.declared)
         if moved is not None and (source.is_independent or found.combine == "each"):
-            members.append((source.id, math.hypot(*moved)))
+            members.append((source.id, moved))
     rule = "the longest sum over all signs of the vectors" if found.combine == "sum" else _RULES[found.combine]
-    yield from step(f"{title}: displacements, {rule}", *_listed(members, "m"))
+    parts = displacement_parts(members, found.combine, correlated_errors(mission))
+    sizes = [(name, math.hypot(*moved)) for name, moved in parts]
+    yield from step(f"{title}: displacements, {rule}", *_listed(sizes, "m"))
     if row.declared is not None:
         yield f"    combined = {row.declared:.6g} m"
     if row.allowable is not None:

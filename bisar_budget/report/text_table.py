@@ -77,6 +77,10 @@ def _mission(mission: MissionFindings, style: Style) -> list[str]:
     details = [line for row in explained for line in _details(row, mission, style)]
     lines += ["", *details] if details else []
     lines += [line for text in _asides(mission, style) for line in wrapped(text, "  ")]
+    if mission.monte_carlo is not None:
+        from bisar_budget.report.monte_carlo import probabilities
+
+        lines += ["", *probabilities(mission.monte_carlo)]
     if mission.verdicts is not None:
         from bisar_budget.report.verification import evidence
 
@@ -171,6 +175,8 @@ def percent(ratio: float) -> str:
         return ">1e5 %"
     if value < 0.01:
         return "<0.01 %"
+    if value < 0.1:
+        return f"{value:.2g} %"  # as wide as the column
     if value < 99:
         return f"{value:.3g} %"
     side = 0 if abs(value - 100) < 1e-7 else math.copysign(1, value - 100)
@@ -183,8 +189,9 @@ def percent(ratio: float) -> str:
 
 
 def _cells(status: str, row: str, declared: str, allowable: str, use: str, reference: str) -> str:
-    left = status.ljust(9) + row.ljust(34)
-    return (left + declared.rjust(12) + allowable.rjust(12) + use.rjust(8) + " " + reference).rstrip()
+    # A blank of its own between cells: a wide one shifts the rest, it does not touch its neighbour.
+    left = status.ljust(8) + " " + row.ljust(34)
+    return f"{left} {declared.rjust(11)} {allowable.rjust(11)} {use.rjust(7)} {reference}".rstrip()
 
 
 def _details(row: Row, mission: MissionFindings, style: Style) -> list[str]:

@@ -138,7 +138,7 @@ class Study:
             "velocity": MotionError(velocity=(x, y, z)),
             "acceleration": MotionError(acceleration=(x, y, z)),
         }[kind]
-        return Errors().of(owner, error)
+        return Errors(transmitter=error, receiver=error) if owner == "common" else Errors().of(owner, error)
 
     def _scaled(self, sizes: Sequence[tuple[ErrorSource, float]], scale: float) -> Errors:
         return superposed(self.errors(source, scale * size) for source, size in sizes)

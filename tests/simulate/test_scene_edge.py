@@ -139,6 +139,24 @@ class TestRow:
         assert variance.declared == pytest.approx(worst, rel=1e-3)
         assert variance.status != "info"
 
+    def test_a_covariance_counts_with_its_correlations(self) -> None:
+        """√(dᵀRd) of the differences, R the correlations."""
+        correlation = np.eye(6)
+        correlation[0, 3] = correlation[3, 0] = -0.9
+        sigmas = [3, 3, 3, 0.2, 0.2, 0.2]
+        covariance = {"position": [3, 3, 3], "velocity": [0.2, 0.2, 0.2], "correlation": correlation.tolist()}
+        errors = {"platforms__receiver__motion_error": {"covariance": covariance}}
+        mission = parse_mission(mission_text(scene={"radius": 500}, allocation__combine="rss", **errors))
+        variance = row(check_mission(mission, TODAY), "mission.spatial_variance")
+        sources = {s.id: s for s in Study(mission).sources}
+        names = [f"receiver.{kind}.{axis}" for kind in ("position", "velocity") for axis in "xyz"]
+        members = [sources[name]._replace(declared=size) for name, size in zip(names, sigmas, strict=True)]
+        edge = EdgePhases(mission, mission.geometry, members)
+        differences = np.array([edge.differences(at(500, math.radians(degrees))) for degrees in range(360)])
+        worst = math.sqrt(max(np.einsum("ki,ij,kj->k", differences, correlation, differences)))
+        assert variance.declared == pytest.approx(worst, rel=1e-3)
+        assert worst < np.linalg.norm(differences, axis=1).max()
+
     @pytest.mark.parametrize("model", ["published", "full", "strictest"])
     def test_the_published_model_has_no_limit_but_warns(self, model: str) -> None:
         variance = row(self.found(5000, allocation__model=model), "mission.spatial_variance")

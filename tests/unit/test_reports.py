@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import math
+import re
 
 import pytest
 
@@ -194,3 +195,12 @@ def test_every_format_ends_with_one_newline() -> None:
         text = render(name, report(), Style())
         assert text.endswith("\n")
         assert not text.endswith("\n\n")
+
+
+def test_cells_of_the_table_do_not_touch(run) -> None:
+    """An allowable of twelve characters beside a dash read as a negative number; one of percent ran into metres."""
+    text = run("check", "specs/missions/drones_same_gnss.yaml").stdout
+    assert " - 3.05e-08 s/s " in text
+    assert not re.search(
+        r" -\d|m\d+\.\d+ %", text[text.index("status") : text.index("FAIL mission.location_error (")]
+    )
