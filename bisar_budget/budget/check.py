@@ -1,11 +1,12 @@
 """Hold a mission's declared errors to its allocated budget: one row for each, and what the rows add up to."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import date
+from typing import TYPE_CHECKING
 
-from bisar_budget import evaluators
-from bisar_budget.budget.allocation import Allocation, Split, allocate
+from bisar_budget.budget import vibration
+from bisar_budget.budget.allocation import Allocation, allocate
 from bisar_budget.budget.correlation import (
     Correlated,
     combined_displacement,
@@ -15,6 +16,7 @@ from bisar_budget.budget.correlation import (
     unused_correlations,
 )
 from bisar_budget.budget.findings import FileWarning, MissionFindings, Resolution, Row
+from bisar_budget.budget.pull_in import pull_in_caps
 from bisar_budget.budget.sources import (
     ErrorSource,
     FullGround,
@@ -23,12 +25,15 @@ from bisar_budget.budget.sources import (
     full_ground,
     image_plane,
 )
-from bisar_budget.budget.validity import FirstOrder, collection_notes
+from bisar_budget.budget.validity import Beyond, FirstOrder, collection_notes, of_members
 from bisar_budget.budget.waivers import apply_waivers
 from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
 from bisar_budget.errors import KeyPath
 from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.model import Mission
+
+if TYPE_CHECKING:
+    from bisar_budget.budget.scene import SceneEdge
 
 NO_REQUIREMENT = "no requirement in the file: computed, not judged"
 
@@ -53,13 +58,22 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
     plane = image_plane(geometry) if mission.allocation.model == "published" else ground.plane
     sources = error_sources(mission, geometry, ground)
     allocation = allocate(mission, sources)
-    errors = list(_error_rows(mission, allocation, sources, plane, FirstOrder(mission, geometry, ground)))
+    first_order = FirstOrder(mission, geometry, ground)
+    errors = list(_error_rows(mission, allocation, sources, plane, first_order))
     judged = [
         *errors,
         *_vibration_rows(mission, allocation),
-        *_aggregate_rows(mission, allocation, sources, errors, plane),
+        *_aggregate_rows(mission, allocation, sources, errors, plane, first_order),
     ]
+    scene = None
+    if mission.scene.radius is not None:
+        scene, row = _scene_row(mission, allocation, sources)
+        judged.append(row)
     rows, warnings = apply_waivers(judged, mission, today)
+    resolution = Resolution(
+        range=geometry.range_resolution(mission.radar.bandwidth, SPEED_OF_LIGHT),
+        cross_range=geometry.cross_range_resolution(mission.radar.wavelength, mission.collection.aperture_time),
+    )
     return MissionFindings(
         mission=mission,
         file=mission.file,
@@ -71,19 +85,18 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
         geometry=geometry,
         aperture_time=mission.collection.aperture_time,
         scene_radius=mission.scene.radius,
-        resolution=Resolution(
-            range=geometry.range_resolution(mission.radar.bandwidth, SPEED_OF_LIGHT),
-            cross_range=geometry.cross_range_resolution(mission.radar.wavelength, mission.collection.aperture_time),
-        ),
+        resolution=resolution,
         allocation=allocation,
         rows=tuple(rows),
         warnings=(
             *_unknown_requirement_ids(mission, rows),
             *warnings,
             *_unused_correlations(mission),
+            *pull_in_caps(mission, resolution),
             *_nothing_declared(rows),
         ),
-        notes=(*collection_notes(mission, geometry), *_unused_keys(mission)),
+        scene=scene,
+        notes=(*collection_notes(mission, geometry, ground), *_unused_keys(mission)),
     )
 
 
@@ -105,11 +118,11 @@ def _error_rows(
         by_table, by_full = abs(source.effect.qpe), source.full.qpe
         published, full = _quotient(limit, by_table), _quotient(limit, abs(by_full))
         if signed is None:
-            yield _undeclared(mission, source, published, full)
+            yield _undeclared(mission, source, published, full, first_order, limit)
             continue
         declared = abs(signed)
         qpe_published, qpe_full = by_table * declared, by_full * signed
-        notes, displacement = source.notes, None
+        notes, displacement, exact = source.notes, None, None
         over = doubt = ""
         if source.is_motion:
             displacement = plane.displacement(source.effect if model == "published" else source.full, signed)
@@ -117,10 +130,12 @@ def _error_rows(
                 notes = (*notes, plane.degeneracy)
             beyond = first_order.beyond(source)
             if beyond is not None:
-                both = f"{qpe_full:.3g} rad becomes {beyond:.3g} rad with the second order"
-                notes = (*notes, f"beyond first order: the full model's {both}")
-                if abs(beyond) > limit * (1 + UTILIZATION_TOLERANCE):
-                    doubt = f"beyond first order, where no limit holds: {both}, {limit:.3g} rad allowed"
+                exact = beyond.exact and beyond.qpe
+                notes = (*notes, beyond.against(qpe_full))
+                doubt = beyond.doubt(qpe_full, limit)
+        allowable = _gating(model, published, full)
+        if of_allowable := first_order.allowable_note(source, allowable if allowable is not None else full, limit):
+            notes = (*notes, of_allowable)
         if qpe_published > limit or abs(qpe_full) > limit:
             qpe = abs(source.qpe(model))
             doubt = _doubt(source, model, limit, first_order.ground) or doubt
@@ -130,7 +145,6 @@ def _error_rows(
                 f"QPE {qpe:.3g} rad, {limit:.3g} rad allowed ({of_model}); "
                 f"passes with autofocus from n_pull {needed:g}"
             )
-        allowable = _gating(model, published, full)
         utilization, margin, status, reason, notes = _status(
             warn_above, declared, allowable, gain, over, doubt, _no_limit(source, model), "", info, True, False, notes
         )
@@ -156,6 +170,8 @@ def _error_rows(
                 mission.requirement_ids.get(source.id),
                 source.evidence,
                 source.is_independent,
+                exact,
+                None,
             )
         )
 
@@ -196,9 +212,19 @@ def _doubt(source: ErrorSource, model: str, limit: float, ground: FullGround) ->
     return ""
 
 
-def _undeclared(mission: Mission, source: ErrorSource, published: float | None, full: float | None) -> Row:
+def _undeclared(
+    mission: Mission,
+    source: ErrorSource,
+    published: float | None,
+    full: float | None,
+    first_order: FirstOrder,
+    limit: float,
+) -> Row:
     """Row of an error that the file does not declare, as `_judged` would make it: half of all rows are such."""
     allowable = _gating(mission.allocation.model, published, full)
+    notes = source.notes
+    if of_allowable := first_order.allowable_note(source, allowable if allowable is not None else full, limit):
+        notes = (*notes, of_allowable)
     return Row._make(
         (
             source.id,
@@ -216,11 +242,13 @@ def _undeclared(mission: Mission, source: ErrorSource, published: float | None, 
             "not_declared",
             mission.line(source.path),
             _no_limit(source, mission.allocation.model) if allowable is None else None,
-            source.notes,
+            notes,
             source.equation,
             mission.requirement_ids.get(source.id),
             source.evidence,
             source.is_independent,
+            None,
+            None,
         )
     )
 
@@ -232,66 +260,28 @@ def _quotient(numerator: float, denominator: float) -> float | None:
 
 
 def _vibration_rows(mission: Mission, allocation: Allocation) -> Iterator[Row]:
-    T = mission.collection.aperture_time
-    for name in ("transmitter", "receiver"):
-        error = getattr(mission.platforms, name).motion_error
-        path: KeyPath = ("platforms", name, "motion_error", "vibration")
-        allowable = _vibration_allowable(mission, mission.requirements.pslr, allocation.pslr, name)
-        missing = "" if mission.requirements.pslr is not None else "no requirements.pslr to hold it to"
-        for index, sinusoid in enumerate(error.vibration.sinusoidal or (None,)):
-            cycles = math.inf if sinusoid is None else sinusoid.frequency * T
-            slow = ""
-            if cycles < 1:
-                slow = (
-                    f"{cycles:.2g} cycles per aperture: slower than one, it acts as a quadratic and cubic phase "
-                    "error, not as paired echoes"
-                )
-            notes: tuple[str, ...] = ()
-            if 1 <= cycles < 3:
-                notes = (
-                    f"{cycles:.3g} cycles per aperture: below three it also acts as a quadratic phase error, "
-                    "which this row does not count",
-                )
-            yield _judged(
-                mission,
-                id=f"{name}.vibration.sinusoidal.{index}",
-                metric="pslr",
-                unit="m",
-                declared=None if sinusoid is None else sinusoid.amplitude,
-                allowable=allowable,
-                path=(*path, "sinusoidal", index, "amplitude"),
-                equation="Section V, sinusoidal",
-                no_limit=missing,
-                not_evaluated=missing or slow,
-                is_declared=sinusoid is not None,
-                over="paired echoes above the platform's share of PSLR (Section V)",
-                evidence=error.source,
-                notes=notes,
-            )
-        wideband = error.vibration.wideband
-        missing = "" if mission.requirements.islr is not None else "no requirements.islr to hold it to"
+    model = mission.allocation.model
+    for case in vibration.cases(mission, allocation):
+        allowed = case.limits
         yield _judged(
             mission,
-            id=f"{name}.vibration.wideband",
-            metric="islr",
+            id=case.id,
+            metric=case.metric,
             unit="m",
-            declared=None if wideband is None else wideband.rms,
-            allowable=_vibration_allowable(mission, mission.requirements.islr, allocation.islr, name),
-            path=(*path, "wideband", "rms"),
-            equation="Section V, wideband",
-            no_limit=missing,
-            not_evaluated=missing,
-            is_declared=wideband is not None,
-            over="power spread above the platform's share of ISLR (Section V)",
-            evidence=error.source,
-        )
-
-
-def _vibration_allowable(mission: Mission, requirement_db: float | None, split: Split, name: str) -> float | None:
-    if requirement_db is None:
-        return None
-    power = 10 ** (requirement_db / 10)  # -30 dB is 10⁻³: PSLR and ISLR are power ratios
-    return evaluators.vibration_limit(mission.radar.wavelength, math.sqrt(power * split.of(name)))
+            declared=case.declared,
+            allowable=None if allowed is None else allowed.by(model),
+            path=case.path,
+            equation=case.equation,
+            no_limit=case.missing,
+            not_evaluated=case.not_evaluated,
+            is_declared=case.declared is not None,
+            over=case.over,
+            doubt=case.doubt,
+            limits=allowed or (None, None),
+            qpe_full=case.qpe,
+            evidence=case.evidence,
+            notes=case.notes,
+        )._replace(published_margin_db=None if allowed is None else allowed.margin_db)
 
 
 def _aggregate_rows(
@@ -300,6 +290,7 @@ def _aggregate_rows(
     sources: Sequence[ErrorSource],
     errors: Sequence[Row],  # of the sources, in their order
     plane: ImagePlane,
+    first_order: FirstOrder,
 ) -> Iterator[Row]:
     combine, model = mission.allocation.combine, mission.allocation.model
     groups = correlated_errors(mission)
@@ -307,7 +298,7 @@ def _aggregate_rows(
     stated = [source for source in sources if source.declared is not None]
     declared = [source for source in stated if source.is_independent]
     if combine != "each":
-        yield from _qpe_aggregates(mission, allocation, declared, groups)
+        yield from _qpe_aggregates(mission, allocation, declared, groups, first_order.found)
     # `each` looks at single rows, those along the scene's axes included.
     motion = [source for source in (stated if combine == "each" else declared) if source.is_motion]
     cubic_limit, cubic_doubt = mission.requirements.cubic_phase_error, ""
@@ -316,6 +307,12 @@ def _aggregate_rows(
         cubic = combined_phase(motion, "cubic", other, combine, groups)
         if cubic > cubic_limit * (1 + UTILIZATION_TOLERANCE):
             cubic_doubt = f"the {other} model says fail: {cubic:.3g} rad, {cubic_limit:.3g} rad allowed"
+    found = first_order.found
+    cubic_notes: tuple[str, ...] = ()
+    if found and motion:
+        by_exact = combined_phase(_with_exact(motion, found), "cubic", "full", combine, groups)
+        cubic_notes, exact_doubt = of_members(found, motion, by_exact, cubic_limit, "rad")
+        cubic_doubt = cubic_doubt or exact_doubt
     yield _judged(
         mission,
         id="mission.cubic_phase_error",
@@ -329,7 +326,7 @@ def _aggregate_rows(
         info="" if mission.requirements.cubic_phase_error is not None else NO_REQUIREMENT,
         over="cubic phase at the aperture edge above the requirement; autofocus gain does not apply",
         doubt=cubic_doubt,
-        notes=notes,
+        notes=(*notes, *cubic_notes),
     )
     counted = {source.id for source in motion}
     known = [(row.id, row.displacement_m) for row in errors if row.displacement_m is not None and row.id in counted]
@@ -339,6 +336,17 @@ def _aggregate_rows(
         published = [(s.id, by_25.displacement(s.effect, s.declared or 0.0)) for s in motion]
         moves = [(row_id, move) for row_id, move in published if move is not None]
         moved = max(moved, combined_displacement(moves, combine, groups))
+    location_notes: tuple[str, ...] = ()
+    location_doubt = ""
+    if found and motion:
+        exact_moves = [(s.id, _moved_exactly(s, found, first_order.ground.plane)) for s in motion]
+        location_notes, location_doubt = of_members(
+            found,
+            motion,
+            combined_displacement(exact_moves, combine, groups),
+            mission.requirements.location_error,
+            "m",
+        )
     yield _judged(
         mission,
         id="mission.location_error",
@@ -353,25 +361,85 @@ def _aggregate_rows(
         is_declared=bool(motion),
         info="" if mission.requirements.location_error is not None else NO_REQUIREMENT,
         over="displacement of the image above the requirement",
-        notes=notes,
+        doubt=location_doubt,
+        notes=(*notes, *location_notes),
     )
     if allocation.n_pull is not None:
+        pull_in = math.pi * allocation.n_pull
+        by_exact = math.fsum(abs(s.qpe("full")) for s in _with_exact(declared, found))
+        pull_in_notes, pull_in_doubt = of_members(found, declared, by_exact, pull_in, "rad")
         yield _judged(
             mission,
             id="mission.autofocus_pull_in",
             metric="quadratic_phase_error",
             unit="rad",
             declared=math.fsum(abs(s.qpe(model)) for s in declared) if declared else None,
-            allowable=math.pi * allocation.n_pull,
+            allowable=pull_in,
             path=("autofocus", "n_pull"),
             equation="Section VI",
             never_fails=True,
             over="the errors together exceed what autofocus corrects: it corrects one total, not each error its own",
+            doubt=pull_in_doubt,
+            notes=pull_in_notes,
         )
 
 
+def _with_exact(members: Sequence[ErrorSource], found: Mapping[str, Beyond]) -> list[ErrorSource]:
+    """The errors, those beyond first order with effects that give what exact ranges give."""
+    return [found[s.id].in_place_of(s) if s.id in found else s for s in members]
+
+
+def _moved_exactly(source: ErrorSource, found: Mapping[str, Beyond], plane: ImagePlane) -> GroundVector:
+    """Displacement by the full model, beyond first order by exact ranges. [m]"""
+    if source.id in found:
+        return found[source.id].displacement
+    return plane.displacement(source.full, source.declared or 0.0) or (0.0, 0.0)
+
+
+def _scene_row(
+    mission: Mission, allocation: Allocation, sources: Sequence[ErrorSource]
+) -> tuple["SceneEdge | None", Row]:
+    """Row of the scene's edge; to the published model an error is the same all over the scene."""
+    from bisar_budget.budget.scene import scene_edge
+
+    combine, total = mission.allocation.combine, allocation.qpe_total
+    single = [s for s in sources if combine == "each" or s.is_independent]
+    edge = scene_edge(mission, mission.geometry, allocation, single)
+    is_published = mission.allocation.model == "published"
+    difference: float | None = None
+    doubt, notes = "", tuple[str, ...]()
+    if edge is not None and not edge.degeneracy:
+        difference, doubt, notes = edge.difference, edge.doubt, edge.notes(total)
+        if is_published and difference > total * (1 + UTILIZATION_TOLERANCE):
+            doubt = f"the full model says fail: {difference:.3g} rad, {total:.3g} rad allowed"
+    row = _judged(
+        mission,
+        id="mission.spatial_variance",
+        metric="quadratic_phase_error",
+        unit="rad",
+        declared=difference,
+        allowable=None if is_published else total,
+        path=("scene", "radius"),
+        equation="full model",
+        no_limit="to the published model an error is the same all over the scene",
+        not_evaluated="" if edge is None else edge.degeneracy,
+        is_declared=edge is not None,
+        over="quadratic phase at the scene's edge and at its centre differ by more than the total budget",
+        doubt=doubt,
+        limits=(None, total),
+        qpe=None if difference is None else 0.0,
+        qpe_full=difference,
+        notes=notes,
+    )
+    return edge, row
+
+
 def _qpe_aggregates(
-    mission: Mission, allocation: Allocation, declared: Sequence[ErrorSource], groups: Sequence[Correlated]
+    mission: Mission,
+    allocation: Allocation,
+    declared: Sequence[ErrorSource],
+    groups: Sequence[Correlated],
+    found: Mapping[str, Beyond],
 ) -> Iterator[Row]:
     combine, model, gain = mission.allocation.combine, mission.allocation.model, allocation.autofocus_gain
     owners = ["transmitter", "receiver", "mission"]
@@ -389,6 +457,8 @@ def _qpe_aggregates(
         doubt = ""
         if other is not None and other[1] is not None and other[1] > limit * (1 + UTILIZATION_TOLERANCE):
             doubt = f"the {other[0]} model says fail: {other[1]:.3g} rad, {limit:.3g} rad allowed"
+        by_exact = combined_phase(_with_exact(members, found), "qpe", "full", combine, groups)
+        notes, exact_doubt = of_members(found, members, by_exact, limit, "rad")
         yield _judged(
             mission,
             id=f"{'timing' if owner == 'clock' else owner}.quadratic_phase_error",
@@ -402,11 +472,11 @@ def _qpe_aggregates(
             equation="sum of the rows" if combine == "sum" else "root-sum-square of the rows",
             gain=gain,
             over=over,
-            doubt=doubt,
+            doubt=doubt or exact_doubt,
             limits=(limit, limit),
             qpe=published,
             qpe_full=full,
-            notes=correlation_notes(combine, [g for g in groups if owner in (g.platform, "mission")]),
+            notes=(*correlation_notes(combine, [g for g in groups if owner in (g.platform, "mission")]), *notes),
         )
 
 
@@ -541,7 +611,6 @@ def _unused_correlations(mission: Mission) -> Iterator[FileWarning]:
 def _unused_keys(mission: Mission) -> Iterator[str]:
     """Say which keys that the file gives have no part in this check."""
     keys = {
-        "scene.radius": mission.scene.radius is not None,
         "collection.pulses": mission.collection.pulses is not None,
         "simulation": mission.simulation is not None,
     }

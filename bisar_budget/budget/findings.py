@@ -12,6 +12,7 @@ from bisar_budget.mission.model import Mission
 if TYPE_CHECKING:
     from bisar_budget.budget.image_evidence import ImageEvidence
     from bisar_budget.budget.monte_carlo import MonteCarlo
+    from bisar_budget.budget.scene import SceneEdge
     from bisar_budget.budget.verdicts import Verdict
 
 # Worst first. The status of a mission or a run is the worst one found; the last three gate nothing.
@@ -24,7 +25,9 @@ class Row(NamedTuple):
     """One line of the budget. Numbers in SI and radians; None where a value does not exist.
 
     `is_independent` marks the rows that sums run over: errors as the file states them. Along the scene's
-    axes an error stated in another frame is shown again, but not counted again.
+    axes an error stated in another frame is shown again, but not counted again. `qpe_exact_rad` is the phase by exact
+    ranges, of errors beyond first order; `published_margin_db` how far the published rule of a vibration stays inside
+    first principles.
     """
 
     id: str
@@ -47,6 +50,8 @@ class Row(NamedTuple):
     requirement_id: str | None
     evidence: str | None
     is_independent: bool
+    qpe_exact_rad: float | None = None
+    published_margin_db: float | None = None
 
 
 class FileWarning(NamedTuple):
@@ -84,6 +89,7 @@ class MissionFindings(NamedTuple):
     rows: tuple[Row, ...]
     warnings: tuple[FileWarning, ...]
     notes: tuple[str, ...]
+    scene: "SceneEdge | None" = None  # of missions with a scene.radius and declared errors
     verdicts: "tuple[Verdict, ...] | None" = None  # of images, if any were formed
     image_evidence: "tuple[ImageEvidence, ...]" = ()  # a few of those images, where a report shows them
     monte_carlo: "MonteCarlo | None" = None  # if errors were drawn

@@ -27,7 +27,6 @@ from bisar_budget.mission.readers import (
     OneOf,
     Quantity,
     Reader,
-    Scalar,
     Section,
     Text,
     TextMap,
@@ -40,7 +39,6 @@ if TYPE_CHECKING:
     from bisar_budget.mission.covariance import Covariance
 
 STILL = 1e-6  # m/s; slower than this no platform flies an aperture
-LATER = "it comes with a later one"
 
 FREQUENCY = Quantity(units.FREQUENCY, gt=0, ge=1e3, le=1e13)
 VIBRATION_FREQUENCY = Quantity(units.FREQUENCY, gt=0, le=1e9)
@@ -100,17 +98,27 @@ class Scene(NamedTuple):
     ] = None
 
 
-class Sinusoid(NamedTuple):
-    """One sinusoidal vibration along the line of sight."""
+SIZES = Triple(SIZE)
+ALONG_SIGHT_OR_AXES = OneOf(lambda value: SIZES if isinstance(value, list) else SIZE, (SIZE, SIZES))
 
-    amplitude: Annotated[float, Key(Scalar(SIZE, LATER), "0 to peak, along the line of sight.")]
+
+class Sinusoid(NamedTuple):
+    """One sinusoidal vibration."""
+
+    amplitude: Annotated[
+        float | Vector,
+        Key(ALONG_SIGHT_OR_AXES, "0 to peak, along the line of sight; a vector: along each axis of the frame."),
+    ]
     frequency: Annotated[float, Key(VIBRATION_FREQUENCY)]
 
 
 class Wideband(NamedTuple):
-    """Noise-like vibration along the line of sight."""
+    """Noise-like vibration."""
 
-    rms: Annotated[float, Key(SIZE, "Root mean square, along the line of sight.")]
+    rms: Annotated[
+        float | Vector,
+        Key(ALONG_SIGHT_OR_AXES, "Root mean square, along the line of sight; a vector: along each axis."),
+    ]
 
 
 class Vibration(NamedTuple):

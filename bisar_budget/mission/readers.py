@@ -210,25 +210,6 @@ class Day(Reader):
         return {"type": "string", "format": "date"}
 
 
-class Scalar(Reader):
-    """A value that later may be a vector."""
-
-    def __init__(self, reader: Quantity, vector_feature: str) -> None:
-        self.reader, self.vector_feature = reader, vector_feature
-
-    def leaf(self, value: Any) -> float:
-        """Refuse a list with its own words."""
-        if isinstance(value, list):
-            raise InvalidValueError(
-                _not_yet(self.vector_feature, "as a vector "), "accepted: one value along the line of sight"
-            )
-        return self.reader.leaf(value)
-
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """As the scalar."""
-        return self.reader.schema(definitions)
-
-
 class TextMap(Reader):
     """A mapping of any key to text."""
 

@@ -116,6 +116,13 @@ def _mission(mission: MissionFindings) -> dict[str, Any]:
             "pslr_share": _shares(allocation.pslr),
             "islr_share": _shares(allocation.islr),
         },
+        "scene": None
+        if mission.scene is None
+        else {
+            "radius_m": mission.scene.radius,
+            "autofocus_radius_m": mission.scene.autofocus_radius,
+            "searched_radius_m": mission.scene.searched,
+        },
         "summary": mission.summary,
         "rows": [row._asdict() for row in mission.rows],
         "warnings": [{"line": warning.line, "message": warning.message} for warning in mission.warnings],

@@ -111,6 +111,12 @@ def head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
     yield "QPE budget", f"{format_quantity(allocation.qpe_total, 'rad')}: {shares}{gain}"
     rule = {"each": "each error alone", "sum": "worst-case sum", "rss": "root-sum-square"}[mission.combine]
     yield "Model", f"{_MODELS[mission.model]}, {rule}"
+    if mission.scene is not None and not mission.scene.degeneracy:
+        radius = format_quantity(mission.scene.radius, "m")
+        yield (
+            "Scene",
+            f"radius {radius}; one autofocus correction of the declared errors serves {mission.scene.served}",
+        )
     if mission.coverage_factor != 1:
         yield "Coverage", f"navigation and clock: declared is {mission.coverage_factor:g} times the file's value"
 

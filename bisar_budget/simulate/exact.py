@@ -56,7 +56,7 @@ def exact_effect(
             scale = 2 * math.pi / wavelength_m
             return ExactEffect(
                 displacement=(float(point[0]), float(point[1])),
-                quadratic=scale * float(left[2]),
-                cubic=scale * float(left[3]),
+                quadratic=scale * float(left[2] + 6 / 7 * left[4] + 5 / 7 * left[6]),  # least squares over all of it
+                cubic=scale * float(left[3] + 10 / 9 * left[5]),
             )
     raise ValueError("no ground point has the recorded range history")

@@ -7,6 +7,7 @@ import numpy as np
 
 from bisar_budget.budget.correlation import correlated_errors, likely_error
 from bisar_budget.budget.sources import PLATFORMS, error_sources
+from bisar_budget.budget.vibration import along_line_of_sight, lines_of
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vector
 from bisar_budget.mission.model import Mission
@@ -160,12 +161,7 @@ def simulate_point(mission: Mission) -> PointImages:
 def _pulses(mission: Mission, cells: int) -> int:
     """Pulses that sample the patch and every declared vibration twice over."""
     given = mission.collection.pulses
-    lines = [
-        line
-        for name in PLATFORMS
-        for line in getattr(mission.platforms, name).motion_error.vibration.sinusoidal
-        if line.amplitude
-    ]
+    lines = [line for name in PLATFORMS for line in lines_of(mission, name) if line.amplitude]
     cycles = max((line.frequency for line in lines), default=0.0) * mission.collection.aperture_time
     if given is not None and given <= 2 * cycles:
         raise SimulationError(
@@ -231,8 +227,8 @@ def _paths(
         if vibrating:
             wideband = declared.vibration.wideband
             error = error._replace(
-                sinusoids=tuple(Sinusoid(s.amplitude, s.frequency) for s in declared.vibration.sinusoidal),
-                wideband_rms=wideband.rms if wideband else 0.0,
+                sinusoids=tuple(Sinusoid(*line) for line in lines_of(mission, name)),
+                wideband_rms=along_line_of_sight(wideband.rms, declared, state, "islr") if wideband else 0.0,
             )
         flown.append(path(state, slow_time, error, rng))
     return flown[0], flown[1]

@@ -97,7 +97,9 @@ class TestJson:
     def test_full_columns_are_filled_for_errors_with_a_phase(self) -> None:
         rows = {row["id"]: row for row in as_json()["missions"][0]["rows"]}
         assert rows["receiver.velocity.y"]["allowable_full"] > 0
-        assert rows["transmitter.vibration.wideband"]["allowable_full"] is None
+        line = rows["transmitter.vibration.sinusoidal.0"]
+        ratio = line["allowable_full"] / line["allowable_published"]
+        assert line["published_margin_db"] == pytest.approx(20 * math.log10(ratio))
 
     def test_no_number_that_json_does_not_have(self) -> None:
         text = render("json", report(), Style())
