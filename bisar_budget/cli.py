@@ -235,7 +235,7 @@ def _checked(files: Sequence[str], today: date, model: str | None, verifying: bo
         for index, verified in zip(usable, _verified(list(usable.values()), "*", None), strict=True):
             found = missions[index]
             if not isinstance(found, UnusableMission):
-                missions[index] = with_verdicts(found, verified.rows)
+                missions[index] = with_verdicts(found, verified)
     return Report(version=__version__, missions=tuple(missions))
 
 
@@ -548,7 +548,7 @@ def verify(missions: Sequence[str], only: str, format_name: str, output: str | N
     The data come from exact ranges, and the phase is measured in the image. A limit is confirmed if the
     image shows its budget within 5 %, optimistic if it shows more, conservative if less. With autofocus
     each limit is formed again with its gain and refocused. Exit code: 0, or 1 if a limit is optimistic, 2
-    for wrong usage or an unusable file.
+    for wrong usage, an unusable file, or a mission on whose limits no image gave a verdict.
     """
     from bisar_budget.report import Style, verification
 
@@ -563,6 +563,11 @@ def verify(missions: Sequence[str], only: str, format_name: str, output: str | N
         _print(text)
     else:
         _write(output, text)
+    doubts = [mission for mission in verified if mission.doubt]
+    for mission in doubts:
+        _complain(f"{printable(mission.file)}: {mission.doubt}")
+    if doubts:
+        sys.exit(EXIT_USAGE)
     sys.exit(EXIT_BROKEN if any(mission.status == "fail" for mission in verified) else 0)
 
 

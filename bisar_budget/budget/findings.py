@@ -75,11 +75,13 @@ class MissionFindings(NamedTuple):
     warnings: tuple[FileWarning, ...]
     notes: tuple[str, ...]
     verdicts: "tuple[Verdict, ...] | None" = None  # of images, if any were formed
+    is_unverified: bool = False  # images were asked for, and none gave a verdict
 
     @property
     def status(self) -> str:
-        """Worst status of the rows."""
-        return worst(row.status for row in self.rows)
+        """Worst status of the rows; no better than `not_evaluated` if images were formed and verified nothing."""
+        doubt = ["not_evaluated"] if self.is_unverified else []
+        return worst([*(row.status for row in self.rows), *doubt])
 
     @property
     def summary(self) -> dict[str, int]:
@@ -112,13 +114,7 @@ class Report(NamedTuple):
         failing = ("fail", "not_evaluated", "warn") if strict else ("fail",)
         if any(mission.status == "error" for mission in self.missions):
             return 2
-        broken = any(
-            row.status in failing
-            for mission in self.missions
-            if isinstance(mission, MissionFindings)
-            for row in mission.rows
-        )
-        return 1 if broken else 0
+        return 1 if any(mission.status in failing for mission in self.missions) else 0
 
 
 def worst(statuses: Iterable[str]) -> str:

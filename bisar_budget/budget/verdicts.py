@@ -59,17 +59,31 @@ class VerifiedMission(NamedTuple):
 
     @property
     def status(self) -> str:
-        """`fail` if a limit of the gating model is optimistic, with or without autofocus, else `pass`."""
+        """`fail` if a limit of the gating model is optimistic, with or without autofocus.
+
+        `not_evaluated` if no limit got a verdict: nothing was verified, which is no pass. Else `pass`.
+        """
         verdicts = {row.verdict for row in self.rows} | {row.verdict_autofocus for row in self.rows}
-        return "fail" if "optimistic" in verdicts else "pass"
+        if "optimistic" in verdicts:
+            return "fail"
+        return "not_evaluated" if self.doubt else "pass"
+
+    @property
+    def doubt(self) -> str:
+        """Say that no limit got a verdict; empty if one did."""
+        if any({row.verdict, row.verdict_autofocus} - {"not_evaluated", None} for row in self.rows):
+            return ""
+        rows = f"{len(self.rows)} row{'s' if len(self.rows) != 1 else ''}"
+        return f"nothing was verified: {rows} with a limit, and no image gave a verdict on any"
 
 
-def with_verdicts(findings: MissionFindings, rows: tuple[Verdict, ...]) -> MissionFindings:
+def with_verdicts(findings: MissionFindings, verified: VerifiedMission) -> MissionFindings:
     """Add verdicts to findings: a limit that the image shows to be optimistic is said at its row.
 
-    A row that passes a limit it would fail as measured becomes a warning: the model that gates says pass, but
-    a gate must not be silent about what it knows.
+    A row that passes a limit it would fail as measured becomes a warning, and so does one that passes by an
+    autofocus that the image refutes: the model that gates says pass, but a gate must not be silent about what it knows. Where no image gave a verdict, that is a warning too.
     """
+    rows = verified.rows
     by_id = {verdict.id: verdict for verdict in rows}
     judged = tuple(_with_verdict(row, by_id[row.id]) if row.id in by_id else row for row in findings.rows)
     known = {row.id for row in findings.rows}
@@ -78,7 +92,11 @@ def with_verdicts(findings: MissionFindings, rows: tuple[Verdict, ...]) -> Missi
         for verdict in rows
         if verdict.id not in known and verdict.verdict == "optimistic"
     )
-    return findings._replace(rows=judged, warnings=(*findings.warnings, *warnings), verdicts=rows)
+    if verified.doubt:
+        warnings = (FileWarning(line=None, message=verified.doubt), *warnings)
+    return findings._replace(
+        rows=judged, warnings=(*findings.warnings, *warnings), verdicts=rows, is_unverified=bool(verified.doubt)
+    )
 
 
 def _with_verdict(row: Row, verdict: Verdict) -> Row:
@@ -87,6 +105,9 @@ def _with_verdict(row: Row, verdict: Verdict) -> Row:
         notes = (*notes, f"optimistic limit: {_shown(verdict)}")
     if verdict.verdict_autofocus == "optimistic":
         notes = (*notes, f"optimistic limit with autofocus: {verdict.reason_autofocus}")
+        if row.status == "pass_with_autofocus":
+            reason = "passes by autofocus alone, and the image at that limit refutes it"
+            return row._replace(status="warn", reason=reason, notes=notes)
     excess = _excess(verdict)
     if (
         row.status in ("pass", "pass_with_autofocus")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.verdicts import Verdict, with_verdicts
+from bisar_budget.budget.verdicts import Verdict, VerifiedMission, with_verdicts
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.simulate import collection as collection_module
 from bisar_budget.simulate.image_formation import backprojection
@@ -334,6 +334,49 @@ def test_verdicts_do_not_depend_on_the_number_of_processes() -> None:
     assert seen == [row.id for row in both.rows]
 
 
+def _verified(*rows: Verdict) -> VerifiedMission:
+    return VerifiedMission(file="mission.yaml", name="base", rows=rows)
+
+
+class TestNothingVerified:
+    """A gate on whose limits no image gave a verdict has verified nothing, and does not pass."""
+
+    @pytest.fixture
+    def too_few_pulses(self, tmp_path):
+        path = tmp_path / "mission.yaml"
+        path.write_text(mission_text(collection__pulses=20), encoding="utf-8")
+        return path
+
+    def test_verify_exits_with_2_and_says_so(self, run, too_few_pulses) -> None:
+        result = run("verify", too_few_pulses)
+        assert result.exit_code == 2
+        assert "mission.yaml: nothing was verified: 9 rows with a limit" in result.stderr
+        assert "aliases below" in result.stdout  # the reasons
+        document = json.loads(run("verify", too_few_pulses, "--format", "json").stdout)
+        assert document["missions"][0]["status"] == "not_evaluated"
+
+    def test_unverified_wins_over_optimistic(self, run, too_few_pulses) -> None:
+        assert run("verify", SECTION_V, too_few_pulses, "--only", "receiver.velocity.y").exit_code == 2
+
+    def test_check_warns_and_fails_under_strict(self, run, too_few_pulses) -> None:
+        plain = run("check", too_few_pulses, "--verify")
+        assert plain.exit_code == 0
+        assert "warning: " in plain.stdout and "nothing was verified: 9 rows" in plain.stdout
+        assert plain.stdout.splitlines()[-1].startswith("NOT EVAL")
+        assert run("check", too_few_pulses, "--verify", "--strict").exit_code == 1
+        assert run("check", too_few_pulses, "--strict").exit_code == 0  # no images were asked for
+
+    def test_one_verdict_is_enough(self, run) -> None:
+        """Other phases and root-sum-squares never have an image: they do not fail a mission that was verified."""
+        verdict = Verdict(id="timing.quadratic", model="published", boundary_error=1.0, unit="1/s")
+        unknown = _verified(verdict)
+        assert unknown.status == "not_evaluated"
+        assert with_verdicts(findings(), unknown).status == "not_evaluated"
+        confirmed = _verified(verdict, verdict._replace(verdict="confirmed"))
+        assert (confirmed.status, confirmed.doubt) == ("pass", "")
+        assert with_verdicts(findings(), confirmed).status == "pass"
+
+
 class TestCheckWithImages:
     def test_json_carries_the_verdicts_and_a_row_says_when_its_limit_is_optimistic(self, run) -> None:
         result = run("check", SECTION_V, "--verify", "--format", "json")
@@ -368,17 +411,33 @@ class TestCheckWithImages:
             id="receiver.vibration.wideband", model="published", boundary_error=1.0, unit="m", requirement_db=-20,
             measured_db=-20 + 20 * math.log10(excess), verdict="optimistic",
         )  # fmt: skip
-        judged = row_of(with_verdicts(found, (verdict,)), verdict.id)
+        judged = row_of(with_verdicts(found, _verified(verdict)), verdict.id)
         assert row_of(found, verdict.id).status == "pass"
         assert judged.status == status
         assert any("optimistic limit" in note for note in judged.notes)
+
+    @pytest.mark.parametrize(
+        ("verdict_autofocus", "status"), [("confirmed", "pass_with_autofocus"), ("optimistic", "warn")]
+    )
+    def test_a_pass_by_an_autofocus_that_the_image_refutes_is_a_warning(self, verdict_autofocus, status) -> None:
+        changes = {"platforms__receiver__motion_error": {"acceleration": [2e-3, 0, 0]}, "autofocus": {"n_pull": 2}}
+        found = findings(**changes)
+        verdict = Verdict(
+            id="receiver.acceleration.x", model="published", boundary_error=1.0, unit="m/s^2", verdict="confirmed",
+            verdict_autofocus=verdict_autofocus, reason_autofocus="autofocus leaves 0.7 of 0.393 rad",
+        )  # fmt: skip
+        assert row_of(found, verdict.id).status == "pass_with_autofocus"
+        judged = row_of(with_verdicts(found, _verified(verdict)), verdict.id)
+        assert judged.status == status
 
     def test_an_optimistic_limit_without_a_row_is_a_warning_of_the_file(self) -> None:
         verdict = Verdict(
             id="mission.vibration.wideband", model="published", boundary_error=1.0, unit="m", requirement_db=-20,
             measured_db=-17, verdict="optimistic",
         )  # fmt: skip
-        (warning,) = [w for w in with_verdicts(findings(), (verdict,)).warnings if "mission.vibration" in w.message]
+        (warning,) = [
+            w for w in with_verdicts(findings(), _verified(verdict)).warnings if "mission.vibration" in w.message
+        ]
         assert "-17.0 dB" in warning.message
 
     def test_text_and_csv_show_them(self, run) -> None:
