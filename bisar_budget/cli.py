@@ -15,6 +15,8 @@ from bisar_budget import __version__
 from bisar_budget.errors import printable
 
 if TYPE_CHECKING:
+    from click._termui_impl import ProgressBar
+
     from bisar_budget.budget.findings import MissionFindings, Report
     from bisar_budget.budget.verdicts import VerifiedMission
     from bisar_budget.mission.model import Mission
@@ -579,11 +581,16 @@ def _verified(missions: "Sequence[Mission]", only: str, jobs: int | None) -> "li
     total = sum(len(rows_to_verify(mission, only)) for mission in missions)
     if not total and only != "*":
         raise click.UsageError(f"--only {printable(only)}: no row with a limit has such an id, nothing was verified.")
-    watched = sys.stderr is not None and sys.stderr.isatty()
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     jobs = jobs or (1 if is_compiled() else cores)
-    with click.progressbar(length=total, label="Forming images", file=sys.stderr, hidden=not watched) as bar:
+    with _progress_bar(total) as bar:
         return [verify_mission(mission, only, jobs, lambda row_id: bar.update(1)) for mission in missions]
+
+
+def _progress_bar(total: int = 1) -> "ProgressBar[int]":
+    """Bar on standard error, where somebody watches."""
+    watched = sys.stderr is not None and sys.stderr.isatty()
+    return click.progressbar(length=total, label="Forming images", file=sys.stderr, hidden=not watched)
 
 
 @cli.command()
@@ -605,7 +612,13 @@ def simulate(mission: str, plot: str | None, output: str | None) -> None:
     from bisar_budget.simulate.point import SimulationError, simulate_point
 
     try:
-        images = simulate_point(loaded)
+        with _progress_bar() as bar:
+
+            def progress(done: int, work: int) -> None:
+                bar.length = work
+                bar.update(done)
+
+            images = simulate_point(loaded, progress)
     except (SimulationError, ValueError) as error:
         _fail(f"{mission}: {error}")
     try:

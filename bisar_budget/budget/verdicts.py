@@ -80,8 +80,9 @@ class VerifiedMission(NamedTuple):
 def with_verdicts(findings: MissionFindings, verified: VerifiedMission) -> MissionFindings:
     """Add verdicts to findings: a limit that the image shows to be optimistic is said at its row.
 
-    A row that passes a limit it would fail as measured becomes a warning, and so does one that passes by an
-    autofocus that the image refutes: the model that gates says pass, but a gate must not be silent about what it knows. Where no image gave a verdict, that is a warning too.
+    A row that passes a limit it would fail as measured becomes a warning, and so does one that passes by an autofocus
+    that the image refutes: the model that gates says pass, but a gate must not be silent about what it knows. That no
+    image gave a verdict is a warning too.
     """
     rows = verified.rows
     by_id = {verdict.id: verdict for verdict in rows}
