@@ -16,6 +16,7 @@ from bisar_budget.errors import printable
 
 if TYPE_CHECKING:
     from click._termui_impl import ProgressBar
+    from click.shell_completion import CompletionItem
 
     from bisar_budget.budget.findings import MissionFindings, Report
     from bisar_budget.budget.verdicts import VerifiedMission
@@ -56,7 +57,28 @@ def cli() -> None:
 
     How large may the motion errors of transmitter and receiver be before the image breaks its
     requirements, and are the declared ones inside? After Rigling & Moses.
+
+    Start with: bisar-budget init mission.yaml, then bisar-budget check mission.yaml
     """
+
+
+class _FileName(click.ParamType[str]):
+    """Name of a file, which a shell completes; what can be read is seen when it is."""
+
+    name = "file"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Take the text as it is."""
+        return str(value)
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> "list[CompletionItem]":
+        """Leave it to the shell, which knows the files."""
+        from click.shell_completion import CompletionItem
+
+        return [CompletionItem(incomplete, type="file")]
+
+
+FILE = _FileName()
 
 
 class _Gate(click.Command):
@@ -101,7 +123,7 @@ class _Gate(click.Command):
 
 
 @cli.command(cls=_Gate)
-@click.argument("missions", nargs=-1, required=True, metavar="MISSION...")
+@click.argument("missions", type=FILE, nargs=-1, required=True, metavar="MISSION...")
 @click.option(
     "--format",
     "format_name",
@@ -111,11 +133,14 @@ class _Gate(click.Command):
     show_default=True,
     help="Format of the report; github: annotations of a pull request, needs: for Sphinx-Needs.",
 )
-@click.option("-o", "--output", metavar="FILE", help="Write the report to FILE instead of standard output.")
+@click.option(
+    "-o", "--output", type=FILE, metavar="FILE", help="Write the report to FILE instead of standard output."
+)
 @click.option(
     "--report",
     "reports",
     envvar="BISAR_BUDGET_REPORT",
+    type=FILE,
     multiple=True,
     metavar="FILE",
     help="Also write a report to FILE, in the format of its suffix: .txt, .json, .csv, .xml (JUnit), .sarif "
@@ -455,7 +480,7 @@ class _Part(click.ParamType[float]):
 
 
 @cli.command()
-@click.argument("files", nargs=-1, required=True, metavar="OLD NEW | MISSION...")
+@click.argument("files", type=FILE, nargs=-1, required=True, metavar="OLD NEW | MISSION...")
 @click.option("--base", metavar="REV", help="Compare each MISSION with itself in this git revision.")
 @click.option(
     "--fail-on-erosion",
@@ -472,7 +497,7 @@ class _Part(click.ParamType[float]):
     show_default=True,
     help="Format of the comparison.",
 )
-@click.option("-o", "--output", metavar="FILE", help="Write to FILE instead of standard output.")
+@click.option("-o", "--output", type=FILE, metavar="FILE", help="Write to FILE instead of standard output.")
 @click.option(
     "--date",
     "today",
@@ -487,7 +512,9 @@ def diff(
     output: str | None,
     today: datetime | None,
 ) -> None:
-    """Compare the findings of two mission files, or of one before and after a change.
+    """Show what a change to a mission does to every margin.
+
+    Compares two mission files, or each with itself in a git revision.
 
     Rows are sorted by erosion: the part of what was left of a limit that the change uses up, (u2 - u1)/(1 - u1)
     with the utilizations before and after. Exit code: 0, or 1 with --fail-on-erosion, 2 for wrong usage,
@@ -527,7 +554,7 @@ def diff(
 
 
 @cli.command()
-@click.argument("missions", nargs=-1, required=True, metavar="MISSION...")
+@click.argument("missions", type=FILE, nargs=-1, required=True, metavar="MISSION...")
 @click.option("--only", default="*", metavar="GLOB", help="Verify only the rows whose id matches.")
 @click.option(
     "--format",
@@ -537,7 +564,7 @@ def diff(
     show_default=True,
     help="Format of the verdicts.",
 )
-@click.option("-o", "--output", metavar="FILE", help="Write to FILE instead of standard output.")
+@click.option("-o", "--output", type=FILE, metavar="FILE", help="Write to FILE instead of standard output.")
 @click.option(
     "--jobs",
     type=click.IntRange(min=1),
@@ -545,7 +572,7 @@ def diff(
     help="Processes to use; default: the cores, or 1 with the extra `fast`, which uses them itself.",
 )
 def verify(missions: Sequence[str], only: str, format_name: str, output: str | None, jobs: int | None) -> None:
-    """Form images with each error at its limit and measure whether the limit is true.
+    """Form images at the limits and measure whether they are true.
 
     The data come from exact ranges, and the phase is measured in the image. A limit is confirmed if the
     image shows its budget within 5 %, optimistic if it shows more, conservative if less. With autofocus
@@ -594,14 +621,18 @@ def _progress_bar(total: int = 1) -> "ProgressBar[int]":
 
 
 @cli.command()
-@click.argument("mission")
-@click.option("--plot", metavar="FILE", help="Draw Figures 3 to 7 of the paper for this mission: .png, .svg or .pdf.")
-@click.option("-o", "--output", metavar="FILE.npz", help="Save the images and what explains them for NumPy.")
+@click.argument("mission", type=FILE)
+@click.option(
+    "--plot", type=FILE, metavar="FILE", help="Draw Figures 3 to 7 of the paper for this mission: .png, .svg or .pdf."
+)
+@click.option(
+    "-o", "--output", type=FILE, metavar="FILE.npz", help="Save the images and what explains them for NumPy."
+)
 def simulate(mission: str, plot: str | None, output: str | None) -> None:
-    """Form the image of a point with the declared errors, before and after autofocus.
+    """Form the image of a point with the declared errors.
 
     The data come from exact ranges; the image is formed where the errors move the point, in the scene's
-    axes and rotated so that the smear lies in cross range, and focused by phase gradient autofocus.
+    axes and rotated so that the smear lies in cross range, before and after phase gradient autofocus.
     """
     for name, suffixes in ((plot, (".png", ".svg", ".pdf")), (output, (".npz",))):
         if name is not None and os.path.splitext(name)[1].lower() not in suffixes:
@@ -632,7 +663,7 @@ def simulate(mission: str, plot: str | None, output: str | None) -> None:
 
 
 @cli.command()
-@click.argument("file", default="mission.yaml")
+@click.argument("file", type=FILE, default="mission.yaml")
 @click.option("--name", default="My bistatic mission", show_default=True, help="Name of the mission.")
 @click.option("--force", is_flag=True, help="Replace an existing file.")
 def init(file: str, name: str, force: bool) -> None:
@@ -667,7 +698,7 @@ def init(file: str, name: str, force: bool) -> None:
 
 
 @cli.command()
-@click.option("-o", "--output", metavar="FILE", help="Write to FILE instead of standard output.")
+@click.option("-o", "--output", type=FILE, metavar="FILE", help="Write to FILE instead of standard output.")
 def schema(output: str | None) -> None:
     """Print the JSON Schema of the mission file, for editors."""
     import json
@@ -700,8 +731,9 @@ def schema(output: str | None) -> None:
 @click.option("--check", "check_only", is_flag=True, help="Fail if the evaluators are not what the derivation gives.")
 @click.option("--write", is_flag=True, help="Rewrite the evaluators from the derivation.")
 def derive(table: str, format_name: str, check_only: bool, write: bool) -> None:
-    """Derive the tables of Rigling & Moses from the geometry and print them.
+    """Derive the paper's tables from the geometry and print them.
 
+    Rigling & Moses, Tables I and II, the equations before them, vibration limits; and the full model.
     Equation and table numbers are the paper's.
     """
     if check_only and write:

@@ -6,31 +6,40 @@ A small table of its own, because general unit libraries read `3 dBi` as three a
 import math
 import re
 from functools import cache
-from typing import NamedTuple
 
 from bisar_budget.constants import STANDARD_GRAVITY
 from bisar_budget.errors import InvalidValueError
 
 _NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 # What nearly every quantity looks like; all else is looked at closely.
-_QUANTITY = re.compile(
+_plain_quantity = re.compile(
     r"([+-]?(?:0|[1-9]\d{0,20})(?:\.\d{0,20})?(?:[eE][+-]?\d{1,3})?) ?([^\s\d]\S{0,20})?", re.ASCII
-)
+).fullmatch
 _MAX_TEXT = 64  # characters; longer text is no quantity anybody wrote
 
 
-class Dimension(NamedTuple):
-    """A kind of quantity: its name with article, the unit of a bare number, every unit with its factor."""
+class Dimension:
+    """A kind of quantity: its name with article, the unit of a bare number, every unit with its factor.
 
-    name: str
-    si: str
-    units: dict[str, float]
+    `scales` maps what can stand behind a number to a factor and a divisor, of which one is 1: dividing by a whole
+    number keeps decimals exact, 5 mm is 0.005 m to the bit.
+    """
+
+    def __init__(self, name: str, si: str, units: dict[str, float]) -> None:
+        self.name, self.si, self.units = name, si, units
+        self.scales = {unit: _scale(factor) for unit, factor in units.items()} | {"": (1.0, 1.0)}
 
     @property
     def accepted(self) -> str:
         """Say which units may stand behind the number."""
         units = ", ".join(unit for unit in self.units if unit)
         return f"accepted: {self.name} in {units}; a bare number is {'in ' + self.si if self.si else 'a ratio'}"
+
+
+def _scale(factor: float) -> tuple[float, float]:
+    """Factor and divisor of a unit, one of them 1."""
+    inverse = float(round(1 / factor))
+    return (1.0, inverse) if inverse and abs(inverse * factor - 1) < 1e-12 else (factor, 1.0)
 
 
 def _scaled(base: str, prefixes: str, power: int = 1) -> dict[str, float]:
@@ -106,13 +115,14 @@ def parse_quantity(value: object, dimension: Dimension) -> float:
     InvalidValueError
         Not a number, not finite, an unknown unit, or a unit of another dimension.
     """
-    plain = _QUANTITY.fullmatch(value) if type(value) is str else None
+    plain = _plain_quantity(value) if type(value) is str else None
     if plain is not None:
         digits, unit = plain.groups("")
-        factor = dimension.units.get(unit) if unit else 1.0
-        if factor is not None:
-            number = float(digits) if factor == 1.0 else _scaled_number(float(digits), factor)
-            return _finite(number, dimension)
+        scale = dimension.scales.get(unit)
+        if scale is not None:
+            number = float(digits) * scale[0] / scale[1]
+            if -math.inf < number < math.inf:
+                return number
     return _parse_closely(value, dimension)
 
 
@@ -131,25 +141,13 @@ def _parse_closely(value: object, dimension: Dimension) -> float:
     if digits[0] == "0" and digits[1:2].isdigit():
         raise InvalidValueError("has a leading zero, which some YAML readers take for octal", "write it without")
     number, unit = float(match[0]), text[match.end() :].lstrip()
-    factor = dimension.units.get(unit) if unit else 1.0
-    if factor is None:
+    scale = dimension.scales.get(unit)
+    if scale is None:
         unit = _normal(unit)
-        factor = dimension.units.get(unit)
-    if factor is None:
+        scale = dimension.scales.get(unit)
+    if scale is None:
         raise _wrong_unit(unit, dimension)
-    return _finite(_scaled_number(number, factor), dimension)
-
-
-def _scaled_number(number: float, factor: float) -> float:
-    divisor = _whole_inverse(factor)
-    return number / divisor if divisor else number * factor
-
-
-@cache
-def _whole_inverse(factor: float) -> int:
-    """1/factor where that is whole, else 0: dividing by it keeps decimals exact, 5 mm is 0.005 m to the bit."""
-    inverse = round(1 / factor)
-    return inverse if inverse and abs(inverse * factor - 1) < 1e-12 else 0
+    return _finite(number * scale[0] / scale[1], dimension)
 
 
 def format_quantity(value: float, unit: str, digits: int = 3, rounding: str = "nearest") -> str:
@@ -157,11 +155,16 @@ def format_quantity(value: float, unit: str, digits: int = 3, rounding: str = "n
 
     `rounding` is `nearest` or `down`; a limit is rounded down so that copying it from the page still passes.
     """
-    size = abs(value)
-    for scale, smallest, largest, suffix in _steps(unit):
+    size, suffix = abs(value), ""
+    for scale, smallest, largest, its_suffix in _steps(unit):
+        suffix = its_suffix
         if smallest <= size < largest:
-            return _rounded(value / scale, digits, rounding) + suffix
-    return _rounded(value, digits, rounding) + _steps(unit)[-1][3]
+            value /= scale
+            break
+    text = "%.*g" % (digits, value)  # noqa: UP031 -- a table has thirty of these, and format() takes twice as long
+    if "e" in text or (rounding == "down" and abs(float(text)) > abs(value)):
+        text = _rounded(value, digits, rounding)
+    return text + suffix
 
 
 _SMALL = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))

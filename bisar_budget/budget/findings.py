@@ -86,8 +86,10 @@ class MissionFindings(NamedTuple):
     @property
     def summary(self) -> dict[str, int]:
         """Number of rows of each status that occurs."""
-        found = [row.status for row in self.rows]
-        return {status: found.count(status) for status in STATUSES if status in found}
+        found: dict[str, int] = {}
+        for row in self.rows:
+            found[row.status] = found.get(row.status, 0) + 1
+        return {status: found[status] for status in STATUSES if status in found}
 
 
 class UnusableMission(NamedTuple):

@@ -30,18 +30,16 @@ class FirstOrder:
         self._harmless = math.sqrt(FLOOR_RAD * nearest * self.wavelength / (4 * math.pi))
         (a, b), (c, d) = ground.plane.adjugate
         determinant = abs(ground.plane.determinant)
-        self._moved_by = (
-            math.hypot(a, c) / determinant,
-            math.hypot(b, d) / determinant,
-        )  # per constant and linear term
+        self._by_constant, self._by_linear = math.hypot(a, c) / determinant, math.hypot(b, d) / determinant
+        self._reach = {"m": 1.0, "m/s": self.T / 2, "m/s^2": self.T**2 / 8}  # of a unit of it at the aperture edge
 
     def beyond(self, source: ErrorSource) -> float | None:
         """Quadratic phase of a declared error with the second order, signed; None inside the first. [rad]"""
-        declared, (constant, linear) = source.declared or 0.0, self._moved_by
-        moves = constant * abs(source.full.constant) + linear * abs(source.full.linear)
-        if abs(declared) * (source.power(self.T / 2) + moves) < self._harmless:
+        declared, full = source.declared or 0.0, source.full
+        moves = self._by_constant * abs(full.constant) + self._by_linear * abs(full.linear)
+        if abs(declared) * (self._reach.get(source.unit, 0.0) + moves) < self._harmless:
             return None  # a bound on what follows
-        first, added = source.full.qpe * declared, self.second(source, declared).qpe
+        first, added = full.qpe * declared, self.second(source, declared).qpe
         return None if abs(added) <= max(FLOOR_RAD, SHARE * abs(first)) else first + added
 
     def second(self, source: ErrorSource, size: float) -> Effect:
@@ -62,7 +60,7 @@ class FirstOrder:
 
         before, middle, after = range_error(-T / 2), range_error(0.0), range_error(T / 2)
         quadratic = 2 * math.pi / self.wavelength * ((before + after) / 2 - middle)
-        return self.ground.effective(middle, (after - before) / T, quadratic, 0.0)
+        return self.ground.effective([(middle, (after - before) / T, quadratic, 0.0)])[0]
 
 
 def collection_notes(mission: Mission, geometry: BistaticGeometry) -> Iterator[str]:

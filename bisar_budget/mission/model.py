@@ -192,19 +192,18 @@ class Platform(NamedTuple):
                 yield Problem(str(error), "accepted: scene", at=("motion_error", "frame"))
 
     def _unclear_geometry(self) -> Problem | None:
-        given = [key for key in (*CARTESIAN_KEYS, *POLAR_KEYS) if getattr(self, key) is not None]
-        cartesian = [key for key in given if key in CARTESIAN_KEYS]
-        polar = [key for key in given if key in POLAR_KEYS]
+        cartesian = [key for key in CARTESIAN_KEYS if getattr(self, key) is not None]
+        polar = [key for key in POLAR_KEYS if getattr(self, key) is not None]
         if cartesian and polar:
             return Problem(f"mixes {cartesian[0]} with {polar[0]}", WAYS, at=(polar[0],))
         if cartesian:
-            missing = [key for key in CARTESIAN_KEYS if key not in given]
+            missing = [key for key in CARTESIAN_KEYS if key not in cartesian]
         else:
             is_fixed = self.speed == 0
             if is_fixed and self.motion_azimuth is not None:
                 return Problem("a platform with speed 0 has none", WAYS, at=("motion_azimuth",))
             optional = ("climb", "motion_azimuth") if is_fixed else ("climb",)
-            missing = [key for key in POLAR_KEYS if key not in given and key not in optional]
+            missing = [key for key in POLAR_KEYS if key not in polar and key not in optional]
         return Problem(f"lacks {', '.join(missing)}", WAYS) if missing else None
 
     @property
@@ -430,10 +429,11 @@ class Mission(NamedTuple):
 
         At last that is the file's first key; None for a mission that came from no file.
         """
-        places = self.places
-        while path and path not in places:
+        get = self.places.get
+        event = get(path)
+        while event is None and path:
             path = path[:-1]
-        event = places.get(path)
+            event = get(path)
         return None if event is None else Place.of(event)
 
 

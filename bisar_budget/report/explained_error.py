@@ -4,7 +4,15 @@ import math
 from collections.abc import Iterator, Mapping
 
 from bisar_budget.budget.findings import MissionFindings
-from bisar_budget.budget.sources import MOTION_UNITS, Effect, ErrorSource, ImagePlane, full_ground, image_plane
+from bisar_budget.budget.sources import (
+    MOTION_UNITS,
+    Effect,
+    ErrorSource,
+    FullGround,
+    ImagePlane,
+    full_ground,
+    image_plane,
+)
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.errors import KeyPath, printable
 from bisar_budget.geometry import FRAME_AXES, PlatformState
@@ -90,7 +98,7 @@ def effect(
     else:
         yield from _projected_effect(mission, found, source, sources, size, each)
     if source.is_motion:
-        yield from _full(source, size, each)
+        yield from _full(full_ground(mission, found.geometry), source, size, each)
         yield from _displacement(mission, found, source)
 
 
@@ -155,10 +163,10 @@ def _projected_effect(
     yield from step(f"Quadratic phase error{each}", *equation("QPE", "QPE/unit*declared", values, qpe, "rad"))
 
 
-def _full(source: ErrorSource, size: float, each: str) -> Iterator[str]:
+def _full(ground: FullGround, source: ErrorSource, size: float, each: str) -> Iterator[str]:
     """What the full model makes of it, signed as declared."""
     size = math.copysign(size, source.declared or 1.0)
-    moved = source.full.moved * size
+    moved = ground.moved(source.full) * size
     values = {"φ_turning": source.full.qpe * size - moved, "φ_displaced": moved}
     title = f"Full model{each}: phase as the line of sight turns, and what the displaced response adds"
     yield from step(title, *equation("QPE_full", "φ_turning + φ_displaced", values, source.full.qpe * size, "rad"))

@@ -44,13 +44,11 @@ _EXPLAINED = ("fail", "not_evaluated", "warn", "waived", "pass_with_autofocus")
 
 def render(report: Report, style: Style) -> str:
     """Write the report for reading, at most 80 columns where the file's own names allow it."""
-    blocks = []
-    for mission in report.missions:
-        if isinstance(mission, UnusableMission):
-            blocks.append(_unusable(mission, style))
-        else:
-            blocks.append(_mission(mission, style))
-    text = ("\n" if style.verbosity < 0 else "\n\n").join("\n".join(block) for block in blocks)
+    blocks = [
+        "\n".join(_unusable(mission, style) if isinstance(mission, UnusableMission) else _mission(mission, style))
+        for mission in report.missions
+    ]
+    text = ("\n" if style.verbosity < 0 else "\n\n").join(blocks)
     if len(report.missions) > 1:
         text += "\n\n" + _overall(report, style)
     return text + "\n"
@@ -125,8 +123,8 @@ def _degrees(angle: float) -> str:
 
 
 def _row(row: Row, style: Style) -> list[str]:
-    status, limit, unit = row.status, row.allowable, row.unit
-    declared = "-" if row.declared is None else format_quantity(row.declared, unit)
+    row_id, status, limit, unit, declared = row.id, row.status, row.allowable, row.unit, row.declared
+    size = "-" if declared is None else format_quantity(declared, unit)
     use = "-"
     if limit is None:
         is_open = status == "not_evaluated" or status == "info" or row.metric == "pslr" or row.metric == "islr"
@@ -137,10 +135,10 @@ def _row(row: Row, style: Style) -> list[str]:
         if row.utilization is not None and status != "not_evaluated":
             use = percent(row.utilization)
     reference = _short_reference(row.equation)
-    if len(row.id) <= 34:
-        lines = [_cells(WORDS[status], row.id, declared, allowable, use, reference)]
+    if len(row_id) <= 34:
+        lines = [_cells(WORDS[status], row_id, size, allowable, use, reference)]
     else:
-        lines = [f"{WORDS[status]:<8} {row.id}", _cells("", "", declared, allowable, use, reference)]
+        lines = [f"{WORDS[status]:<8} {row_id}", _cells("", "", size, allowable, use, reference)]
     if style.color:
         lines[0] = _word(status, style, 8) + lines[0][8:]
     if row.requirement_id and status not in _EXPLAINED and style.verbosity < 1:
@@ -179,7 +177,8 @@ def percent(ratio: float) -> str:
 
 
 def _cells(status: str, row: str, declared: str, allowable: str, use: str, reference: str) -> str:
-    return f"{status:<8} {row:<34} {declared:>11} {allowable:>11} {use:>7} {reference}".rstrip()
+    left = status.ljust(9) + row.ljust(34)
+    return (left + declared.rjust(12) + allowable.rjust(12) + use.rjust(8) + " " + reference).rstrip()
 
 
 def _details(row: Row, mission: MissionFindings, style: Style) -> list[str]:

@@ -237,7 +237,8 @@ class Study:
             along = np.sum(off * one.actual, axis=1) / ranges
             second -= (np.sum(off**2, axis=1) - along**2) / (2 * ranges)
         curve = 2 * math.pi / self.collection.wavelength * ((second[0] + second[2]) / 2 - second[1])
-        added = self.ground.effective(float(second[1]), float(second[2] - second[0]) / (2 * half), float(curve), 0.0)
+        row = (float(second[1]), float(second[2] - second[0]) / (2 * half), float(curve), 0.0)
+        added = self.ground.effective([row])[0]
         if abs(added.qpe) <= TOLERANCE * budget:
             return ""
         return (

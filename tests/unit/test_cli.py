@@ -336,3 +336,27 @@ def test_module_runs_like_the_command() -> None:
         [sys.executable, "-m", "bisar_budget", "--version"], capture_output=True, text=True, cwd=ROOT, check=True
     )
     assert __version__ in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "offered"),
+    [
+        ("bisar-budget che", "plain,check"),
+        ("bisar-budget check --form", "plain,--format"),
+        ("bisar-budget check --format sar", "plain,sarif"),
+        ("bisar-budget check missions/", "file,missions/"),
+        ("bisar-budget check --report out/", "file,out/"),
+        ("bisar-budget simulate miss", "file,miss"),
+    ],
+)
+def test_shells_complete_commands_options_and_files(words: str, offered: str) -> None:
+    environment = os.environ | {
+        "COMP_WORDS": words,
+        "COMP_CWORD": str(len(words.split()) - 1),
+        "_BISAR_BUDGET_COMPLETE": "bash_complete",
+    }
+    program = "import sys; sys.argv = ['bisar-budget']; from bisar_budget.cli import main; main()"
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, env=environment, check=False
+    )
+    assert done.stdout.split() == [offered], done.stderr
