@@ -212,19 +212,44 @@ class TestTogether:
         assert math.hypot(*row.displacement_published_m) == pytest.approx(2.0)
         assert row.measured_displacement_m == pytest.approx(row.displacement_m, abs=0.02)  # 4 % of a cell
 
-    def test_location_by_the_full_model_where_25_is_metres_off(self) -> None:
+    @staticmethod
+    def location(model: str, position: list[float], requirement: float = 2) -> Verdict:
         """Climbing and squinted: (25) says more than twice what the image moves by, the full model what it does."""
         platforms = {
             "transmitter": {
-                "position": [12e3, -3e3, 5e3], "velocity": [30, 120, 25], "motion_error": {"position": [1, 1, 1]},
+                "position": [12e3, -3e3, 5e3], "velocity": [30, 120, 25], "motion_error": {"position": position},
             },
             "receiver": {"position": [-2e3, 9e3, 2e3], "velocity": [50, 0, -4]},
         }  # fmt: skip
-        changes = {"platforms": platforms, "collection": {"aperture_time": 3}, "requirements__location_error": 2}
-        by = {m: verdicts("mission.location_error", **changes, allocation__model=m) for m in ("published", "full")}
-        assert by["full"]["mission.location_error"].verdict == "confirmed"
-        assert "the full model and the image" in by["full"]["mission.location_error"].reason
-        assert by["published"]["mission.location_error"].verdict != "confirmed"
+        changes = {"platforms": platforms, "collection": {"aperture_time": 3}, "allocation": {"model": model}}
+        row_id = "mission.location_error"
+        return verdicts(row_id, requirements__location_error=requirement, **changes)[row_id]
+
+    def test_location_by_the_full_model_where_25_is_metres_off(self) -> None:
+        row = self.location("full", [1, 1, 1])
+        assert row.verdict == "confirmed"
+        assert "the full model and the image" in row.reason
+
+    def test_location_that_goes_elsewhere_is_optimistic_although_it_is_shorter(self) -> None:
+        """2 m to the north by (25); 1.3 m to the north-east in the image."""
+        row = self.location("published", [1, 1, 1])
+        assert math.hypot(*row.measured_displacement_m) < 1.5
+        assert row.verdict == "optimistic"
+        assert "(25) does not say where the image goes" in row.reason
+
+    def test_location_that_only_is_shorter_is_conservative_and_says_that_the_number_is_wrong(self) -> None:
+        row = self.location("published", [0, 0, 1])
+        assert math.hypot(*row.displacement_published_m) == pytest.approx(2)
+        assert math.hypot(*row.measured_displacement_m) < 1
+        assert row.verdict == "conservative"
+        assert "(25) does not say where the image goes" in row.reason
+
+    def test_location_of_errors_that_hide_each_other_is_not_confirmed(self) -> None:
+        """Together 0.3 m by (25), an eighth of a pixel off; each alone three metres, and metres off."""
+        row = self.location("published", [1, 1, 1], 0.3)
+        assert "differ by 9.7e-05 and 0.14 pixels" in row.reason
+        assert "transmitter.position.y alone: -2.334 m east, 2.143 m north by (25), -744.2 mm east" in row.reason
+        assert row.verdict != "confirmed"
 
     def test_location_of_errors_that_defocus_is_not_read(self) -> None:
         rows = verdicts("mission.location_error", requirements__location_error=15, **ERRORS)
@@ -430,6 +455,21 @@ class TestCheckWithImages:
         assert row_of(found, verdict.id).status == "pass_with_autofocus"
         judged = row_of(with_verdicts(found, _verified(verdict)), verdict.id)
         assert judged.status == status
+
+    @pytest.mark.parametrize(("verdict", "status"), [("conservative", "pass"), ("optimistic", "warn")])
+    def test_a_location_that_the_image_contradicts_is_a_warning(self, verdict: str, status: str) -> None:
+        error = {"platforms__receiver__motion_error": {"position": [1, 0, 0]}}
+        found = findings(requirements__location_error=5, **error)
+        shown = Verdict(
+            id="mission.location_error",
+            model="published",
+            boundary_error=5,
+            unit="m",
+            verdict=verdict,
+            reason="elsewhere",
+        )
+        assert row_of(found, shown.id).status == "pass"
+        assert row_of(with_verdicts(found, _verified(shown)), shown.id).status == status
 
     def test_an_optimistic_limit_without_a_row_is_a_warning_of_the_file(self) -> None:
         verdict = Verdict(
