@@ -51,11 +51,12 @@ class Verdict(NamedTuple):
 
 
 class VerifiedMission(NamedTuple):
-    """The verdicts on one mission's limits."""
+    """The verdicts on one mission's limits; `conditions` says of what images they are."""
 
     file: str
     name: str
     rows: tuple[Verdict, ...]
+    conditions: str = ""
 
     @property
     def status(self) -> str:
@@ -96,7 +97,11 @@ def with_verdicts(findings: MissionFindings, verified: VerifiedMission) -> Missi
     if verified.doubt:
         warnings = (FileWarning(line=None, message=verified.doubt), *warnings)
     return findings._replace(
-        rows=judged, warnings=(*findings.warnings, *warnings), verdicts=rows, is_unverified=bool(verified.doubt)
+        rows=judged,
+        warnings=(*findings.warnings, *warnings),
+        notes=(*findings.notes, f"images: {verified.conditions}") if verified.conditions else findings.notes,
+        verdicts=rows,
+        is_unverified=bool(verified.doubt),
     )
 
 

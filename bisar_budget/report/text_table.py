@@ -202,8 +202,15 @@ def _asides(mission: MissionFindings, style: Style) -> Iterator[str]:
     for warning in mission.warnings:
         place = f"{printable(mission.file)}:{warning.line}: " if warning.line is not None else ""
         yield f"warning: {place}{printable(warning.message)}"
+    yield from (f"note: {note}" for note in mission.notes)
     if style.verbosity > 0:
-        yield from (f"note: {note}" for note in mission.notes)
+        return  # each row has its notes
+    qualified: dict[str, list[str]] = {}
+    for row in mission.rows:
+        if row.declared and row.status not in _EXPLAINED:
+            for note in row.notes:
+                qualified.setdefault(note, []).append(row.id)
+    yield from (f"note: {', '.join(ids)}: {note}" for note, ids in qualified.items())
 
 
 def _summary(mission: MissionFindings, style: Style) -> str:

@@ -24,6 +24,7 @@ def as_json(version: str, missions: Sequence[VerifiedMission]) -> str:
                 "file": mission.file,
                 "name": mission.name,
                 "status": mission.status,
+                "conditions": mission.conditions,
                 "rows": [row._asdict() for row in mission.rows],
             }
             for mission in missions
@@ -44,7 +45,8 @@ def _mission(mission: VerifiedMission, style: Style) -> list[str]:
     refuted = sum(row.verdict_autofocus == "optimistic" for row in mission.rows)
     counts += f"; {refuted} optimistic with autofocus" if refuted else ""  # they decide the exit code too
     summary = f"{printable(mission.file)}: {counts or 'no row has a limit here'}"
-    return [mission.name, "", *evidence(mission.rows, style), "", summary]
+    conditions = wrapped(f"Images: {mission.conditions}.", "  ") if mission.conditions else []
+    return [mission.name, "", *conditions, "", *evidence(mission.rows, style), "", summary]
 
 
 def evidence(rows: Sequence[Verdict], style: Style) -> list[str]:

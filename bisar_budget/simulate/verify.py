@@ -14,7 +14,7 @@ from bisar_budget.budget.allocation import allocate
 from bisar_budget.budget.sources import ErrorSource, error_sources, full_ground, image_plane
 from bisar_budget.budget.verdicts import Verdict, VerifiedMission
 from bisar_budget.geometry import GroundVector
-from bisar_budget.mission.model import Mission
+from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.simulate import vibration
 from bisar_budget.simulate.autofocus import ALGORITHMS
 from bisar_budget.simulate.collection import CELLS, RANGE_CELLS, Chip, Errors, PointCollection, superposed
@@ -66,12 +66,23 @@ def verify_mission(
             for row in pool.map(partial(_verify_row, mission), wanted):
                 rows.append(row)
                 progress(row.id)
-    return VerifiedMission(file=mission.file, name=mission.name, rows=tuple(rows))
+    return VerifiedMission(
+        file=mission.file, name=mission.name, rows=tuple(rows), conditions=", ".join(_conditions(mission))
+    )
 
 
 def rows_to_verify(mission: Mission, only: str = "*") -> list[str]:
     """Ids of the rows that `verify_mission` would verify."""
     return [row_id for row_id in Study(mission).cases if fnmatchcase(row_id, only)]
+
+
+def _conditions(mission: Mission) -> Iterator[str]:
+    """Say of what images the verdicts are, and which keys of the file have no part in them."""
+    settings = mission.simulation or Simulation()
+    yield f"one point, exact ranges, {settings.window} window"
+    yield "no noise" if settings.noise is None else "no noise (simulation.noise is for `simulate`)"
+    given = mission.collection.pulses
+    yield "pulses as needed" + (f" (the {given} of collection.pulses must not alias)" if given else "")
 
 
 def _verify_row(mission: Mission, row_id: str) -> Verdict:

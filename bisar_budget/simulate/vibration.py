@@ -45,9 +45,8 @@ def cases(mission: Mission, allocation: Allocation, collection: PointCollection)
     rms = _limits(islr, allocation.islr, collection.wavelength)
     seed = mission.simulation.seed if mission.simulation else 1
     lines = {name: getattr(mission.platforms, name).motion_error.vibration.sinusoidal for name in PLATFORMS}
-    assumed = _UNDECLARED_CYCLES / collection.aperture_time
     for name in PLATFORMS:
-        for index, frequency in enumerate([line.frequency for line in lines[name]] or [assumed]):
+        for index, frequency in enumerate([line.frequency for line in lines[name]] or [None]):
             if pslr is not None:
                 row_id = f"{name}.vibration.sinusoidal.{index}"
                 yield row_id, partial(_sinusoidal, collection, row_id, {name: amplitude[name]}, frequency, pslr)
@@ -55,7 +54,7 @@ def cases(mission: Mission, allocation: Allocation, collection: PointCollection)
             row_id = f"{name}.vibration.wideband"
             yield row_id, partial(_wideband, collection, row_id, {name: rms[name]}, islr, seed)
     if pslr is not None:
-        frequency = next((line.frequency for name in PLATFORMS for line in lines[name]), assumed)
+        frequency = next((line.frequency for name in PLATFORMS for line in lines[name]), None)
         row_id = "mission.vibration.sinusoidal"
         yield row_id, partial(_sinusoidal, collection, row_id, amplitude, frequency, pslr)
     if islr is not None:
@@ -76,10 +75,11 @@ def _blank(row_id: str, limits: dict[str, float], requirement_db: float) -> Verd
 
 
 def _sinusoidal(
-    collection: PointCollection, row_id: str, limits: dict[str, float], frequency: float, requirement_db: float
+    collection: PointCollection, row_id: str, limits: dict[str, float], declared: float | None, requirement_db: float
 ) -> Verdict:
     """Measure the paired echo on the difference from the error-free image, which its sidelobes would bury."""
     blank = _blank(row_id, limits, requirement_db)
+    frequency = _UNDECLARED_CYCLES / collection.aperture_time if declared is None else declared
     cycles = frequency * collection.aperture_time
     if cycles < 3:
         return blank._replace(reason=f"{cycles:.3g} cycles per aperture: below three the echoes lie on the mainlobe")
@@ -98,10 +98,11 @@ def _sinusoidal(
     peaks = [float(np.abs(upsampled(cut, _FINE)).max()) for cut in (echo, clean)]
     level = 20 * math.log10(peaks[0] / peaks[1])
     who = "one platform alone" if len(limits) == 1 else "both platforms in phase"
+    assumed = ", a frequency assumed: the file declares no vibration" if declared is None else ""
     return blank._replace(
         measured_db=level,
         verdict=_compare(level - requirement_db),
-        reason=f"echoes of {who}, at {cycles:.3g} cells from the peak{smeared}",
+        reason=f"echoes of {who}, at {cycles:.3g} cells from the peak{smeared}{assumed}",
     )
 
 

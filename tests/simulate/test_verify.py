@@ -544,3 +544,22 @@ def test_compiled_and_numpy_images_give_the_same_verdicts(monkeypatch) -> None:
     for a, b in zip(fast, plain, strict=True):
         assert a.measured_qpe_rad == pytest.approx(b.measured_qpe_rad, abs=1e-4)  # images are 118 dB apart
         assert a.measured_displacement_m == pytest.approx(b.measured_displacement_m, abs=1e-4)
+
+
+class TestConditions:
+    """What changes how a verdict is to be read stands in the text, not in the JSON alone."""
+
+    def test_window_noise_and_pulses(self, run, tmp_path) -> None:
+        path = tmp_path / "m.yaml"
+        path.write_text(mission_text(simulation={"window": "taylor", "noise": "-30 dB"}, collection__pulses=500))
+        text = " ".join(run("verify", path, "--only", "timing.*").stdout.split())
+        assert "Images: one point, exact ranges, taylor window, no noise (simulation.noise is for `simulate`)" in text
+        assert "pulses as needed (the 500 of collection.pulses must not alias)" in text
+        assert "note: images: one point, exact ranges, taylor window" in " ".join(
+            run("check", path, "--verify").stdout.split()
+        )
+
+    def test_a_frequency_that_the_file_does_not_give_is_said_to_be_assumed(self) -> None:
+        row = verdicts("receiver.vibration.sinusoidal.0", requirements__pslr=-30)["receiver.vibration.sinusoidal.0"]
+        assert "10 cells from the peak" in row.reason
+        assert "assumed: the file declares no vibration" in row.reason
