@@ -11,6 +11,7 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.report import formulas
 from bisar_budget.report.explained_error import as_written, declaration, effect, missing, place, plane_and_effect
 from bisar_budget.report.formulas import equation, number, step
+from bisar_budget.report.layout import wrapped
 from bisar_budget.report.text_table import WORDS, percent
 from bisar_budget.units import format_quantity
 
@@ -47,7 +48,17 @@ def explain(mission: Mission, found: MissionFindings, row_id: str) -> str:
     elif row.id == "mission.location_error":
         lines += _location_aggregate(mission, found, row, sources.values())
     lines += _verdict(row)
-    return "\n".join(lines) + "\n"
+    return "\n".join(part for line in lines for part in _fitted(line)) + "\n"
+
+
+def _fitted(line: str) -> list[str]:
+    """Break a line, an equation deeper than any begins, and never between a result, its sign and its unit."""
+    start = len(line) - len(line.lstrip())
+    if not start:
+        return wrapped(line, "  ")
+    body, _, unit = line.replace("= ", "=\u00a0").rpartition(" ")
+    joined = f"{body}\u00a0{unit}" if body.strip() else line
+    return [part.replace("\u00a0", " ") for part in wrapped(joined, " " * (start + 6))]
 
 
 def _budget(allocation: Allocation, owner: str, qpe_per_unit: float, row: Row) -> Iterator[str]:

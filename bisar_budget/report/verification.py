@@ -7,10 +7,16 @@ from collections.abc import Iterator, Sequence
 from bisar_budget.budget.verdicts import Verdict, VerifiedMission
 from bisar_budget.errors import printable
 from bisar_budget.report import Style
-from bisar_budget.report.layout import wrapped
+from bisar_budget.report.layout import table, wrapped, wrapped_counts
 from bisar_budget.units import format_quantity
 
 FORMAT = "bisar-budget/verify/1"
+WORDS = {
+    "optimistic": "optimistic",
+    "confirmed": "confirmed",
+    "conservative": "conservative",
+    "not_evaluated": "not eval",
+}
 _ANSI = {"optimistic": "1;31", "confirmed": "32", "conservative": "33", "not_evaluated": "35"}
 
 
@@ -41,33 +47,42 @@ def as_text(missions: Sequence[VerifiedMission], style: Style) -> str:
 
 def _mission(mission: VerifiedMission, style: Style) -> list[str]:
     found = [row.verdict for row in mission.rows]
-    counts = ", ".join(f"{found.count(verdict)} {verdict}" for verdict in _ANSI if verdict in found)
+    counts = ", ".join(f"{found.count(verdict)} {word}" for verdict, word in WORDS.items() if verdict in found)
     refuted = sum(row.verdict_autofocus == "optimistic" for row in mission.rows)
     counts += f"; {refuted} optimistic with autofocus" if refuted else ""  # they decide the exit code too
     summary = f"{printable(mission.file)}: {counts or 'no row has a limit here'}"
     conditions = wrapped(f"Images: {mission.conditions}.", "  ") if mission.conditions else []
-    return [mission.name, "", *conditions, "", *evidence(mission.rows, style), "", summary]
+    return [
+        *wrapped(printable(mission.name), "  "),
+        "",
+        *conditions,
+        "",
+        *evidence(mission.rows, style),
+        "",
+        *wrapped_counts(summary),
+    ]
 
 
 def evidence(rows: Sequence[Verdict], style: Style) -> list[str]:
     """Table of the verdicts, with autofocus a second one, and what there is to say about them."""
-    width = max((len(row.id) for row in rows), default=0)
-    lines = [f"{'row':<{width}}      limit   budget     full    exact    image verdict"]
-    lines += [
-        f"{row.id:<{width}} {_limit(row):>11} {' '.join(f'{cell:>8}' for cell in _numbers(row))} "
-        + _word(row.verdict, style)
-        for row in rows
-    ]
+    cells = [(printable(row.id), _limit(row), *_numbers(row), WORDS[row.verdict]) for row in rows]
+    lines = table([("row", "limit", "budget", "full", "exact", "image", "verdict"), *cells])
     refocused = [row for row in rows if row.verdict_autofocus]
     if refocused:
         lines += ["", "At the limit with autofocus, refocused:", ""]
-        lines += [f"{'row':<{width}}      limit   budget residual     loss verdict"]
-        lines += [
-            f"{row.id:<{width}} {_quantity(row.boundary_autofocus, row.unit):>11} {_phase(row.budget_rad):>8} "
-            f"{_phase(row.measured_residual_qpe_rad):>8} {_decibel(row.refocused_loss_db):>8} "
-            + _word(row.verdict_autofocus or "", style)
+        after = [
+            (
+                printable(row.id),
+                _quantity(row.boundary_autofocus, row.unit),
+                _phase(row.budget_rad),
+                _phase(row.measured_residual_qpe_rad),
+                _decibel(row.refocused_loss_db),
+                WORDS[row.verdict_autofocus or "not_evaluated"],
+            )
             for row in refocused
         ]
+        lines += table([("row", "limit", "budget", "residual", "loss", "verdict"), *after])
+    lines = [_coloured(line, style) for line in lines]
     reasons = [f"{row.id}: {reason}" for row in rows for reason in (row.reason, row.reason_autofocus) if reason]
     asides = [line for text in (*_geometry(rows), *reasons) for line in wrapped(f"  {text}", "    ")]
     return [*lines, "", *asides] if asides else lines
@@ -101,7 +116,7 @@ def _limit(row: Verdict) -> str:
 def _numbers(row: Verdict) -> tuple[str, str, str, str]:
     """Budget, what the full model and exact ranges predict, what the image shows; phases in rad."""
     if row.requirement_db is not None:
-        return _decibel(row.requirement_db), "-", "-", _decibel(row.measured_db)
+        return f"{row.requirement_db:g} dB", "-", "-", _decibel(row.measured_db)
     if row.unit == "m" and row.budget_rad is None:
         moves = (row.displacement_m, row.measured_displacement_m)
         exact, image = ("-" if move is None else format_quantity(math.hypot(*move), "m") for move in moves)
@@ -125,5 +140,9 @@ def _decibel(value: float | None) -> str:
     return "-" if value is None else f"{value:.1f} dB" if abs(value) >= 1 else f"{value:.2f} dB"
 
 
-def _word(verdict: str, style: Style) -> str:
-    return f"\x1b[{_ANSI[verdict]}m{verdict}\x1b[0m" if style.color else verdict
+def _coloured(line: str, style: Style) -> str:
+    """Colour the verdict that ends a line."""
+    for verdict, word in WORDS.items() if style.color else ():
+        if line.endswith(f" {word}"):
+            return f"{line.removesuffix(word)}\x1b[{_ANSI[verdict]}m{word}\x1b[0m"
+    return line

@@ -61,7 +61,7 @@ def evaluated(text: str) -> float:
 def sums(text: str) -> list[tuple[str, str, float]]:
     """Every `symbol = numbers = value` of an explanation; the symbol may stand in the line above."""
     found, symbol = [], ""
-    for line in text.splitlines():
+    for line in re.sub(r"\n {8,}(?! *= )(?=\S)", " ", text).splitlines():  # a long one is broken
         left, *parts = line.split(" = ")
         symbol = left.strip() or symbol
         if line.startswith("    ") and len(parts) >= 2:
