@@ -15,6 +15,7 @@ from bisar_budget.report.layout import wrapped
 from bisar_budget.report.text_table import WORDS, percent
 from bisar_budget.units import format_quantity
 
+_LONGEST_UNIT = 16  # letters, of what may follow a number
 _RULES = {"each": "the largest", "sum": "the sum", "rss": "the root-sum-square"}
 
 
@@ -56,8 +57,10 @@ def _fitted(line: str) -> list[str]:
     start = len(line) - len(line.lstrip())
     if not start:
         return wrapped(line, "  ")
-    body, _, unit = line.replace("= ", "=\u00a0").rpartition(" ")
-    joined = f"{body}\u00a0{unit}" if body.strip() else line
+    joined = line.replace("= ", "=\u00a0")
+    body, _, unit = joined.rpartition(" ")
+    if body.strip() and len(unit) < _LONGEST_UNIT:
+        joined = f"{body}\u00a0{unit}"
     return [part.replace("\u00a0", " ") for part in wrapped(joined, " " * (start + 6))]
 
 
