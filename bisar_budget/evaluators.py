@@ -111,9 +111,9 @@ def look_series(
     a_z: float,
     slant_range: float,
 ) -> tuple[tuple[float, ...], ...]:
-    """Line of sight to a platform and its first three derivatives at the aperture midpoint.
+    """Line of sight to a platform and its first four derivatives at the aperture midpoint.
 
-    Rows are orders 0 to 3 [1/sⁿ], columns x, y, z, on a path of constant acceleration. Derived here.
+    Rows are orders 0 to 4 [1/sⁿ], columns x, y, z, on a path of constant acceleration. Derived here.
     """
     shared_0 = 1/slant_range
     shared_1 = 2*x
@@ -125,16 +125,24 @@ def look_series(
     shared_7 = shared_4*shared_6
     shared_8 = shared_4*shared_5
     shared_9 = slant_range**(-4)
-    shared_10 = a_x*x + a_y*y + a_z*z + v_x**2 + v_y**2 + v_z**2
-    shared_11 = -shared_10*shared_6 + 0.375*shared_4**2*shared_9
-    shared_12 = 1.5*shared_8
-    shared_13 = 6*shared_11
-    shared_14 = 4.5*shared_10*shared_4*shared_9 - 1.875*shared_4**3/slant_range**6 - 6*shared_6*(a_x*v_x + a_y*v_y + a_z*v_z)
+    shared_10 = shared_4**2
+    shared_11 = a_x*x + a_y*y + a_z*z + v_x**2 + v_y**2 + v_z**2
+    shared_12 = 0.375*shared_10*shared_9 - shared_11*shared_6
+    shared_13 = 1.5*shared_8
+    shared_14 = 6*shared_12
+    shared_15 = a_x*v_x + a_y*v_y + a_z*v_z
+    shared_16 = slant_range**(-6)
+    shared_17 = 0.75*shared_11*shared_4*shared_9 - shared_15*shared_6 - 0.3125*shared_16*shared_4**3
+    shared_18 = 6*shared_17
+    shared_19 = 12*shared_12
+    shared_20 = 24*shared_17
+    shared_21 = -22.5*shared_10*shared_11*shared_16 + 9*shared_11**2*shared_9 + 18*shared_15*shared_4*shared_9 + 6.5625*shared_4**4/slant_range**8 - 24*shared_6*(0.25*a_x**2 + 0.25*a_y**2 + 0.25*a_z**2)
     return (
         (shared_0*x, shared_0*y, shared_0*z),  # u
         (shared_0*(-shared_7*x + v_x), shared_0*(-shared_7*y + v_y), shared_0*(-shared_7*z + v_z)),  # first derivative
-        (shared_0*(a_x + shared_1*shared_11 - shared_8*v_x), shared_0*(a_y + shared_11*shared_2 - shared_8*v_y), shared_0*(a_z + shared_11*shared_3 - shared_8*v_z)),  # second derivative
-        (shared_0*(-a_x*shared_12 + shared_13*v_x + shared_14*x), shared_0*(-a_y*shared_12 + shared_13*v_y + shared_14*y), shared_0*(-a_z*shared_12 + shared_13*v_z + shared_14*z)),  # third derivative
+        (shared_0*(a_x + shared_1*shared_12 - shared_8*v_x), shared_0*(a_y + shared_12*shared_2 - shared_8*v_y), shared_0*(a_z + shared_12*shared_3 - shared_8*v_z)),  # second derivative
+        (shared_0*(-a_x*shared_13 + shared_14*v_x + shared_18*x), shared_0*(-a_y*shared_13 + shared_14*v_y + shared_18*y), shared_0*(-a_z*shared_13 + shared_14*v_z + shared_18*z)),  # third derivative
+        (shared_0*(a_x*shared_19 + shared_20*v_x + shared_21*x), shared_0*(a_y*shared_19 + shared_20*v_y + shared_21*y), shared_0*(a_z*shared_19 + shared_20*v_z + shared_21*z)),  # fourth derivative
     )
 
 
@@ -151,34 +159,42 @@ def full_motion(
     u_dddot_x: float,
     u_dddot_y: float,
     u_dddot_z: float,
+    u_ddddot_x: float,
+    u_ddddot_y: float,
+    u_ddddot_z: float,
     wavelength: float,
     aperture_time: float,
 ) -> tuple[tuple[float, ...], ...]:
     """Effects of one unit of each motion error of one platform, every first-order term kept.
 
-    Columns as in published_motion, before what the displacement of the image adds. u and its
+    Columns as in published_motion, before what the displacement of the image adds; the quadratic phase
+    is that of the quadratic fitted over the aperture, in which the quartic term has a part. u and its
     derivatives as look_series gives them. Derived here.
     """
     shared_0 = -u_x
     shared_1 = 3.1415926535897932/wavelength
     shared_2 = aperture_time**2*shared_1
     shared_3 = 0.25*shared_2
-    shared_4 = aperture_time**3*shared_1
-    shared_5 = (1/24)*shared_4
-    shared_6 = -u_y
-    shared_7 = -u_z
-    shared_8 = 0.5*shared_2
-    shared_9 = 0.125*shared_4
+    shared_4 = aperture_time**4*shared_1
+    shared_5 = (1/224)*shared_4
+    shared_6 = aperture_time**3*shared_1
+    shared_7 = (1/24)*shared_6
+    shared_8 = -u_y
+    shared_9 = -u_z
+    shared_10 = 0.5*shared_2
+    shared_11 = (1/56)*shared_4
+    shared_12 = 0.125*shared_6
+    shared_13 = (3/112)*shared_4
     return (
-        (shared_0, -u_dot_x, -shared_3*u_ddot_x, -shared_5*u_dddot_x),  # position x
-        (shared_6, -u_dot_y, -shared_3*u_ddot_y, -shared_5*u_dddot_y),  # position y
-        (shared_7, -u_dot_z, -shared_3*u_ddot_z, -shared_5*u_dddot_z),  # position z
-        (0.0, shared_0, -shared_8*u_dot_x, -shared_9*u_ddot_x),  # velocity x
-        (0.0, shared_6, -shared_8*u_dot_y, -shared_9*u_ddot_y),  # velocity y
-        (0.0, shared_7, -shared_8*u_dot_z, -shared_9*u_ddot_z),  # velocity z
-        (0.0, 0.0, -shared_3*u_x, -shared_9*u_dot_x),  # acceleration x
-        (0.0, 0.0, -shared_3*u_y, -shared_9*u_dot_y),  # acceleration y
-        (0.0, 0.0, -shared_3*u_z, -shared_9*u_dot_z),  # acceleration z
+        (shared_0, -u_dot_x, -shared_3*u_ddot_x - shared_5*u_ddddot_x, -shared_7*u_dddot_x),  # position x
+        (shared_8, -u_dot_y, -shared_3*u_ddot_y - shared_5*u_ddddot_y, -shared_7*u_dddot_y),  # position y
+        (shared_9, -u_dot_z, -shared_3*u_ddot_z - shared_5*u_ddddot_z, -shared_7*u_dddot_z),  # position z
+        (0.0, shared_0, -shared_10*u_dot_x - shared_11*u_dddot_x, -shared_12*u_ddot_x),  # velocity x
+        (0.0, shared_8, -shared_10*u_dot_y - shared_11*u_dddot_y, -shared_12*u_ddot_y),  # velocity y
+        (0.0, shared_9, -shared_10*u_dot_z - shared_11*u_dddot_z, -shared_12*u_ddot_z),  # velocity z
+        (0.0, 0.0, -shared_13*u_ddot_x - shared_3*u_x, -shared_12*u_dot_x),  # acceleration x
+        (0.0, 0.0, -shared_13*u_ddot_y - shared_3*u_y, -shared_12*u_dot_y),  # acceleration y
+        (0.0, 0.0, -shared_13*u_ddot_z - shared_3*u_z, -shared_12*u_dot_z),  # acceleration z
     )
 
 
@@ -191,6 +207,8 @@ def full_ground(
     s_ddot_y: float,
     s_dddot_x: float,
     s_dddot_y: float,
+    s_ddddot_x: float,
+    s_ddddot_y: float,
     wavelength: float,
     aperture_time: float,
 ) -> tuple[tuple[float, ...], ...]:
@@ -202,13 +220,14 @@ def full_ground(
     """
     shared_0 = 3.1415926535897932/wavelength
     shared_1 = 0.25*aperture_time**2*shared_0
-    shared_2 = (1/24)*aperture_time**3*shared_0
+    shared_2 = (1/224)*aperture_time**4*shared_0
+    shared_3 = (1/24)*aperture_time**3*shared_0
     return (
         (-s_dot_y, s_y),  # adjugate, first row
         (s_dot_x, -s_x),  # adjugate, second row
         (-s_dot_x*s_y + s_dot_y*s_x,),  # determinant
-        (s_ddot_x*shared_1, s_ddot_y*shared_1),  # quadratic phase
-        (s_dddot_x*shared_2, s_dddot_y*shared_2),  # cubic phase
+        (s_ddddot_x*shared_2 + s_ddot_x*shared_1, s_ddddot_y*shared_2 + s_ddot_y*shared_1),  # quadratic phase
+        (s_dddot_x*shared_3, s_dddot_y*shared_3),  # cubic phase
     )
 
 

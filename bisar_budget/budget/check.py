@@ -1,7 +1,7 @@
 """Hold a mission's declared errors to its allocated budget: one row for each, and what the rows add up to."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import date
 
 from bisar_budget import evaluators
@@ -16,7 +16,7 @@ from bisar_budget.budget.sources import (
     full_ground,
     image_plane,
 )
-from bisar_budget.budget.validity import FirstOrder, collection_notes
+from bisar_budget.budget.validity import Beyond, FirstOrder, collection_notes, of_members
 from bisar_budget.budget.waivers import apply_waivers
 from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
 from bisar_budget.errors import KeyPath
@@ -46,11 +46,12 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
     plane = image_plane(geometry) if mission.allocation.model == "published" else ground.plane
     sources = error_sources(mission, geometry, ground)
     allocation = allocate(mission, sources)
-    errors = list(_error_rows(mission, allocation, sources, plane, FirstOrder(mission, geometry, ground)))
+    first_order = FirstOrder(mission, geometry, ground)
+    errors = list(_error_rows(mission, allocation, sources, plane, first_order))
     judged = [
         *errors,
         *_vibration_rows(mission, allocation),
-        *_aggregate_rows(mission, allocation, sources, errors, plane),
+        *_aggregate_rows(mission, allocation, sources, errors, plane, first_order),
     ]
     rows, warnings = apply_waivers(judged, mission, today)
     return MissionFindings(
@@ -68,7 +69,7 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
         allocation=allocation,
         rows=tuple(rows),
         warnings=(*_unknown_requirement_ids(mission, rows), *warnings, *_nothing_declared(rows)),
-        notes=(*collection_notes(mission, geometry), *_unused_keys(mission)),
+        notes=(*collection_notes(mission, geometry, ground), *_unused_keys(mission)),
     )
 
 
@@ -90,11 +91,11 @@ def _error_rows(
         by_table, by_full = abs(source.effect.qpe), source.full.qpe
         published, full = _quotient(limit, by_table), _quotient(limit, abs(by_full))
         if signed is None:
-            yield _undeclared(mission, source, published, full)
+            yield _undeclared(mission, source, published, full, first_order, limit)
             continue
         declared = abs(signed)
         qpe_published, qpe_full = by_table * declared, by_full * signed
-        notes, displacement = source.notes, None
+        notes, displacement, exact = source.notes, None, None
         over = doubt = ""
         if source.is_motion:
             displacement = plane.displacement(source.effect if model == "published" else source.full, signed)
@@ -102,10 +103,12 @@ def _error_rows(
                 notes = (*notes, plane.degeneracy)
             beyond = first_order.beyond(source)
             if beyond is not None:
-                both = f"{qpe_full:.3g} rad becomes {beyond:.3g} rad with the second order"
-                notes = (*notes, f"beyond first order: the full model's {both}")
-                if abs(beyond) > limit * (1 + UTILIZATION_TOLERANCE):
-                    doubt = f"beyond first order, where no limit holds: {both}, {limit:.3g} rad allowed"
+                exact = beyond.exact and beyond.qpe
+                notes = (*notes, beyond.against(qpe_full))
+                doubt = beyond.doubt(qpe_full, limit)
+        allowable = _gating(model, published, full)
+        if of_allowable := first_order.allowable_note(source, allowable if allowable is not None else full, limit):
+            notes = (*notes, of_allowable)
         if qpe_published > limit or abs(qpe_full) > limit:
             qpe = abs(source.qpe(model))
             doubt = _doubt(source, model, limit, first_order.ground) or doubt
@@ -115,7 +118,6 @@ def _error_rows(
                 f"QPE {qpe:.3g} rad, {limit:.3g} rad allowed ({of_model}); "
                 f"passes with autofocus from n_pull {needed:g}"
             )
-        allowable = _gating(model, published, full)
         utilization, margin, status, reason, notes = _status(
             warn_above, declared, allowable, gain, over, doubt, _no_limit(source, model), "", info, True, False, notes
         )
@@ -141,6 +143,8 @@ def _error_rows(
                 mission.requirement_ids.get(source.id),
                 source.evidence,
                 source.is_independent,
+                exact,
+                None,
             )
         )
 
@@ -181,9 +185,19 @@ def _doubt(source: ErrorSource, model: str, limit: float, ground: FullGround) ->
     return ""
 
 
-def _undeclared(mission: Mission, source: ErrorSource, published: float | None, full: float | None) -> Row:
+def _undeclared(
+    mission: Mission,
+    source: ErrorSource,
+    published: float | None,
+    full: float | None,
+    first_order: FirstOrder,
+    limit: float,
+) -> Row:
     """Row of an error that the file does not declare, as `_judged` would make it: half of all rows are such."""
     allowable = _gating(mission.allocation.model, published, full)
+    notes = source.notes
+    if of_allowable := first_order.allowable_note(source, allowable if allowable is not None else full, limit):
+        notes = (*notes, of_allowable)
     return Row._make(
         (
             source.id,
@@ -201,11 +215,13 @@ def _undeclared(mission: Mission, source: ErrorSource, published: float | None, 
             "not_declared",
             mission.line(source.path),
             _no_limit(source, mission.allocation.model) if allowable is None else None,
-            source.notes,
+            notes,
             source.equation,
             mission.requirement_ids.get(source.id),
             source.evidence,
             source.is_independent,
+            None,
+            None,
         )
     )
 
@@ -285,12 +301,13 @@ def _aggregate_rows(
     sources: Sequence[ErrorSource],
     errors: Sequence[Row],  # of the sources, in their order
     plane: ImagePlane,
+    first_order: FirstOrder,
 ) -> Iterator[Row]:
     combine, model = mission.allocation.combine, mission.allocation.model
     stated = [source for source in sources if source.declared is not None]
     declared = [source for source in stated if source.is_independent]
     if combine != "each":
-        yield from _qpe_aggregates(mission, allocation, declared)
+        yield from _qpe_aggregates(mission, allocation, declared, first_order.found)
     # `each` looks at single rows, those along the scene's axes included.
     motion = [source for source in (stated if combine == "each" else declared) if source.is_motion]
     cubic_limit, cubic_doubt = mission.requirements.cubic_phase_error, ""
@@ -299,6 +316,12 @@ def _aggregate_rows(
         cubic = combine_phases([s.cubic(other) for s in motion], combine)
         if cubic > cubic_limit * (1 + UTILIZATION_TOLERANCE):
             cubic_doubt = f"the {other} model says fail: {cubic:.3g} rad, {cubic_limit:.3g} rad allowed"
+    found = first_order.found
+    cubic_notes: tuple[str, ...] = ()
+    if found and motion:
+        by_exact = [found[s.id].cubic if s.id in found else s.full.cubic * (s.declared or 0.0) for s in motion]
+        cubic_notes, exact_doubt = of_members(found, motion, combine_phases(by_exact, combine), cubic_limit, "rad")
+        cubic_doubt = cubic_doubt or exact_doubt
     yield _judged(
         mission,
         id="mission.cubic_phase_error",
@@ -312,6 +335,7 @@ def _aggregate_rows(
         info="" if mission.requirements.cubic_phase_error is not None else NO_REQUIREMENT,
         over="cubic phase at the aperture edge above the requirement; autofocus gain does not apply",
         doubt=cubic_doubt,
+        notes=cubic_notes,
     )
     counted = {source.id for source in motion}
     known = [row.displacement_m for row in errors if row.displacement_m is not None and row.id in counted]
@@ -320,6 +344,13 @@ def _aggregate_rows(
         by_25 = image_plane(mission.geometry)
         published = [by_25.displacement(s.effect, s.declared or 0.0) for s in motion]
         moved = max(moved, combine_displacements([move for move in published if move is not None], combine))
+    location_notes: tuple[str, ...] = ()
+    location_doubt = ""
+    if found and motion:
+        moves = [_moved_exactly(s, found, first_order.ground.plane) for s in motion]
+        location_notes, location_doubt = of_members(
+            found, motion, combine_displacements(moves, combine), mission.requirements.location_error, "m"
+        )
     yield _judged(
         mission,
         id="mission.location_error",
@@ -334,23 +365,45 @@ def _aggregate_rows(
         is_declared=bool(motion),
         info="" if mission.requirements.location_error is not None else NO_REQUIREMENT,
         over="displacement of the image above the requirement",
+        doubt=location_doubt,
+        notes=location_notes,
     )
     if allocation.n_pull is not None:
+        pull_in = math.pi * allocation.n_pull
+        pull_in_notes, pull_in_doubt = of_members(
+            found, declared, combine_phases(_exact_phases(declared, found), "sum"), pull_in, "rad"
+        )
         yield _judged(
             mission,
             id="mission.autofocus_pull_in",
             metric="quadratic_phase_error",
             unit="rad",
             declared=math.fsum(abs(s.qpe(model)) for s in declared) if declared else None,
-            allowable=math.pi * allocation.n_pull,
+            allowable=pull_in,
             path=("autofocus", "n_pull"),
             equation="Section VI",
             never_fails=True,
             over="the errors together exceed what autofocus corrects: it corrects one total, not each error its own",
+            doubt=pull_in_doubt,
+            notes=pull_in_notes,
         )
 
 
-def _qpe_aggregates(mission: Mission, allocation: Allocation, declared: Sequence[ErrorSource]) -> Iterator[Row]:
+def _exact_phases(members: Sequence[ErrorSource], found: Mapping[str, Beyond]) -> list[float]:
+    """Quadratic phases by the full model, of members beyond first order by exact ranges. [rad]"""
+    return [found[s.id].qpe if s.id in found else s.qpe("full") for s in members]
+
+
+def _moved_exactly(source: ErrorSource, found: Mapping[str, Beyond], plane: ImagePlane) -> GroundVector:
+    """Displacement by the full model, beyond first order by exact ranges. [m]"""
+    if source.id in found:
+        return found[source.id].displacement
+    return plane.displacement(source.full, source.declared or 0.0) or (0.0, 0.0)
+
+
+def _qpe_aggregates(
+    mission: Mission, allocation: Allocation, declared: Sequence[ErrorSource], found: Mapping[str, Beyond]
+) -> Iterator[Row]:
     combine, model, gain = mission.allocation.combine, mission.allocation.model, allocation.autofocus_gain
     owners = ["transmitter", "receiver", "mission"]
     if allocation.qpe.clock is not None:
@@ -367,6 +420,9 @@ def _qpe_aggregates(mission: Mission, allocation: Allocation, declared: Sequence
         doubt = ""
         if other is not None and other[1] is not None and other[1] > limit * (1 + UTILIZATION_TOLERANCE):
             doubt = f"the {other[0]} model says fail: {other[1]:.3g} rad, {limit:.3g} rad allowed"
+        notes, exact_doubt = of_members(
+            found, members, combine_phases(_exact_phases(members, found), combine), limit, "rad"
+        )
         yield _judged(
             mission,
             id=f"{'timing' if owner == 'clock' else owner}.quadratic_phase_error",
@@ -380,7 +436,8 @@ def _qpe_aggregates(mission: Mission, allocation: Allocation, declared: Sequence
             equation="sum of the rows" if combine == "sum" else "root-sum-square of the rows",
             gain=gain,
             over=over,
-            doubt=doubt,
+            doubt=doubt or exact_doubt,
+            notes=notes,
             limits=(limit, limit),
             qpe=published,
             qpe_full=full,

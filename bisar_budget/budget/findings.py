@@ -20,7 +20,9 @@ class Row(NamedTuple):
     """One line of the budget. Numbers in SI and radians; None where a value does not exist.
 
     `is_independent` marks the rows that sums run over: errors as the file states them. Along the scene's
-    axes an error stated in another frame is shown again, but not counted again.
+    axes an error stated in another frame is shown again, but not counted again. `qpe_exact_rad` is the phase by exact
+    ranges, of errors beyond first order; `published_margin_db` how far the published rule of a vibration stays inside
+    first principles.
     """
 
     id: str
@@ -43,6 +45,8 @@ class Row(NamedTuple):
     requirement_id: str | None
     evidence: str | None
     is_independent: bool
+    qpe_exact_rad: float | None = None
+    published_margin_db: float | None = None
 
 
 class FileWarning(NamedTuple):

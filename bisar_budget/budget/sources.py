@@ -8,6 +8,7 @@ lets the line of sight turn and counts what the displacement of the image adds.
 import math
 from collections.abc import Iterable, Iterator
 from functools import cache
+from itertools import chain
 from typing import NamedTuple
 
 from bisar_budget import evaluators
@@ -72,6 +73,11 @@ class ErrorSource(NamedTuple):
         """Whether it moves platforms, or the clock: what only is a phase displaces nothing."""
         return self.unit != "rad"
 
+    @property
+    def is_position(self) -> bool:
+        """Whether it is an error of a platform's measured path, or of both."""
+        return self.direction != _NOWHERE
+
     def moves(self, platform: str) -> bool:
         """Whether it is an error of a platform's position; one of the mission's own is of both."""
         return self.owner in (platform, "mission")
@@ -124,7 +130,7 @@ class ImagePlane(NamedTuple):
 class FullGround(NamedTuple):
     """What constant and linear terms do in the full model: Q⁻¹, and the phases that the displacement adds.
 
-    `looks` are the line of sight of each platform and its derivatives, (4, 3) [1/sⁿ]; `quadratic` and `cubic`
+    `looks` are the line of sight of each platform and its derivatives, (5, 3) [1/sⁿ]; `quadratic` and `cubic`
     the phases added per unit of the constant [rad/m] and of the linear term [rad/(m/s)].
     """
 
@@ -217,8 +223,7 @@ def _motion(
 ) -> Iterator[ErrorSource]:
     wavelength, T = mission.radar.wavelength, mission.collection.aperture_time
     rows = evaluators.published_motion(*state.position, *state.velocity, state.slant_range, wavelength, T)
-    u, u_dot, u_ddot, u_dddot = look
-    full_effects = ground.effective(evaluators.full_motion(*(*u, *u_dot, *u_ddot, *u_dddot, wavelength, T)))
+    full_effects = ground.effective(evaluators.full_motion(*(*chain.from_iterable(look), wavelength, T)))
     error: MotionError = getattr(mission.platforms, name).motion_error
     factor = mission.allocation.coverage_factor
     in_scene = error.frame == "scene"

@@ -86,7 +86,7 @@ def both_platforms_arguments() -> tuple[tuple[Symbol, str], ...]:
 
 def look_arguments(platform: Platform) -> tuple[tuple[Symbol, str], ...]:
     """Return the line of sight and its derivatives as arguments without a subscript."""
-    names = ("u", "u_dot", "u_ddot", "u_dddot")
+    names = ("u", "u_dot", "u_ddot", "u_dddot", "u_ddddot")
     return tuple(
         (symbol, f"{name}_{axis}")
         for name, vector in zip(names, platform.look, strict=True)
@@ -103,33 +103,35 @@ def _full_evaluators(motion: tuple[Symbol, ...], phase_arguments: tuple[tuple[Sy
     # The sums of both platforms' derivatives stand where one platform's do: (u_t + u_r) → s.
     alone = {symbol: 0 for look in RECEIVER.look for symbol in look}
     history = [vector.subs(alone) for vector in full.ground_history()]
-    names = ("s", "s_dot", "s_ddot", "s_dddot")
+    names = ("s", "s_dot", "s_ddot", "s_dddot", "s_ddddot")
     sums = [
         (vector[axis], f"{name}_{'xy'[axis]}") for vector, name in zip(history, names, strict=True) for axis in (0, 1)
     ]
     Q = full.ground_matrix().subs(alone)
     adjugate = Q.adjugate()
-    phases = [full.displacement_phase(order).subs(alone) for order in (2, 3)]
+    added = full.displacement_coefficients()
+    phases = [phase(added).subs(alone) for phase in (full.quadratic_phase, full.cubic_phase)]
     return [
         Evaluator(
             name="look_series",
-            summary="Line of sight to a platform and its first three derivatives at the aperture midpoint.",
+            summary="Line of sight to a platform and its first four derivatives at the aperture midpoint.",
             details=(
-                "Rows are orders 0 to 3 [1/sⁿ], columns x, y, z, on a path of constant acceleration. Derived here."
+                "Rows are orders 0 to 4 [1/sⁿ], columns x, y, z, on a path of constant acceleration. Derived here."
             ),
             arguments=(*track, *acceleration, slant_range),
             rows=tuple(tuple(look.subs(growth)) for look in full.look_series(TRANSMITTER)),
-            row_names=("u", "first derivative", "second derivative", "third derivative"),
+            row_names=("u", *(f"{order} derivative" for order in ("first", "second", "third", "fourth"))),
         ),
         Evaluator(
             name="full_motion",
             summary="Effects of one unit of each motion error of one platform, every first-order term kept.",
             details=(
-                "Columns as in published_motion, before what the displacement of the image adds. "
+                "Columns as in published_motion, before what the displacement of the image adds; the quadratic phase "
+                "is that of the quadratic fitted over the aperture, in which the quartic term has a part. "
                 "u and its derivatives as look_series gives them. Derived here."
             ),
             arguments=(*look_arguments(TRANSMITTER), *phase_arguments),
-            rows=tuple(effects(beta, error) for error in motion),
+            rows=tuple(full_effects(beta, error) for error in motion),
             row_names=tuple(f"{kind} {axis}" for kind in published.KINDS for axis in "xyz"),
         ),
         Evaluator(
@@ -167,6 +169,12 @@ def effects(beta: Sequence[Expr], error: Symbol) -> tuple[Expr, ...]:
         published.edge_phase(per_unit[2], 2),
         published.edge_phase(per_unit[3], 3),
     )
+
+
+def full_effects(beta: Sequence[Expr], error: Symbol) -> tuple[Expr, ...]:
+    """Return the same of the full model, whose quadratic phase holds its part of the quartic term."""
+    per_unit = [published.sensitivity(term, error) for term in beta]
+    return (per_unit[0], per_unit[1], full.quadratic_phase(per_unit), full.cubic_phase(per_unit))
 
 
 def evaluators() -> tuple[Evaluator, ...]:

@@ -6,22 +6,38 @@ order. Constant and linear terms move the response to x̂, where a point has a h
 the rest. Derived here; nothing of it is in the paper.
 """
 
+from collections.abc import Sequence
 from functools import cache
 
-from sympy import Add, Eq, Expr, Function, ImmutableMatrix, Matrix, Poly, Symbol, diff, expand, factorial, sqrt
+from sympy import (
+    Add,
+    Eq,
+    Expr,
+    Function,
+    ImmutableMatrix,
+    Matrix,
+    Poly,
+    Rational,
+    Symbol,
+    diff,
+    expand,
+    factorial,
+    legendre,
+    sqrt,
+)
 
 from bisar_budget.theory import differential_range as dr
 from bisar_budget.theory import published
 from bisar_budget.theory.published import Equation, Row, Table
 from bisar_budget.theory.symbols import AXES, PLATFORMS, Platform, c, real, tau
 
-ORDER = 3
+ORDER = 4  # of slow time: the quartic term of a long aperture is in part a quadratic phase
 
 DISPLACEMENT = ImmutableMatrix([real("xhat"), real("yhat")])
 
 
 def growth(platform: Platform) -> dict[Symbol, Expr]:
-    """d₁ … d₃ of |r|² = R²(1 + d₁τ + d₂τ² + d₃τ³ + …) on a path of constant acceleration. [1/sⁿ]"""
+    """d₁ … d₄ of |r|² = R²(1 + d₁τ + d₂τ² + d₃τ³ + d₄τ⁴) on a path of constant acceleration. [1/sⁿ]"""
     track = platform.position + platform.velocity * tau + platform.acceleration * tau**2 / 2
     square = Poly(expand(track.dot(track)), tau)
     return {
@@ -32,7 +48,7 @@ def growth(platform: Platform) -> dict[Symbol, Expr]:
 
 @cache
 def look_series(platform: Platform) -> tuple[Matrix, ...]:
-    """Derivatives of the line of sight u = r/|r| at τ = 0, orders 0 to 3, (3,) each, in `growth`. [1/sⁿ]"""
+    """Derivatives of the line of sight u = r/|r| at τ = 0, orders 0 to 4, (3,) each, in `growth`. [1/sⁿ]"""
     grown = 1 + sum(d * tau**n for n, d in enumerate(growth(platform), start=1))
     inverse = [diff(1 / sqrt(grown), tau, n).subs(tau, 0) / factorial(n) for n in range(ORDER + 1)]
     track = (platform.position, platform.velocity, platform.acceleration / 2)
@@ -45,7 +61,7 @@ def look_series(platform: Platform) -> tuple[Matrix, ...]:
 
 @cache
 def range_error() -> tuple[Expr, ...]:
-    """β̃₀ … β̃₃ of −Σ u(τ)·r̃(τ) + c·t̃(τ), in the derivatives of u. [m/sⁿ]"""
+    """β̃₀ … β̃₄ of −Σ u(τ)·r̃(τ) + c·t̃(τ), in the derivatives of u. [m/sⁿ]"""
     total = c * dr.clock_polynomial()
     for platform in PLATFORMS:
         look = sum(
@@ -58,7 +74,7 @@ def range_error() -> tuple[Expr, ...]:
 
 
 def ground_history() -> tuple[Matrix, ...]:
-    """Derivatives of s = u_t + u_r on the ground, orders 0 to 3, (2,) each: a point has the range −s(τ)·x."""
+    """Derivatives of s = u_t + u_r on the ground, orders 0 to 4, (2,) each: a point has the range −s(τ)·x."""
     looks = zip(*(platform.look for platform in PLATFORMS), strict=True)
     return tuple(Matrix([sum(u[axis] for u in both) for axis in range(2)]) for both in looks)
 
@@ -69,17 +85,37 @@ def ground_matrix() -> Matrix:
     return -Matrix([list(s), list(rate)])
 
 
-def displacement_phase(order: int) -> Expr:
-    """Phase at the aperture edge that a displacement (x̂, ŷ) adds, order 2 or 3: of +s⁽ⁿ⁾·x̂τⁿ/n!. [rad]"""
-    added = ground_history()[order].dot(DISPLACEMENT) / factorial(order)
-    return published.edge_phase(added, order)
+def quartic_as_quadratic() -> Expr:
+    """What a unit of x⁴ adds to the quadratic coefficient of the cubic fitted to it over −1 … 1: 6/7.
+
+    Its projection on the second Legendre polynomial, the only one up to the third that holds an x².
+    """
+    x = real("x")
+    second = legendre(2, x)
+    return Poly(x**4 * second, x).integrate().eval((1,)) / Poly(second**2, x).integrate().eval((1,)) * Rational(3, 2)
 
 
-def effective_coefficients() -> tuple[Expr, Expr]:
-    """β₂, β₃ left at the displaced point: β̃ₙ + s⁽ⁿ⁾·x̂/n!."""
-    history, beta = ground_history(), range_error()
-    second, third = (beta[n] + history[n].dot(DISPLACEMENT) / factorial(n) for n in (2, 3))
-    return second, third
+def quadratic_phase(coefficients: Sequence[Expr]) -> Expr:
+    """Phase at the aperture edge of the quadratic fitted to β₀ … β₄ over the aperture. [rad]"""
+    quadratic, quartic = (published.edge_phase(coefficients[n], n) for n in (2, 4))
+    return quadratic + quartic_as_quadratic() * quartic
+
+
+def cubic_phase(coefficients: Sequence[Expr]) -> Expr:
+    """Phase of β₃ at the aperture edge. [rad]"""
+    return published.edge_phase(coefficients[3], 3)
+
+
+def displacement_coefficients() -> tuple[Expr, ...]:
+    """What a displacement (x̂, ŷ) adds to β₀ … β₄: +s⁽ⁿ⁾·x̂/n!. [m/sⁿ]"""
+    return tuple(s.dot(DISPLACEMENT) / factorial(n) for n, s in enumerate(ground_history()))
+
+
+def effective_coefficients() -> tuple[Expr, Expr, Expr]:
+    """β₂, β₃, β₄ left at the displaced point: β̃ₙ + s⁽ⁿ⁾·x̂/n!."""
+    beta, added = range_error(), displacement_coefficients()
+    second, third, fourth = (beta[n] + added[n] for n in (2, 3, 4))
+    return second, third, fourth
 
 
 def table() -> Table:
@@ -105,7 +141,7 @@ def table() -> Table:
     return Table(
         number="Full model",
         title="Differential range errors with the line of sight turning as it does",
-        columns=("Constant β̃₀", "Linear β̃₁", "Quadratic β̃₂", "Cubic β̃₃"),
+        columns=("Constant β̃₀", "Linear β̃₁", "Quadratic β̃₂", "Cubic β̃₃", "Quartic β̃₄"),
         rows=tuple(rows),
         notes=("Derived here. u and its derivatives are those of the unit vector to the platform at τ = 0.",),
     )
@@ -114,16 +150,19 @@ def table() -> Table:
 def equations() -> tuple[Equation, ...]:
     """How the line of sight turns, where a response goes, and what defocuses there."""
     platform = PLATFORMS[0]
-    second, third = effective_coefficients()
+    second, third, fourth = effective_coefficients()
     history = ground_history()
     determinant = history[0][0] * history[1][1] - history[0][1] * history[1][0]
+    left = [real(f"beta_{n}") for n in range(ORDER + 1)]
+    fitted = quadratic_phase(left)
     constant, linear = real("beta_0tilde"), real("beta_1tilde")
     moved = -Matrix(
         [history[1][1] * constant - history[0][1] * linear, history[0][0] * linear - history[1][0] * constant]
     )
     grown = (Equation("", "Growth of the squared range", d, value) for d, value in growth(platform).items())
-    names = ("u", "udot", "uddot", "udddot")
-    titles = ("Line of sight", "Its first derivative", "Its second derivative", "Its third derivative")
+    names = ("u", "udot", "uddot", "udddot", "uddddot")
+    orders = ("first", "second", "third", "fourth")
+    titles = ("Line of sight", *(f"Its {order} derivative" for order in orders))
     looks = zip(names, titles, look_series(platform), strict=True)
     return (
         *grown,
@@ -132,14 +171,15 @@ def equations() -> tuple[Equation, ...]:
         Equation("", "Determinant of Q", Symbol("detQ"), determinant),
         Equation("", "Quadratic coefficient at the displaced point", real("beta_2"), _collected(second)),
         Equation("", "Cubic coefficient at the displaced point", real("beta_3"), _collected(third)),
-        Equation("", "Quadratic phase error", real("phi_2"), published.edge_phase(real("beta_2"), 2)),
-        Equation("", "Cubic phase at the aperture edge", real("phi_3"), published.edge_phase(real("beta_3"), 3)),
+        Equation("", "Quartic coefficient at the displaced point", real("beta_4"), _collected(fourth)),
+        Equation("", "Quadratic phase error, of the quadratic fitted over the aperture", real("phi_2"), fitted),
+        Equation("", "Cubic phase at the aperture edge", real("phi_3"), cubic_phase(left)),
     )
 
 
 def _collected(coefficient: Expr) -> Expr:
     """Write β̃ₙ for what the table has, and keep what the displacement adds."""
-    order = 2 if coefficient == effective_coefficients()[0] else 3
+    order = 2 + effective_coefficients().index(coefficient)
     return Add(real(f"beta_{order}tilde"), expand(coefficient - range_error()[order]), evaluate=False)
 
 
@@ -147,6 +187,6 @@ def at_constant_range(expression: Expr) -> Expr:
     """Replace u by (r + vτ)/R, as (17) has it: u is r/R, u̇ is v/R and the rest vanishes."""
     for platform in PLATFORMS:
         held = (platform.position / platform.slant_range, platform.velocity / platform.slant_range)
-        for derivative, value in zip(platform.look, (*held, Matrix([0, 0, 0]), Matrix([0, 0, 0])), strict=True):
+        for derivative, value in zip(platform.look, (*held, *[Matrix([0, 0, 0])] * (ORDER - 1)), strict=True):
             expression = expression.subs(dict(zip(derivative, value, strict=True)))
     return expand(expression)

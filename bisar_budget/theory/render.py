@@ -16,7 +16,7 @@ from bisar_budget.theory import full, published
 from bisar_budget.theory.published import Equation, Table
 
 _NAME = re.compile(
-    r"(?P<letter>[A-Za-z]+?)(?P<index>_\d)?(?P<accent>tilde|bar|hat|dot|ddot|dddot)?(?:_(?P<subscript>\w+))?"
+    r"(?P<letter>[A-Za-z]+?)(?P<index>_\d)?(?P<accent>tilde|bar|hat|dot|ddot|dddot|ddddot)?(?:_(?P<subscript>\w+))?"
 )
 _GREEK = {"lambda": "λ", "tau": "τ", "phi": "φ", "theta": "θ", "beta": "β", "sigma": "σ"}
 _ACCENTS = {
@@ -26,8 +26,9 @@ _ACCENTS = {
     "dot": "\u0307",
     "ddot": "\u0308",
     "dddot": "\u20db",
+    "ddddot": "\u20dc",
 }
-_ABOVE = {"tilde": "~", "bar": "¯", "hat": "^", "dot": "˙", "ddot": "¨", "dddot": "⃛"}
+_ABOVE = {"tilde": "~", "bar": "¯", "hat": "^", "dot": "˙", "ddot": "¨", "dddot": "⃛", "ddddot": "⃜"}
 _COMMANDS = {
     "Delta": r"\Delta{}",
     "PSLR": r"\mathrm{PSLR}",
@@ -272,7 +273,7 @@ def _latex_table(table: Table) -> str:
     return "\n".join([*lines, r"\end{tabular}", *(f"% {note}" for note in _notes(table))]) + "\n"
 
 
-_SUBSCRIPTS = str.maketrans("₀₁₂₃", "0123")
+_SUBSCRIPTS = str.maketrans("₀₁₂₃₄", "01234")
 
 
 def _markdown_table(table: Table) -> str:

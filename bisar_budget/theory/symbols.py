@@ -40,7 +40,7 @@ class Platform:
     """One platform at the aperture midpoint, with the error of its measured motion.
 
     Vectors are (3,) east-north-up. [m], [m/s], [m/s²]. `look` holds the unit vector to the platform and its
-    first three derivatives, [1/sⁿ]; the paper's model has neither them nor the acceleration.
+    first four derivatives, [1/sⁿ]; the paper's model has neither them nor the acceleration.
     """
 
     name: str
@@ -73,7 +73,7 @@ def platform(name: str, subscript: str) -> Platform:
         position=ImmutableMatrix([real(f"{axis}_{subscript}") for axis in AXES]),
         velocity=vector("v"),
         acceleration=vector("a"),
-        look=tuple(vector(name) for name in ("u", "udot", "uddot", "udddot")),
+        look=tuple(vector(name) for name in ("u", "udot", "uddot", "udddot", "uddddot")),
         position_error=vector("ptilde"),
         velocity_error=vector("vtilde"),
         acceleration_error=vector("atilde"),

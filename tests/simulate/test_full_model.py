@@ -12,8 +12,6 @@ from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.errors import MissionError
 from bisar_budget.geometry import norm
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.simulate import exact
-from bisar_budget.simulate.aperture_fit import EdgePhases
 from bisar_budget.simulate.exact import exact_effect
 from bisar_budget.simulate.phase_history import cell_centres, path
 from bisar_budget.simulate.verify import Study, verify_mission
@@ -51,13 +49,6 @@ def random_missions(count: int, seed: int, climbing: bool = True):
             yield mission
 
 
-@pytest.fixture
-def at_the_midpoint(monkeypatch) -> None:
-    """Let exact ranges give the Taylor terms at the midpoint, as the closed form does, not the best fit."""
-    monkeypatch.setattr(exact, "edge_phases", lambda terms: EdgePhases(float(terms[2]), float(terms[3])))
-
-
-@pytest.mark.usefixtures("at_the_midpoint")
 def test_shift_and_phase_of_every_row_inside_first_order_are_those_of_exact_ranges() -> None:
     """500 collections: within 2 % or 0.02 rad of phase, 2 % or 10 cm of shift.
 

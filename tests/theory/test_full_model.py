@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 from sympy import Matrix, Rational, diff, simplify, sqrt
 
@@ -13,7 +14,7 @@ from bisar_budget.theory.symbols import PLATFORMS, RECEIVER, TRANSMITTER, clock_
 ERRORS = [error for platform in PLATFORMS for error in published.motion_errors(platform)]
 
 
-@pytest.mark.parametrize("order", range(4))
+@pytest.mark.parametrize("order", range(5))
 def test_the_series_of_the_line_of_sight_is_its_derivative(order: int) -> None:
     """u = r/|r| differentiated as it stands, on a climbing, turning path of whole numbers: exact rationals."""
     p, v, a = Matrix([12, -9, 20]), Matrix([3, 5, -2]), Matrix([1, -1, 4])  # |p| = 25
@@ -62,7 +63,7 @@ def test_without_squint_velocity_and_acceleration_rows_are_those_of_table_2() ->
 
 def test_an_error_that_moves_nothing_keeps_its_quadratic_term() -> None:
     """x̂ = 0: the effective coefficient is β̃₂ itself."""
-    second, third = full.effective_coefficients()
+    second, third, _ = full.effective_coefficients()
     nowhere = dict.fromkeys(full.DISPLACEMENT, 0)
     assert second.subs(nowhere) == full.range_error()[2]
     assert third.subs(nowhere) == full.range_error()[3]
@@ -105,9 +106,20 @@ def test_a_monostatic_radar_at_broadside_loses_no_phase_to_the_displacement_of_a
 @pytest.mark.parametrize(("order", "axis", "factor"), [(2, 0, Rational(1, 2)), (3, 1, Rational(1, 6))])
 def test_displacement_phases_are_quadratic_and_cubic_terms_at_the_edge(order, axis, factor) -> None:
     """One metre of displacement, s⁽ⁿ⁾ of 1: a range of τⁿ/n!."""
-    per_metre = published.sensitivity(full.displacement_phase(order), full.DISPLACEMENT[axis])
-    one = {TRANSMITTER.look[order][axis]: 1, RECEIVER.look[order][axis]: 0}
-    assert per_metre.subs(one) == published.edge_phase(factor, order)
+    phase = {2: full.quadratic_phase, 3: full.cubic_phase}[order](full.displacement_coefficients())
+    per_metre = published.sensitivity(phase, full.DISPLACEMENT[axis])
+    still = {symbol: 0 for platform in PLATFORMS for look in platform.look for symbol in look}
+    one = still | {TRANSMITTER.look[order][axis]: 1}
+    assert simplify(per_metre.subs(one) - published.edge_phase(factor, order)) == 0
+
+
+def test_the_quadratic_phase_is_that_of_a_quadratic_fitted_over_the_aperture() -> None:
+    """Of a quartic six sevenths, by least squares on a fine grid with a cubic beside it, which changes nothing."""
+    x = np.linspace(-1, 1, 100_001)
+    fitted = np.polynomial.polynomial.polyfit(x, x**4, 3)
+    assert float(full.quartic_as_quadratic()) == pytest.approx(fitted[2], rel=1e-4)
+    quartic = full.quadratic_phase([0, 0, 0, 0, Rational(1)])
+    assert quartic == Rational(6, 7) * published.edge_phase(Rational(1), 4)
 
 
 def test_curved_paths_turn_the_line_of_sight() -> None:

@@ -579,11 +579,13 @@ class TestBeyondFirstOrder:
         found = row(findings(platforms__receiver=receiver, allocation__model="full"), "receiver.velocity.z")
         assert found.utilization < 1
         assert found.status == "warn"
-        assert "with the second order" in found.reason
+        assert "by exact ranges" in found.reason
+        assert abs(found.qpe_exact_rad) > found.allowable * abs(found.qpe_full_rad) / 1.9
 
     def test_a_small_error_is_inside(self) -> None:
         found = row(findings(**{f"{ERROR}__velocity": [0, 0, 0.1]}), "transmitter.velocity.z")
-        assert not any("first order" in note for note in found.notes)
+        assert not any("by exact ranges" in note for note in found.notes)
+        assert found.qpe_exact_rad is None
 
 
 class TestTheStricterOfBothModels:

@@ -1,0 +1,136 @@
+"""What declared errors do by exact ranges: no expansion, and no array library, so that a check can ask for it.
+
+The range history is sampled at the nodes of Gauss-Legendre quadrature, where its projection on Legendre polynomials
+is a sum. The displaced point has the recorded constant and linear term at the aperture midpoint, as the full model
+has it; quadratic and cubic phase are those of the cubic fitted to what remains, over the whole aperture.
+`simulate/exact.py` does the same on arrays.
+"""
+
+import math
+from collections.abc import Iterable
+from functools import cache
+from operator import mul
+from typing import NamedTuple
+
+from bisar_budget.budget.sources import ErrorSource
+from bisar_budget.geometry import BistaticGeometry, GroundVector
+
+_NODES = 16  # more change nothing, up to turns of ±1 rad
+_ORDER = 6  # of the projection, of which value and slope at the midpoint are taken
+_ITERATIONS = 20
+_SETTLED_M = 1e-6
+
+Weights = tuple[float, ...]
+
+
+class ExactPhases(NamedTuple):
+    """Displacement east, north [m]; quadratic and cubic phase at the aperture edge, signed like β̃. [rad]"""
+
+    displacement: GroundVector
+    quadratic: float
+    cubic: float
+
+
+class ExactRanges:
+    """The exact paths of one collection, sampled over the aperture."""
+
+    def __init__(self, geometry: BistaticGeometry, wavelength_m: float, aperture_time_s: float) -> None:
+        self.wavelength, self.half = wavelength_m, aperture_time_s / 2
+        self.times = [node * self.half for node in _quadrature()[0]]
+        states = {"transmitter": geometry.transmitter, "receiver": geometry.receiver}
+        self.tracks = {name: [state.at(tau)[0] for tau in self.times] for name, state in states.items()}
+        self.recorded = [math.hypot(*t) + math.hypot(*r) for t, r in zip(*self.tracks.values(), strict=True)]
+
+    def phases(self, errors: Iterable[tuple[ErrorSource, float]]) -> ExactPhases | None:
+        """Find where errors of given sizes move a point at the scene centre, and what defocuses there.
+
+        None where the iteration finds no ground point with the recorded history.
+        """
+        measured = {name: [list(at) for at in track] for name, track in self.tracks.items()}
+        recorded = list(self.recorded)
+        for source, size in errors:
+            for name, track in measured.items():
+                if source.moves(name) and source.is_position:
+                    x, y, z = source.direction
+                    for at, tau in zip(track, self.times, strict=True):
+                        by = size * source.power(tau)
+                        at[0] += by * x
+                        at[1] += by * y
+                        at[2] += by * z
+            if not source.is_position:  # a clock, or a phase as such: its polynomial is exact
+                for index, (tau, node) in enumerate(zip(self.times, _quadrature()[0], strict=True)):
+                    term = source.effect
+                    edge = term.qpe * node**2 + term.cubic * node**3
+                    metres = term.constant + term.linear * tau + self.wavelength / (2 * math.pi) * edge
+                    recorded[index] += size * metres
+        return self._settled(recorded, *measured.values())
+
+    def _settled(self, recorded: list[float], *tracks: list[list[float]]) -> ExactPhases | None:
+        """Newton's method for the point; the slope of a track's range is minus its direction."""
+        _, at_midpoint, per_half, quadratic, cubic = _quadrature()
+        east = north = 0.0
+        for _ in range(_ITERATIONS):
+            left, by_east, by_north = list(recorded), [0.0] * _NODES, [0.0] * _NODES
+            for track in tracks:
+                for index, (x, y, z) in enumerate(track):
+                    dx, dy = x - east, y - north
+                    distance = math.sqrt(dx * dx + dy * dy + z * z)
+                    if not distance:
+                        return None  # the iteration has run into a platform
+                    left[index] -= distance
+                    by_east[index] -= dx / distance
+                    by_north[index] -= dy / distance
+            a, b = _sum(at_midpoint, by_east), _sum(at_midpoint, by_north)
+            c, d = _sum(per_half, by_east), _sum(per_half, by_north)
+            constant, linear = _sum(at_midpoint, left), _sum(per_half, left)
+            determinant = a * d - b * c
+            if not determinant or not math.isfinite(determinant):
+                return None
+            step_east, step_north = (
+                (d * constant - b * linear) / determinant,
+                (a * linear - c * constant) / determinant,
+            )
+            east, north = east + step_east, north + step_north
+            if math.hypot(step_east, step_north) < _SETTLED_M:
+                scale = 2 * math.pi / self.wavelength
+                return ExactPhases((east, north), scale * _sum(quadratic, left), scale * _sum(cubic, left))
+        return None
+
+
+def _sum(weights: Weights, samples: list[float]) -> float:
+    total: float = sum(map(mul, weights, samples))
+    return total
+
+
+@cache
+def _quadrature() -> tuple[Weights, Weights, Weights, Weights, Weights]:
+    """Nodes in -1 to 1, and the weights that give, of samples there: value and slope at 0, x² and x³ of the fit."""
+    nodes: list[float] = []
+    weights: list[float] = []
+    for k in range(_NODES):
+        x = math.cos(math.pi * (k + 0.75) / (_NODES + 0.5))  # close enough for Newton's method
+        for _ in range(8):
+            before, at = 1.0, x
+            for n in range(2, _NODES + 1):
+                before, at = at, ((2 * n - 1) * x * at - (n - 1) * before) / n
+            slope = _NODES * (x * at - before) / (x * x - 1)
+            x -= at / slope
+        nodes.append(x)
+        weights.append(2 / ((1 - x * x) * slope * slope))
+    legendre: list[Weights] = []  # the weights that project on each polynomial
+    last, this = [0.0] * _NODES, [1.0] * _NODES
+    for n in range(_ORDER + 1):
+        legendre.append(tuple((2 * n + 1) / 2 * w * p for w, p in zip(weights, this, strict=True)))
+        recurred = [((2 * n + 1) * x * p - n * q) / (n + 1) for x, p, q in zip(nodes, this, last, strict=True)]
+        last, this = this, recurred
+
+    def combined(*factors: float) -> Weights:
+        return tuple(sum(f * w for f, w in zip(factors, row, strict=True)) for row in zip(*legendre, strict=True))
+
+    return (
+        tuple(nodes),
+        combined(1, 0, -1 / 2, 0, 3 / 8, 0, -5 / 16),  # Pₙ(0)
+        combined(0, 1, 0, -3 / 2, 0, 15 / 8, 0),  # P′ₙ(0)
+        combined(0, 0, 3 / 2, 0, 0, 0, 0),  # P₂ = (3x² - 1)/2
+        combined(0, 0, 0, 5 / 2, 0, 0, 0),  # P₃ = (5x³ - 3x)/2
+    )
