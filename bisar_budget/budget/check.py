@@ -322,28 +322,32 @@ def _aggregate_rows(
         by_exact = [found[s.id].cubic if s.id in found else s.full.cubic * (s.declared or 0.0) for s in motion]
         cubic_notes, exact_doubt = of_members(found, motion, combine_phases(by_exact, combine), cubic_limit, "rad")
         cubic_doubt = cubic_doubt or exact_doubt
+    cubic_phase = combine_phases([s.cubic(model) for s in motion], combine) if motion else None
+    over = _exceeded("cubic phase", cubic_phase, cubic_limit, "rad", [(s.id, abs(s.cubic(model))) for s in motion])
     yield _judged(
         mission,
         id="mission.cubic_phase_error",
         metric="cubic_phase_error",
         unit="rad",
-        declared=combine_phases([s.cubic(model) for s in motion], combine) if motion else None,
+        declared=cubic_phase,
         allowable=mission.requirements.cubic_phase_error,
         path=("requirements", "cubic_phase_error"),
         equation="Table I, cubic column" if model == "published" else "full model",
         no_limit=NO_REQUIREMENT,
         info="" if mission.requirements.cubic_phase_error is not None else NO_REQUIREMENT,
-        over="cubic phase at the aperture edge above the requirement; autofocus gain does not apply",
+        over=f"{over}; autofocus gain does not apply",
         doubt=cubic_doubt,
         notes=cubic_notes,
     )
     counted = {source.id for source in motion}
-    known = [row.displacement_m for row in errors if row.displacement_m is not None and row.id in counted]
+    shown = [(row.id, row.displacement_m) for row in errors if row.displacement_m is not None and row.id in counted]
+    known = [move for _, move in shown]
     moved = combine_displacements(known, combine) if motion and len(known) == len(motion) else None
     if model == "strictest" and moved is not None:
         by_25 = image_plane(mission.geometry)
         published = [by_25.displacement(s.effect, s.declared or 0.0) for s in motion]
         moved = max(moved, combine_displacements([move for move in published if move is not None], combine))
+    lengths = [(row_id, math.hypot(*move)) for row_id, move in shown]
     location_notes: tuple[str, ...] = ()
     location_doubt = ""
     if found and motion:
@@ -364,12 +368,13 @@ def _aggregate_rows(
         not_evaluated=plane.degeneracy if model == "published" else "",
         is_declared=bool(motion),
         info="" if mission.requirements.location_error is not None else NO_REQUIREMENT,
-        over="displacement of the image above the requirement",
+        over=_exceeded("displacement of the image", moved, mission.requirements.location_error, "m", lengths),
         doubt=location_doubt,
         notes=location_notes,
     )
     if allocation.n_pull is not None:
         pull_in = math.pi * allocation.n_pull
+        total = math.fsum(abs(s.qpe(model)) for s in declared) if declared else None
         pull_in_notes, pull_in_doubt = of_members(
             found, declared, combine_phases(_exact_phases(declared, found), "sum"), pull_in, "rad"
         )
@@ -378,15 +383,26 @@ def _aggregate_rows(
             id="mission.autofocus_pull_in",
             metric="quadratic_phase_error",
             unit="rad",
-            declared=math.fsum(abs(s.qpe(model)) for s in declared) if declared else None,
+            declared=total,
             allowable=pull_in,
             path=("autofocus", "n_pull"),
             equation="Section VI",
             never_fails=True,
-            over="the errors together exceed what autofocus corrects: it corrects one total, not each error its own",
+            over=_exceeded("QPE", total, pull_in, "rad", [(s.id, abs(s.qpe(model))) for s in declared])
+            + "; autofocus corrects one total, not each error its own",
             doubt=pull_in_doubt,
             notes=pull_in_notes,
         )
+
+
+def _exceeded(
+    what: str, size: float | None, limit: float | None, unit: str, members: Sequence[tuple[str, float]]
+) -> str:
+    """Say how large an aggregate is, what is allowed, and which of its members is the largest."""
+    if size is None or limit is None or not members:
+        return ""
+    row_id, largest = max(members, key=lambda member: member[1])
+    return f"{what} {size:.3g} {unit}, {limit:.3g} {unit} allowed; largest: {row_id}, {largest:.3g} {unit}"
 
 
 def _exact_phases(members: Sequence[ErrorSource], found: Mapping[str, Beyond]) -> list[float]:
@@ -415,7 +431,10 @@ def _qpe_aggregates(
             for of in (model, "published", "full")
         )
         limit = allocation.qpe_limit(owner) * gain
-        over = "" if qpe is None else f"passes with autofocus from n_pull {allocation.n_pull_needed(qpe, owner):g}"
+        over = ""
+        if qpe is not None:
+            exceeded = _exceeded("QPE", qpe, limit, "rad", [(s.id, abs(s.qpe(model))) for s in members])
+            over = f"{exceeded}; passes with autofocus from n_pull {allocation.n_pull_needed(qpe, owner):g}"
         other = {"published": ("full", full), "full": ("published", published)}.get(model)
         doubt = ""
         if other is not None and other[1] is not None and other[1] > limit * (1 + UTILIZATION_TOLERANCE):
