@@ -15,6 +15,7 @@ from bisar_budget.report.layout import wrapped
 from bisar_budget.report.text_table import WORDS, percent
 from bisar_budget.units import format_quantity
 
+_DEEPER = 3  # a broken equation goes on; no symbol has the width that would put its equals sign there
 _LONGEST_UNIT = 16  # letters, of what may follow a number
 _RULES = {"each": "the largest", "sum": "the sum", "rss": "the root-sum-square"}
 
@@ -61,7 +62,7 @@ def _fitted(line: str) -> list[str]:
     body, _, unit = joined.rpartition(" ")
     if body.strip() and len(unit) < _LONGEST_UNIT:
         joined = f"{body}\u00a0{unit}"
-    return [part.replace("\u00a0", " ") for part in wrapped(joined, " " * (start + 6))]
+    return [part.replace("\u00a0", " ") for part in wrapped(joined, " " * (start + _DEEPER))]
 
 
 def _budget(allocation: Allocation, owner: str, qpe_per_unit: float, row: Row) -> Iterator[str]:
