@@ -113,7 +113,7 @@ def _error_rows(
             qpe = abs(source.qpe(model))
             doubt = _doubt(source, model, limit, first_order.ground) or doubt
             needed = allocation.n_pull_needed(qpe, source.owner)
-            of_model = "full model" if source.by(model) is source.full else source.equation
+            of_model = source.equation_by(model)
             over = (
                 f"QPE {qpe:.3g} rad, {limit:.3g} rad allowed ({of_model}); "
                 f"passes with autofocus from n_pull {needed:g}"
@@ -139,7 +139,7 @@ def _error_rows(
                 mission.line(source.path),
                 reason or None,
                 notes,
-                source.equation,
+                source.equation_by(model),
                 mission.requirement_ids.get(source.id),
                 source.evidence,
                 source.is_independent,
@@ -216,7 +216,7 @@ def _undeclared(
             mission.line(source.path),
             _no_limit(source, mission.allocation.model) if allowable is None else None,
             notes,
-            source.equation,
+            source.equation_by(mission.allocation.model),
             mission.requirement_ids.get(source.id),
             source.evidence,
             source.is_independent,

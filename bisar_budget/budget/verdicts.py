@@ -12,9 +12,10 @@ class Verdict(NamedTuple):
 
     Phases are magnitudes at the aperture edge [rad]: by the full model's closed form, predicted from exact
     ranges, and measured, `…_inside` and `…_beyond` at 0.9 and 1.1 times the limit. Displacements are on the
-    ground (east, north) [m]: `displacement_m` by exact ranges, `displacement_published_m` by (25). The smear
-    azimuth is that of a line, from 0 to π; `…_published_rad` by (31). For vibration `measured_db` stands
-    against `requirement_db`. With autofocus the row is formed again at `boundary_autofocus` and refocused.
+    ground (east, north) [m]: `displacement_m` by exact ranges, `…_published_m` by (25), `…_full_m` by the full
+    model. The smear azimuth is that of a line, from 0 to π; `…_published_rad` by (31). For vibration
+    `measured_db` stands against `requirement_db`. With autofocus the row is formed again at
+    `boundary_autofocus` and refocused.
     """
 
     id: str
@@ -38,6 +39,7 @@ class Verdict(NamedTuple):
     measured_db_error: float | None = None
     displacement_m: GroundVector | None = None
     displacement_published_m: GroundVector | None = None
+    displacement_full_m: GroundVector | None = None
     measured_displacement_m: GroundVector | None = None
     smear_azimuth_published_rad: float | None = None
     measured_smear_azimuth_rad: float | None = None

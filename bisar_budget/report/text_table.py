@@ -148,7 +148,9 @@ def _row(row: Row, style: Style) -> list[str]:
 
 @cache
 def _short_reference(equation: str) -> str:
-    """Shorten `Table II row 4` to `II.4`, `Section V, …` to `V`; what is not from the paper to nothing."""
+    """Shorten `Table II row 4` to `II.4`, `Section V, …` to `V`, `full model` to `full`; others to nothing."""
+    if equation == "full model":
+        return "full"
     match = re.match(r"Table (I+)(?: rows? ([\d-]+))?|Section (V?I*)|(\(\d+\))", equation)
     if match is None:
         return ""

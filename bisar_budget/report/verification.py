@@ -89,15 +89,22 @@ def evidence(rows: Sequence[Verdict], style: Style) -> list[str]:
 
 
 def _geometry(rows: Sequence[Verdict]) -> Iterator[str]:
-    """Say how far displacement and smear of the images are from (25) and (31), at worst."""
-    apart = [
-        (math.dist(row.measured_displacement_m, row.displacement_published_m), row.id)
-        for row in rows
-        if row.measured_displacement_m and row.displacement_published_m
-    ]
-    if apart:
-        distance, row_id = max(apart)
-        yield f"displacement of the images: within {format_quantity(distance, 'm', 2)} of (25), farthest {row_id}"
+    """Say how far displacement and smear of the images are from the gating model's and from (31), at worst."""
+    by_25 = [row for row in rows if row.model == "published"]
+    by_full = [row for row in rows if row.model != "published"]
+    for rule, members, field in (
+        ("(25)", by_25, "displacement_published_m"),
+        ("the full model", by_full, "displacement_full_m"),
+    ):
+        apart = [
+            (math.dist(row.measured_displacement_m, said), row.id)
+            for row in members
+            if row.measured_displacement_m and (said := getattr(row, field)) is not None
+        ]
+        if apart:
+            distance, row_id = max(apart)
+            within = format_quantity(distance, "m", 2)
+            yield f"displacement of the images: within {within} of {rule}, farthest {row_id}"
     turned = [
         (abs((measured - line + math.pi / 2) % math.pi - math.pi / 2), row.id)
         for row in rows

@@ -212,6 +212,7 @@ class Study:
             pslr_db=response.pslr_db,
             islr_db=response.islr_db,
             displacement_published_m=self._published_displacement(sizes, scale),
+            displacement_full_m=self._moves([(source, scale * size) for source, size in sizes]),
             measured_displacement_m=_moved(effect.displacement, shift.displacement),
             smear_azimuth_published_rad=(self.geometry.look_azimuth + math.pi / 2) % math.pi,
             measured_smear_azimuth_rad=shift.smear_azimuth,
@@ -395,6 +396,7 @@ class Study:
         return blank._replace(
             **_predicted(effect),
             displacement_published_m=self._published_displacement(sizes, scale),
+            displacement_full_m=self._moves([(source, scale * size) for source, size in sizes]),
             measured_displacement_m=measured,
             verdict=verdict,
             reason=reason,

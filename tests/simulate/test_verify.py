@@ -563,3 +563,11 @@ class TestConditions:
         row = verdicts("receiver.vibration.sinusoidal.0", requirements__pslr=-30)["receiver.vibration.sinusoidal.0"]
         assert "10 cells from the peak" in row.reason
         assert "assumed: the file declares no vibration" in row.reason
+
+
+@pytest.mark.parametrize(("model", "rule"), [("published", "(25)"), ("full", "the full model")])
+def test_displacement_is_compared_with_the_gating_models(run, tmp_path, model: str, rule: str) -> None:
+    path = tmp_path / "m.yaml"
+    path.write_text(mission_text(allocation={"model": model}), encoding="utf-8")
+    text = " ".join(run("verify", path, "--only", "receiver.velocity.y").stdout.split())
+    assert re.search(rf"displacement of the images: within [\d.]+ \w+ of {re.escape(rule)}, farthest", text)

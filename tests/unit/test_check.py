@@ -651,3 +651,19 @@ class TestAggregatesThatFail:
     def test_pull_in(self) -> None:
         reason = self.reason("mission.autofocus_pull_in", autofocus__n_pull=0.1)
         assert "QPE 0.584 rad, 0.314 rad allowed; largest: receiver.velocity.y" in reason
+
+
+@pytest.mark.parametrize(
+    ("model", "row_id", "equation"),
+    [
+        ("published", "receiver.velocity.y", "Table II row 2"),
+        ("full", "receiver.velocity.y", "full model"),
+        ("full", "receiver.position.x", "full model"),
+        ("full", "timing.quadratic", "full model"),
+        ("strictest", "receiver.velocity.x", "Table II row 1"),  # the full model allows more
+        ("full", "other.troposphere", "as declared"),
+    ],
+)
+def test_a_row_names_the_model_that_gates_it(model: str, row_id: str, equation: str) -> None:
+    other = [{"name": "troposphere", "quadratic_phase_error": 0.1}]
+    assert row(findings(allocation__model=model, other_errors=other), row_id).equation == equation
