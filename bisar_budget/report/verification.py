@@ -140,7 +140,7 @@ def _quantity(value: float | None, unit: str) -> str:
 
 
 def _phase(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3f}"
+    return "-" if value is None else f"{value:.3f}" if value < 10 else f"{value:.4g}"
 
 
 def _decibel(value: float | None) -> str:

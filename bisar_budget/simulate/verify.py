@@ -326,6 +326,8 @@ class Study:
             budget_rad=requirement,
         )  # fmt: skip
         sizes = [(s, s.declared or 0.0) for s in self._declared]
+        if not sizes:
+            return blank._replace(reason="no error with a motion is declared")
         total = abs(math.fsum(s.cubic(self.model) for s, _ in sizes))
         if not total:
             return blank._replace(reason=f"no declared error has a cubic phase by the {self.model} model")
@@ -351,6 +353,8 @@ class Study:
         """
         blank = Verdict(id="mission.location_error", model=self.model, boundary_error=requirement, unit="m")
         sizes = [(s, s.declared or 0.0) for s in self._declared]
+        if not sizes:
+            return blank._replace(reason="no error that moves the image is declared")
         rule = "(25)" if self.model == "published" else "the full model"
         declared = self._places(sizes)
         if declared is None:

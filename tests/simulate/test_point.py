@@ -210,6 +210,12 @@ class TestCommand:
         assert run("simulate", tmp_path / "none.yaml").exit_code == 2
         assert run("simulate", ROOT / "specs" / "missions" / "sentinel1_fixed_receiver.yaml").exit_code == 2
 
+    def test_an_autofocus_that_fails_is_said_to(self, run) -> None:
+        """Beyond its pull-in and over ±0.3 rad of turn the UAV pair's response stays smeared."""
+        said = "autofocus does not restore the response"
+        assert said in run("simulate", ROOT / "specs" / "missions" / "uav_pair_l_band.yaml").stdout
+        assert said not in run("simulate", SECTION_V).stdout
+
     def test_unwritable_target_is_2(self, run, tmp_path) -> None:
         result = run("simulate", SECTION_V, "-o", tmp_path / "no" / "v.npz")
         assert result.exit_code == 2

@@ -259,7 +259,7 @@ class TestTogether:
     def test_location_without_errors_says_so(self) -> None:
         row = verdicts("mission.location_error", requirements__location_error=2)["mission.location_error"]
         assert (row.verdict, row.measured_displacement_m) == ("not_evaluated", None)
-        assert "move nothing" in row.reason
+        assert "no error that moves the image is declared" in row.reason
 
     def test_cubic(self) -> None:
         """Exact ranges and the image agree; Table I holds the range constant and is held to the image."""
@@ -271,7 +271,12 @@ class TestTogether:
 
     def test_cubic_without_errors_says_so(self) -> None:
         row = verdicts("mission.cubic_phase_error", requirements__cubic_phase_error=0.1)
-        assert "no declared error has a cubic phase" in row["mission.cubic_phase_error"].reason
+        assert "no error with a motion is declared" in row["mission.cubic_phase_error"].reason
+
+    def test_location_of_errors_that_move_nothing_says_so(self) -> None:
+        error = {"platforms__receiver__motion_error": {"acceleration": [1e-6, 0, 0]}}
+        row = verdicts("mission.location_error", requirements__location_error=2, **error)["mission.location_error"]
+        assert "move nothing by (25)" in row.reason
 
     def test_worst_case_sums_reach_their_budgets(self) -> None:
         rows = verdicts("*.quadratic_phase_error", allocation__combine="sum", **ERRORS)
