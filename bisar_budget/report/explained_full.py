@@ -62,7 +62,7 @@ def full_chain(
         cell = equation(f"β̃_{order}", formulas.clock_coefficient(order), values, beta[order], RATES[order])
         yield from step(f"Full model, clock{each}", *cell)
     elif source.owner == "mission":
-        yield from _terrain(ground.looks, beta, size, each)
+        yield from _of_both(source, ground.looks, beta, size, each)
     else:
         yield from _motion(source, ground.looks, beta, size, each)
     s = [tuple(t + r for t, r in zip(*of_order, strict=True)) for of_order in zip(*ground.looks, strict=True)]
@@ -146,18 +146,27 @@ def _motion(
     yield from step(f"Full model, terms of the range error by powers of slow time{each}", *lines)
 
 
-def _terrain(
-    looks: tuple[tuple[tuple[float, ...], ...], ...], beta: list[float], size: float, each: str
+def _of_both(
+    source: ErrorSource, looks: tuple[tuple[tuple[float, ...], ...], ...], beta: list[float], size: float, each: str
 ) -> Iterator[str]:
-    """β̃ of a scene that is higher than it is taken for: both platforms measured too high."""
+    """β̃ of one error of both platforms: a common one, or a scene h higher, as if both were measured too high."""
+    is_terrain = source.id == "mission.terrain"
+    kind, axis = ("position", "z") if is_terrain else source.id.split(".")[1:]
+    letter = axis if axis in formulas.AXES else "d"
+    error = "h" if is_terrain else formulas.motion_symbol(kind, letter, "t")[:-1]  # of neither alone
     known: dict[str, float] = {}
     lines: list[str] = []
-    for n, divisor in ((0, ""), (1, ""), (2, "/2"), (4, "/24")):
-        names = [f"{_dotted('u', n)}_z{platform[0]}" for platform in PLATFORMS]
-        known |= {name: look[n][2] for name, look in zip(names, looks, strict=True)}
-        beta[n] = -size * sum(look[n][2] for look in looks) / math.factorial(n)
-        lines += equation(f"β̃_{n}", f"-h*({names[0]} + {names[1]}){divisor}", known | {"h": size}, beta[n], RATES[n])
+    for order, (n, _) in motion_cells(kind, letter, "t").items():
+        names = [f"{_dotted('u', n)}_{letter}{platform[0]}" for platform in PLATFORMS]
+        along = [sum(u * d for u, d in zip(look[n], source.direction, strict=True)) for look in looks]
+        known |= dict(zip(names, along, strict=True))
+        beta[order] = -size * sum(along) * _FRACTIONS[kind][order]
+        divisor = 1 / _FRACTIONS[kind][order]
+        formula = f"-{error}*({names[0]} + {names[1]})" + (f"/{divisor:g}" if divisor > 1 else "")
+        lines += equation(f"β̃_{order}", formula, known | {error: size}, beta[order], RATES[order])
     yield from step(
-        f"Full model: lines of sight of both platforms along z, with their derivatives ({_DERIVED})", *_numbers(known)
+        f"Full model: lines of sight of both platforms along {axis}, with their derivatives ({_DERIVED})",
+        *_numbers(known),
     )
-    yield from step(f"A scene higher by h is as both platforms measured too high by h{each}", *lines)
+    why = ": a scene higher by h is as both measured too high by h" if is_terrain else ""
+    yield from step(f"Terms of the range error, the same error on both platforms{why}{each}", *lines)

@@ -130,7 +130,7 @@ def test_every_row_can_be_repeated_by_hand(path, model: str) -> None:
     for row in found.rows:
         results: dict[str, float] = {}
         for symbol, numbers, value in sums(explain(mission, found, row.id)):
-            sizes = evaluated(re.sub(r"(^|\(|\+ )-", r"\1", numbers))
+            sizes = evaluated(re.sub(r"(^|\(|\+ )-", r"\1", numbers).replace(" - ", " + "))
             assert abs(evaluated(numbers) - value) <= 1e-5 * max(abs(sizes), abs(value)), (row.id, symbol, numbers)
             results[symbol] = value
         assert results or row.allowable is None or row.declared is None
