@@ -12,6 +12,7 @@ import click
 from click.core import ParameterSource
 
 from bisar_budget import __version__
+from bisar_budget.constants import MAX_DRAWS
 from bisar_budget.errors import printable
 
 if TYPE_CHECKING:
@@ -122,6 +123,24 @@ class _Gate(click.Command):
         return defaults
 
 
+class _Draws(click.ParamType[int]):
+    """A number of draws: 1000000 or 1e6."""
+
+    name = "number"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        from decimal import Decimal, InvalidOperation
+
+        try:
+            number = Decimal(str(value).strip())
+        except InvalidOperation:
+            number = Decimal(0)
+        if not (number.is_finite() and 1 <= number <= MAX_DRAWS and number == int(number)):
+            accepted = f"must be a whole number of draws from 1 to {MAX_DRAWS:,}, such as 100000 or 1e6"
+            self.fail(f"{printable(str(value))}: {accepted}.", param, ctx)
+        return int(number)
+
+
 @cli.command(cls=_Gate)
 @click.argument("missions", type=FILE, nargs=-1, required=True, metavar="MISSION...")
 @click.option(
@@ -169,6 +188,21 @@ class _Gate(click.Command):
     help="Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC).",
 )
 @click.option("--verify", "verifying", is_flag=True, help="Form images at the limits too and add their verdicts.")
+@click.option(
+    "--monte-carlo",
+    "draws",
+    envvar="BISAR_BUDGET_MONTE_CARLO",
+    type=_Draws(),
+    metavar="N",
+    help="Also draw the declared errors N times from their distributions and say how often each requirement holds.",
+)
+@click.option(
+    "--seed",
+    envvar="BISAR_BUDGET_SEED",
+    type=click.IntRange(0, 2**53),
+    metavar="S",
+    help="Seed of --monte-carlo (default: simulation.seed of the mission file, else 1).",
+)
 @click.option("-q", "--quiet", is_flag=True, help="One line per mission.")
 @click.option("-v", "--verbose", is_flag=True, help="Reason, equation, displacement and evidence of every row.")
 @click.option(
@@ -195,6 +229,8 @@ def check(
     model: str | None,
     today: datetime | None,
     verifying: bool,
+    draws: int | None,
+    seed: int | None,
     quiet: bool,
     verbose: bool,
     explain: str | None,
@@ -205,21 +241,25 @@ def check(
     MISSION is a YAML file, a glob pattern, or - for standard input. Exit code: 0 all met,
     1 a requirement is broken, 2 wrong usage or an unusable mission file, 3 a fault of the tool.
 
-    Defaults of --format, --report, --strict, --exit-zero, --model and --color: [tool.bisar-budget] in
-    the nearest pyproject.toml, and over it the variables BISAR_BUDGET_FORMAT and so on.
+    Defaults of --format, --report, --strict, --exit-zero, --model, --monte-carlo, --seed and --color:
+    [tool.bisar-budget] in the nearest pyproject.toml, and over it the variables BISAR_BUDGET_FORMAT and so on.
     """
-    from bisar_budget.report import Style, render
+    from bisar_budget.report import ILLUSTRATED, Style, render
 
     written = [(name, _format_of(name)) for name in reports]
     files = _expanded(missions)
     _spare(files, [output, *reports])
+    given = click.get_current_context().get_parameter_source
+    if seed is not None and draws is None and given("seed") is ParameterSource.COMMANDLINE:
+        raise click.UsageError("--seed is that of --monte-carlo N: give both.")
     if explain is not None:
-        given = click.get_current_context().get_parameter_source
-        if any(given(name) is ParameterSource.COMMANDLINE for name in ("format_name", "reports")):
-            raise click.UsageError("--explain writes text: it excludes --format and --report.")
+        if any(given(name) is ParameterSource.COMMANDLINE for name in ("format_name", "reports", "draws")):
+            raise click.UsageError("--explain writes text: it excludes --format, --report and --monte-carlo.")
         _explain(files, explain, today.date() if today else _today(), model, output)
         return
-    report = _checked(files, today.date() if today else _today(), model, verifying)
+    illustrated = any(name in ILLUSTRATED for name in (format_name, *(name for _, name in written)))
+    drawn = None if draws is None else (draws, seed)
+    report = _checked(files, today.date() if today else _today(), model, verifying, illustrated, drawn)
     if format_name != "text" or output is not None or quiet or not _is_terminal():
         _say_faults(report)
     style = Style(verbosity=-1 if quiet else 1 if verbose else 0, root=_repository())
@@ -237,7 +277,18 @@ def check(
     sys.exit(0 if exit_zero and code == EXIT_BROKEN else code)
 
 
-def _checked(files: Sequence[str], today: date, model: str | None, verifying: bool) -> "Report":
+def _checked(
+    files: Sequence[str],
+    today: date,
+    model: str | None,
+    verifying: bool,
+    illustrated: bool = False,
+    drawn: tuple[int, int | None] | None = None,
+) -> "Report":
+    """Check every file; `verifying` adds verdicts of images, and `illustrated` the images themselves.
+
+    `drawn` is the number of draws of a Monte Carlo and their seed.
+    """
     from bisar_budget.budget.check import check_mission
     from bisar_budget.budget.findings import Report, UnusableMission
     from bisar_budget.errors import MissionError
@@ -250,7 +301,12 @@ def _checked(files: Sequence[str], today: date, model: str | None, verifying: bo
     for index, file in enumerate(files):
         try:
             mission = load_mission(file, model)
-            missions.append(check_mission(mission, today))
+            found = check_mission(mission, today)
+            if drawn is not None:
+                from bisar_budget.budget.monte_carlo import monte_carlo
+
+                found = found._replace(monte_carlo=monte_carlo(mission, *drawn))
+            missions.append(found)
             if verifying:
                 usable[index] = mission
         except MissionError as error:
@@ -260,10 +316,18 @@ def _checked(files: Sequence[str], today: date, model: str | None, verifying: bo
 
         gc.enable()  # images are large
         for index, verified in zip(usable, _verified(list(usable.values()), "*", None), strict=True):
-            found = missions[index]
-            if not isinstance(found, UnusableMission):
-                missions[index] = with_verdicts(found, verified)
+            judged = missions[index]
+            if not isinstance(judged, UnusableMission):
+                judged = with_verdicts(judged, verified)
+                missions[index] = _illustrated(usable[index], judged) if illustrated else judged
     return Report(version=__version__, missions=tuple(missions))
+
+
+def _illustrated(mission: "Mission", found: "MissionFindings") -> "MissionFindings":
+    """Add the images of the rows that decide most."""
+    from bisar_budget.simulate.image_evidence import form_image_evidence
+
+    return found._replace(image_evidence=form_image_evidence(mission, found))
 
 
 def _explain(files: Sequence[str], row_id: str, today: date, model: str | None, output: str | None) -> None:

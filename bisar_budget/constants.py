@@ -12,3 +12,5 @@ ROUNDING = 1e-12
 
 MIN_GROUND_GRADIENT = 0.02  # |u_t + u_r| on the ground; below, range says nothing about the ground
 MIN_GRADIENT_ANGLE_DEG = 1.0  # between range and Doppler gradients on the ground
+
+MAX_DRAWS = 10**9  # of a Monte Carlo: minutes, and a probability known to 1e-6

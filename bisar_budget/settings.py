@@ -6,8 +6,17 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 TABLE = "tool.bisar-budget"
-KEYS = {"format": str, "report": list, "strict": bool, "exit-zero": bool, "model": str, "color": str}
-_KINDS = {str: "text", bool: "true or false", list: "a list of file names"}
+KEYS = {
+    "format": str,
+    "report": list,
+    "strict": bool,
+    "exit-zero": bool,
+    "model": str,
+    "monte-carlo": int,
+    "seed": int,
+    "color": str,
+}
+_KINDS = {str: "text", bool: "true or false", int: "a whole number", list: "a list of file names"}
 # Only a file in which the table can be is parsed: tomllib costs a fifth of a check's start.
 _CANDIDATE = re.compile(rb"""[.\s\["']bisar-budget["']?\s*[\].=]""")
 

@@ -78,6 +78,9 @@ RATIO = Dimension("a number", "", {"": 1.0, "%": 1e-2, "ppm": 1e-6, "ppb": 1e-9,
 RATE = Dimension("a rate", "1/s", {"1/s": 1.0, "s^-1": 1.0, "Hz": 1.0, "s/s^2": 1.0})
 RATE_SQUARED = Dimension("a rate per second", "1/s^2", {"1/s^2": 1.0, "s^-2": 1.0, "s/s^3": 1.0})
 POWER_RATIO = Dimension("a power ratio in decibel", "dB", {"dB": 1.0})
+POSITION_VARIANCE = Dimension("a position variance", "m^2", _scaled("m^2", "kcmu", 2))
+POSITION_VELOCITY = Dimension("a covariance of position and velocity", "m^2/s", _scaled("m^2/s", "kcmu", 2))
+VELOCITY_VARIANCE = Dimension("a velocity variance", "m^2/s^2", _scaled("m^2/s^2", "kcmu", 2))
 MEMORY = Dimension("an amount of memory", "B", _scaled("B", "kMGT") | {"KB": 1e3, "MiB": 2.0**20, "GiB": 2.0**30})
 
 DIMENSIONS = (
@@ -91,6 +94,9 @@ DIMENSIONS = (
     RATE,
     RATE_SQUARED,
     POWER_RATIO,
+    POSITION_VARIANCE,
+    POSITION_VELOCITY,
+    VELOCITY_VARIANCE,
     MEMORY,
 )
 

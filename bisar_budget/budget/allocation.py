@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from bisar_budget.budget.combine import combine_phases
+from bisar_budget.budget.correlation import combined_phase, correlated_errors
 from bisar_budget.budget.sources import ErrorSource
 from bisar_budget.mission.model import MetricSplits, Mission, Shares
 
@@ -84,14 +84,14 @@ def _divide(split: object, mission: Mission, sources: Sequence[ErrorSource]) -> 
     weight = {}
     for platform in ("transmitter", "receiver"):
         rule = mission.allocation.combine
-        phases = [
-            source.qpe(mission.allocation.model)
+        members = [
+            source
             for source in sources
             if source.declared is not None
             and EQUAL.includes(source.owner, platform)
             and (rule == "each" or source.is_independent)
         ]
-        weight[platform] = combine_phases(phases, rule)
+        weight[platform] = combined_phase(members, "qpe", mission.allocation.model, rule, correlated_errors(mission))
     total = weight["transmitter"] + weight["receiver"]
     if total == 0:
         return EQUAL

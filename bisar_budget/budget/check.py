@@ -3,11 +3,22 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import date
+from typing import TYPE_CHECKING
 
-from bisar_budget import evaluators
-from bisar_budget.budget.allocation import Allocation, Split, allocate
-from bisar_budget.budget.combine import combine_displacements, combine_phases
+from bisar_budget.budget import vibration
+from bisar_budget.budget.allocation import Allocation, allocate
+from bisar_budget.budget.correlation import (
+    Correlated,
+    combined_displacement,
+    combined_phase,
+    correlated_errors,
+    correlation_notes,
+    displacement_parts,
+    phase_parts,
+    unused_correlations,
+)
 from bisar_budget.budget.findings import FileWarning, MissionFindings, Resolution, Row
+from bisar_budget.budget.pull_in import pull_in_caps
 from bisar_budget.budget.sources import (
     ErrorSource,
     FullGround,
@@ -22,6 +33,9 @@ from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
 from bisar_budget.errors import KeyPath
 from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.model import Mission
+
+if TYPE_CHECKING:
+    from bisar_budget.budget.scene import SceneEdge
 
 NO_REQUIREMENT = "no requirement in the file: computed, not judged"
 
@@ -53,7 +67,15 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
         *_vibration_rows(mission, allocation),
         *_aggregate_rows(mission, allocation, sources, errors, plane, first_order),
     ]
+    scene = None
+    if mission.scene.radius is not None:
+        scene, row = _scene_row(mission, allocation, sources)
+        judged.append(row)
     rows, warnings = apply_waivers(judged, mission, today)
+    resolution = Resolution(
+        range=geometry.range_resolution(mission.radar.bandwidth, SPEED_OF_LIGHT),
+        cross_range=geometry.cross_range_resolution(mission.radar.wavelength, mission.collection.aperture_time),
+    )
     return MissionFindings(
         file=mission.file,
         name=mission.name,
@@ -62,13 +84,19 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
         coverage_factor=mission.allocation.coverage_factor,
         wavelength=mission.radar.wavelength,
         geometry=geometry,
-        resolution=Resolution(
-            range=geometry.range_resolution(mission.radar.bandwidth, SPEED_OF_LIGHT),
-            cross_range=geometry.cross_range_resolution(mission.radar.wavelength, mission.collection.aperture_time),
-        ),
+        aperture_time=mission.collection.aperture_time,
+        scene_radius=mission.scene.radius,
+        resolution=resolution,
         allocation=allocation,
         rows=tuple(rows),
-        warnings=(*_unknown_requirement_ids(mission, rows), *warnings, *_nothing_declared(rows)),
+        warnings=(
+            *_unknown_requirement_ids(mission, rows),
+            *warnings,
+            *_unused_correlations(mission),
+            *pull_in_caps(mission, resolution),
+            *_nothing_declared(rows),
+        ),
+        scene=scene,
         notes=(*collection_notes(mission, geometry, ground), *_unused_keys(mission)),
     )
 
@@ -233,66 +261,28 @@ def _quotient(numerator: float, denominator: float) -> float | None:
 
 
 def _vibration_rows(mission: Mission, allocation: Allocation) -> Iterator[Row]:
-    T = mission.collection.aperture_time
-    for name in ("transmitter", "receiver"):
-        error = getattr(mission.platforms, name).motion_error
-        path: KeyPath = ("platforms", name, "motion_error", "vibration")
-        allowable = _vibration_allowable(mission, mission.requirements.pslr, allocation.pslr, name)
-        missing = "" if mission.requirements.pslr is not None else "no requirements.pslr to hold it to"
-        for index, sinusoid in enumerate(error.vibration.sinusoidal or (None,)):
-            cycles = math.inf if sinusoid is None else sinusoid.frequency * T
-            slow = ""
-            if cycles < 1:
-                slow = (
-                    f"{cycles:.2g} cycles per aperture: slower than one, it acts as a quadratic and cubic phase "
-                    "error, not as paired echoes"
-                )
-            notes: tuple[str, ...] = ()
-            if 1 <= cycles < 3:
-                notes = (
-                    f"{cycles:.3g} cycles per aperture: below three it also acts as a quadratic phase error, "
-                    "which this row does not count",
-                )
-            yield _judged(
-                mission,
-                id=f"{name}.vibration.sinusoidal.{index}",
-                metric="pslr",
-                unit="m",
-                declared=None if sinusoid is None else sinusoid.amplitude,
-                allowable=allowable,
-                path=(*path, "sinusoidal", index, "amplitude"),
-                equation="Section V, sinusoidal",
-                no_limit=missing,
-                not_evaluated=missing or slow,
-                is_declared=sinusoid is not None,
-                over="paired echoes above the platform's share of PSLR (Section V)",
-                evidence=error.source,
-                notes=notes,
-            )
-        wideband = error.vibration.wideband
-        missing = "" if mission.requirements.islr is not None else "no requirements.islr to hold it to"
+    model = mission.allocation.model
+    for case in vibration.cases(mission, allocation):
+        allowed = case.limits
         yield _judged(
             mission,
-            id=f"{name}.vibration.wideband",
-            metric="islr",
+            id=case.id,
+            metric=case.metric,
             unit="m",
-            declared=None if wideband is None else wideband.rms,
-            allowable=_vibration_allowable(mission, mission.requirements.islr, allocation.islr, name),
-            path=(*path, "wideband", "rms"),
-            equation="Section V, wideband",
-            no_limit=missing,
-            not_evaluated=missing,
-            is_declared=wideband is not None,
-            over="power spread above the platform's share of ISLR (Section V)",
-            evidence=error.source,
-        )
-
-
-def _vibration_allowable(mission: Mission, requirement_db: float | None, split: Split, name: str) -> float | None:
-    if requirement_db is None:
-        return None
-    power = 10 ** (requirement_db / 10)  # -30 dB is 10⁻³: PSLR and ISLR are power ratios
-    return evaluators.vibration_limit(mission.radar.wavelength, math.sqrt(power * split.of(name)))
+            declared=case.declared,
+            allowable=None if allowed is None else allowed.by(model),
+            path=case.path,
+            equation=case.equation,
+            no_limit=case.missing,
+            not_evaluated=case.not_evaluated,
+            is_declared=case.declared is not None,
+            over=case.over,
+            doubt=case.doubt,
+            limits=allowed or (None, None),
+            qpe_full=case.qpe,
+            evidence=case.evidence,
+            notes=case.notes,
+        )._replace(published_margin_db=None if allowed is None else allowed.margin_db)
 
 
 def _aggregate_rows(
@@ -304,26 +294,29 @@ def _aggregate_rows(
     first_order: FirstOrder,
 ) -> Iterator[Row]:
     combine, model = mission.allocation.combine, mission.allocation.model
+    groups = correlated_errors(mission)
+    notes = correlation_notes(combine, groups) if combine != "each" else ()
     stated = [source for source in sources if source.declared is not None]
     declared = [source for source in stated if source.is_independent]
     if combine != "each":
-        yield from _qpe_aggregates(mission, allocation, declared, first_order.found)
+        yield from _qpe_aggregates(mission, allocation, declared, groups, first_order.found)
     # `each` looks at single rows, those along the scene's axes included.
     motion = [source for source in (stated if combine == "each" else declared) if source.is_motion]
     cubic_limit, cubic_doubt = mission.requirements.cubic_phase_error, ""
     other = {"published": "full", "full": "published"}.get(model)
     if cubic_limit is not None and other is not None and motion:
-        cubic = combine_phases([s.cubic(other) for s in motion], combine)
+        cubic = combined_phase(motion, "cubic", other, combine, groups)
         if cubic > cubic_limit * (1 + UTILIZATION_TOLERANCE):
             cubic_doubt = f"the {other} model says fail: {cubic:.3g} rad, {cubic_limit:.3g} rad allowed"
     found = first_order.found
     cubic_notes: tuple[str, ...] = ()
     if found and motion:
-        by_exact = [found[s.id].cubic if s.id in found else s.full.cubic * (s.declared or 0.0) for s in motion]
-        cubic_notes, exact_doubt = of_members(found, motion, combine_phases(by_exact, combine), cubic_limit, "rad")
+        by_exact = combined_phase(_with_exact(motion, found), "cubic", "full", combine, groups)
+        cubic_notes, exact_doubt = of_members(found, motion, by_exact, cubic_limit, "rad")
         cubic_doubt = cubic_doubt or exact_doubt
-    cubic_phase = combine_phases([s.cubic(model) for s in motion], combine) if motion else None
-    over = _exceeded("cubic phase", cubic_phase, cubic_limit, "rad", [(s.id, abs(s.cubic(model))) for s in motion])
+    cubic_phase = combined_phase(motion, "cubic", model, combine, groups) if motion else None
+    cubic_parts = phase_parts(motion, "cubic", model, combine, groups)
+    over = _exceeded("cubic phase", cubic_phase, cubic_limit, "rad", cubic_parts)
     yield _judged(
         mission,
         id="mission.cubic_phase_error",
@@ -337,23 +330,27 @@ def _aggregate_rows(
         info="" if mission.requirements.cubic_phase_error is not None else NO_REQUIREMENT,
         over=f"{over}; autofocus gain does not apply",
         doubt=cubic_doubt,
-        notes=cubic_notes,
+        notes=(*notes, *cubic_notes),
     )
     counted = {source.id for source in motion}
-    shown = [(row.id, row.displacement_m) for row in errors if row.displacement_m is not None and row.id in counted]
-    known = [move for _, move in shown]
-    moved = combine_displacements(known, combine) if motion and len(known) == len(motion) else None
+    known = [(row.id, row.displacement_m) for row in errors if row.displacement_m is not None and row.id in counted]
+    moved = combined_displacement(known, combine, groups) if motion and len(known) == len(motion) else None
     if model == "strictest" and moved is not None:
         by_25 = image_plane(mission.geometry)
-        published = [by_25.displacement(s.effect, s.declared or 0.0) for s in motion]
-        moved = max(moved, combine_displacements([move for move in published if move is not None], combine))
-    lengths = [(row_id, math.hypot(*move)) for row_id, move in shown]
+        published = [(s.id, by_25.displacement(s.effect, s.declared or 0.0)) for s in motion]
+        moves = [(row_id, move) for row_id, move in published if move is not None]
+        moved = max(moved, combined_displacement(moves, combine, groups))
+    lengths = [(row_id, math.hypot(*move)) for row_id, move in displacement_parts(known, combine, groups)]
     location_notes: tuple[str, ...] = ()
     location_doubt = ""
     if found and motion:
-        moves = [_moved_exactly(s, found, first_order.ground.plane) for s in motion]
+        exact_moves = [(s.id, _moved_exactly(s, found, first_order.ground.plane)) for s in motion]
         location_notes, location_doubt = of_members(
-            found, motion, combine_displacements(moves, combine), mission.requirements.location_error, "m"
+            found,
+            motion,
+            combined_displacement(exact_moves, combine, groups),
+            mission.requirements.location_error,
+            "m",
         )
     yield _judged(
         mission,
@@ -370,14 +367,13 @@ def _aggregate_rows(
         info="" if mission.requirements.location_error is not None else NO_REQUIREMENT,
         over=_exceeded("displacement of the image", moved, mission.requirements.location_error, "m", lengths),
         doubt=location_doubt,
-        notes=location_notes,
+        notes=(*notes, *location_notes),
     )
     if allocation.n_pull is not None:
         pull_in = math.pi * allocation.n_pull
         total = math.fsum(abs(s.qpe(model)) for s in declared) if declared else None
-        pull_in_notes, pull_in_doubt = of_members(
-            found, declared, combine_phases(_exact_phases(declared, found), "sum"), pull_in, "rad"
-        )
+        by_exact = math.fsum(abs(s.qpe("full")) for s in _with_exact(declared, found))
+        pull_in_notes, pull_in_doubt = of_members(found, declared, by_exact, pull_in, "rad")
         yield _judged(
             mission,
             id="mission.autofocus_pull_in",
@@ -401,13 +397,13 @@ def _exceeded(
     """Say how large an aggregate is, what is allowed, and which of its members is the largest."""
     if size is None or limit is None or not members:
         return ""
-    row_id, largest = max(members, key=lambda member: member[1])
-    return f"{what} {size:.3g} {unit}, {limit:.3g} {unit} allowed; largest: {row_id}, {largest:.3g} {unit}"
+    row_id, largest = max(members, key=lambda member: abs(member[1]))
+    return f"{what} {size:.3g} {unit}, {limit:.3g} {unit} allowed; largest: {row_id}, {abs(largest):.3g} {unit}"
 
 
-def _exact_phases(members: Sequence[ErrorSource], found: Mapping[str, Beyond]) -> list[float]:
-    """Quadratic phases by the full model, of members beyond first order by exact ranges. [rad]"""
-    return [found[s.id].qpe if s.id in found else s.qpe("full") for s in members]
+def _with_exact(members: Sequence[ErrorSource], found: Mapping[str, Beyond]) -> list[ErrorSource]:
+    """The errors, those beyond first order with effects that give what exact ranges give."""
+    return [found[s.id].in_place_of(s) if s.id in found else s for s in members]
 
 
 def _moved_exactly(source: ErrorSource, found: Mapping[str, Beyond], plane: ImagePlane) -> GroundVector:
@@ -417,8 +413,50 @@ def _moved_exactly(source: ErrorSource, found: Mapping[str, Beyond], plane: Imag
     return plane.displacement(source.full, source.declared or 0.0) or (0.0, 0.0)
 
 
+def _scene_row(
+    mission: Mission, allocation: Allocation, sources: Sequence[ErrorSource]
+) -> tuple["SceneEdge | None", Row]:
+    """Row of the scene's edge; to the published model an error is the same all over the scene."""
+    from bisar_budget.budget.scene import scene_edge
+
+    combine, total = mission.allocation.combine, allocation.qpe_total
+    single = [s for s in sources if combine == "each" or s.is_independent]
+    edge = scene_edge(mission, mission.geometry, allocation, single)
+    is_published = mission.allocation.model == "published"
+    difference: float | None = None
+    doubt, notes = "", tuple[str, ...]()
+    if edge is not None and not edge.degeneracy:
+        difference, doubt, notes = edge.difference, edge.doubt, edge.notes(total)
+        if is_published and difference > total * (1 + UTILIZATION_TOLERANCE):
+            doubt = f"the full model says fail: {difference:.3g} rad, {total:.3g} rad allowed"
+    row = _judged(
+        mission,
+        id="mission.spatial_variance",
+        metric="quadratic_phase_error",
+        unit="rad",
+        declared=difference,
+        allowable=None if is_published else total,
+        path=("scene", "radius"),
+        equation="full model",
+        no_limit="to the published model an error is the same all over the scene",
+        not_evaluated="" if edge is None else edge.degeneracy,
+        is_declared=edge is not None,
+        over="quadratic phase at the scene's edge and at its centre differ by more than the total budget",
+        doubt=doubt,
+        limits=(None, total),
+        qpe=None if difference is None else 0.0,
+        qpe_full=difference,
+        notes=notes,
+    )
+    return edge, row
+
+
 def _qpe_aggregates(
-    mission: Mission, allocation: Allocation, declared: Sequence[ErrorSource], found: Mapping[str, Beyond]
+    mission: Mission,
+    allocation: Allocation,
+    declared: Sequence[ErrorSource],
+    groups: Sequence[Correlated],
+    found: Mapping[str, Beyond],
 ) -> Iterator[Row]:
     combine, model, gain = mission.allocation.combine, mission.allocation.model, allocation.autofocus_gain
     owners = ["transmitter", "receiver", "mission"]
@@ -427,21 +465,20 @@ def _qpe_aggregates(
     for owner in owners:
         members = [s for s in declared if owner == "mission" or allocation.qpe.includes(s.owner, owner)]
         qpe, published, full = (
-            combine_phases([s.qpe(of) for s in members], combine) if members else None
+            combined_phase(members, "qpe", of, combine, groups) if members else None
             for of in (model, "published", "full")
         )
         limit = allocation.qpe_limit(owner) * gain
         over = ""
         if qpe is not None:
-            exceeded = _exceeded("QPE", qpe, limit, "rad", [(s.id, abs(s.qpe(model))) for s in members])
+            exceeded = _exceeded("QPE", qpe, limit, "rad", phase_parts(members, "qpe", model, combine, groups))
             over = f"{exceeded}; passes with autofocus from n_pull {allocation.n_pull_needed(qpe, owner):g}"
         other = {"published": ("full", full), "full": ("published", published)}.get(model)
         doubt = ""
         if other is not None and other[1] is not None and other[1] > limit * (1 + UTILIZATION_TOLERANCE):
             doubt = f"the {other[0]} model says fail: {other[1]:.3g} rad, {limit:.3g} rad allowed"
-        notes, exact_doubt = of_members(
-            found, members, combine_phases(_exact_phases(members, found), combine), limit, "rad"
-        )
+        by_exact = combined_phase(_with_exact(members, found), "qpe", "full", combine, groups)
+        notes, exact_doubt = of_members(found, members, by_exact, limit, "rad")
         yield _judged(
             mission,
             id=f"{'timing' if owner == 'clock' else owner}.quadratic_phase_error",
@@ -456,10 +493,10 @@ def _qpe_aggregates(
             gain=gain,
             over=over,
             doubt=doubt or exact_doubt,
-            notes=notes,
             limits=(limit, limit),
             qpe=published,
             qpe_full=full,
+            notes=(*correlation_notes(combine, [g for g in groups if owner in (g.platform, "mission")]), *notes),
         )
 
 
@@ -587,10 +624,13 @@ def _nothing_declared(rows: Sequence[Row]) -> Iterator[FileWarning]:
         yield FileWarning(line=None, message="no error is declared: nothing was judged")
 
 
+def _unused_correlations(mission: Mission) -> Iterator[FileWarning]:
+    return (FileWarning(line, message) for line, message in unused_correlations(mission))
+
+
 def _unused_keys(mission: Mission) -> Iterator[str]:
     """Say which keys that the file gives have no part in this check."""
     keys = {
-        "scene.radius": mission.scene.radius is not None,
         "collection.pulses": mission.collection.pulses is not None,
         "simulation": mission.simulation is not None,
     }

@@ -8,6 +8,9 @@ from bisar_budget.errors import Fault
 from bisar_budget.geometry import BistaticGeometry, GroundVector
 
 if TYPE_CHECKING:
+    from bisar_budget.budget.image_evidence import ImageEvidence
+    from bisar_budget.budget.monte_carlo import MonteCarlo
+    from bisar_budget.budget.scene import SceneEdge
     from bisar_budget.budget.verdicts import Verdict
 
 # Worst first. The status of a mission or a run is the worst one found; the last three gate nothing.
@@ -73,13 +76,18 @@ class MissionFindings(NamedTuple):
     coverage_factor: float
     wavelength: float
     geometry: BistaticGeometry
+    aperture_time: float
+    scene_radius: float | None
     resolution: Resolution
     allocation: Allocation
     rows: tuple[Row, ...]
     warnings: tuple[FileWarning, ...]
     notes: tuple[str, ...]
+    scene: "SceneEdge | None" = None  # of missions with a scene.radius and declared errors
     verdicts: "tuple[Verdict, ...] | None" = None  # of images, if any were formed
     is_unverified: bool = False  # images were asked for, and none gave a verdict
+    image_evidence: "tuple[ImageEvidence, ...]" = ()  # a few of those images, where a report shows them
+    monte_carlo: "MonteCarlo | None" = None  # if errors were drawn
 
     @property
     def status(self) -> str:

@@ -217,6 +217,10 @@ def error_sources(
     for name, state, look in zip(PLATFORMS, states, ground.looks, strict=True):
         sources += _motion(mission, name, state, look, ground)
     sources += _clock(mission, ground)
+    if mission.common_motion_error is not None:
+        from bisar_budget.budget.common import common_sources  # most missions do without
+
+        sources += common_sources(mission, sources)
     sources += _terrain(mission, sources)
     sources += _other(mission)
     return sources
@@ -235,13 +239,21 @@ def _motion(
     for kind_index, (kind, unit) in enumerate(MOTION_UNITS.items()):
         of_kind = slice(3 * kind_index, 3 * kind_index + 3)
         effects, full = list(map(Effect._make, rows[of_kind])), full_effects[of_kind]
-        values: Vector | None = getattr(error, kind)
+        covariance = error.covariance if kind != "acceleration" else None
+        values: Vector | None = getattr(error, kind) if covariance is None else covariance.of(kind)
         declared = None if values is None else tuple([value * factor for value in values])
-        path = ("platforms", name, "motion_error", kind)
+        path: KeyPath = ("platforms", name, "motion_error", kind if covariance is None else "covariance")
         for axis, (row_id, own_path, equation, no_limit) in enumerate(_scene_axes(name, kind)):
             on_axis = None
             if declared is not None:
-                on_axis = declared[axis] if in_scene else _along_scene_axis(declared, axes, axis, error.distribution)
+                if in_scene:
+                    on_axis = declared[axis]
+                elif covariance is None:
+                    on_axis = _along_scene_axis(declared, axes, axis, error.distribution)
+                else:
+                    on_axis = factor * covariance.along(kind, [direction[axis] for direction in axes])
+            if covariance is not None:
+                own_path = (*path, *covariance.path(kind, axis))
             yield ErrorSource._make(  # twice as quick as by keyword, and there are 18 in every mission
                 (
                     row_id,
@@ -267,7 +279,7 @@ def _motion(
                 owner=name,
                 unit=unit,
                 declared=declared[index],
-                path=(*path, index),
+                path=(*path, *((index,) if covariance is None else covariance.path(kind, index))),
                 effect=_along(effects, direction),
                 full=_along(full, direction),
                 direction=direction,

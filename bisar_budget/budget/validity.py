@@ -51,6 +51,11 @@ class Beyond(NamedTuple):
         """Displacement by exact ranges, likewise. [m]"""
         return (math.nan, math.nan) if self.exact is None else self.exact.displacement
 
+    def in_place_of(self, source: ErrorSource) -> ErrorSource:
+        """The error with phases per unit, of the full model, that give what exact ranges give."""
+        size = source.declared or 1.0
+        return source._replace(full=source.full._replace(qpe=self.qpe / size, cubic=self.cubic / size))
+
     def against(self, qpe_full: float) -> str:
         """Say the phase of both."""
         if self.exact is None:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Mapping
 from datetime import date
 from functools import lru_cache
-from typing import Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from bisar_budget import units
 from bisar_budget.constants import SPEED_OF_LIGHT
@@ -22,12 +22,11 @@ from bisar_budget.mission.readers import (
     Choice,
     Day,
     Key,
-    Later,
+    Late,
     ListOf,
     OneOf,
     Quantity,
     Reader,
-    Scalar,
     Section,
     Text,
     TextMap,
@@ -36,8 +35,10 @@ from bisar_budget.mission.readers import (
     Whole,
 )
 
+if TYPE_CHECKING:
+    from bisar_budget.mission.covariance import Covariance
+
 STILL = 1e-6  # m/s; slower than this no platform flies an aperture
-LATER = "it comes with a later one"
 
 FREQUENCY = Quantity(units.FREQUENCY, gt=0, ge=1e3, le=1e13)
 VIBRATION_FREQUENCY = Quantity(units.FREQUENCY, gt=0, le=1e9)
@@ -54,6 +55,8 @@ PHASE = Quantity(units.ANGLE, ge=-1e6, le=1e6)
 PHASE_REQUIREMENT = Quantity(units.ANGLE, gt=0, ge=1e-6, le=1e6)
 SIDELOBE_REQUIREMENT = Quantity(units.POWER_RATIO, lt=0, ge=-200)
 SHARE = Quantity(units.RATIO, gt=0, ge=1e-6, le=1)
+DISTRIBUTION = Choice("normal", "uniform", "bound")
+DISTRIBUTIONS = "normal: the values are one sigma; uniform, bound: they are not exceeded."
 
 
 class Radar(NamedTuple):
@@ -95,17 +98,27 @@ class Scene(NamedTuple):
     ] = None
 
 
-class Sinusoid(NamedTuple):
-    """One sinusoidal vibration along the line of sight."""
+SIZES = Triple(SIZE)
+ALONG_SIGHT_OR_AXES = OneOf(lambda value: SIZES if isinstance(value, list) else SIZE, (SIZE, SIZES))
 
-    amplitude: Annotated[float, Key(Scalar(SIZE, LATER), "0 to peak, along the line of sight.")]
+
+class Sinusoid(NamedTuple):
+    """One sinusoidal vibration."""
+
+    amplitude: Annotated[
+        float | Vector,
+        Key(ALONG_SIGHT_OR_AXES, "0 to peak, along the line of sight; a vector: along each axis of the frame."),
+    ]
     frequency: Annotated[float, Key(VIBRATION_FREQUENCY)]
 
 
 class Wideband(NamedTuple):
-    """Noise-like vibration along the line of sight."""
+    """Noise-like vibration."""
 
-    rms: Annotated[float, Key(SIZE, "Root mean square, along the line of sight.")]
+    rms: Annotated[
+        float | Vector,
+        Key(ALONG_SIGHT_OR_AXES, "Root mean square, along the line of sight; a vector: along each axis."),
+    ]
 
 
 class Vibration(NamedTuple):
@@ -113,6 +126,12 @@ class Vibration(NamedTuple):
 
     sinusoidal: Annotated[tuple[Sinusoid, ...], Key(ListOf(Sinusoid), "One entry per line.")] = ()
     wideband: Annotated[Wideband | None, Key(Section(Wideband))] = None
+
+
+def _covariance_reader() -> Reader:
+    from bisar_budget.mission.covariance import COVARIANCE
+
+    return COVARIANCE
 
 
 class MotionError(NamedTuple):
@@ -128,15 +147,60 @@ class MotionError(NamedTuple):
     position: Annotated[Vector | None, Key(Triple(COORDINATE, or_scalar=True), "At the midpoint.")] = None
     velocity: Annotated[Vector | None, Key(Triple(VELOCITY, or_scalar=True), "Constant part.")] = None
     acceleration: Annotated[Vector | None, Key(Triple(ACCELERATION, or_scalar=True), "Constant part.")] = None
-    covariance: Annotated[None, Key(Later(LATER))] = None
-    distribution: Annotated[
+    covariance: Annotated[
+        "Covariance | None",
+        Key(
+            Late(_covariance_reader),
+            "Of position and velocity, instead of the two: 6 x 6 in m and s, or sigmas with correlations.",
+        ),
+    ] = None
+    distribution: Annotated[str, Key(DISTRIBUTION, DISTRIBUTIONS)] = "normal"
+    vibration: Annotated[Vibration, Key(Section(Vibration))] = Vibration()
+    source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
+
+    @staticmethod
+    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+        """Hold a covariance to standing alone, to its frame and to a normal distribution."""
+        covariance: Covariance | None = values.get("covariance")
+        if covariance is None:
+            return
+        from bisar_budget.mission.covariance import misplaced_axes
+
+        both = [kind for kind in ("position", "velocity") if values.get(kind) is not None]
+        if both:
+            yield Problem(
+                f"stands instead of position and velocity, but there is a {both[0]} too", at=("covariance",)
+            )
+        if values.get("distribution", "normal") != "normal":
+            yield Problem("a covariance is that of a normal distribution", "accepted: normal", at=("distribution",))
+        if "frame" in values:
+            yield from misplaced_axes(covariance, values["frame"])
+
+    def stated(self, kind: str) -> Vector | None:
+        """Position, velocity or acceleration error along the frame's axes; of a covariance the marginal sigmas."""
+        if self.covariance is not None and kind != "acceleration":
+            return self.covariance.of(kind)
+        stated: Vector | None = getattr(self, kind)
+        return stated
+
+
+class CommonMotionError(NamedTuple):
+    """The same error on both platforms, such as the bias of one GNSS service. A scalar means each axis."""
+
+    frame: Annotated[
         str,
         Key(
-            Choice("normal", "uniform", "bound"),
-            "normal: the values are one sigma; uniform, bound: they are not exceeded.",
+            Choice(
+                "scene",
+                refused=dict.fromkeys(("track", "look"), "each platform has its own, an error of both has none"),
+            ),
+            "east, north, up.",
         ),
-    ] = "normal"
-    vibration: Annotated[Vibration, Key(Section(Vibration))] = Vibration()
+    ] = "scene"
+    position: Annotated[Vector | None, Key(Triple(COORDINATE, or_scalar=True), "At the midpoint.")] = None
+    velocity: Annotated[Vector | None, Key(Triple(VELOCITY, or_scalar=True), "Constant part.")] = None
+    acceleration: Annotated[Vector | None, Key(Triple(ACCELERATION, or_scalar=True), "Constant part.")] = None
+    distribution: Annotated[str, Key(DISTRIBUTION, DISTRIBUTIONS)] = "normal"
     source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
 
 
@@ -392,7 +456,9 @@ class Mission(NamedTuple):
     collection: Annotated[Collection, Key(Section(Collection))]
     platforms: Annotated[Platforms, Key(Section(Platforms))]
     scene: Annotated[Scene, Key(Section(Scene))] = Scene()
-    common_motion_error: Annotated[None, Key(Later(LATER))] = None
+    common_motion_error: Annotated[
+        CommonMotionError | None, Key(Section(CommonMotionError), "The same for both platforms, in the scene's axes.")
+    ] = None
     timing_error: Annotated[TimingError, Key(Section(TimingError))] = TimingError()
     other_errors: Annotated[tuple[OtherError, ...], Key(ListOf(OtherError))] = ()
     requirements: Annotated[Requirements, Key(Section(Requirements))] = Requirements()

@@ -138,19 +138,19 @@ class Text(Reader):
 
 
 class Choice(Reader):
-    """One of a few words; `later` maps the known ones that this version cannot honour to why."""
+    """One of a few words; `refused` maps words that mean something elsewhere to why not here."""
 
-    def __init__(self, *names: str, later: Mapping[str, str] | None = None) -> None:
+    def __init__(self, *names: str, refused: Mapping[str, str] | None = None) -> None:
         self.names = names
-        self.later = later or {}
+        self.refused = refused or {}
 
     def leaf(self, value: Any) -> str:
         """Refuse other words, with the nearest."""
         if isinstance(value, str) and value in self.names:
             return value
         accepted = f"accepted: {', '.join(self.names)}"
-        if isinstance(value, str) and value in self.later:
-            raise InvalidValueError(_not_yet(self.later[value]), accepted)
+        if isinstance(value, str) and value in self.refused:
+            raise InvalidValueError(self.refused[value], accepted)
         raise InvalidValueError("is not a known choice", accepted, did_you_mean(value, self.names))
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
@@ -208,40 +208,6 @@ class Day(Reader):
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Date."""
         return {"type": "string", "format": "date"}
-
-
-class Later(Reader):
-    """A key that the schema knows and this version cannot honour: an error, never silence."""
-
-    def __init__(self, feature: str) -> None:
-        self.feature = feature
-
-    def leaf(self, value: Any) -> Any:
-        """Refuse any value."""
-        raise InvalidValueError(_not_yet(self.feature), hint="Remove it: no result takes it into account")
-
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Nothing."""
-        return {"not": {}, "description": f"Not supported yet: {self.feature}"}
-
-
-class Scalar(Reader):
-    """A value that later may be a vector."""
-
-    def __init__(self, reader: Quantity, vector_feature: str) -> None:
-        self.reader, self.vector_feature = reader, vector_feature
-
-    def leaf(self, value: Any) -> float:
-        """Refuse a list with its own words."""
-        if isinstance(value, list):
-            raise InvalidValueError(
-                _not_yet(self.vector_feature, "as a vector "), "accepted: one value along the line of sight"
-            )
-        return self.reader.leaf(value)
-
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """As the scalar."""
-        return self.reader.schema(definitions)
 
 
 class TextMap(Reader):
@@ -374,6 +340,21 @@ class OneOf(Reader):
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Any of the forms."""
         return {"anyOf": [form.schema(definitions) for form in self.forms]}
+
+
+class Late(Reader):
+    """A reader of a rare key, imported when a file has it."""
+
+    def __init__(self, load: Callable[[], Reader]) -> None:
+        self.load = load
+
+    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
+        """Read by it."""
+        return self.load().read(value, path, report)
+
+    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+        """Write its schema."""
+        return self.load().schema(definitions)
 
 
 def _read(reader: Reader, value: Any, path: KeyPath, report: Report) -> Any:

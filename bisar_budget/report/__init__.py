@@ -26,6 +26,9 @@ SUFFIXES = {
     ".xml": "junit",
 }
 
+# Formats that show images of verified limits; for the others none is kept.
+ILLUSTRATED = frozenset({"html", "markdown"})
+
 
 def format_of(name: str) -> str | None:
     """Format that the name of a report asks for: `budget.sarif`, `x.needs.json` or `needs.json` itself."""

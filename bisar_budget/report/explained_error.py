@@ -1,7 +1,7 @@
 """The first half of an explanation: one error, from its line in the mission file to what it does to the image."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 from bisar_budget.budget.findings import MissionFindings
 from bisar_budget.budget.sources import (
@@ -34,11 +34,15 @@ def declaration(mission: Mission, source: ErrorSource) -> Iterator[str]:
     k = mission.allocation.coverage_factor
     if kind in MOTION_UNITS and platform in ("transmitter", "receiver"):
         error = getattr(mission.platforms, platform).motion_error
-        stated = getattr(error, kind)
+        stated = error.stated(kind)
         if error.frame != "scene" and axis in formulas.AXES:
             yield from _turned(mission, source, axis)
             return
+        if error.covariance is not None and error.covariance.is_matrix and kind != "acceleration":
+            yield from step("One sigma is the root of the variance")
         own = stated[FRAME_AXES[error.frame].index(axis)]
+    elif platform == "common":
+        own = getattr(mission.common_motion_error, kind)[formulas.AXES.index(axis)]
     elif source.owner == "clock":
         own = getattr(mission.timing_error, kind)
     else:
@@ -52,12 +56,16 @@ def _turned(mission: Mission, source: ErrorSource, axis: str) -> Iterator[str]:
     platform, kind, _ = source.id.split(".")
     error = getattr(mission.platforms, platform).motion_error
     axes = getattr(mission.platforms, platform).state.frame(error.frame)
+    covariance = error.covariance if kind != "acceleration" else None
     k = mission.allocation.coverage_factor
     parts = [
         f"{number(k * value)}*{number(direction[formulas.AXES.index(axis)])}"
-        for value, direction in zip(getattr(error, kind), axes, strict=True)
+        for value, direction in zip(error.stated(kind), axes, strict=True)
     ]
-    if error.distribution == "normal":
+    if covariance is not None:
+        text = _quadratic_form(parts, covariance.block(kind))
+        how = "a covariance turns as AᵀCA"
+    elif error.distribution == "normal":
         text = "sqrt(" + " + ".join(f"({part})^2" for part in parts) + ")"
         how = "one-sigma values turn like a covariance"
     else:
@@ -65,6 +73,18 @@ def _turned(mission: Mission, source: ErrorSource, axis: str) -> Iterator[str]:
         how = "bounds add as magnitudes"
     title = f"Along {axis} from the {error.frame} frame ({', '.join(FRAME_AXES[error.frame])}): {how}"
     yield from step(title, f"declared = {text} = {with_unit(abs(source.declared or 0.0), source.unit)}")
+
+
+def _quadratic_form(parts: Sequence[str], correlation: Sequence[Sequence[float]]) -> str:
+    """Root of Σ ρᵢⱼ pᵢ pⱼ, written out."""
+    terms = [f"({part})^2" for part in parts]
+    terms += [
+        f"2*{number(rho)}*{parts[i]}*{parts[j]}"
+        for i, row in enumerate(correlation)
+        for j, rho in enumerate(row[:i])
+        if rho
+    ]
+    return "sqrt(" + " + ".join(terms) + ")"
 
 
 def effect(
@@ -80,6 +100,8 @@ def effect(
         yield from step("The published model, for comparison; what gates, the full model, comes after it")
     if not source.is_motion:
         yield from step("Quadratic phase error, as declared", f"QPE = {size:.6g} rad")
+    elif platform == "common":
+        yield from _common_effect(source, sources, size, each)
     elif source.owner == "mission":
         yield from step("Published model: a height error moves the image, no quadratic term")
     elif source.owner == "clock":
@@ -142,6 +164,14 @@ def _clock_effect(mission: Mission, source: ErrorSource, size: float, each: str)
     if order == 2:
         qpe = abs(source.effect.qpe) * size
         yield from step(f"{source.equation}{each}", *equation("QPE", formulas.CLOCK_PHASE, values, qpe, "rad"))
+
+
+def _common_effect(source: ErrorSource, sources: Mapping[str, ErrorSource], size: float, each: str) -> Iterator[str]:
+    """The effects of both platforms, added with their signs."""
+    legs = [sources[source.id.replace("common", platform)] for platform in ("transmitter", "receiver")]
+    values = {"φ_t": legs[0].effect.qpe * size, "φ_r": legs[1].effect.qpe * size}
+    qpe = abs(source.effect.qpe) * size
+    yield from step(f"{source.equation}{each}, signed", *equation("QPE", "|φ_t + φ_r|", values, qpe, "rad"))
 
 
 def _projected_effect(

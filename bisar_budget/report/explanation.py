@@ -4,8 +4,11 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 
 from bisar_budget.budget.allocation import Allocation
+from bisar_budget.budget.correlation import correlated_errors, displacement_parts, phase_parts
 from bisar_budget.budget.findings import MissionFindings, Row
+from bisar_budget.budget.scene import EdgePhases, at
 from bisar_budget.budget.sources import ErrorSource, error_sources
+from bisar_budget.budget.vibration import amplitude_share, echo_phase, lines_of, quadratic_part, shared_frequencies
 from bisar_budget.errors import KeyPath, printable
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import formulas
@@ -44,9 +47,11 @@ def explain(mission: Mission, found: MissionFindings, row_id: str) -> str:
     elif ".vibration." in row.id:
         lines += _vibration(mission, found.allocation, row)
     elif row.id.endswith(".quadratic_phase_error") or row.id == "mission.autofocus_pull_in":
-        lines += _phase_aggregate(found, row, sources.values())
+        lines += _phase_aggregate(mission, found, row, sources.values())
     elif row.id == "mission.cubic_phase_error":
-        lines += _cubic_aggregate(found, row, sources.values())
+        lines += _cubic_aggregate(mission, found, row, sources.values())
+    elif row.id == "mission.spatial_variance":
+        lines += _spatial_variance(mission, found, row, sources.values())
     elif row.id == "mission.location_error":
         lines += _location_aggregate(mission, found, row, sources.values())
     lines += _verdict(row)
@@ -99,19 +104,31 @@ def _autofocus_gain(allocation: Allocation) -> Iterator[str]:
 
 
 def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[str]:
-    platform = row.id.split(".")[0]
-    is_sinusoid = row.metric == "pslr"
-    key = "sinusoidal" if is_sinusoid else "wideband"
-    path: KeyPath = ("platforms", platform, "motion_error", "vibration", key)
+    """From the file to the limits of both models, for one line, lines that share a frequency, or noise."""
+    platform, _, _, *rest = row.id.split(".")
+    is_sinusoid, is_sum = row.metric == "pslr", rest[:1] == ["sum"]
+    path: KeyPath = ("platforms", platform, "motion_error", "vibration", "sinusoidal" if is_sinusoid else "wideband")
     if row.declared is None:
         yield missing(mission, path)
+    elif is_sum:
+        yield from _shared_frequency(mission, platform, int(rest[1]), row.declared)
     else:
-        path = (*path, int(row.id.rsplit(".", 1)[1]), "amplitude") if is_sinusoid else (*path, "rms")
+        path = (*path, int(rest[0]), "amplitude") if is_sinusoid else (*path, "rms")
         yield from step(f"Declared in {place(mission, path)}", as_written(mission, path))
     if row.evidence:
         yield from step("Evidence", printable(row.evidence))
+    wavelength = mission.radar.wavelength
+    if row.qpe_full_rad is not None and row.declared is not None:
+        line = lines_of(mission, platform)[int(rest[0])]
+        values = {
+            "A": row.declared,
+            "λ": wavelength,
+            "q": quadratic_part(line.frequency * mission.collection.aperture_time),
+        }
+        lines = equation("QPE_full", "2*π*A*q/λ", values, row.qpe_full_rad, "rad")
+        yield from step("Worst-phase quadratic phase, q = 7.5*j_2(π*f*T)", *lines)
     requirement = mission.requirements.pslr if is_sinusoid else mission.requirements.islr
-    if requirement is None or row.allowable is None:
+    if requirement is None or row.allowable_published is None or row.allowable_full is None:
         return
     name = row.metric.upper()
     ratio = 10 ** (requirement / 10)
@@ -120,12 +137,46 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[s
         *equation(name, "10^(dB/10)", {"dB": requirement}, ratio, ""),
     )
     split = allocation.pslr if is_sinusoid else allocation.islr
-    values = {name: ratio, "λ": mission.radar.wavelength, "s": split.of(platform)}
-    lines = equation("allowable", formulas.VIBRATION[row.metric], values, row.allowable, "m")
+    share = split.of(platform)
+    values = {name: ratio, "λ": wavelength, "s": share}
+    lines = equation("published", formulas.VIBRATION[row.metric], values, row.allowable_published, "m")
     yield from step(f"{row.equation}, s is the {platform}’s share of power", *lines)
+    if is_sinusoid:
+        part = amplitude_share(split, platform)
+        shares = {"s_k": share, "s_t": split.transmitter, "s_r": split.receiver}
+        yield from step(
+            "Both platforms at one frequency: echoes add in amplitude, its part a",
+            *equation("a", formulas.AMPLITUDE_SHARE, shares, part, ""),
+        )
+        values = {
+            "a": part,
+            "λ": wavelength,
+            "φ": echo_phase(math.sqrt(ratio * (split.transmitter + split.receiver))),
+        }
+        title = "First principles, φ from J_1(φ)/J_0(φ) = sqrt(PSLR*(s_t + s_r)), about 2*sqrt(PSLR)"
+    else:
+        title = "First principles, independent on both platforms: exp(σ^2) - 1 is the ISLR of a phase σ"
+    lines = equation("full", formulas.FULL_VIBRATION[row.metric], values, row.allowable_full, "m")
+    yield from step(title, *lines)
+    limits = {"published": row.allowable_published, "full": row.allowable_full}
+    model = mission.allocation.model
+    chosen = "min(published, full)" if model == "strictest" else model
+    yield from step(
+        f"Allowable, allocation.model {model}", *equation("allowable", chosen, limits, row.allowable or 0.0, "m")
+    )
 
 
-def _phase_aggregate(found: MissionFindings, row: Row, sources: Iterable[ErrorSource]) -> Iterator[str]:
+def _shared_frequency(mission: Mission, platform: str, index: int, total: float) -> Iterator[str]:
+    lines = lines_of(mission, platform)
+    members = shared_frequencies(lines, mission.collection.aperture_time)[index]
+    sizes = " + ".join(number(lines[member].amplitude) for member in members)
+    title = f"Entries {', '.join(map(str, members))}, less than one cycle per aperture apart: amplitudes add"
+    yield from step(title, f"declared = {sizes} = {total:.6g} m")
+
+
+def _phase_aggregate(
+    mission: Mission, found: MissionFindings, row: Row, sources: Iterable[ErrorSource]
+) -> Iterator[str]:
     owner = {"timing": "clock"}.get(row.id.split(".")[0], row.id.split(".")[0])
     members = [
         source
@@ -135,7 +186,8 @@ def _phase_aggregate(found: MissionFindings, row: Row, sources: Iterable[ErrorSo
         and (owner == "mission" or found.allocation.qpe.includes(source.owner, owner))
     ]
     rule = "sum" if row.id == "mission.autofocus_pull_in" else found.combine
-    yield from _combined("QPE", rule, [(source.id, abs(source.qpe(found.model))) for source in members], row)
+    parts = phase_parts(members, "qpe", found.model, rule, correlated_errors(mission))
+    yield from _combined("QPE", rule, [(name, abs(size)) for name, size in parts], row)
     if row.id == "mission.autofocus_pull_in":
         values = {"N_pull": found.allocation.n_pull or 0.0}
         lines = equation("allowable", "π*N_pull", values, row.allowable or 0.0, "rad")
@@ -144,15 +196,40 @@ def _phase_aggregate(found: MissionFindings, row: Row, sources: Iterable[ErrorSo
         yield from _limit(found.allocation, owner, row.allowable or 0.0)
 
 
-def _cubic_aggregate(found: MissionFindings, row: Row, sources: Iterable[ErrorSource]) -> Iterator[str]:
+def _cubic_aggregate(
+    mission: Mission, found: MissionFindings, row: Row, sources: Iterable[ErrorSource]
+) -> Iterator[str]:
     members = [
-        (source.id, abs(source.cubic(found.model)))
+        source
         for source in sources
         if source.declared is not None and source.is_motion and (source.is_independent or found.combine == "each")
     ]
-    yield from _combined("cubic phase", found.combine, members, row)
+    parts = phase_parts(members, "cubic", found.model, found.combine, correlated_errors(mission))
+    yield from _combined("cubic phase", found.combine, [(name, abs(size)) for name, size in parts], row)
     if row.allowable is not None:
         yield from step("Allowable", f"requirements.cubic_phase_error = {row.allowable:.6g} rad")
+
+
+def _spatial_variance(
+    mission: Mission, found: MissionFindings, row: Row, sources: Iterable[ErrorSource]
+) -> Iterator[str]:
+    """Phases at the centre and at the worst place of the scene's edge, and the largest difference."""
+    scene = found.scene
+    if scene is None or scene.degeneracy or row.declared is None:
+        return
+    members = [
+        source
+        for source in sources
+        if source.declared is not None and source.is_motion and (source.is_independent or found.combine == "each")
+    ]
+    edge = EdgePhases(mission, found.geometry, members)
+    east, north = at(scene.radius, scene.azimuth)
+    sizes = [(name, abs(phase)) for name, phase in edge.parts(edge.differences((east, north)))]
+    yield from step(
+        f"Full model at the scene’s edge, {east:.6g} m east, {north:.6g} m north of the centre, less there"
+    )
+    yield from _combined("Difference of QPE", found.combine, sizes, row)
+    yield from step("Budget of what one autofocus correction leaves", f"total = {found.allocation.qpe_total:.6g} rad")
 
 
 def _location_aggregate(
@@ -165,9 +242,11 @@ def _location_aggregate(
         plane, by_model, title = plane_and_effect(mission, found, source)
         moved = plane.displacement(by_model, source.declared)
         if moved is not None and (source.is_independent or found.combine == "each"):
-            members.append((source.id, math.hypot(*moved)))
+            members.append((source.id, moved))
     rule = "the longest sum over all signs of the vectors" if found.combine == "sum" else _RULES[found.combine]
-    yield from step(f"{title}: displacements, {rule}", *_listed(members, "m"))
+    parts = displacement_parts(members, found.combine, correlated_errors(mission))
+    sizes = [(name, math.hypot(*moved)) for name, moved in parts]
+    yield from step(f"{title}: displacements, {rule}", *_listed(sizes, "m"))
     if row.declared is not None:
         yield f"    combined = {row.declared:.6g} m"
     if row.allowable is not None:

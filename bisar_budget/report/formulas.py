@@ -23,6 +23,9 @@ _PHASES = {
 _LETTERS = {"position": "p\u0303", "velocity": "ṽ", "acceleration": "ã"}
 CLOCK_PHASE = "π*T^2*f_0*|t̃_2|/2"
 VIBRATION = {"pslr": "sqrt(PSLR)*λ*sqrt(s)/(2*π)", "islr": "sqrt(ISLR)*λ*sqrt(s)/(2*π)"}
+# From first principles; of a sinusoid φ is the phase of the echoes that both platforms may make.
+FULL_VIBRATION = {"pslr": "a*λ*φ/(2*π)", "islr": "λ*sqrt(s)*sqrt(log(ISLR + 1))/(2*π)"}
+AMPLITUDE_SHARE = "sqrt(s_k)/(sqrt(s_t) + sqrt(s_r))"
 AUTOFOCUS_GAIN = "π*N_pull/q"
 
 

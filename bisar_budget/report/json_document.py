@@ -3,12 +3,15 @@
 import json
 from collections.abc import Callable
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from bisar_budget.budget.allocation import Split
 from bisar_budget.budget.findings import MissionFindings, Report, UnusableMission
 from bisar_budget.geometry import PlatformState
 from bisar_budget.report import Style
+
+if TYPE_CHECKING:
+    from bisar_budget.budget.monte_carlo import MonteCarlo
 
 FORMAT = "bisar-budget/check/1"
 
@@ -113,13 +116,25 @@ def _mission(mission: MissionFindings) -> dict[str, Any]:
             "pslr_share": _shares(allocation.pslr),
             "islr_share": _shares(allocation.islr),
         },
+        "scene": None
+        if mission.scene is None
+        else {
+            "radius_m": mission.scene.radius,
+            "autofocus_radius_m": mission.scene.autofocus_radius,
+            "searched_radius_m": mission.scene.searched,
+        },
         "summary": mission.summary,
         "rows": [row._asdict() for row in mission.rows],
         "warnings": [{"line": warning.line, "message": warning.message} for warning in mission.warnings],
         "notes": mission.notes,
         "errors": [],
+        "monte_carlo": None if mission.monte_carlo is None else _monte_carlo(mission.monte_carlo),
         "verification": None if mission.verdicts is None else [verdict._asdict() for verdict in mission.verdicts],
     }
+
+
+def _monte_carlo(drawn: "MonteCarlo") -> dict[str, Any]:
+    return {**drawn._asdict(), "requirements": [requirement._asdict() for requirement in drawn.requirements]}
 
 
 def _platform(state: PlatformState) -> dict[str, float | None]:

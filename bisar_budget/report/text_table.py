@@ -76,6 +76,10 @@ def _mission(mission: MissionFindings, style: Style) -> list[str]:
     details = [line for row in explained for line in _details(row, mission, style)]
     lines += ["", *details] if details else []
     lines += [line for text in _asides(mission, style) for line in wrapped(text, "  ")]
+    if mission.monte_carlo is not None:
+        from bisar_budget.report.monte_carlo import probabilities
+
+        lines += ["", *probabilities(mission.monte_carlo)]
     if mission.verdicts is not None:
         from bisar_budget.report.verification import evidence
 
@@ -106,6 +110,12 @@ def _head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
     yield "QPE budget", f"{format_quantity(allocation.qpe_total, 'rad')}: {shares}{gain}"
     rule = {"each": "each error alone", "sum": "worst-case sum", "rss": "root-sum-square"}[mission.combine]
     yield "Model", f"{_MODELS[mission.model]}, {rule}"
+    if mission.scene is not None and not mission.scene.degeneracy:
+        radius = format_quantity(mission.scene.radius, "m")
+        yield (
+            "Scene",
+            f"radius {radius}; one autofocus correction of the declared errors serves {mission.scene.served}",
+        )
     if mission.coverage_factor != 1:
         yield "Coverage", f"navigation and clock: declared is {mission.coverage_factor:g} times the file's value"
 
@@ -167,6 +177,8 @@ def percent(ratio: float) -> str:
         return ">1e5 %"
     if value < 0.01:
         return "<0.01 %"
+    if value < 0.1:
+        return f"{value:.2g} %"  # as wide as the column
     if value < 99:
         return f"{value:.3g} %"
     side = 0 if abs(value - 100) < 1e-7 else math.copysign(1, value - 100)
@@ -179,8 +191,9 @@ def percent(ratio: float) -> str:
 
 
 def _cells(status: str, row: str, declared: str, allowable: str, use: str, reference: str) -> str:
-    left = status.ljust(9) + row.ljust(34)
-    return (left + declared.rjust(12) + allowable.rjust(12) + use.rjust(8) + " " + reference).rstrip()
+    # A blank of its own between cells: a wide one shifts the rest, it does not touch its neighbour.
+    left = status.ljust(8) + " " + row.ljust(34)
+    return f"{left} {declared.rjust(11)} {allowable.rjust(11)} {use.rjust(7)} {reference}".rstrip()
 
 
 def _details(row: Row, mission: MissionFindings, style: Style) -> list[str]:

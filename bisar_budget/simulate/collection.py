@@ -48,14 +48,16 @@ def superposed(parts: Iterable[Errors]) -> Errors:
     total = Errors()
     for part in parts:
         total = Errors(
-            transmitter=_sum(total.transmitter, part.transmitter),
-            receiver=_sum(total.receiver, part.receiver),
+            transmitter=superposed_motion(total.transmitter, part.transmitter),
+            receiver=superposed_motion(total.receiver, part.receiver),
             clock=tuple(a + b for a, b in zip(total.clock, part.clock, strict=True)),
         )
     return total
 
 
-def _sum(a: MotionError, b: MotionError) -> MotionError:
+def superposed_motion(a: MotionError, b: MotionError) -> MotionError:
+    """Two polynomial errors of one platform at once; vibration is not added."""
+
     def add(u: tuple[float, float, float], v: tuple[float, float, float]) -> tuple[float, float, float]:
         return (u[0] + v[0], u[1] + v[1], u[2] + v[2])
 

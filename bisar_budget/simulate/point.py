@@ -6,13 +6,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bisar_budget.budget.sources import PLATFORMS
+from bisar_budget.budget.correlation import correlated_errors, likely_error
+from bisar_budget.budget.sources import PLATFORMS, error_sources
+from bisar_budget.budget.vibration import along_line_of_sight, lines_of
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vector
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.mission.model import MotionError as DeclaredError
 from bisar_budget.simulate.autofocus import ALGORITHMS
-from bisar_budget.simulate.collection import baseband
+from bisar_budget.simulate.collection import baseband, superposed_motion
 from bisar_budget.simulate.exact import ExactEffect, exact_effect
 from bisar_budget.simulate.image_formation import backprojection, ground_grid, taylor_window
 from bisar_budget.simulate.impulse_response import ImpulseResponse, impulse_response
@@ -119,8 +121,9 @@ class Plan(NamedTuple):
 def simulate_point(mission: Mission, progress: Callable[[int, int], None] = lambda done, work: None) -> PointImages:
     """Form the image of a point at the scene centre with the declared errors, before and after autofocus.
 
-    Signs and coverage factor of the file are used. Vibration along the line of sight is in the data, wideband
-    by the file's seed.
+    Signs and coverage factor of the file are used; of a covariance, which has no sign, the most probable error
+    whose quadratic phase is one sigma, times the coverage factor. Vibration along the line of sight is in the
+    data, wideband by the file's seed.
 
     Parameters
     ----------
@@ -240,12 +243,7 @@ def _plan(mission: Mission, left: Floats, slope: Floats) -> Plan:
 def _pulses(mission: Mission, cells: int) -> int:
     """Pulses that sample the patch and every declared vibration twice over."""
     given = mission.collection.pulses
-    lines = [
-        line
-        for name in PLATFORMS
-        for line in getattr(mission.platforms, name).motion_error.vibration.sinusoidal
-        if line.amplitude
-    ]
+    lines = [line for name in PLATFORMS for line in lines_of(mission, name) if line.amplitude]
     cycles = max((line.frequency for line in lines), default=0.0) * mission.collection.aperture_time
     if given is not None and given <= 2 * cycles:
         raise SimulationError(
@@ -285,6 +283,8 @@ def _paths(
     rng: np.random.Generator | None = None,
 ) -> tuple[Path, Path]:
     factor = mission.allocation.coverage_factor
+    common = mission.common_motion_error
+    likely = _likely_errors(mission, geometry)
     flown = []
     for name in ("transmitter", "receiver"):
         declared: DeclaredError = getattr(mission.platforms, name).motion_error
@@ -295,14 +295,39 @@ def _paths(
             velocity=_vector(declared.velocity, axes, factor),
             acceleration=_vector(declared.acceleration, axes, factor),
         )
+        if name in likely:
+            position, velocity = (_vector(values, axes, 1.0) for values in likely[name])
+            error = error._replace(position=position, velocity=velocity)
+        if common is not None:
+            scene = state.frame("scene")
+            shared = MotionError(
+                position=_vector(common.position, scene, factor),
+                velocity=_vector(common.velocity, scene, factor),
+                acceleration=_vector(common.acceleration, scene, factor),
+            )
+            error = superposed_motion(error, shared)
         if vibrating:
             wideband = declared.vibration.wideband
             error = error._replace(
-                sinusoids=tuple(Sinusoid(s.amplitude, s.frequency) for s in declared.vibration.sinusoidal),
-                wideband_rms=wideband.rms if wideband else 0.0,
+                sinusoids=tuple(Sinusoid(*line) for line in lines_of(mission, name)),
+                wideband_rms=along_line_of_sight(wideband.rms, declared, state, "islr") if wideband else 0.0,
             )
         flown.append(path(state, slow_time, error, rng))
     return flown[0], flown[1]
+
+
+def _likely_errors(mission: Mission, geometry: BistaticGeometry) -> dict[str, tuple[Vector, Vector]]:
+    """Position and velocity error along the frame's axes of each platform with a covariance: one of its errors.
+
+    A covariance has no sign to fly with. Shown is its most probable error of one sigma of quadratic phase.
+    """
+    groups = correlated_errors(mission)
+    sources = {source.id: source for source in error_sources(mission, geometry)} if groups else {}
+    errors = {}
+    for group in groups:
+        a, b, c, d, e, f = likely_error(group, [sources[row_id] for row_id in group.ids])
+        errors[group.platform] = ((a, b, c), (d, e, f))
+    return errors
 
 
 def _clock(mission: Mission, slow_time: Floats) -> Floats:

@@ -150,7 +150,7 @@ class Study:
             "velocity": MotionError(velocity=(x, y, z)),
             "acceleration": MotionError(acceleration=(x, y, z)),
         }[kind]
-        return Errors().of(owner, error)
+        return Errors(transmitter=error, receiver=error) if owner == "common" else Errors().of(owner, error)
 
     def _scaled(self, sizes: Sequence[tuple[ErrorSource, float]], scale: float) -> Errors:
         return superposed(self.errors(source, scale * size) for source, size in sizes)
@@ -168,7 +168,7 @@ class Study:
 
     def _sum(self, row_id: str, owner: str) -> Verdict:
         """All declared errors of an owner at once, each with the sign that makes their phases add."""
-        members = [s for s in self._declared if owner == "mission" or self.allocation.qpe.includes(s.owner, owner)]
+        members = self._members(owner)
         budget = self.allocation.qpe_limit(owner)
         blank = Verdict(id=row_id, model=self.model, boundary_error=budget, unit="rad", budget_rad=budget)
         if self.mission.allocation.combine == "rss":
@@ -176,8 +176,29 @@ class Study:
         total = math.fsum(abs(s.qpe(self.model)) for s in members)
         if not total:
             return blank._replace(reason="no declared error has a quadratic phase")
-        sizes = [(s, math.copysign(s.declared or 0.0, s.by(self.model).qpe)) for s in members if s.by(self.model).qpe]
-        return self._judged_phase(blank, sizes, budget / total)
+        return self._judged_phase(blank, self._aligned(members), budget / total)
+
+    def _members(self, owner: str) -> list[ErrorSource]:
+        return [s for s in self._declared if owner == "mission" or self.allocation.qpe.includes(s.owner, owner)]
+
+    def _aligned(self, members: Sequence[ErrorSource]) -> list[tuple[ErrorSource, float]]:
+        """Declared errors, each with the sign that makes their phases add."""
+        return [(s, math.copysign(s.declared or 0.0, s.by(self.model).qpe)) for s in members if s.by(self.model).qpe]
+
+    def images(self, row_id: str, limit: float) -> tuple[Chip, Chip]:
+        """Image at a limit of a row of quadratic phase, as its verdict reads it, and of no error at that place."""
+        source = next((s for s in self.sources if s.id == row_id), None)
+        if source is not None:
+            errors = self.errors(source, limit)
+        else:
+            owner = row_id.partition(".")[0].replace("timing", "clock")
+            sizes = self._aligned(self._members(owner))
+            errors = self._scaled(sizes, limit / math.fsum(abs(s.by(self.model).qpe * size) for s, size in sizes))
+        return self._chips(errors, self.collection.effect(errors))
+
+    def focused(self, chip: Chip) -> Chip:
+        """Refocus a chip by the mission's algorithm."""
+        return Chip(ALGORITHMS[self.mission.autofocus.algorithm](chip.image).image, chip.grid)
 
     def _judged_phase(self, blank: Verdict, sizes: Sequence[tuple[ErrorSource, float]], scale: float) -> Verdict:
         """Form the images of errors at the limit and on both sides, and hold the phase to the budget."""
@@ -283,7 +304,7 @@ class Study:
             if reason := self._beyond_first_order(errors, effect, self.allocation.autofocus_gain * budget):
                 return {"verdict_autofocus": "not_evaluated", "reason_autofocus": reason}
             chip, reference = self._chips(errors, effect)
-            focused = Chip(ALGORITHMS[self.mission.autofocus.algorithm](chip.image).image, chip.grid)
+            focused = self.focused(chip)
             residual = abs(self._phases(focused, reference)[0])
             peaks = [impulse_response(one.cut, self.collection.spacing[1]).peak for one in (reference, focused)]
             loss = 20 * math.log10(peaks[0] / peaks[1])

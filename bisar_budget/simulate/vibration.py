@@ -1,7 +1,8 @@
-"""Verdicts on the vibration limits of Section V: one platform alone, and both together.
+"""Verdicts on the vibration limits: one platform alone, and both together.
 
-What comes out by first principles, for equal shares: a sinusoid of one platform makes echoes 9 dB inside the
-requirement, both in phase 3 dB inside; noise-like vibration of both, independent, fills the requirement.
+What comes out for the published limits at equal shares: a sinusoid of one platform makes echoes 9 dB inside the
+requirement, both in phase 3 dB inside; noise-like vibration of both, independent, fills the requirement. By the full
+model's limits both in phase fill it.
 """
 
 import math
@@ -10,10 +11,10 @@ from functools import partial
 
 import numpy as np
 
-from bisar_budget import evaluators
-from bisar_budget.budget.allocation import Allocation, Split
+from bisar_budget.budget.allocation import Allocation
 from bisar_budget.budget.sources import PLATFORMS
 from bisar_budget.budget.verdicts import Verdict
+from bisar_budget.budget.vibration import lines_of, shared_frequencies, vibration_limits
 from bisar_budget.mission.model import Mission
 from bisar_budget.simulate.collection import CELLS, Errors, PointCollection
 from bisar_budget.simulate.impulse_response import upsampled
@@ -41,44 +42,51 @@ def cases(mission: Mission, allocation: Allocation, collection: PointCollection)
         Forms the images.
     """
     pslr, islr = mission.requirements.pslr, mission.requirements.islr
-    amplitude = _limits(pslr, allocation.pslr, collection.wavelength)
-    rms = _limits(islr, allocation.islr, collection.wavelength)
+    model, T = mission.allocation.model, collection.aperture_time
+    amplitude, rms = (
+        {name: limit.by(model) for name, limit in vibration_limits(mission, allocation, metric).items()}
+        for metric in ("pslr", "islr")
+    )
     seed = mission.simulation.seed if mission.simulation else 1
-    lines = {name: getattr(mission.platforms, name).motion_error.vibration.sinusoidal for name in PLATFORMS}
+    lines = {name: lines_of(mission, name) for name in PLATFORMS}
     for name in PLATFORMS:
-        for index, frequency in enumerate([line.frequency for line in lines[name]] or [None]):
-            if pslr is not None:
+        if pslr is not None:
+            echo = partial(_sinusoidal, collection, model, pslr, {name: amplitude[name]})
+            for index, frequency in enumerate([line.frequency for line in lines[name]] or [None]):
                 row_id = f"{name}.vibration.sinusoidal.{index}"
-                yield row_id, partial(_sinusoidal, collection, row_id, {name: amplitude[name]}, frequency, pslr)
+                yield row_id, partial(echo, row_id, frequency)
+            for index, members in enumerate(shared_frequencies(lines[name], T)):
+                row_id = f"{name}.vibration.sinusoidal.sum.{index}"
+                yield row_id, partial(echo, row_id, lines[name][members[0]].frequency)
         if islr is not None:
             row_id = f"{name}.vibration.wideband"
-            yield row_id, partial(_wideband, collection, row_id, {name: rms[name]}, islr, seed)
+            yield row_id, partial(_wideband, collection, model, islr, {name: rms[name]}, row_id, seed)
     if pslr is not None:
         frequency = next((line.frequency for name in PLATFORMS for line in lines[name]), None)
         row_id = "mission.vibration.sinusoidal"
-        yield row_id, partial(_sinusoidal, collection, row_id, amplitude, frequency, pslr)
+        yield row_id, partial(_sinusoidal, collection, model, pslr, amplitude, row_id, frequency)
     if islr is not None:
         row_id = "mission.vibration.wideband"
-        yield row_id, partial(_wideband, collection, row_id, rms, islr, seed)
+        yield row_id, partial(_wideband, collection, model, islr, rms, row_id, seed)
 
 
-def _limits(requirement_db: float | None, split: Split, wavelength: float) -> dict[str, float]:
-    power = 10 ** (requirement_db / 10) if requirement_db is not None else 0.0
-    return {name: evaluators.vibration_limit(wavelength, math.sqrt(power * split.of(name))) for name in PLATFORMS}
-
-
-def _blank(row_id: str, limits: dict[str, float], requirement_db: float) -> Verdict:
+def _blank(row_id: str, model: str, limits: dict[str, float], requirement_db: float) -> Verdict:
     # Both together: the larger of two limits stands for the row.
     return Verdict(
-        id=row_id, model="published", boundary_error=max(limits.values()), unit="m", requirement_db=requirement_db
+        id=row_id, model=model, boundary_error=max(limits.values()), unit="m", requirement_db=requirement_db
     )
 
 
 def _sinusoidal(
-    collection: PointCollection, row_id: str, limits: dict[str, float], declared: float | None, requirement_db: float
+    collection: PointCollection,
+    model: str,
+    requirement_db: float,
+    limits: dict[str, float],
+    row_id: str,
+    declared: float | None,
 ) -> Verdict:
     """Measure the paired echo on the difference from the error-free image, which its sidelobes would bury."""
-    blank = _blank(row_id, limits, requirement_db)
+    blank = _blank(row_id, model, limits, requirement_db)
     frequency = _UNDECLARED_CYCLES / collection.aperture_time if declared is None else declared
     cycles = frequency * collection.aperture_time
     if cycles < 3:
@@ -107,7 +115,12 @@ def _sinusoidal(
 
 
 def _wideband(
-    collection: PointCollection, row_id: str, limits: dict[str, float], requirement_db: float, seed: int
+    collection: PointCollection,
+    model: str,
+    requirement_db: float,
+    limits: dict[str, float],
+    row_id: str,
+    seed: int,
 ) -> Verdict:
     """Measure the power that white vibration spreads, over all of the repeat interval, on a seeded ensemble.
 
@@ -143,7 +156,7 @@ def _wideband(
         common = 10 * math.log10(added(is_common=True)[0])
         reason = f"power added by both platforms, independent; the same motion of both adds {common:.1f} dB"
     level = 10 * math.log10(mean)
-    return _blank(row_id, limits, requirement_db)._replace(
+    return _blank(row_id, model, limits, requirement_db)._replace(
         measured_db=level,
         measured_db_error=10 / math.log(10) * spread / mean,
         verdict=_compare(level - requirement_db),

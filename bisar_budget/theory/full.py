@@ -19,17 +19,34 @@ from sympy import (
     Poly,
     Rational,
     Symbol,
+    besselj,
     diff,
+    exp,
     expand,
     factorial,
     legendre,
+    pi,
+    series,
+    solve,
     sqrt,
 )
 
 from bisar_budget.theory import differential_range as dr
 from bisar_budget.theory import published
 from bisar_budget.theory.published import Equation, Row, Table
-from bisar_budget.theory.symbols import AXES, PLATFORMS, Platform, c, real, tau
+from bisar_budget.theory.symbols import (
+    AXES,
+    PLATFORMS,
+    Platform,
+    c,
+    islr,
+    positive,
+    pslr,
+    real,
+    share,
+    tau,
+    wavelength,
+)
 
 ORDER = 4  # of slow time: the quartic term of a long aperture is in part a quadratic phase
 
@@ -190,3 +207,31 @@ def at_constant_range(expression: Expr) -> Expr:
         for derivative, value in zip(platform.look, (*held, *[Matrix([0, 0, 0])] * (ORDER - 1)), strict=True):
             expression = expression.subs(dict(zip(derivative, value, strict=True)))
     return expand(expression)
+
+
+def vibration() -> Table:
+    """Vibration from first principles: what a phase of peak φ or rms σ does, and the motion that does it.
+
+    A sinusoid's echoes are J₁(φ)/J₀(φ) of the response, φ/2 to first order. Of Gaussian noise exp(-σ²) of the power
+    stays in the response, so that the rest over it is exp(σ²) - 1. Both platforms at one frequency divide amplitudes,
+    both with noise of their own divide powers.
+    """
+    amplitude, rms, phase, part = positive("A"), positive("sigma"), positive("phi"), positive("a")
+    over, under = (series(besselj(n, phase), phase, 0, 2).removeO() for n in (1, 0))
+    echo = over / under
+    (largest,) = solve(Eq(echo, sqrt(pslr)), phase)
+    spread = exp(phase**2) - 1
+    (noise,) = (root for root in solve(Eq(spread, islr), phase) if root.is_nonnegative is not False)
+    to_metres = wavelength / (2 * pi)
+    rows = (
+        (amplitude, echo**2, largest * to_metres, "one platform alone"),
+        (amplitude, echo**2, largest * part * to_metres, "a part a of the amplitude of both, in phase"),
+        (rms, spread, sqrt(share) * noise * to_metres, "share s of the power of both, independent"),
+    )
+    return Table(
+        number="Vibration, first principles",
+        title="Amplitude A (0 to peak) and rms σ along the line of sight, φ = 2πA/λ",
+        columns=("Power beside the response", "Allowable"),
+        rows=tuple(Row(number=None, error=e, label=e, cells=(p, limit), note=note) for e, p, limit, note in rows),
+        notes=("Derived here. The tool takes J₁(φ)/J₀(φ) as it is; a = √s_k/(√s_t + √s_r) of PSLR·(s_t + s_r).",),
+    )

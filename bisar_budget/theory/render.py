@@ -165,7 +165,11 @@ def as_mathml(expression: Basic) -> str:
     """Presentation MathML, one `math` element."""
     printer = _MathML()
     xml = str(printer._print(expression).toxml())
-    for name, character in (("InvisibleTimes", "\u2062"), ("pi", "π")):  # XML knows no HTML entities
+    for name, character in (
+        ("InvisibleTimes", "\u2062"),
+        ("pi", "π"),
+        ("ExponentialE", "e"),
+    ):  # XML knows no HTML entities
         xml = xml.replace(f"&{name};", character)
     return f'<math xmlns="http://www.w3.org/1998/Math/MathML">{xml}</math>'
 
@@ -186,6 +190,8 @@ def derivation(selection: str, format_name: str) -> str:
             if name == "full":
                 blocks.append(_EQUATIONS[format_name]("Equations of the full model", full.equations()))
             blocks.append(_TABLES[format_name](table()))
+            if name == "vibration":
+                blocks.append(_TABLES[format_name](full.vibration()))
     return "\n".join(blocks)
 
 

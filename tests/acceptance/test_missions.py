@@ -70,13 +70,14 @@ def test_bad_faults_point_at_the_culprit(path: Path) -> None:
     """The place named holds the key or the value: an independent look at what the header claims."""
     lines = path.read_text(encoding="utf-8").splitlines()
     for fault in header(path, "faults")[0].split(" | "):
-        match = re.match(r"(\d+):(\d+) (?:([\w.\[\] ]+): )?", fault)
+        match = re.match(r"(\d+):(\d+) (?:([\w.\[\] -]+): )?", fault)
         if match is None or "YAML" in fault or "missing" in fault or "lacks" in fault or "has a key" in fault:
             continue
         line, column, key = int(match[1]), int(match[2]), match[3]
         last = re.sub(r"\[\d+\]", "", key.split(".")[-1])
         assert column <= len(lines[line - 1]) + 1
-        nearby = "\n".join(lines[max(0, line - 3) : line])
+        above = 8 if "covariance" in key else 3  # a matrix has its key above its first row
+        nearby = "\n".join(lines[max(0, line - above) : line])
         assert last in nearby, fault
 
 

@@ -292,7 +292,8 @@ class TestVibration:
     @pytest.mark.parametrize(("cycles", "has_note"), [(2.9, True), (3.1, False)])
     def test_a_slow_vibration_is_also_a_quadratic_phase_and_says_so(self, cycles: float, has_note: bool) -> None:
         found = self.vibrating(sinusoidal=[{"amplitude": 1e-5, "frequency": cycles / T}])
-        assert bool(row(found, "transmitter.vibration.sinusoidal.0").notes) == has_note
+        notes = row(found, "transmitter.vibration.sinusoidal.0").notes
+        assert any("quadratic phase error" in note for note in notes) == has_note
 
     def test_without_a_requirement_it_is_not_evaluated(self) -> None:
         found = findings(**{f"{ERROR}__vibration": {"wideband": {"rms": 1e-5}}})
@@ -496,8 +497,8 @@ def test_nothing_declared_is_said() -> None:
 
 
 def test_keys_without_a_part_in_the_check_are_said() -> None:
-    notes = findings(scene__radius="250 m", collection__pulses=512).notes
-    assert any("scene.radius, collection.pulses" in note for note in notes)
+    notes = findings(simulation={"seed": 2}, collection__pulses=512).notes
+    assert any("collection.pulses, simulation" in note for note in notes)
 
 
 def test_singular_q_with_the_range_held_constant_leaves_displacement_open() -> None:
@@ -537,7 +538,7 @@ signed = st.floats(-1e3, 1e3)
     frame=st.sampled_from(["scene", "track", "look"]),
     n_pull=st.floats(0.01, 50),
 )
-@settings(max_examples=80)
+@settings(max_examples=80, deadline=None)  # absurd errors take exact ranges all their iterations
 def test_every_number_is_finite_and_every_row_consistent(velocity, error, rule, frame, n_pull) -> None:
     from bisar_budget.errors import MissionError
 
@@ -553,7 +554,7 @@ def test_every_number_is_finite_and_every_row_consistent(velocity, error, rule, 
     except MissionError:
         return  # a still platform without a track, a degenerate geometry
     for r in found.rows:
-        for number in (r.declared, r.allowable, r.utilization, r.margin, r.qpe_published_rad):
+        for number in (r.declared, r.allowable, r.utilization, r.margin, r.qpe_published_rad, r.qpe_exact_rad):
             assert number is None or math.isfinite(number)
         if r.status == "fail":
             assert r.utilization > 1

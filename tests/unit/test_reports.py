@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import math
+import re
 
 import pytest
 
@@ -96,7 +97,9 @@ class TestJson:
     def test_full_columns_are_filled_for_errors_with_a_phase(self) -> None:
         rows = {row["id"]: row for row in as_json()["missions"][0]["rows"]}
         assert rows["receiver.velocity.y"]["allowable_full"] > 0
-        assert rows["transmitter.vibration.wideband"]["allowable_full"] is None
+        line = rows["transmitter.vibration.sinusoidal.0"]
+        ratio = line["allowable_full"] / line["allowable_published"]
+        assert line["published_margin_db"] == pytest.approx(20 * math.log10(ratio))
 
     def test_no_number_that_json_does_not_have(self) -> None:
         text = render("json", report(), Style())
@@ -207,3 +210,12 @@ def test_text_shows_what_qualifies_a_pass_without_being_asked() -> None:
     assert f"note: {', '.join(declared)}: holds by a hair" in text
     silent = [row._replace(status="not_declared", declared=None) for row in rows]
     assert "by a hair" not in render("text", Report("1", (found._replace(rows=tuple(silent)),)), Style())
+
+
+def test_cells_of_the_table_do_not_touch(run) -> None:
+    """An allowable of twelve characters beside a dash read as a negative number; one of percent ran into metres."""
+    text = run("check", "specs/missions/drones_same_gnss.yaml").stdout
+    assert " - 3.05e-08 s/s " in text
+    assert not re.search(
+        r" -\d|m\d+\.\d+ %", text[text.index("status") : text.index("FAIL mission.location_error (")]
+    )

@@ -1,0 +1,292 @@
+"""Position-velocity covariance of a platform's motion error: the two ways to write it, and what makes it one.
+
+Either the 6 x 6 matrix, or sigmas with their correlations. What is held is sigmas and a correlation matrix, which
+has no units: there a tolerance means the same for metres and for millimetres per second.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Annotated, Any, NamedTuple
+
+from bisar_budget import units
+from bisar_budget.errors import KeyPath, Problem
+from bisar_budget.geometry import FRAME_AXES, Vector
+from bisar_budget.mission.readers import INVALID, Key, OneOf, Quantity, Reader, Report, Section, Triple
+from bisar_budget.mission.symmetric import eigensystem, exceed, quadratic_form
+
+KINDS = ("position", "velocity")
+SIZE = 6
+
+# Matrices are written with finite digits. Six decimals of a correlation leave an element wrong by 5e-7 and, five
+# of them in a row, an eigenvalue by 2.5e-6 (Weyl).
+_ELEMENT_TOLERANCE = 1e-6
+_EIGENVALUE_TOLERANCE = 2.5e-6
+
+_AXIS = {name: index for names in FRAME_AXES.values() for index, name in enumerate(names)}
+_Matrix = tuple[tuple[float, ...], ...]
+
+
+class Covariance(NamedTuple):
+    """Covariance of position and velocity error along the axes of their frame.
+
+    `sigmas` (6,) are one sigma of position [m] and velocity [m/s]; `correlation` (6, 6) has a diagonal of 1 and
+    is positive semi-definite to six decimals. `pairs` are the pairs of errors as the file names them.
+    """
+
+    sigmas: tuple[float, ...]
+    correlation: _Matrix
+    is_matrix: bool
+    pairs: tuple[str, ...] = ()
+
+    def of(self, kind: str) -> Vector:
+        """Marginal sigmas of a kind, position or velocity, along the frame's axes."""
+        first = 3 * KINDS.index(kind)
+        a, b, c = self.sigmas[first : first + 3]
+        return (a, b, c)
+
+    def along(self, kind: str, direction: Sequence[float]) -> float:
+        """Sigma of position or velocity error along a direction given in the frame's axes: √(dᵀCd)."""
+        parts = [sigma * d for sigma, d in zip(self.of(kind), direction, strict=True)]
+        return math.sqrt(quadratic_form(self.block(kind), parts))
+
+    def block(self, kind: str) -> list[tuple[float, ...]]:
+        """Correlations (3, 3) of the errors of a kind among each other."""
+        first = 3 * KINDS.index(kind)
+        return [row[first : first + 3] for row in self.correlation[first : first + 3]]
+
+    def path(self, kind: str, axis: int) -> KeyPath:
+        """Where the file says the sigma of an error, below `covariance`."""
+        index = 3 * KINDS.index(kind) + axis
+        return (index, index) if self.is_matrix else (kind, axis)
+
+    def has_correlations(self) -> bool:
+        """Whether any two of the errors are correlated."""
+        return any(rho for i, row in enumerate(self.correlation) for rho in row[:i])
+
+
+def _problems(correlation: _Matrix) -> Iterator[Problem]:
+    if not exceed(correlation, -_EIGENVALUE_TOLERANCE):
+        smallest = min(eigensystem(correlation)[0])
+        yield Problem(
+            f"is not positive semi-definite: the correlation matrix has the eigenvalue {smallest:.3g}",
+            "no error has such a covariance",
+            "Too few digits? Correlations of nearly dependent errors take six decimals",
+        )
+
+
+def _square(value: Any, path: KeyPath, report: Report, otherwise: str) -> bool:
+    """Whether a value is a list of six lists of six."""
+    if not isinstance(value, list) or len(value) != SIZE:
+        given = f", {len(value)} given" if isinstance(value, list) else ""
+        accepted = f"accepted: x, y, z of position, then of velocity, or {otherwise}"
+        report(path, Problem(f"must be 6 rows of 6 numbers{given}", accepted))
+        return False
+    is_square = True
+    for index, row in enumerate(value):
+        if not isinstance(row, list) or len(row) != SIZE:
+            given = f", {len(row)} given" if isinstance(row, list) else ""
+            report((*path, index), Problem(f"must be a row of 6 numbers{given}"))
+            is_square = False
+    return is_square
+
+
+def _elements(value: Any, readers: Sequence[Sequence[Reader]], path: KeyPath, report: Report) -> Any:
+    rows = [
+        [
+            item if item is INVALID else reader.read(item, (*path, i, j), report)
+            for j, (item, reader) in enumerate(zip(row, of_row, strict=True))
+        ]
+        for i, (row, of_row) in enumerate(zip(value, readers, strict=True))
+    ]
+    return INVALID if any(item is INVALID for row in rows for item in row) else rows
+
+
+def _asymmetries(rows: Sequence[Sequence[float]], scales: Sequence[float]) -> Iterator[Problem]:
+    for i in range(SIZE):
+        for j in range(i):
+            if abs(rows[i][j] - rows[j][i]) > _ELEMENT_TOLERANCE * scales[i] * scales[j]:
+                yield Problem(f"is not symmetric: row {j + 1}, column {i + 1} is {rows[j][i]:.7g}", at=(i, j))
+
+
+def _symmetric(rows: Sequence[Sequence[float]]) -> _Matrix:
+    """Mean of a matrix and its transpose, the diagonal 1, within ±1."""
+    return tuple(
+        tuple(1.0 if i == j else max(-1.0, min(1.0, (rows[i][j] + rows[j][i]) / 2)) for j in range(SIZE))
+        for i in range(SIZE)
+    )
+
+
+_BLOCKS = [
+    Quantity(dimension, ge=-1e18, le=1e18)
+    for dimension in (units.POSITION_VARIANCE, units.POSITION_VELOCITY, units.VELOCITY_VARIANCE)
+]
+_ELEMENTS = [[_BLOCKS[(i > 2) + (j > 2)] for j in range(SIZE)] for i in range(SIZE)]
+
+
+class _MatrixReader(Reader):
+    """The 6 x 6 matrix: m², m²/s and m²/s², position before velocity, each in the order of the frame's axes."""
+
+    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
+        """Read the elements and hold them to what a covariance is."""
+        if not _square(value, path, report, "a mapping with position, velocity and correlation"):
+            return INVALID
+        rows = _elements(value, _ELEMENTS, path, report)
+        if rows is INVALID:
+            return INVALID
+        faults = [Problem("is a negative variance", at=(i, i)) for i in range(SIZE) if rows[i][i] < 0]
+        if not faults:
+            sigmas = [math.sqrt(rows[i][i]) for i in range(SIZE)]
+            faults += [*_asymmetries(rows, sigmas), *_excesses(rows, sigmas)]
+        if not faults:
+            ratios = [
+                [x / (a * b) if a and b else 0.0 for x, b in zip(row, sigmas, strict=True)]
+                for row, a in zip(rows, sigmas, strict=True)
+            ]
+            correlation = _symmetric(ratios)
+            faults = list(_problems(correlation))
+        for fault in faults:
+            report(path, fault)
+        return INVALID if faults else Covariance(tuple(sigmas), correlation, is_matrix=True)
+
+    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+        """Array of six arrays of six."""
+        return _matrix_schema(_ELEMENTS[0][0].schema(definitions))
+
+
+def _excesses(rows: Sequence[Sequence[float]], sigmas: Sequence[float]) -> Iterator[Problem]:
+    for i in range(SIZE):
+        for j in range(i):
+            most = sigmas[i] * sigmas[j]
+            if abs(rows[i][j]) > most * (1 + _ELEMENT_TOLERANCE):
+                problem = (
+                    f"makes a correlation of {rows[i][j] / most:.4g}, beyond ±1"
+                    if most
+                    else "is a covariance with an error whose variance is 0"
+                )
+                accepted = f"accepted: -{most:.4g} to {most:.4g}" if most else "accepted: 0"
+                yield Problem(problem, accepted, at=(i, j))
+
+
+def _matrix_schema(element: dict[str, Any]) -> dict[str, Any]:
+    def six(items: dict[str, Any]) -> dict[str, Any]:
+        return {"type": "array", "items": items, "minItems": SIZE, "maxItems": SIZE}
+
+    return six(six(element))
+
+
+class _Correlations(NamedTuple):
+    matrix: _Matrix
+    pairs: tuple[str, ...] = ()
+
+
+class _CorrelationReader(Reader):
+    """Correlations: of named pairs of errors, all others zero, or the 6 x 6 matrix with a diagonal of 1."""
+
+    _NUMBER = Quantity(units.RATIO, ge=-1, le=1)
+
+    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
+        """Read either form."""
+        read = self._pairs(value, path, report) if isinstance(value, dict) else self._matrix(value, path, report)
+        if read is INVALID:
+            return INVALID
+        faults = list(_problems(read.matrix))
+        for fault in faults:
+            report(path, fault)
+        return INVALID if faults else read
+
+    def _matrix(self, value: Any, path: KeyPath, report: Report) -> Any:
+        if not _square(value, path, report, "pairs such as position.x-velocity.x: 0.3"):
+            return INVALID
+        rows = _elements(value, [[self._NUMBER] * SIZE] * SIZE, path, report)
+        if rows is INVALID:
+            return INVALID
+        faults = [
+            Problem("an error's correlation with itself is 1", at=(i, i)) for i in range(SIZE) if rows[i][i] != 1
+        ]
+        faults += _asymmetries(rows, [1.0] * SIZE)
+        for fault in faults:
+            report(path, fault)
+        return INVALID if faults else _Correlations(_symmetric(rows))
+
+    def _pairs(self, value: dict[str, Any], path: KeyPath, report: Report) -> Any:
+        rows = [[float(i == j) for j in range(SIZE)] for i in range(SIZE)]
+        named: dict[frozenset[int | None], str] = {}
+        is_valid = True
+        for key, text in value.items():
+            number = text if text is INVALID else self._NUMBER.read(text, (*path, key), report)
+            indices = [error_index(name.strip()) for name in key.split("-")]
+            first, second = indices if len(indices) == 2 else (None, None)
+            pair = frozenset((first, second))
+            if first is None or second is None:
+                accepted = "accepted: two errors joined by -, such as position.x-velocity.x"
+                report((*path, key), Problem("is not a known key", accepted))
+            elif first == second:
+                report((*path, key), Problem("an error's correlation with itself is 1", hint="Remove it"))
+            elif pair in named:
+                report((*path, key), Problem(f"is the pair {named[pair]} again", "accepted: each once"))
+            elif number is not INVALID:
+                named[pair] = key
+                rows[first][second] = rows[second][first] = number
+                continue
+            is_valid = False
+        return _Correlations(tuple(map(tuple, rows)), tuple(named.values())) if is_valid else INVALID
+
+    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+        """Object of pairs, or array of six arrays of six."""
+        number = self._NUMBER.schema(definitions)
+        name = rf"(?:{'|'.join(KINDS)})\.(?:{'|'.join(_AXIS)})"
+        pairs = {
+            "type": "object",
+            "patternProperties": {rf"^\s*{name}\s*-\s*{name}\s*$": number},
+            "additionalProperties": False,
+        }
+        return {"anyOf": [pairs, _matrix_schema(number)]}
+
+
+def error_index(name: str) -> int | None:
+    """Place of `position.x`, `velocity.along` and the like among the six; None if it is none of them."""
+    kind, _, axis = name.partition(".")
+    return 3 * KINDS.index(kind) + _AXIS[axis] if kind in KINDS and axis in _AXIS else None
+
+
+class Sigmas(NamedTuple):
+    """One sigma of position and velocity error along the frame's axes, and how they are correlated."""
+
+    position: Annotated[
+        Vector, Key(Triple(Quantity(units.LENGTH, ge=0, le=1e9), or_scalar=True), "One sigma at the midpoint.")
+    ]
+    velocity: Annotated[
+        Vector, Key(Triple(Quantity(units.SPEED, ge=0, le=1e6), or_scalar=True), "One sigma of the constant part.")
+    ]
+    correlation: Annotated[
+        _Correlations,
+        Key(_CorrelationReader(), "Of pairs, such as position.x-velocity.x: 0.3, or a 6 x 6 matrix; else none."),
+    ] = _Correlations(_symmetric([[0.0] * SIZE] * SIZE))
+
+
+class _SigmasReader(Section):
+    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
+        """Read the section and put its parts together."""
+        stated = super().read(value, path, report)
+        if stated is INVALID:
+            return INVALID
+        sigmas = (*stated.position, *stated.velocity)
+        return Covariance(sigmas, stated.correlation.matrix, is_matrix=False, pairs=stated.correlation.pairs)
+
+
+_FORMS: tuple[Reader, Reader] = (_MatrixReader(), _SigmasReader(Sigmas))
+COVARIANCE = OneOf(lambda value: _FORMS[isinstance(value, dict)], _FORMS)
+
+
+def misplaced_axes(covariance: Covariance, frame: str) -> Iterator[Problem]:
+    """Say which pairs name an axis that the frame does not have; paths are below `motion_error`."""
+    for pair in covariance.pairs:
+        for name in pair.split("-"):
+            axis = name.strip().partition(".")[2]
+            if axis not in FRAME_AXES[frame]:
+                yield Problem(
+                    "is not a known key",
+                    f"accepted in the {frame} frame: {', '.join(FRAME_AXES[frame])}",
+                    at=("covariance", "correlation", pair),
+                )
+                break

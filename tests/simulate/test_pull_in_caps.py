@@ -1,0 +1,71 @@
+"""Where autofocus gives out: the room that a smear needs, and range walk; at two bandwidths, and what check says."""
+
+import math
+
+import numpy as np
+import pytest
+
+from bisar_budget.budget.pull_in import ROOM
+from bisar_budget.mission.load import parse_mission
+from bisar_budget.simulate.autofocus import ALGORITHMS
+from bisar_budget.simulate.collection import Errors
+from bisar_budget.simulate.verify import Study
+from tests.conftest import findings, mission_text
+
+F0_MHZ = 10_000
+
+
+def loss_db(algorithm: str, bandwidth_mhz: float, n_pull: float, room: float) -> float:
+    """Peak lost by a point that a clock error of π·n_pull smeared, refocused in a patch of `room` times the smear."""
+    study = Study(parse_mission(mission_text(radar__bandwidth=f"{bandwidth_mhz} MHz")))
+    clock = next(s for s in study.sources if s.id == "timing.quadratic")
+    errors = study.errors(clock, math.pi * n_pull / abs(clock.effect.qpe))
+    cells = 2 * math.ceil(room * 4 * n_pull / 2)
+    smeared, clean = (study.collection.chip((0.0, 0.0), e, cells=cells, range_cells=12) for e in (errors, Errors()))
+    focused = ALGORITHMS[algorithm](smeared.image).image
+    return 20 * math.log10(np.abs(clean.image).max() / np.abs(focused).max())
+
+
+@pytest.mark.parametrize("n_pull", [8, 20])
+@pytest.mark.parametrize("bandwidth", [50, 300])
+@pytest.mark.parametrize("algorithm", ["pga", "map_drift"])
+def test_autofocus_needs_room_whatever_the_range_walk(algorithm: str, bandwidth: float, n_pull: float) -> None:
+    """Walks of 0.02 to 0.3 cells: with the room it works, with 1.25 times the smear it does not.
+
+    What is lost with room is the walk's own: 0.25 dB at 0.3 cells.
+    """
+    assert loss_db(algorithm, bandwidth, n_pull, ROOM[algorithm]) < 0.35
+    assert loss_db(algorithm, bandwidth, n_pull, 1.25) > 5
+
+
+@pytest.mark.parametrize(("walk", "low", "high"), [(0.1, -0.1, 0.1), (0.5, 0.5, 0.75), (1.0, 1.1, 1.5)])
+def test_range_walk_costs_a_loss_but_not_the_correction(walk: float, low: float, high: float) -> None:
+    """600 MHz, n_pull up to 33, with room for it: half a cell loses 0.6 dB, a whole one 1.3 dB."""
+    n_pull = 2 * walk * F0_MHZ / 600
+    assert low < loss_db("pga", 600, n_pull, 4.0) < high
+
+
+def warnings(**changes) -> list[str]:
+    return [w.message for w in findings(**changes).warnings if "n_pull" in w.message]
+
+
+class TestWarnings:
+    @pytest.mark.parametrize(("n_pull", "warns"), [(33.3, False), (33.4, True)])
+    def test_range_walk(self, n_pull: float, warns: bool) -> None:
+        """f₀/B of the base mission is 33.33."""
+        found = warnings(autofocus={"n_pull": n_pull})
+        assert bool(found) == warns
+        if warns:
+            assert "half a cell is n_pull 33.33" in found[0]
+
+    @pytest.mark.parametrize(("algorithm", "room"), [("pga", 3.0), ("map_drift", 1.5)])
+    def test_smear_against_the_scene(self, algorithm: str, room: float) -> None:
+        cell = findings().resolution.cross_range
+        autofocus = {"algorithm": algorithm, "n_pull": 4}
+        fits = room * 4 * 4 * cell / 2
+        assert not warnings(autofocus=autofocus, scene={"radius": 1.001 * fits})
+        (warning,) = warnings(autofocus=autofocus, scene={"radius": 0.9 * fits})
+        assert "holds n_pull 3.6" in warning
+
+    def test_no_autofocus_no_warning(self) -> None:
+        assert not warnings(scene={"radius": 1})

@@ -1,0 +1,198 @@
+"""The scene's edge: the full model there against exact ranges and against images, and what follows for the row."""
+
+import math
+
+import numpy as np
+import pytest
+
+from bisar_budget.budget.check import check_mission
+from bisar_budget.budget.scene import EdgePhases, at
+from bisar_budget.budget.validity import FirstOrder
+from bisar_budget.geometry import PlatformState
+from bisar_budget.mission.load import parse_mission
+from bisar_budget.simulate.collection import Errors
+from bisar_budget.simulate.exact import exact_effect
+from bisar_budget.simulate.impulse_response import quadratic_phase_error
+from bisar_budget.simulate.phase_history import cell_centres, path
+from bisar_budget.simulate.verify import Study
+from tests.conftest import TODAY, findings, mission_text, row
+from tests.simulate.conftest import collection
+
+
+def squinted(squint: float):
+    """Section V at 10 GHz, both platforms turned by a squint."""
+    geometry = collection(squint).geometry
+    platforms = {
+        name: {"position": list(getattr(geometry, name).position), "velocity": list(getattr(geometry, name).velocity)}
+        for name in ("transmitter", "receiver")
+    }
+    return parse_mission(mission_text(platforms=platforms, allocation__model="full"))
+
+
+def exact_at(mission, source, size: float, point):
+    """Effect of one error at a point of the scene, by exact ranges from there."""
+    slow_time = cell_centres(6.0, 256)
+    errors = Study(mission).errors(source, size)
+    states = (mission.geometry.transmitter, mission.geometry.receiver)
+    flown = []
+    for state, error in zip(states, (errors.transmitter, errors.receiver), strict=True):
+        position = (state.position[0] - point[0], state.position[1] - point[1], state.position[2])
+        flown.append(path(PlatformState(position=position, velocity=state.velocity), slow_time, error))
+    clock = np.polynomial.polynomial.polyval(slow_time, errors.clock)
+    return exact_effect(slow_time, *flown, clock, mission.radar.wavelength, 6.0)
+
+
+@pytest.mark.parametrize(("radius", "tolerance"), [(250.0, 0.002), (1000.0, 0.006)])
+@pytest.mark.parametrize("squint", [0, 30, 45])
+def test_phases_at_the_edge_are_those_of_exact_ranges(squint: float, radius: float, tolerance: float) -> None:
+    """Every error at its limit of π/8 that is inside first order, at eight places of the rim."""
+    mission = squinted(squint)
+    study = Study(mission)
+    first_order = FirstOrder(mission, mission.geometry, study.ground)
+    largest, seen = 0.0, 0
+    for source in study.sources:
+        size = math.pi / 8 / abs(source.full.qpe) if source.full.qpe else 0.0
+        if not size or abs(first_order.second(source, size).qpe) > 0.002:
+            continue
+        edge = EdgePhases(mission, mission.geometry, [source._replace(declared=size)])
+        centre = exact_at(mission, source, size, (0.0, 0.0)).quadratic
+        for azimuth in np.arange(8) * math.pi / 4:
+            point = at(radius, azimuth)
+            (difference,) = edge.differences(point)
+            exact = exact_at(mission, source, size, point).quadratic - centre
+            assert difference == pytest.approx(exact, abs=tolerance, rel=0.02), (source.id, azimuth)
+            largest, seen = max(largest, abs(exact)), seen + 1
+    assert seen >= 40
+    assert largest > 0.01
+
+
+@pytest.mark.parametrize(("radius", "azimuth"), [(250.0, 1.0), (1000.0, 1.0), (1000.0, 4.2)])
+@pytest.mark.parametrize("row_id", ["receiver.velocity.x", "transmitter.velocity.y", "receiver.acceleration.y"])
+def test_images_at_the_edge_show_them(row_id: str, radius: float, azimuth: float) -> None:
+    """Backprojection, with the collection's own geometry, of a point on the rim; 0.01 rad is what a cut resolves."""
+    mission = squinted(30)
+    study = Study(mission)
+    source = next(s for s in study.sources if s.id == row_id)
+    size = math.pi / 8 / abs(source.full.qpe)
+    edge = EdgePhases(mission, mission.geometry, [source._replace(declared=size)])
+    measured = []
+    for point in ((0.0, 0.0), at(radius, azimuth)):
+        moved = exact_at(mission, source, size, point).displacement
+        there = (point[0] + moved[0], point[1] + moved[1])
+        chip = study.collection.chip(there, study.errors(source, size), scatterer=point)
+        reference = study.collection.chip(there, Errors(), scatterer=there)
+        history = study.collection.spatial_frequency(reference)
+        measured.append(quadratic_phase_error(chip.cut, reference.cut, study.collection.spacing[1], *history)[0])
+    (difference,) = edge.differences(at(radius, azimuth))
+    assert measured[1] - measured[0] == pytest.approx(difference, abs=0.01)
+
+
+class TestRow:
+    VELOCITY = {"platforms__receiver__motion_error": {"velocity": [0, 0.6, 0]}}
+
+    def found(self, radius: float, **changes):
+        changes = {"allocation__model": "full", **self.VELOCITY, **changes}
+        return findings(scene={"radius": radius}, **changes)
+
+    def test_no_radius_no_row(self) -> None:
+        assert "mission.spatial_variance" not in [r.id for r in findings(**self.VELOCITY).rows]
+        assert findings(**self.VELOCITY).scene is None
+
+    def test_nothing_declared(self) -> None:
+        found = findings(scene={"radius": 250})
+        variance = row(found, "mission.spatial_variance")
+        assert (variance.status, variance.declared, variance.allowable_full) == ("not_declared", None, math.pi / 4)
+
+    def test_the_radius_that_one_correction_serves_is_where_the_row_fails(self) -> None:
+        """Both sides, with autofocus that pulls in far more: its gain is not in this row."""
+        changes = {"autofocus": {"n_pull": 40}}
+        served = self.found(100, **changes).scene.autofocus_radius
+        for factor, is_over in ((0.99, False), (1.01, True)):
+            variance = row(self.found(factor * served, **changes), "mission.spatial_variance")
+            assert variance.allowable == pytest.approx(math.pi / 4)
+            assert (variance.status == "fail") == is_over
+            assert variance.declared == pytest.approx(math.pi / 4, rel=0.03)
+
+    def test_it_is_the_same_from_a_scene_that_is_too_large(self) -> None:
+        outward, inward = (self.found(radius).scene.autofocus_radius for radius in (100, 5000))
+        assert outward == pytest.approx(inward, rel=0.01)
+
+    def test_the_worst_azimuth_is_found_between_the_rim_points(self) -> None:
+        """Against a rim of 720 points."""
+        mission = parse_mission(mission_text(scene={"radius": 500}, allocation__model="full", **self.VELOCITY))
+        found = check_mission(mission, TODAY)
+        source = next(s for s in Study(mission).sources if s.id == "receiver.velocity.y")
+        edge = EdgePhases(mission, mission.geometry, [source])
+        worst = max(edge.difference(500, math.radians(degrees / 2)) for degrees in range(720))
+        assert row(found, "mission.spatial_variance").declared == pytest.approx(worst, rel=1e-3)
+
+    @pytest.mark.parametrize("rule", ["each", "sum", "rss"])
+    def test_differences_combine_as_the_mission_says(self, rule: str) -> None:
+        errors = {"platforms__receiver__motion_error": {"velocity": [0.3, 0.6, 0]}}
+        found = self.found(300, allocation__combine=rule, **errors)
+        mission = parse_mission(mission_text(**errors))
+        members = [s for s in Study(mission).sources if s.declared]
+        edge = EdgePhases(mission, mission.geometry, members)
+        join = {"each": lambda d: np.abs(d).max(), "sum": lambda d: np.abs(d).sum(), "rss": np.linalg.norm}[rule]
+        worst = max(join(edge.differences(at(300, math.radians(degrees)))) for degrees in range(360))
+        variance = row(found, "mission.spatial_variance")
+        assert variance.declared == pytest.approx(worst, rel=1e-3)
+        assert variance.status != "info"
+
+    def test_a_covariance_counts_with_its_correlations(self) -> None:
+        """√(dᵀRd) of the differences, R the correlations."""
+        correlation = np.eye(6)
+        correlation[0, 3] = correlation[3, 0] = -0.9
+        sigmas = [3, 3, 3, 0.2, 0.2, 0.2]
+        covariance = {"position": [3, 3, 3], "velocity": [0.2, 0.2, 0.2], "correlation": correlation.tolist()}
+        errors = {"platforms__receiver__motion_error": {"covariance": covariance}}
+        mission = parse_mission(mission_text(scene={"radius": 500}, allocation__combine="rss", **errors))
+        variance = row(check_mission(mission, TODAY), "mission.spatial_variance")
+        sources = {s.id: s for s in Study(mission).sources}
+        names = [f"receiver.{kind}.{axis}" for kind in ("position", "velocity") for axis in "xyz"]
+        members = [sources[name]._replace(declared=size) for name, size in zip(names, sigmas, strict=True)]
+        edge = EdgePhases(mission, mission.geometry, members)
+        differences = np.array([edge.differences(at(500, math.radians(degrees))) for degrees in range(360)])
+        worst = math.sqrt(max(np.einsum("ki,ij,kj->k", differences, correlation, differences)))
+        assert variance.declared == pytest.approx(worst, rel=1e-3)
+        assert worst < np.linalg.norm(differences, axis=1).max()
+
+    @pytest.mark.parametrize("model", ["published", "full", "strictest"])
+    def test_the_published_model_has_no_limit_but_warns(self, model: str) -> None:
+        variance = row(self.found(5000, allocation__model=model), "mission.spatial_variance")
+        assert variance.status == {"published": "warn"}.get(model, "fail")
+        assert (variance.allowable is None) == (model == "published")
+        assert variance.allowable_full == pytest.approx(math.pi / 4)
+
+    def test_an_error_over_its_limit_at_the_edge_alone_is_a_warning(self) -> None:
+        """Just inside at the centre; the difference itself is far inside the total."""
+        limit = row(findings(allocation__model="full"), "receiver.velocity.y").allowable
+        error = {"platforms__receiver__motion_error": {"velocity": [0, 0.999 * limit, 0]}}
+        variance = row(self.found(500, **error), "mission.spatial_variance")
+        assert variance.utilization < 0.5
+        assert variance.status == "warn"
+        assert "receiver.velocity.y" in variance.reason
+
+    def test_an_edge_without_an_image_is_not_evaluated(self) -> None:
+        """A receiver on the ground, at the edge itself."""
+        receiver = {"position": [6000, 0, 0], "velocity": [0, 40, 0], "motion_error": {"velocity": 0.01}}
+        for radius, is_there in ((5000, True), (6000, False)):
+            variance = row(
+                findings(scene={"radius": radius}, platforms__receiver=receiver), "mission.spatial_variance"
+            )
+            assert (variance.status != "not_evaluated") == is_there
+        assert "a platform is within 1 m of it" in variance.reason
+
+    def test_clock_and_terrain_vary_over_the_scene(self) -> None:
+        """A constant clock error moves the image, and so bends it differently at the edge: exact ranges agree."""
+        mission = parse_mission(mission_text(timing_error={"constant": "20 ns"}, scene={"radius": 1000}))
+        variance = row(check_mission(mission, TODAY), "mission.spatial_variance")
+        source = next(s for s in Study(mission).sources if s.id == "timing.constant")
+        centre = exact_at(mission, source, 20e-9, (0, 0)).quadratic
+        worst = max(
+            abs(exact_at(mission, source, 20e-9, at(1000, azimuth)).quadratic - centre)
+            for azimuth in np.linspace(0, 2 * math.pi, 72)
+        )
+        assert variance.qpe_full_rad == pytest.approx(worst, rel=0.02, abs=1e-3)
+        raised = row(findings(scene={"radius": 1000, "height_error": 5}), "mission.spatial_variance")
+        assert raised.qpe_full_rad > 0.001

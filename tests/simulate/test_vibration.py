@@ -1,0 +1,52 @@
+"""Vibration limits of the full model in images, and vectors in the simulated data."""
+
+import math
+
+import pytest
+
+from bisar_budget.mission.load import parse_mission
+from bisar_budget.simulate.point import simulate_point
+from bisar_budget.simulate.verify import verify_mission
+from tests.conftest import findings, mission_text, row
+
+
+def lines(*amplitudes, cycles: float = 10.3):
+    return {"vibration": {"sinusoidal": [{"amplitude": a, "frequency": cycles / 6} for a in amplitudes]}}
+
+
+def verdicts(only: str, **changes):
+    changes = {"requirements": {"pslr": -30}, "allocation__model": "full", **changes}
+    return {verdict.id: verdict for verdict in verify_mission(parse_mission(mission_text(**changes)), only).rows}
+
+
+@pytest.mark.parametrize("split", ["equal", {"transmitter": 0.8, "receiver": 0.2}])
+def test_both_platforms_in_phase_at_the_full_limits_fill_the_requirement(split) -> None:
+    verdict = verdicts("mission.vibration.sinusoidal", allocation={"model": "full", "split": split})
+    assert verdict["mission.vibration.sinusoidal"].measured_db == pytest.approx(-30, abs=0.3)
+    assert verdict["mission.vibration.sinusoidal"].verdict == "confirmed"
+
+
+def test_one_platform_alone_at_its_full_limit_is_6_db_inside() -> None:
+    (verdict,) = verdicts("receiver.vibration.*").values()
+    assert (verdict.model, verdict.verdict) == ("full", "conservative")
+    assert verdict.measured_db == pytest.approx(-36.02, abs=0.3)
+
+
+def test_lines_that_share_a_frequency_are_verified_as_one() -> None:
+    error = {"platforms__receiver__motion_error": lines("1 um", "2 um")}
+    verdict = verdicts("receiver.vibration.sinusoidal.sum.0", **error)["receiver.vibration.sinusoidal.sum.0"]
+    assert verdict.measured_db == pytest.approx(-36.02, abs=0.3)
+
+
+def test_a_vector_is_in_the_data_as_its_part_along_the_line_of_sight() -> None:
+    vector = {"frame": "track", **lines(["3 mm", "2 mm", "1 mm"])}
+    projected = row(findings(platforms__receiver__motion_error=vector), "receiver.vibration.sinusoidal.0").declared
+    images = [
+        simulate_point(parse_mission(mission_text(platforms__receiver__motion_error=error)))
+        for error in (vector, lines(projected))
+    ]
+    assert 1e-3 < projected < 3e-3
+    assert images[0].rotated == pytest.approx(images[1].rotated)
+    loss = 20 * math.log10(images[0].response.peak / images[0].clean_response.peak)
+    phase = 2 * math.pi * projected / 0.0299792458
+    assert loss == pytest.approx(20 * math.log10(1 - phase**2 / 4 + phase**4 / 64), abs=0.05)  # J₀
