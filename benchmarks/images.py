@@ -52,16 +52,16 @@ def grid(count: int) -> np.ndarray:
     return ground_grid((0.0, 0.0), GEOMETRY.look_azimuth, (count * SPACING, count * SPACING), (count, count))
 
 
-def in_turn(runs: int, *tasks: Callable[[], object]) -> list[float]:
-    """Median seconds of each task over `runs` rounds, the tasks taking turns; one round of warm-up."""
-    figures: list[list[float]] = [[] for _ in tasks]
+def in_turn(runs: int, *tasks: Callable[[], object]) -> list[tuple[float, float]]:
+    """Median seconds by the clock and of CPU over `runs` rounds, the tasks taking turns; one round of warm-up."""
+    figures: list[list[tuple[float, float]]] = [[] for _ in tasks]
     for index in range(runs + 1):
         for task, kept in zip(tasks, figures, strict=True):
-            start = time.perf_counter()
+            start, used = time.perf_counter(), time.process_time()
             task()
             if index:
-                kept.append(time.perf_counter() - start)
-    return [statistics.median(kept) for kept in figures]
+                kept.append((time.perf_counter() - start, time.process_time() - used))
+    return [(statistics.median(w for w, _ in kept), statistics.median(c for _, c in kept)) for kept in figures]
 
 
 def error_db(image: np.ndarray, history: PhaseHistory, points: np.ndarray) -> float:
@@ -108,11 +108,12 @@ def compare_backprojection(runs: int) -> None:
             sides["numpy"] = lambda p=points: backprojection(history, p, "numpy")
         seconds = in_turn(runs, *sides.values())
         pairs = PULSES * count**2
-        for (name, side), took in zip(sides.items(), seconds, strict=True):
+        for (name, side), (took, used) in zip(sides.items(), seconds, strict=True):
             scale = PULSES * FREQUENCIES if "fastsar" in name else 1
             print(
                 f"  {count:4}² {name:20} {took * 1e3:8.1f} ms {pairs / took / 1e6:6.0f} Mpixel·pulse/s"
-                f"   {seconds[2] / took:5.2f} ÷ default, {seconds[3] / took:5.2f} ÷ upsample 16"
+                f"   {seconds[2][0] / took:5.2f} ÷ default (CPU {seconds[2][1] / used:5.2f}),"
+                f" {seconds[3][0] / took:5.2f} ÷ upsample 16"
                 f"   error {error_db(side() / scale, history, points):6.1f} dB"
             )
 
@@ -164,10 +165,10 @@ def compare_exact(runs: int) -> None:
     sides = {"Horner in Numba": by_horner, "cubic": lambda: backprojection(history, points, "cubic")}
     seconds = in_turn(runs, *sides.values())
     print("exact filter, 128² pixels: cubic backprojection ÷ a matched filter by Horner's rule in Numba (at least 4)")
-    for (name, side), took in zip(sides.items(), seconds, strict=True):
+    for (name, side), (took, _) in zip(sides.items(), seconds, strict=True):
         rate = PULSES * FREQUENCIES * 128**2 / took / 1e9
         error = error_db(side(), history, points)
-        ratio = seconds[0] / took
+        ratio = seconds[0][0] / took
         print(f"  {name:16} {took * 1e3:7.1f} ms {rate:6.1f} Gsample/s   {ratio:5.1f}   error {error:.1f} dB")
 
 

@@ -30,7 +30,7 @@ from bisar_budget.simulate.range_profile import (
 Spline = Literal["linear", "cubic"]
 
 _LINE = 32  # pixels of one expansion; two or four vectors of a processor
-_ROWS = 32  # lines of one tile, which share what they read of the profiles
+_ROWS = 16  # lines of one tile; what it needs of a pulse stays in a processor's first cache
 _OVERSAMPLING = 2  # of profiles from the FFT
 _TAPS = 8  # of the kernel that refines them: -140 dB at this oversampling
 _REFINEMENT = {"linear": 16, "cubic": 8}  # samples per sample from the FFT
@@ -89,8 +89,10 @@ def lattice_of(points: Floats, tolerance: float) -> Lattice | None:
     across = (grid[-1, 0] - origin) / max(1, lines - 1)
     along = (grid[0, -1] - origin) / max(1, count - 1)
     first = origin + np.arange(count)[:, None] * along
-    for line in range(lines):  # one at a time: no second copy of the grid
-        if not np.abs(grid[line] - first - line * across).max() <= tolerance:
+    for top in range(0, lines, _ROWS):  # a few at a time: no second copy of the grid
+        part = grid[top : top + _ROWS]
+        line = np.arange(top, top + part.shape[0])[:, None, None]
+        if not np.abs(part - first - line * across).max() <= tolerance:
             return None
     return Lattice(origin, across, along, (lines, count))
 
@@ -173,8 +175,8 @@ def _profile_blocks(history: PhaseHistory, centre: Floats, radius: float, spline
     transform = kernel_transform(2 * math.pi * harmonic / length, _TAPS, _OVERSAMPLING)
     transform = transform * np.sinc(harmonic / (length * factor)) ** (order + 1)
     # Weights of the taps for each of the places between two samples.
-    offset = np.arange(factor)[:, None] / factor - (np.arange(_TAPS) - _TAPS // 2 + 1)
-    weights = kernel(offset, _TAPS, _OVERSAMPLING)
+    offset = np.arange(factor) / factor - (np.arange(_TAPS)[:, None] - _TAPS // 2 + 1)
+    weights = kernel(offset, _TAPS, _OVERSAMPLING).astype(np.float32)
     reference = np.linalg.norm(history.transmitter, axis=1) + np.linalg.norm(history.receiver, axis=1)
     middle = np.linalg.norm(history.transmitter - centre, axis=1) + np.linalg.norm(history.receiver - centre, axis=1)
     # Neither leg's range changes faster than the pixel moves.
@@ -184,7 +186,7 @@ def _profile_blocks(history: PhaseHistory, centre: Floats, radius: float, spline
     for start in range(0, history.slow_time.size, pulses):
         part = slice(start, start + pulses)
         profiles = range_profiles(history, length, transform, part)
-        refined = np.empty((profiles.shape[0], count * factor), dtype=np.complex64)
+        refined = np.empty((profiles.shape[0], 2 * count * factor), dtype=np.float32)
         _refine(profiles, first[part], weights, refined)
         yield _Block(
             refined.view(np.int64),
@@ -199,44 +201,41 @@ def _profile_blocks(history: PhaseHistory, centre: Floats, radius: float, spline
 
 @_parallel
 def _refine(profiles, first, weights, refined):
-    """Samples between the samples; profiles repeat."""
-    length, factor = profiles.shape[1], weights.shape[0]
-    count = refined.shape[1] // factor
+    """Samples between the samples, as real and imaginary parts; profiles repeat."""
+    length, factor = profiles.shape[1], weights.shape[1]
+    count = refined.shape[1] // (2 * factor)
     for pulse in prange(profiles.shape[0]):
-        cut = np.empty(count + _TAPS, np.complex64)
-        for n in range(cut.size):
-            cut[n] = profiles[pulse, (first[pulse] + n - _TAPS // 2 + 1) % length]
-        real, imag = cut.real.copy(), cut.imag.copy()
-        re, im = np.empty(count, np.float32), np.empty(count, np.float32)
-        for place in range(factor):
-            re[:] = 0
-            im[:] = 0
-            for tap in range(_TAPS):
-                weight = _F(weights[place, tap])
-                for n in range(count):
-                    re[n] += weight * real[n + tap]
-                    im[n] += weight * imag[n + tap]
-            for n in range(count):
-                refined[pulse, n * factor + place] = complex(re[n], im[n])
+        real, imag = np.empty(count + _TAPS, np.float32), np.empty(count + _TAPS, np.float32)
+        for n in range(count + _TAPS):
+            sample = profiles[pulse, (first[pulse] + n - _TAPS // 2 + 1) % length]
+            real[n], imag[n] = _F(sample.real), _F(sample.imag)
+        for n in range(count):
+            for place in range(factor):
+                re = im = _F(0)
+                for tap in range(_TAPS):
+                    re += real[n + tap] * weights[tap, place]
+                    im += imag[n + tap] * weights[tap, place]
+                refined[pulse, 2 * (n * factor + place)] = re
+                refined[pulse, 2 * (n * factor + place) + 1] = im
 
 
 # Half a turn's sine over its angle and cosine, as polynomials of the squared angle in cycles, a bit beyond ±½.
 _SINE = tuple(
-    Chebyshev.interpolate(lambda z: math.pi * np.sinc(np.sqrt(z)), 5, domain=[0, 0.27]).convert(kind=Polynomial).coef
+    Chebyshev.interpolate(lambda z: math.pi * np.sinc(np.sqrt(z)), 4, domain=[0, 0.27]).convert(kind=Polynomial).coef
 )
 _COSINE = tuple(
-    Chebyshev.interpolate(lambda z: np.cos(math.pi * np.sqrt(z)), 5, domain=[0, 0.27]).convert(kind=Polynomial).coef
+    Chebyshev.interpolate(lambda z: np.cos(math.pi * np.sqrt(z)), 4, domain=[0, 0.27]).convert(kind=Polynomial).coef
 )
-_S0, _S1, _S2, _S3, _S4, _S5 = (np.float32(c) for c in _SINE)
-_C0, _C1, _C2, _C3, _C4, _C5 = (np.float32(c) for c in _COSINE)
+_S0, _S1, _S2, _S3, _S4 = (np.float32(c) for c in _SINE)
+_C0, _C1, _C2, _C3, _C4 = (np.float32(c) for c in _COSINE)
 
 
 @_compiled
 def _phasor(cycles):
     """exp(2πj·cycles) in single precision for |cycles| up to a bit beyond ½: the square of half the turn."""
     z = cycles * cycles
-    sine = cycles * (_S0 + z * (_S1 + z * (_S2 + z * (_S3 + z * (_S4 + z * _S5)))))
-    cosine = _C0 + z * (_C1 + z * (_C2 + z * (_C3 + z * (_C4 + z * _C5))))
+    sine = cycles * (_S0 + z * (_S1 + z * (_S2 + z * (_S3 + z * _S4))))
+    cosine = _C0 + z * (_C1 + z * (_C2 + z * (_C3 + z * _C4)))
     return cosine * cosine - sine * sine, _F(2) * sine * cosine
 
 
@@ -246,7 +245,7 @@ def _expand(middle, platform, along, ranges):
     px, py, pz = platform[0], platform[1], platform[2]
     ex, ey, ez = along[0], along[1], along[2]
     square = ex * ex + ey * ey + ez * ez
-    for i in range(_ROWS):
+    for i in range(ranges.shape[1]):
         x, y, z = middle[0, i] - px, middle[1, i] - py, middle[2, i] - pz
         distance = np.sqrt(x * x + y * y + z * z)
         inverse = 1 / distance
@@ -262,76 +261,96 @@ def _expand(middle, platform, along, ranges):
 @_compiled
 def _split(ranges, per_metre, first, cycles, whole, fraction, turn, order):
     """Take whole samples and whole cycles off, in double precision."""
-    for i in range(_ROWS):
+    for i in range(ranges.shape[1]):
         cell, step = ranges[0, i] * per_metre - first, ranges[1, i] * per_metre
         whole[0, i], whole[1, i] = _I(np.floor(cell)), _I(np.rint(step))
         fraction[0, i], fraction[1, i] = _F(cell - np.floor(cell)), _F(step - np.rint(step))
     for n in range(3):
-        for i in range(_ROWS):
+        for i in range(ranges.shape[1]):
             c = ranges[n, i] * cycles
             turn[n, i] = _I(np.int64((c - np.rint(c)) * _TURN))
             order[n, i] = _F(ranges[n + 2, i] * cycles)
 
 
+# Each of the loops below takes a whole tile: calls, and the counting of references to arrays, would cost a third
+# of the time if made line by line.
+
+
 @_compiled
-def _places(base, step, place, slope, p2, p3, p4, cells_per_cycle, index, between):
-    """Sample before each pixel of a segment, and how far beyond it the pixel is."""
-    for j in range(_LINE):
-        x = _F(j - _LINE // 2)
-        bend = x * x * (p2 + x * (p3 + x * p4))
-        t = place + x * slope + cells_per_cycle * bend
-        whole = np.floor(t)
-        between[j] = t - whole
-        index[j] = _I(base + _I(j - _LINE // 2) * step + _I(whole))
+def _places(whole, fraction, order, cells_per_cycle, index, between):
+    """Sample before each pixel, and how far beyond it the pixel is."""
+    for i in range(index.shape[0]):
+        base, step, place, slope = whole[0, i], whole[1, i], fraction[0, i], fraction[1, i]
+        p2, p3, p4 = order[0, i], order[1, i], order[2, i]
+        for j in range(_LINE):
+            x = _F(j - _LINE // 2)
+            bend = x * x * (p2 + x * (p3 + x * p4))
+            t = place + x * slope + cells_per_cycle * bend
+            floor = np.floor(t)
+            between[i, j] = t - floor
+            index[i, j] = _I(base + _I(j - _LINE // 2) * step + _I(floor))
+
+
+# Loops of their own: next to arithmetic, loads from anywhere would keep that from being vectorised. Neighbours are
+# read before any is written, so that they are read at once.
 
 
 @_compiled
 def _fetch2(profile, index, fetched):
-    # A loop of its own: next to arithmetic, loads from anywhere would keep that from being vectorised.
-    for j in range(_LINE):
-        n = np.uint32(index[j])
-        fetched[2 * j] = profile[n]
-        fetched[2 * j + 1] = profile[n + np.uint32(1)]
+    for i in range(index.shape[0]):
+        for j in range(_LINE):
+            n = np.uint64(np.uint32(index[i, j]))
+            s0, s1 = profile[n], profile[n + np.uint64(1)]
+            fetched[i, 2 * j], fetched[i, 2 * j + 1] = s0, s1
 
 
 @_compiled
 def _fetch4(profile, index, fetched):
-    for j in range(_LINE):
-        n = np.uint32(index[j] - _I(1))
-        fetched[4 * j] = profile[n]
-        fetched[4 * j + 1] = profile[n + np.uint32(1)]
-        fetched[4 * j + 2] = profile[n + np.uint32(2)]
-        fetched[4 * j + 3] = profile[n + np.uint32(3)]
+    for i in range(index.shape[0]):
+        for j in range(_LINE):
+            n = np.uint64(np.uint32(index[i, j] - _I(1)))
+            s0, s1 = profile[n], profile[n + np.uint64(1)]
+            s2, s3 = profile[n + np.uint64(2)], profile[n + np.uint64(3)]
+            fetched[i, 4 * j], fetched[i, 4 * j + 1], fetched[i, 4 * j + 2], fetched[i, 4 * j + 3] = s0, s1, s2, s3
 
 
 @_compiled
-def _add2(taps, between, c0, c1, c2, p3, p4, real, imag):
+def _add2(taps, between, turn, order, real, imag):
     """Linear B-spline times the carrier."""
-    for j in range(_LINE):
-        k = _I(j - _LINE // 2)
-        x = _F(k)
-        turned = _I(c0 + k * _I(c1 + k * c2))
-        cosine, sine = _phasor(_F(turned) * _F(1 / _TURN) + x * x * x * (p3 + x * p4))
-        v = between[j]
-        re = taps[4 * j] + v * (taps[4 * j + 2] - taps[4 * j])
-        im = taps[4 * j + 1] + v * (taps[4 * j + 3] - taps[4 * j + 1])
-        real[j] += re * cosine - im * sine
-        imag[j] += re * sine + im * cosine
+    for i in range(real.shape[0]):
+        c0, c1, c2 = turn[0, i], turn[1, i], turn[2, i]
+        p3, p4 = order[1, i], order[2, i]
+        for j in range(_LINE):
+            cosine, sine = _carrier(j, c0, c1, c2, p3, p4)
+            v = between[i, j]
+            re = taps[i, 4 * j] + v * (taps[i, 4 * j + 2] - taps[i, 4 * j])
+            im = taps[i, 4 * j + 1] + v * (taps[i, 4 * j + 3] - taps[i, 4 * j + 1])
+            real[i, j] += re * cosine - im * sine
+            imag[i, j] += re * sine + im * cosine
 
 
 @_compiled
-def _add4(taps, between, c0, c1, c2, p3, p4, real, imag):
+def _add4(taps, between, turn, order, real, imag):
     """Cubic B-spline times the carrier."""
-    for j in range(_LINE):
-        k = _I(j - _LINE // 2)
-        x = _F(k)
-        turned = _I(c0 + k * _I(c1 + k * c2))
-        cosine, sine = _phasor(_F(turned) * _F(1 / _TURN) + x * x * x * (p3 + x * p4))
-        w0, w1, w2, w3 = _cubic(between[j])
-        re = w0 * taps[8 * j] + w1 * taps[8 * j + 2] + w2 * taps[8 * j + 4] + w3 * taps[8 * j + 6]
-        im = w0 * taps[8 * j + 1] + w1 * taps[8 * j + 3] + w2 * taps[8 * j + 5] + w3 * taps[8 * j + 7]
-        real[j] += re * cosine - im * sine
-        imag[j] += re * sine + im * cosine
+    for i in range(real.shape[0]):
+        c0, c1, c2 = turn[0, i], turn[1, i], turn[2, i]
+        p3, p4 = order[1, i], order[2, i]
+        for j in range(_LINE):
+            cosine, sine = _carrier(j, c0, c1, c2, p3, p4)
+            w0, w1, w2, w3 = _cubic(between[i, j])
+            re = w0 * taps[i, 8 * j] + w1 * taps[i, 8 * j + 2] + w2 * taps[i, 8 * j + 4] + w3 * taps[i, 8 * j + 6]
+            im = w0 * taps[i, 8 * j + 1] + w1 * taps[i, 8 * j + 3] + w2 * taps[i, 8 * j + 5] + w3 * taps[i, 8 * j + 7]
+            real[i, j] += re * cosine - im * sine
+            imag[i, j] += re * sine + im * cosine
+
+
+@_compiled
+def _carrier(j, c0, c1, c2, p3, p4):
+    """Phasor of pixel j of a segment: up to second order in integers, beyond in fractions of a cycle."""
+    k = _I(j - _LINE // 2)
+    x = _F(k)
+    turned = _I(c0 + k * _I(c1 + k * c2))
+    return _phasor(_F(turned) * _F(1 / _TURN) + x * x * x * (p3 + x * p4))
 
 
 @_compiled
@@ -354,15 +373,15 @@ def _add_lattice(
     for tile in prange(segments * groups):
         top, left = tile // segments * _ROWS, tile % segments * _LINE
         rows = min(_ROWS, image.shape[0] - top)
-        real, imag = np.zeros((_ROWS, _LINE), np.float32), np.zeros((_ROWS, _LINE), np.float32)
-        index, between = np.empty(_LINE, np.int32), np.empty(_LINE, np.float32)
-        fetched = np.empty(4 * _LINE, np.int64)
+        real, imag = np.zeros((rows, _LINE), np.float32), np.zeros((rows, _LINE), np.float32)
+        index, between = np.empty((rows, _LINE), np.int32), np.empty((rows, _LINE), np.float32)
+        fetched = np.empty((rows, (4 if cubic else 2) * _LINE), np.int64)
         taps = fetched.view(np.float32)
-        whole, fraction = np.empty((2, _ROWS), np.int32), np.empty((2, _ROWS), np.float32)
-        turn, order = np.empty((3, _ROWS), np.int32), np.empty((3, _ROWS), np.float32)
-        middle, ranges = np.empty((3, _ROWS)), np.empty((5, _ROWS))
+        whole, fraction = np.empty((2, rows), np.int32), np.empty((2, rows), np.float32)
+        turn, order = np.empty((3, rows), np.int32), np.empty((3, rows), np.float32)
+        middle, ranges = np.empty((3, rows)), np.empty((5, rows))
         for axis in range(3):
-            for i in range(_ROWS):
+            for i in range(rows):
                 middle[axis, i] = origin[axis] + (top + i) * across[axis] + (left + _LINE // 2) * along[axis]
         for pulse in range(profiles.shape[0]):
             ranges[0] = -reference[pulse]
@@ -370,27 +389,13 @@ def _add_lattice(
             _expand(middle, transmitter[pulse], along, ranges)
             _expand(middle, receiver[pulse], along, ranges)
             _split(ranges, per_metre, first[pulse], cycles, whole, fraction, turn, order)
-            for i in range(rows):
-                c0, c1, c2 = turn[0, i], turn[1, i], turn[2, i]
-                p2, p3, p4 = order[0, i], order[1, i], order[2, i]
-                _places(
-                    whole[0, i],
-                    whole[1, i],
-                    fraction[0, i],
-                    fraction[1, i],
-                    p2,
-                    p3,
-                    p4,
-                    cells_per_cycle,
-                    index,
-                    between,
-                )
-                if cubic:
-                    _fetch4(profiles[pulse], index, fetched)
-                    _add4(taps, between, c0, c1, c2, p3, p4, real[i], imag[i])
-                else:
-                    _fetch2(profiles[pulse], index, fetched)
-                    _add2(taps, between, c0, c1, c2, p3, p4, real[i], imag[i])
+            _places(whole, fraction, order, cells_per_cycle, index, between)
+            if cubic:
+                _fetch4(profiles[pulse], index, fetched)
+                _add4(taps, between, turn, order, real, imag)
+            else:
+                _fetch2(profiles[pulse], index, fetched)
+                _add2(taps, between, turn, order, real, imag)
         for i in range(rows):
             for j in range(_LINE):
                 image[top + i, left + j] += complex(real[i, j], imag[i, j])

@@ -67,7 +67,9 @@ def range_profiles(history: PhaseHistory, length: int, transform: Floats, pulses
     """
     samples = history.samples[pulses]
     spectrum = np.zeros((samples.shape[0], length), dtype=complex)
-    spectrum[:, harmonics(history) % length] = samples / transform
+    below = -int(harmonics(history)[0])  # the carrier
+    np.divide(samples[:, below:], transform[below:], out=spectrum[:, : samples.shape[1] - below])
+    np.divide(samples[:, :below], transform[:below], out=spectrum[:, length - below :])
     return np.fft.ifft(spectrum, axis=1, norm="forward")
 
 
