@@ -16,6 +16,7 @@ from bisar_budget.constants import MAX_DRAWS
 from bisar_budget.errors import printable
 
 if TYPE_CHECKING:
+    from click._termui_impl import ProgressBar
     from click.shell_completion import CompletionItem
 
     from bisar_budget.budget.findings import MissionFindings, Option, Report
@@ -356,7 +357,7 @@ def _checked(
         for index, verified in zip(usable, _verified(list(usable.values()), "*", None), strict=True):
             judged = missions[index]
             if not isinstance(judged, UnusableMission):
-                judged = with_verdicts(judged, verified.rows)
+                judged = with_verdicts(judged, verified)
                 missions[index] = _illustrated(usable[index], judged) if illustrated else judged
     return Report(version=__version__, missions=tuple(missions))
 
@@ -686,7 +687,7 @@ def verify(missions: Sequence[str], only: str, format_name: str, output: str | N
     The data come from exact ranges, and the phase is measured in the image. A limit is confirmed if the
     image shows its budget within 5 %, optimistic if it shows more, conservative if less. With autofocus
     each limit is formed again with its gain and refocused. Exit code: 0, or 1 if a limit is optimistic, 2
-    for wrong usage or an unusable file.
+    for wrong usage, an unusable file, or a mission on whose limits no image gave a verdict.
     """
     from bisar_budget.report import Style, verification
 
@@ -701,6 +702,11 @@ def verify(missions: Sequence[str], only: str, format_name: str, output: str | N
         _print(text)
     else:
         _write(output, text)
+    doubts = [mission for mission in verified if mission.doubt]
+    for mission in doubts:
+        _complain(f"{printable(mission.file)}: {mission.doubt}")
+    if doubts:
+        sys.exit(EXIT_USAGE)
     sys.exit(EXIT_BROKEN if any(mission.status == "fail" for mission in verified) else 0)
 
 
@@ -712,11 +718,16 @@ def _verified(missions: "Sequence[Mission]", only: str, jobs: int | None) -> "li
     total = sum(len(rows_to_verify(mission, only)) for mission in missions)
     if not total and only != "*":
         raise click.UsageError(f"--only {printable(only)}: no row with a limit has such an id, nothing was verified.")
-    watched = sys.stderr is not None and sys.stderr.isatty()
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     jobs = jobs or (1 if is_compiled() else cores)
-    with click.progressbar(length=total, label="Forming images", file=sys.stderr, hidden=not watched) as bar:
+    with _progress_bar(total) as bar:
         return [verify_mission(mission, only, jobs, lambda row_id: bar.update(1)) for mission in missions]
+
+
+def _progress_bar(total: int = 1) -> "ProgressBar[int]":
+    """Bar on standard error, where somebody watches."""
+    watched = sys.stderr is not None and sys.stderr.isatty()
+    return click.progressbar(length=total, label="Forming images", file=sys.stderr, hidden=not watched)
 
 
 @cli.command()
@@ -742,7 +753,13 @@ def simulate(mission: str, plot: str | None, output: str | None) -> None:
     from bisar_budget.simulate.point import SimulationError, simulate_point
 
     try:
-        images = simulate_point(loaded)
+        with _progress_bar() as bar:
+
+            def progress(done: int, work: int) -> None:
+                bar.length = work
+                bar.update(done)
+
+            images = simulate_point(loaded, progress)
     except (SimulationError, ValueError) as error:
         _fail(f"{mission}: {error}")
     try:

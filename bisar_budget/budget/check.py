@@ -13,6 +13,8 @@ from bisar_budget.budget.correlation import (
     combined_phase,
     correlated_errors,
     correlation_notes,
+    displacement_parts,
+    phase_parts,
     unused_correlations,
 )
 from bisar_budget.budget.findings import FileWarning, MissionFindings, Resolution, Row
@@ -140,7 +142,7 @@ def _error_rows(
             qpe = abs(source.qpe(model))
             doubt = _doubt(source, model, limit, first_order.ground) or doubt
             needed = allocation.n_pull_needed(qpe, source.owner)
-            of_model = "full model" if source.by(model) is source.full else source.equation
+            of_model = source.equation_by(model)
             over = (
                 f"QPE {qpe:.3g} rad, {limit:.3g} rad allowed ({of_model}); "
                 f"passes with autofocus from n_pull {needed:g}"
@@ -166,7 +168,7 @@ def _error_rows(
                 mission.line(source.path),
                 reason or None,
                 notes,
-                source.equation,
+                source.equation_by(model),
                 mission.requirement_ids.get(source.id),
                 source.evidence,
                 source.is_independent,
@@ -243,7 +245,7 @@ def _undeclared(
             mission.line(source.path),
             _no_limit(source, mission.allocation.model) if allowable is None else None,
             notes,
-            source.equation,
+            source.equation_by(mission.allocation.model),
             mission.requirement_ids.get(source.id),
             source.evidence,
             source.is_independent,
@@ -313,18 +315,21 @@ def _aggregate_rows(
         by_exact = combined_phase(_with_exact(motion, found), "cubic", "full", combine, groups)
         cubic_notes, exact_doubt = of_members(found, motion, by_exact, cubic_limit, "rad")
         cubic_doubt = cubic_doubt or exact_doubt
+    cubic_phase = combined_phase(motion, "cubic", model, combine, groups) if motion else None
+    cubic_parts = phase_parts(motion, "cubic", model, combine, groups)
+    over = _exceeded("cubic phase", cubic_phase, cubic_limit, "rad", cubic_parts)
     yield _judged(
         mission,
         id="mission.cubic_phase_error",
         metric="cubic_phase_error",
         unit="rad",
-        declared=combined_phase(motion, "cubic", model, combine, groups) if motion else None,
+        declared=cubic_phase,
         allowable=mission.requirements.cubic_phase_error,
         path=("requirements", "cubic_phase_error"),
         equation="Table I, cubic column" if model == "published" else "full model",
         no_limit=NO_REQUIREMENT,
         info="" if mission.requirements.cubic_phase_error is not None else NO_REQUIREMENT,
-        over="cubic phase at the aperture edge above the requirement; autofocus gain does not apply",
+        over=f"{over}; autofocus gain does not apply",
         doubt=cubic_doubt,
         notes=(*notes, *cubic_notes),
     )
@@ -336,6 +341,7 @@ def _aggregate_rows(
         published = [(s.id, by_25.displacement(s.effect, s.declared or 0.0)) for s in motion]
         moves = [(row_id, move) for row_id, move in published if move is not None]
         moved = max(moved, combined_displacement(moves, combine, groups))
+    lengths = [(row_id, math.hypot(*move)) for row_id, move in displacement_parts(known, combine, groups)]
     location_notes: tuple[str, ...] = ()
     location_doubt = ""
     if found and motion:
@@ -360,12 +366,13 @@ def _aggregate_rows(
         not_evaluated=plane.degeneracy if model == "published" else "",
         is_declared=bool(motion),
         info="" if mission.requirements.location_error is not None else NO_REQUIREMENT,
-        over="displacement of the image above the requirement",
+        over=_exceeded("displacement of the image", moved, mission.requirements.location_error, "m", lengths),
         doubt=location_doubt,
         notes=(*notes, *location_notes),
     )
     if allocation.n_pull is not None:
         pull_in = math.pi * allocation.n_pull
+        total = math.fsum(abs(s.qpe(model)) for s in declared) if declared else None
         by_exact = math.fsum(abs(s.qpe("full")) for s in _with_exact(declared, found))
         pull_in_notes, pull_in_doubt = of_members(found, declared, by_exact, pull_in, "rad")
         yield _judged(
@@ -373,15 +380,26 @@ def _aggregate_rows(
             id="mission.autofocus_pull_in",
             metric="quadratic_phase_error",
             unit="rad",
-            declared=math.fsum(abs(s.qpe(model)) for s in declared) if declared else None,
+            declared=total,
             allowable=pull_in,
             path=("autofocus", "n_pull"),
             equation="Section VI",
             never_fails=True,
-            over="the errors together exceed what autofocus corrects: it corrects one total, not each error its own",
+            over=_exceeded("QPE", total, pull_in, "rad", [(s.id, abs(s.qpe(model))) for s in declared])
+            + "; autofocus corrects one total, not each error its own",
             doubt=pull_in_doubt,
             notes=pull_in_notes,
         )
+
+
+def _exceeded(
+    what: str, size: float | None, limit: float | None, unit: str, members: Sequence[tuple[str, float]]
+) -> str:
+    """Say how large an aggregate is, what is allowed, and which of its members is the largest."""
+    if size is None or limit is None or not members:
+        return ""
+    row_id, largest = max(members, key=lambda member: abs(member[1]))
+    return f"{what} {size:.3g} {unit}, {limit:.3g} {unit} allowed; largest: {row_id}, {abs(largest):.3g} {unit}"
 
 
 def _with_exact(members: Sequence[ErrorSource], found: Mapping[str, Beyond]) -> list[ErrorSource]:
@@ -452,7 +470,10 @@ def _qpe_aggregates(
             for of in (model, "published", "full")
         )
         limit = allocation.qpe_limit(owner) * gain
-        over = "" if qpe is None else f"passes with autofocus from n_pull {allocation.n_pull_needed(qpe, owner):g}"
+        over = ""
+        if qpe is not None:
+            exceeded = _exceeded("QPE", qpe, limit, "rad", phase_parts(members, "qpe", model, combine, groups))
+            over = f"{exceeded}; passes with autofocus from n_pull {allocation.n_pull_needed(qpe, owner):g}"
         other = {"published": ("full", full), "full": ("published", published)}.get(model)
         doubt = ""
         if other is not None and other[1] is not None and other[1] > limit * (1 + UTILIZATION_TOLERANCE):

@@ -91,13 +91,15 @@ class MissionFindings(NamedTuple):
     notes: tuple[str, ...]
     scene: "SceneEdge | None" = None  # of missions with a scene.radius and declared errors
     verdicts: "tuple[Verdict, ...] | None" = None  # of images, if any were formed
+    is_unverified: bool = False  # images were asked for, and none gave a verdict
     image_evidence: "tuple[ImageEvidence, ...]" = ()  # a few of those images, where a report shows them
     monte_carlo: "MonteCarlo | None" = None  # if errors were drawn
 
     @property
     def status(self) -> str:
-        """Worst status of the rows."""
-        return worst(row.status for row in self.rows)
+        """Worst status of the rows; no better than `not_evaluated` if images were formed and verified nothing."""
+        doubt = ["not_evaluated"] if self.is_unverified else []
+        return worst([*(row.status for row in self.rows), *doubt])
 
     @property
     def summary(self) -> dict[str, int]:
@@ -146,13 +148,7 @@ class Report(NamedTuple):
         failing = ("fail", "not_evaluated", "warn") if strict else ("fail",)
         if any(mission.status == "error" for mission in self.missions):
             return 2
-        broken = any(
-            row.status in failing
-            for mission in self.missions
-            if isinstance(mission, MissionFindings)
-            for row in mission.rows
-        )
-        return 1 if broken else 0
+        return 1 if any(mission.status in failing for mission in self.missions) else 0
 
 
 def worst(statuses: Iterable[str]) -> str:

@@ -95,6 +95,10 @@ class ErrorSource(NamedTuple):
         is_full = model == "full" or abs(self.full.qpe) >= abs(self.effect.qpe)
         return self.full if is_full else self.effect
 
+    def equation_by(self, model: str) -> str:
+        """Where the effect by a model comes from."""
+        return "full model" if self.is_motion and self.by(model) is self.full else self.equation
+
     def qpe(self, model: str) -> float:
         """Quadratic phase error of the declared error by a model, signed; 0 if none is declared. [rad]"""
         return self.by(model).qpe * (self.declared or 0.0)

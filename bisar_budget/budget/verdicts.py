@@ -12,9 +12,10 @@ class Verdict(NamedTuple):
 
     Phases are magnitudes at the aperture edge [rad]: by the full model's closed form, predicted from exact
     ranges, and measured, `…_inside` and `…_beyond` at 0.9 and 1.1 times the limit. Displacements are on the
-    ground (east, north) [m]: `displacement_m` by exact ranges, `displacement_published_m` by (25). The smear
-    azimuth is that of a line, from 0 to π; `…_published_rad` by (31). For vibration `measured_db` stands
-    against `requirement_db`. With autofocus the row is formed again at `boundary_autofocus` and refocused.
+    ground (east, north) [m]: `displacement_m` by exact ranges, `…_published_m` by (25), `…_full_m` by the full
+    model. The smear azimuth is that of a line, from 0 to π; `…_published_rad` by (31). For vibration
+    `measured_db` stands against `requirement_db`. With autofocus the row is formed again at
+    `boundary_autofocus` and refocused.
     """
 
     id: str
@@ -38,6 +39,7 @@ class Verdict(NamedTuple):
     measured_db_error: float | None = None
     displacement_m: GroundVector | None = None
     displacement_published_m: GroundVector | None = None
+    displacement_full_m: GroundVector | None = None
     measured_displacement_m: GroundVector | None = None
     smear_azimuth_published_rad: float | None = None
     measured_smear_azimuth_rad: float | None = None
@@ -51,25 +53,41 @@ class Verdict(NamedTuple):
 
 
 class VerifiedMission(NamedTuple):
-    """The verdicts on one mission's limits."""
+    """The verdicts on one mission's limits; `conditions` says of what images they are."""
 
     file: str
     name: str
     rows: tuple[Verdict, ...]
+    conditions: str = ""
 
     @property
     def status(self) -> str:
-        """`fail` if a limit of the gating model is optimistic, with or without autofocus, else `pass`."""
+        """`fail` if a limit of the gating model is optimistic, with or without autofocus.
+
+        `not_evaluated` if no limit got a verdict: nothing was verified, which is no pass. Else `pass`.
+        """
         verdicts = {row.verdict for row in self.rows} | {row.verdict_autofocus for row in self.rows}
-        return "fail" if "optimistic" in verdicts else "pass"
+        if "optimistic" in verdicts:
+            return "fail"
+        return "not_evaluated" if self.doubt else "pass"
+
+    @property
+    def doubt(self) -> str:
+        """Say that no limit got a verdict; empty if one did."""
+        if any({row.verdict, row.verdict_autofocus} - {"not_evaluated", None} for row in self.rows):
+            return ""
+        rows = f"{len(self.rows)} row{'s' if len(self.rows) != 1 else ''}"
+        return f"nothing was verified: {rows} with a limit, and no image gave a verdict on any"
 
 
-def with_verdicts(findings: MissionFindings, rows: tuple[Verdict, ...]) -> MissionFindings:
+def with_verdicts(findings: MissionFindings, verified: VerifiedMission) -> MissionFindings:
     """Add verdicts to findings: a limit that the image shows to be optimistic is said at its row.
 
-    A row that passes a limit it would fail as measured becomes a warning: the model that gates says pass, but
-    a gate must not be silent about what it knows.
+    A row that passes a limit it would fail as measured becomes a warning, and so does one that passes by an autofocus
+    that the image refutes: the model that gates says pass, but a gate must not be silent about what it knows. That no
+    image gave a verdict is a warning too.
     """
+    rows = verified.rows
     by_id = {verdict.id: verdict for verdict in rows}
     judged = tuple(_with_verdict(row, by_id[row.id]) if row.id in by_id else row for row in findings.rows)
     known = {row.id for row in findings.rows}
@@ -78,7 +96,15 @@ def with_verdicts(findings: MissionFindings, rows: tuple[Verdict, ...]) -> Missi
         for verdict in rows
         if verdict.id not in known and verdict.verdict == "optimistic"
     )
-    return findings._replace(rows=judged, warnings=(*findings.warnings, *warnings), verdicts=rows)
+    if verified.doubt:
+        warnings = (FileWarning(line=None, message=verified.doubt), *warnings)
+    return findings._replace(
+        rows=judged,
+        warnings=(*findings.warnings, *warnings),
+        notes=(*findings.notes, f"images: {verified.conditions}") if verified.conditions else findings.notes,
+        verdicts=rows,
+        is_unverified=bool(verified.doubt),
+    )
 
 
 def _with_verdict(row: Row, verdict: Verdict) -> Row:
@@ -87,6 +113,11 @@ def _with_verdict(row: Row, verdict: Verdict) -> Row:
         notes = (*notes, f"optimistic limit: {_shown(verdict)}")
     if verdict.verdict_autofocus == "optimistic":
         notes = (*notes, f"optimistic limit with autofocus: {verdict.reason_autofocus}")
+        if row.status == "pass_with_autofocus":
+            reason = "passes by autofocus alone, and the image at that limit refutes it"
+            return row._replace(status="warn", reason=reason, notes=notes)
+    if row.metric == "location_error" and row.status == "pass" and verdict.verdict == "optimistic":
+        return row._replace(status="warn", reason="the image is not where the gating model puts it", notes=notes)
     excess = _excess(verdict)
     if (
         row.status in ("pass", "pass_with_autofocus")

@@ -8,6 +8,7 @@ from bisar_budget.budget.findings import Row
 from bisar_budget.errors import printable
 from bisar_budget.report.comparison import Change, MissionChange
 from bisar_budget.report.escapes import markdown_text
+from bisar_budget.report.layout import table, wrapped
 from bisar_budget.report.text_table import WORDS, percent
 from bisar_budget.units import format_quantity
 
@@ -20,19 +21,14 @@ def as_text(missions: Sequence[MissionChange], tolerated: float | None) -> str:
 
 
 def _text(mission: MissionChange, tolerated: float | None) -> list[str]:
-    lines = [printable(f"{mission.before.file} -> {mission.after.file}"), ""]
+    lines = [*wrapped(printable(f"{mission.before.file} -> {mission.after.file}"), "  "), ""]
     if mission.changes:
-        lines.append(_cells("row", "before", "after", "erosion", "status"))
-        for change in mission.changes:
-            numbers = (_use(change.before), _use(change.after), _erosion(change), _statuses(change))
-            name = printable(change.id)
-            lines += [_cells(name, *numbers)] if len(name) <= 34 else [name, _cells("", *numbers)]
-        lines.append("")
-    return [*lines, _summary(mission, tolerated)]
-
-
-def _cells(row: str, before: str, after: str, erosion: str, status: str) -> str:
-    return f"{row:<34} {before:>8} {after:>8} {erosion:>8}  {status}".rstrip()
+        rows = [
+            (printable(change.id), _use(change.before), _use(change.after), _erosion(change), _statuses(change))
+            for change in mission.changes
+        ]
+        lines += [*table([("row", "before", "after", "erosion", "status"), *rows]), ""]
+    return [*lines, *wrapped(_summary(mission, tolerated), "  ")]
 
 
 def _use(row: Row | None) -> str:

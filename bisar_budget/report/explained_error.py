@@ -18,9 +18,8 @@ from bisar_budget.errors import KeyPath, printable
 from bisar_budget.geometry import FRAME_AXES, PlatformState
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import formulas
+from bisar_budget.report.explained_full import RATES, full_chain
 from bisar_budget.report.formulas import Equation, Step, Sum, equation, number, step, with_unit
-
-_RATES = ("m", "m/s", "m/s²", "m/s³")  # units of the range error's coefficients
 
 
 def declaration(mission: Mission, source: ErrorSource) -> Iterator[Step]:
@@ -96,6 +95,9 @@ def effect(
     each = " of one unit" if source.declared is None else ""
     qpe = abs(source.effect.qpe) * size
     platform, kind, axis = (*source.id.split(".", 2), "")[:3]
+    gates_by_full = mission.allocation.model != "published" and source.by(mission.allocation.model) is source.full
+    if gates_by_full and source.is_motion and source.owner != "mission":
+        yield from step("The published model, for comparison; what gates, the full model, comes after it")
     if not source.is_motion:
         yield from step("Quadratic phase error, as declared", f"QPE = {size:.6g} rad")
     elif platform == "common":
@@ -112,14 +114,18 @@ def effect(
             result = coefficients[order] * size if order < 2 else _coefficient(mission, source, order) * size
             yield from step(
                 f"Table I row {2 + 3 * formulas.AXES.index(axis) + list(MOTION_UNITS).index(kind)}{each}",
-                *equation(f"β̃_{order}", formula, values, result, _RATES[order]),
+                *equation(f"β̃_{order}", formula, values, result, RATES[order]),
             )
         phase = formulas.motion_phase(kind, axis, platform)
         if phase is not None:
             yield from step(f"{source.equation}{each}", *equation("QPE", phase, values, qpe, "rad"))
     else:
         yield from _projected_effect(mission, found, source, sources, size, each)
-    if source.is_motion:
+    if not source.is_motion:
+        return
+    if gates_by_full:
+        yield from full_chain(mission, found, source, math.copysign(size, source.declared or 1.0), each)
+    else:
         yield from _full(full_ground(mission, found.geometry), source, size, each)
         yield from _displacement(mission, found, source)
 
@@ -153,7 +159,7 @@ def _clock_effect(mission: Mission, source: ErrorSource, size: float, each: str)
         f"t̃_{order}": size,
     }
     result = SPEED_OF_LIGHT * size
-    lines = equation(f"β̃_{order}", formulas.clock_coefficient(order), values, result, _RATES[order])
+    lines = equation(f"β̃_{order}", formulas.clock_coefficient(order), values, result, RATES[order])
     yield from step(f"Table I row 1{each}", *lines)
     if order == 2:
         qpe = abs(source.effect.qpe) * size
@@ -198,7 +204,10 @@ def _full(ground: FullGround, source: ErrorSource, size: float, each: str) -> It
     size = math.copysign(size, source.declared or 1.0)
     moved = ground.moved(source.full) * size
     values = {"φ_turning": source.full.qpe * size - moved, "φ_displaced": moved}
-    title = f"Full model{each}: phase as the line of sight turns, and what the displaced response adds"
+    title = (
+        f"Full model{each}, for comparison: phase as the line of sight turns, and what the displaced response adds "
+        "(--model full shows how)"
+    )
     yield from step(title, *equation("QPE_full", "φ_turning + φ_displaced", values, source.full.qpe * size, "rad"))
 
 

@@ -14,9 +14,12 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.report import formulas
 from bisar_budget.report.explained_error import as_written, declaration, effect, missing, place, plane_and_effect
 from bisar_budget.report.formulas import Step, Sum, equation, number, step
+from bisar_budget.report.layout import wrapped
 from bisar_budget.report.text_table import WORDS, percent
 from bisar_budget.units import format_quantity
 
+_DEEPER = 3  # a broken equation goes on; no symbol has the width that would put its equals sign there
+_LONGEST_UNIT = 16  # letters, of what may follow a number
 _RULES = {"each": "the largest", "sum": "the sum", "rss": "the root-sum-square"}
 
 
@@ -37,7 +40,19 @@ def explain(mission: Mission, found: MissionFindings, row_id: str) -> str:
     lines = [f"{WORDS[row.status]} {printable(row.id)}{own_id} of {printable(mission.name)}", ""]
     lines += [line for step in chain(mission, found, row) for line in step.lines]
     lines += _verdict(row)
-    return "\n".join(lines) + "\n"
+    return "\n".join(part for line in lines for part in _fitted(line)) + "\n"
+
+
+def _fitted(line: str) -> list[str]:
+    """Break a line, an equation deeper than any begins, and never between a result, its sign and its unit."""
+    start = len(line) - len(line.lstrip())
+    if not start:
+        return wrapped(line, "  ")
+    joined = line.replace("= ", "=\u00a0")
+    body, _, unit = joined.rpartition(" ")
+    if body.strip() and len(unit) < _LONGEST_UNIT:
+        joined = f"{body}\u00a0{unit}"
+    return [part.replace("\u00a0", " ") for part in wrapped(joined, " " * (start + _DEEPER))]
 
 
 def chain(mission: Mission, found: MissionFindings, row: Row) -> Iterator[Step]:

@@ -1,5 +1,7 @@
 """Lines of text for a terminal."""
 
+from collections.abc import Sequence
+
 WIDTH = 80
 
 
@@ -16,3 +18,25 @@ def wrapped(text: str, indent: str) -> list[str]:
         else:
             line += f" {word}"
     return [*lines, line]
+
+
+def wrapped_counts(text: str) -> list[str]:
+    """Break `file: 1 FAIL, 2 pass` before 80 columns, after a colon or comma."""
+    joined = text.replace(" ", "\u00a0").replace(",\u00a0", ", ").replace(":\u00a0", ": ").replace(";\u00a0", "; ")
+    return [line.replace("\u00a0", " ") for line in wrapped(joined, "  ")]
+
+
+def table(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Align rows of cells, the header first: names to the left, numbers to the right, the last column to the left.
+
+    A name that would take its line beyond 80 columns gets a line of its own, above its numbers.
+    """
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    room = WIDTH - sum(widths[1:]) - len(widths) + 1
+    first = max((len(row[0]) for row in rows if len(row[0]) <= room), default=0)
+    lines = []
+    for name, *cells in rows:
+        numbers = " ".join(cell.rjust(width) for cell, width in zip(cells[:-1], widths[1:-1], strict=True))
+        rest = f"{numbers} {cells[-1]}".rstrip()
+        lines += [f"{name:<{first}} {rest}"] if len(name) <= first else [name, f"{'':<{first}} {rest}"]
+    return lines

@@ -9,7 +9,7 @@ from bisar_budget.budget.findings import MissionFindings, Report, Row, UnusableM
 from bisar_budget.errors import printable
 from bisar_budget.geometry import PlatformState
 from bisar_budget.report import Style
-from bisar_budget.report.layout import wrapped
+from bisar_budget.report.layout import WIDTH, wrapped, wrapped_counts
 from bisar_budget.units import format_quantity
 
 WORDS = {
@@ -56,19 +56,18 @@ def render(report: Report, style: Style) -> str:
 
 def _unusable(mission: UnusableMission, style: Style) -> list[str]:
     count = len(mission.faults)
-    summary = (
-        f"{_word('error', style)} {printable(mission.file)}: cannot be used, {count} fault{'s' if count != 1 else ''}"
-    )
+    summary = f"{WORDS['error']} {printable(mission.file)}: cannot be used, {count} fault{'s' if count != 1 else ''}"
     if style.verbosity < 0:
-        return [summary]
+        return [_lead(summary, "error", style)]
     places = [f"  {fault.line or '-'}:{fault.column or '-'}  {fault}" for fault in mission.faults]
-    return [*(line for place in places for line in wrapped(place, "       ")), summary]
+    first, *rest = wrapped_counts(summary)
+    return [*(line for place in places for line in wrapped(place, "       ")), _lead(first, "error", style), *rest]
 
 
 def _mission(mission: MissionFindings, style: Style) -> list[str]:
     if style.verbosity < 0:
-        return [_summary(mission, style)]
-    lines = [mission.name, ""]
+        return [_lead(_summary(mission), mission.status, style)]
+    lines = [*wrapped(mission.name, "  "), ""]
     lines += [line for key, text in head(mission) for line in wrapped(f"{key:<12} {text}", " " * 13)]
     rows = worst_first(mission.rows)
     lines += ["", _cells("status", "row", "declared", "allowable", "use", "from")]
@@ -85,7 +84,8 @@ def _mission(mission: MissionFindings, style: Style) -> list[str]:
         from bisar_budget.report.verification import evidence
 
         lines += ["", "Images with each error at its limit", "", *evidence(mission.verdicts, style)]
-    return [*lines, "", _summary(mission, style)]
+    first, *rest = wrapped_counts(_summary(mission))
+    return [*lines, "", _lead(first, mission.status, style), *rest]
 
 
 def head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
@@ -146,10 +146,10 @@ def _row(row: Row, style: Style) -> list[str]:
         if row.utilization is not None and status != "not_evaluated":
             use = percent(row.utilization)
     reference = _short_reference(row.equation)
-    if len(row_id) <= 34:
-        lines = [_cells(WORDS[status], row_id, size, allowable, use, reference)]
-    else:
-        lines = [f"{WORDS[status]:<8} {row_id}", _cells("", "", size, allowable, use, reference)]
+    lines = [_cells(WORDS[status], row_id, size, allowable, use, reference)]
+    if len(row_id) > 34 or len(lines[0]) > WIDTH:
+        numbers = _cells("", "", size, allowable, use, reference)
+        lines = [f"{WORDS[status]:<8} {row_id}", numbers if len(numbers) <= WIDTH else numbers.lstrip().rjust(WIDTH)]
     if style.color:
         lines[0] = _word(status, style, 8) + lines[0][8:]
     if row.requirement_id and status not in _EXPLAINED and style.verbosity < 1:
@@ -159,7 +159,9 @@ def _row(row: Row, style: Style) -> list[str]:
 
 @cache
 def _short_reference(equation: str) -> str:
-    """Shorten `Table II row 4` to `II.4`, `Section V, …` to `V`; what is not from the paper to nothing."""
+    """Shorten `Table II row 4` to `II.4`, `Section V, …` to `V`, `full model` to `full`; others to nothing."""
+    if equation == "full model":
+        return "full"
     match = re.match(r"Table (I+)(?: rows? ([\d-]+))?|Section (V?I*)|(\(\d+\))", equation)
     if match is None:
         return ""
@@ -199,7 +201,7 @@ def _details(row: Row, mission: MissionFindings, style: Style) -> list[str]:
     file = printable(mission.file)
     place = f"{file}:{row.line}" if row.line is not None else file
     own_id = f" [{row.requirement_id}]" if row.requirement_id else ""
-    head = f"{_word(row.status, style)} {row.id}{own_id} ({place})"
+    head = f"{WORDS[row.status]} {row.id}{own_id} ({place})"
     texts = [row.reason] if row.reason else []
     texts += row.notes
     if style.verbosity > 0:
@@ -209,26 +211,39 @@ def _details(row: Row, mission: MissionFindings, style: Style) -> list[str]:
             texts.append(f"moves the image by {format_quantity(x, 'm')} east, {format_quantity(y, 'm')} north")
         if row.evidence:
             texts.append(f"evidence: {row.evidence}")
-    return [head, *(line for text in texts for line in wrapped(f"  {text}", "  "))]
+    lines = [*wrapped(head, "  "), *(line for text in texts for line in wrapped(f"  {text}", "  "))]
+    return [_lead(lines[0], row.status, style), *lines[1:]]
 
 
 def _asides(mission: MissionFindings, style: Style) -> Iterator[str]:
     for warning in mission.warnings:
         place = f"{printable(mission.file)}:{warning.line}: " if warning.line is not None else ""
         yield f"warning: {place}{printable(warning.message)}"
+    yield from (f"note: {note}" for note in mission.notes)
     if style.verbosity > 0:
-        yield from (f"note: {note}" for note in mission.notes)
+        return  # each row has its notes
+    qualified: dict[str, list[str]] = {}
+    for row in mission.rows:
+        if row.declared and row.status not in _EXPLAINED:
+            for note in row.notes:
+                qualified.setdefault(note, []).append(row.id)
+    yield from (f"note: {', '.join(ids)}: {note}" for note, ids in qualified.items())
 
 
-def _summary(mission: MissionFindings, style: Style) -> str:
+def _summary(mission: MissionFindings) -> str:
     counts = ", ".join(f"{count} {WORDS[status]}" for status, count in mission.summary.items())
-    return f"{_word(mission.status, style)} {printable(mission.file)}: {counts}"
+    return f"{WORDS[mission.status]} {printable(mission.file)}: {counts}"
 
 
 def _overall(report: Report, style: Style) -> str:
     statuses = [mission.status for mission in report.missions]
     counts = ", ".join(f"{statuses.count(status)} {WORDS[status]}" for status in WORDS if status in statuses)
     return f"{_word(report.status, style)} {len(statuses)} missions: {counts}"
+
+
+def _lead(line: str, status: str, style: Style) -> str:
+    """Colour the status that a line begins with."""
+    return _word(status, style) + line.removeprefix(WORDS[status])
 
 
 def _word(status: str, style: Style, width: int = 0) -> str:

@@ -7,10 +7,16 @@ from collections.abc import Iterator, Sequence
 from bisar_budget.budget.verdicts import Verdict, VerifiedMission
 from bisar_budget.errors import printable
 from bisar_budget.report import Style
-from bisar_budget.report.layout import wrapped
+from bisar_budget.report.layout import table, wrapped, wrapped_counts
 from bisar_budget.units import format_quantity
 
 FORMAT = "bisar-budget/verify/1"
+WORDS = {
+    "optimistic": "optimistic",
+    "confirmed": "confirmed",
+    "conservative": "conservative",
+    "not_evaluated": "not eval",
+}
 _ANSI = {"optimistic": "1;31", "confirmed": "32", "conservative": "33", "not_evaluated": "35"}
 
 
@@ -24,6 +30,7 @@ def as_json(version: str, missions: Sequence[VerifiedMission]) -> str:
                 "file": mission.file,
                 "name": mission.name,
                 "status": mission.status,
+                "conditions": mission.conditions,
                 "rows": [row._asdict() for row in mission.rows],
             }
             for mission in missions
@@ -40,47 +47,53 @@ def as_text(missions: Sequence[VerifiedMission], style: Style) -> str:
 
 def _mission(mission: VerifiedMission, style: Style) -> list[str]:
     found = [row.verdict for row in mission.rows]
-    counts = ", ".join(f"{found.count(verdict)} {verdict}" for verdict in _ANSI if verdict in found)
+    counts = ", ".join(f"{found.count(verdict)} {word}" for verdict, word in WORDS.items() if verdict in found)
     refuted = sum(row.verdict_autofocus == "optimistic" for row in mission.rows)
     counts += f"; {refuted} optimistic with autofocus" if refuted else ""  # they decide the exit code too
     summary = f"{printable(mission.file)}: {counts or 'no row has a limit here'}"
-    return [mission.name, "", *evidence(mission.rows, style), "", summary]
+    conditions = wrapped(f"Images: {mission.conditions}.", "  ") if mission.conditions else []
+    return [
+        *wrapped(printable(mission.name), "  "),
+        "",
+        *conditions,
+        "",
+        *evidence(mission.rows, style),
+        "",
+        *wrapped_counts(summary),
+    ]
 
 
 def evidence(rows: Sequence[Verdict], style: Style) -> list[str]:
     """Table of the verdicts, with autofocus a second one, and what there is to say about them."""
-    width = max((len(row.id) for row in rows), default=0)
-    lines = [f"{'row':<{width}}      limit   budget     full    exact    image verdict"]
-    lines += [
-        f"{row.id:<{width}} {limit(row):>11} {' '.join(f'{cell:>8}' for cell in numbers(row))} "
-        + _word(row.verdict, style)
-        for row in rows
-    ]
-    refocused = [row for row in rows if row.verdict_autofocus]
+    cells = [(printable(row.id), limit(row), *numbers(row), WORDS[row.verdict]) for row in rows]
+    lines = table([("row", "limit", "budget", "full", "exact", "image", "verdict"), *cells])
+    refocused = [(printable(row.id), *refocused_cells(row)) for row in rows if row.verdict_autofocus]
     if refocused:
         lines += ["", "At the limit with autofocus, refocused:", ""]
-        lines += [f"{'row':<{width}}      limit   budget residual     loss verdict"]
-        for row in refocused:
-            limit_refocused, *cells, verdict = refocused_cells(row)
-            lines.append(
-                f"{row.id:<{width}} {limit_refocused:>11} {' '.join(f'{cell:>8}' for cell in cells)} "
-                + _word(verdict, style)
-            )
+        lines += table([("row", "limit", "budget", "residual", "loss", "verdict"), *refocused])
+    lines = [_coloured(line, style) for line in lines]
     reasons = [f"{row.id}: {reason}" for row in rows for reason in (row.reason, row.reason_autofocus) if reason]
     asides = [line for text in (*geometry_remarks(rows), *reasons) for line in wrapped(f"  {text}", "    ")]
     return [*lines, "", *asides] if asides else lines
 
 
 def geometry_remarks(rows: Sequence[Verdict]) -> Iterator[str]:
-    """Say how far displacement and smear of the images are from (25) and (31), at worst."""
-    apart = [
-        (math.dist(row.measured_displacement_m, row.displacement_published_m), row.id)
-        for row in rows
-        if row.measured_displacement_m and row.displacement_published_m
-    ]
-    if apart:
-        distance, row_id = max(apart)
-        yield f"displacement of the images: within {format_quantity(distance, 'm', 2)} of (25), farthest {row_id}"
+    """Say how far displacement and smear of the images are from the gating model's and from (31), at worst."""
+    by_25 = [row for row in rows if row.model == "published"]
+    by_full = [row for row in rows if row.model != "published"]
+    for rule, members, field in (
+        ("(25)", by_25, "displacement_published_m"),
+        ("the full model", by_full, "displacement_full_m"),
+    ):
+        apart = [
+            (math.dist(row.measured_displacement_m, said), row.id)
+            for row in members
+            if row.measured_displacement_m and (said := getattr(row, field)) is not None
+        ]
+        if apart:
+            distance, row_id = max(apart)
+            within = format_quantity(distance, "m", 2)
+            yield f"displacement of the images: within {within} of {rule}, farthest {row_id}"
     turned = [
         (abs((measured - line + math.pi / 2) % math.pi - math.pi / 2), row.id)
         for row in rows
@@ -100,7 +113,7 @@ def limit(row: Verdict) -> str:
 def numbers(row: Verdict) -> tuple[str, str, str, str]:
     """Budget, what the full model and exact ranges predict, what the image shows; phases in rad."""
     if row.requirement_db is not None:
-        return _decibel(row.requirement_db), "-", "-", _decibel(row.measured_db)
+        return f"{row.requirement_db:g} dB", "-", "-", _decibel(row.measured_db)
     if row.unit == "m" and row.budget_rad is None:
         moves = (row.displacement_m, row.measured_displacement_m)
         exact, image = ("-" if move is None else format_quantity(math.hypot(*move), "m") for move in moves)
@@ -119,7 +132,7 @@ def refocused_cells(row: Verdict) -> tuple[str, str, str, str, str]:
         _phase(row.budget_rad),
         _phase(row.measured_residual_qpe_rad),
         _decibel(row.refocused_loss_db),
-        row.verdict_autofocus or "",
+        WORDS[row.verdict_autofocus or "not_evaluated"],
     )
 
 
@@ -128,12 +141,16 @@ def _quantity(value: float | None, unit: str) -> str:
 
 
 def _phase(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3f}"
+    return "-" if value is None else f"{value:.3f}" if value < 10 else f"{value:.4g}"
 
 
 def _decibel(value: float | None) -> str:
     return "-" if value is None else f"{value:.1f} dB" if abs(value) >= 1 else f"{value:.2f} dB"
 
 
-def _word(verdict: str, style: Style) -> str:
-    return f"\x1b[{_ANSI[verdict]}m{verdict}\x1b[0m" if style.color else verdict
+def _coloured(line: str, style: Style) -> str:
+    """Colour the verdict that ends a line."""
+    for verdict, word in WORDS.items() if style.color else ():
+        if line.endswith(f" {word}"):
+            return f"{line.removesuffix(word)}\x1b[{_ANSI[verdict]}m{word}\x1b[0m"
+    return line

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.simulate.aperture_fit import edge_phases
 from bisar_budget.simulate.phase_history import Floats, Path
 
 _ORDER = 6  # of the fit in slow time
@@ -15,7 +16,10 @@ _SETTLED_M = 1e-6  # a satellite's range in double precision gives no more
 
 @dataclass(frozen=True, kw_only=True)
 class ExactEffect:
-    """Displacement (east, north) [m]; phases at the aperture edge, signed like the range error [rad]."""
+    """Displacement (east, north) [m]; phases at the aperture edge, signed like the range error [rad].
+
+    The phases are those of the best fit over the whole aperture (`aperture_fit`), whatever its length.
+    """
 
     displacement: tuple[float, float]
     quadratic: float
@@ -33,7 +37,7 @@ def exact_effect(
     """Find where the response of a scatterer at the scene centre goes, and what phase is left there.
 
     The response sits at the ground point whose range history, for the measured positions, has the recorded
-    constant and linear term; what remains of the history at that point is what defocuses.
+    constant and linear term at the aperture midpoint; what remains of the history at that point is what defocuses.
 
     Raises
     ------
@@ -53,10 +57,8 @@ def exact_effect(
         step = np.linalg.solve(slope[:2], left[:2])
         point[:2] += step
         if np.hypot(*step) < _SETTLED_M:
-            scale = 2 * math.pi / wavelength_m
+            phases = edge_phases(2 * math.pi / wavelength_m * left)
             return ExactEffect(
-                displacement=(float(point[0]), float(point[1])),
-                quadratic=scale * float(left[2] + 6 / 7 * left[4] + 5 / 7 * left[6]),  # least squares over all of it
-                cubic=scale * float(left[3] + 10 / 9 * left[5]),
+                displacement=(float(point[0]), float(point[1])), quadratic=phases.quadratic, cubic=phases.cubic
             )
     raise ValueError("no ground point has the recorded range history")

@@ -12,10 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bisar_budget.simulate.aperture_fit import EdgePhases, edge_phases
 from bisar_budget.simulate.phase_history import Complexes, Floats
 
 _UPSAMPLING = 32
 _CHIP_UPSAMPLING = 8
+_ORDER = 4  # of the phase over the aperture; higher ones follow the ripple
 _INNER_BAND = 0.9  # of the aperture; its edges ring in an image of finite extent
 _ASCENTS = 50  # at most, along x′ and y′ in turn
 _SETTLED = 1e-4  # samples
@@ -269,7 +271,7 @@ def _vertex(values: Floats, top: int) -> float:
 
 def quadratic_phase_error(
     cut: Complexes, reference: Complexes, spacing_m: float, slow_time: Floats, spatial_frequency: Floats
-) -> tuple[float, float]:
+) -> EdgePhases:
     """Measure quadratic and cubic phase of a response against an error-free one at the same place.
 
     Both cuts go back to the aperture by FFT, tapered to their ends, where a finite image cuts sidelobes off.
@@ -290,7 +292,8 @@ def quadratic_phase_error(
     Returns
     -------
     quadratic, cubic : float
-        Phase at the aperture edge, signed like the range error. [rad]
+        Phase at the aperture edge, signed like the range error: of the best fit over the whole aperture,
+        `aperture_fit`, to which the fit over its inner part is continued. [rad]
     """
     count = cut.size
     taper = np.cos(math.pi * (np.arange(count) - count // 2) / count) ** 2
@@ -302,6 +305,5 @@ def quadratic_phase_error(
     inner = inner[np.argsort(place[inner])]
     phase = np.unwrap(np.angle(product[inner]))
     weights = np.sqrt(np.abs(product[inner]))
-    fit = np.polynomial.polynomial.polyfit(place[inner], phase, 4, w=weights)
-    # The image's phase is −2π/λ times the range error.
-    return -float(fit[2]), -float(fit[3])
+    fit = np.polynomial.polynomial.polyfit(place[inner], phase, _ORDER, w=weights)
+    return edge_phases(-fit)  # the image's phase is −2π/λ times the range error

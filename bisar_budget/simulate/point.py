@@ -1,6 +1,7 @@
 """The image of a point with a mission's declared errors: Section V and VI of Rigling & Moses, Figures 3 to 7."""
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +11,7 @@ from bisar_budget.budget.sources import PLATFORMS, error_sources
 from bisar_budget.budget.vibration import along_line_of_sight, lines_of
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vector
-from bisar_budget.mission.model import Mission
+from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.mission.model import MotionError as DeclaredError
 from bisar_budget.simulate.autofocus import ALGORITHMS
 from bisar_budget.simulate.collection import baseband, superposed_motion
@@ -22,6 +23,7 @@ from bisar_budget.simulate.phase_history import (
     Floats,
     MotionError,
     Path,
+    PhaseHistory,
     Sinusoid,
     cell_centres,
     path,
@@ -29,10 +31,13 @@ from bisar_budget.simulate.phase_history import (
 )
 
 _MARGIN_CELLS = 16  # of the patch beyond the smear, each way
-_SAMPLES_PER_CELL = 2
+_SAMPLES_PER_CELL = 3
 _MIN_PULSES, _MAX_PULSES = 256, 1 << 15
+_MIN_FREQUENCIES = 64
 _MAX_BEND = 0.5  # range cells
-_BYTES_PER_PIXEL = 16 * 8  # the images kept, and what their formation holds at once
+_BYTES_PER_PIXEL = 16 * 4  # image, grid and what forming a block of them holds
+_BYTES_PER_SAMPLE = 16 * 5  # of the phase history; it is a product of terms of its own size
+_BLOCK = 1 << 18  # pixels formed between two words on the progress
 
 
 class SimulationError(Exception):
@@ -43,8 +48,9 @@ class PointImages(NamedTuple):
     """Images of a point scatterer at the scene centre, and what explains them.
 
     `in_scene` is on a grid along (x, y), the others along (x′, y′): (nx, ny) complex, all centred where the
-    errors move the point. `range_error` is its quadratic and higher part over `slow_time`; `segments` are the
-    slopes and `points` the ground points of (26)-(29), relative to the displaced point.
+    errors move the point; `scene_spacing` and `spacing`, (2,) [m], are those of their pixels. `range_error` is its
+    quadratic and higher part over `slow_time`; `segments` are the slopes and `points` the ground points of
+    (26)-(29), relative to the displaced point.
     """
 
     slow_time: Floats
@@ -53,7 +59,8 @@ class PointImages(NamedTuple):
     segments: Floats
     points: Floats
     effect: ExactEffect
-    spacing: float
+    spacing: tuple[float, float]
+    scene_spacing: tuple[float, float]
     look_azimuth: float
     in_scene: Complexes
     rotated: Complexes
@@ -64,56 +71,88 @@ class PointImages(NamedTuple):
     clean_response: ImpulseResponse
 
 
-def simulate_point(mission: Mission) -> PointImages:
+class Patch(NamedTuple):
+    """Ground patch around the displaced point: direction of its first axis, extent [m] and pixels of both."""
+
+    azimuth: float
+    size: tuple[float, float]
+    shape: tuple[int, int]
+
+    @property
+    def pixels(self) -> int:
+        """Number of them."""
+        return self.shape[0] * self.shape[1]
+
+    @property
+    def spacing(self) -> tuple[float, float]:
+        """Between pixels. [m]"""
+        return (self.size[0] / self.shape[0], self.size[1] / self.shape[1])
+
+
+class Plan(NamedTuple):
+    """What the images of a mission take, known before any is formed."""
+
+    rotated: Patch
+    in_scene: Patch
+    pulses: int
+    frequencies: int
+
+    @property
+    def memory(self) -> float:
+        """At the peak. [B]"""
+        images = _BYTES_PER_PIXEL * (self.in_scene.pixels + 3 * self.rotated.pixels)
+        return images + _BYTES_PER_SAMPLE * self.pulses * self.frequencies
+
+    @property
+    def work(self) -> int:
+        """Pixels times pulses: of the image in the scene's axes, of the rotated one and of the error-free one."""
+        return self.pulses * (self.in_scene.pixels + 2 * self.rotated.pixels)
+
+    def require_memory(self, limit: float) -> None:
+        """Raise SimulationError where the plan exceeds a limit. [B]"""
+        if self.memory > limit:
+            x, y = self.in_scene.shape
+            raise SimulationError(
+                f"images of {x} x {y} pixels from {self.pulses} pulses of {self.frequencies} frequencies need about "
+                f"{self.memory / 1e6:.4g} MB, simulation.memory_limit is {limit / 1e6:.4g} MB: raise it"
+            )
+
+
+def simulate_point(mission: Mission, progress: Callable[[int, int], None] = lambda done, work: None) -> PointImages:
     """Form the image of a point at the scene centre with the declared errors, before and after autofocus.
 
     Signs and coverage factor of the file are used; of a covariance, which has no sign, the most probable error
     whose quadratic phase is one sigma, times the coverage factor. Vibration along the line of sight is in the
     data, wideband by the file's seed.
 
+    Parameters
+    ----------
+    mission : Mission
+        As loaded.
+    progress : callable
+        Told the pixels times pulses done since it was last told, and all there are.
+
     Raises
     ------
     SimulationError
-        Too few pulses for the patch, lines of equal range that bend through cells, or an image beyond
-        `simulation.memory_limit`.
+        Too few pulses for the patch, lines of equal range that bend through cells, or images and phase history
+        beyond `simulation.memory_limit`. Nothing is formed before that is known.
     """
     geometry, settings = mission.geometry, mission.simulation
     T, wavelength = mission.collection.aperture_time, mission.radar.wavelength
-    cross_range = geometry.cross_range_resolution(wavelength, T)
-    in_range = geometry.range_resolution(mission.radar.bandwidth, SPEED_OF_LIGHT)
     fine = cell_centres(T, 2048)
     smooth = _paths(mission, geometry, fine, vibrating=False)
     effect = exact_effect(fine, *smooth, _clock(mission, fine), wavelength, T)
     left = _left_over(smooth, effect) + SPEED_OF_LIGHT * _clock(mission, fine)
     slope = np.gradient(left, fine)
-    reach = float(np.abs(slope).max()) * T / wavelength  # cycles over the aperture are cells of cross range
-    cells = 2 * math.ceil(reach + _MARGIN_CELLS)
-    pulses = _pulses(mission, cells)
-    spacing = min(cross_range, in_range) / _SAMPLES_PER_CELL
-    extent = cells * max(cross_range, in_range)
-    count = 2 * math.ceil(extent / spacing / 2)
-    limit = settings.memory_limit if settings else 500e6
-    if count**2 * _BYTES_PER_PIXEL > limit:
-        raise SimulationError(
-            f"an image of {count} x {count} pixels needs about {count**2 * _BYTES_PER_PIXEL / 1e6:.0f} MB, "
-            f"simulation.memory_limit is {limit / 1e6:.0f} MB"
-        )
-    nearest = min(geometry.transmitter.slant_range, geometry.receiver.slant_range)
-    bend = (extent / 2) ** 2 / (2 * nearest) / in_range
-    if bend > _MAX_BEND:
-        raise SimulationError(
-            f"lines of equal range bend by {bend:.2g} range cells within the patch of {extent:.0f} m, a platform "
-            f"being {nearest:.4g} m away: beyond {_MAX_BEND:g} the image is not separable and autofocus means nothing"
-        )
-    slow_time = cell_centres(T, pulses)
-    step = SPEED_OF_LIGHT / (4 * extent)  # half of what keeps a profile from repeating within the patch
-    frequency = mission.radar.center_frequency + cell_centres(
-        mission.radar.bandwidth, max(64, math.ceil(mission.radar.bandwidth / step))
-    )
+    plan = _plan(mission, left, slope)
+    plan.require_memory((settings or Simulation()).memory_limit)
+    slow_time = cell_centres(T, plan.pulses)
+    frequency = mission.radar.center_frequency + cell_centres(mission.radar.bandwidth, plan.frequencies)
     rng = np.random.default_rng(settings.seed if settings else 1)
 
-    def image(paths: tuple[Path, Path], clock: Floats, azimuth: float, scatterer: GroundVector) -> Complexes:
-        history = phase_history(
+    def history(paths: tuple[Path, Path], clock: Floats, scatterer: GroundVector) -> PhaseHistory:
+        recorded = phase_history(
             np.array([[*scatterer, 0.0]]),
             np.ones(1, dtype=complex),
             slow_time=slow_time,
@@ -125,18 +164,27 @@ def simulate_point(mission: Mission) -> PointImages:
             rng=rng,
         )
         if settings and settings.window == "taylor":
-            history.samples[:] *= np.outer(taylor_window(pulses), taylor_window(frequency.size))
-        grid = ground_grid(effect.displacement, azimuth, (extent, extent), (count, count))
-        return backprojection(history, grid) * baseband(geometry, grid, wavelength)
+            recorded.samples[:] *= np.outer(taylor_window(plan.pulses), taylor_window(plan.frequencies))
+        return recorded
 
-    look = geometry.look_azimuth
+    def image(recorded: PhaseHistory, patch: Patch) -> Complexes:
+        grid = ground_grid(effect.displacement, patch.azimuth, patch.size, patch.shape)
+        formed = np.empty(patch.shape, dtype=complex)
+        rows = max(1, _BLOCK // patch.shape[1])
+        for start in range(0, patch.shape[0], rows):
+            part = grid[start : start + rows]
+            formed[start : start + rows] = backprojection(recorded, part) * baseband(geometry, part, wavelength)
+            progress(plan.pulses * part.shape[0] * part.shape[1], plan.work)
+        return formed
+
     flown = _paths(mission, geometry, slow_time, vibrating=True, rng=rng)
-    clock = _clock(mission, slow_time)
-    rotated = image(flown, clock, look, (0.0, 0.0))
+    recorded = history(flown, _clock(mission, slow_time), (0.0, 0.0))
+    rotated, in_scene = image(recorded, plan.rotated), image(recorded, plan.in_scene)
     still = (path(geometry.transmitter, slow_time), path(geometry.receiver, slow_time))
-    error_free = image(still, 0 * slow_time, look, effect.displacement)
+    error_free = image(history(still, 0 * slow_time, effect.displacement), plan.rotated)
     focused = ALGORITHMS[mission.autofocus.algorithm](rotated).image
-    clean = _measured(error_free, extent / count, None)
+    across = plan.rotated.spacing[1]
+    clean = _measured(error_free, across, None)
     times = np.array([-T / 3, 0.0, T / 3])  # centres of three sub-apertures
     values, slopes = np.interp(times, fine, left), np.interp(times, fine, slope)
     return PointImages(
@@ -146,16 +194,50 @@ def simulate_point(mission: Mission) -> PointImages:
         segments=np.stack((values, slopes), axis=1),
         points=np.array([_indicated(geometry, *args) for args in zip(times, values, slopes, strict=True)]),
         effect=effect,
-        spacing=extent / count,
-        look_azimuth=look,
-        in_scene=image(flown, clock, 0.0, (0.0, 0.0)),
+        spacing=plan.rotated.spacing,
+        scene_spacing=plan.in_scene.spacing,
+        look_azimuth=geometry.look_azimuth,
+        in_scene=in_scene,
         rotated=rotated,
         focused=focused,
         error_free=error_free,
-        response=_measured(rotated, extent / count, clean.mask_m),
-        focused_response=_measured(focused, extent / count, clean.mask_m),
+        response=_measured(rotated, across, clean.mask_m),
+        focused_response=_measured(focused, across, clean.mask_m),
         clean_response=clean,
     )
+
+
+def _plan(mission: Mission, left: Floats, slope: Floats) -> Plan:
+    """Choose patches and samples no larger than the response asks for, from its range error and that one's slope.
+
+    In (x′, y′) the band of a response is a box, and its smear lies along y′; in (x, y) both are turned.
+    """
+    geometry, T = mission.geometry, mission.collection.aperture_time
+    in_range = geometry.range_resolution(mission.radar.bandwidth, SPEED_OF_LIGHT)
+    cross_range = geometry.cross_range_resolution(mission.radar.wavelength, T)
+    # Cycles over the aperture are cells of cross range; what the range error walks, cells of c/B.
+    reach = float(np.abs(slope).max()) * T / mission.radar.wavelength
+    walk = float(np.abs(left).max()) * mission.radar.bandwidth / SPEED_OF_LIGHT
+    cells = [2 * math.ceil(extra + _MARGIN_CELLS) for extra in (walk, reach)]
+    pulses = _pulses(mission, cells[1])
+    size = (cells[0] * in_range, cells[1] * cross_range)
+    shape = (_SAMPLES_PER_CELL * cells[0], _SAMPLES_PER_CELL * cells[1])
+    rotated = Patch(geometry.look_azimuth, size, shape)
+    nearest = min(geometry.transmitter.slant_range, geometry.receiver.slant_range)
+    bend = (size[1] / 2) ** 2 / (2 * nearest) / in_range
+    if bend > _MAX_BEND:
+        raise SimulationError(
+            f"lines of equal range bend by {bend:.2g} range cells within the patch of {size[1]:.0f} m, a platform "
+            f"being {nearest:.4g} m away: beyond {_MAX_BEND:g} the image is not separable and autofocus means nothing"
+        )
+    cosine, sine = abs(math.cos(geometry.look_azimuth)), abs(math.sin(geometry.look_azimuth))
+    extent = max(size[0] * cosine + size[1] * sine, size[0] * sine + size[1] * cosine)
+    band = (cosine / in_range + sine / cross_range, sine / in_range + cosine / cross_range)
+    nx, ny = (2 * math.ceil(_SAMPLES_PER_CELL * extent * one / 2) for one in band)
+    in_scene = Patch(0.0, (extent, extent), (nx, ny))
+    step = SPEED_OF_LIGHT / (4 * max(extent, *size))  # half of what keeps a profile from repeating within a patch
+    frequencies = max(_MIN_FREQUENCIES, math.ceil(mission.radar.bandwidth / step))
+    return Plan(rotated, in_scene, pulses, frequencies)
 
 
 def _pulses(mission: Mission, cells: int) -> int:

@@ -52,7 +52,7 @@ def cases(mission: Mission, allocation: Allocation, collection: PointCollection)
     for name in PLATFORMS:
         if pslr is not None:
             echo = partial(_sinusoidal, collection, model, pslr, {name: amplitude[name]})
-            for index, frequency in enumerate([line.frequency for line in lines[name]] or [_UNDECLARED_CYCLES / T]):
+            for index, frequency in enumerate([line.frequency for line in lines[name]] or [None]):
                 row_id = f"{name}.vibration.sinusoidal.{index}"
                 yield row_id, partial(echo, row_id, frequency)
             for index, members in enumerate(shared_frequencies(lines[name], T)):
@@ -62,7 +62,7 @@ def cases(mission: Mission, allocation: Allocation, collection: PointCollection)
             row_id = f"{name}.vibration.wideband"
             yield row_id, partial(_wideband, collection, model, islr, {name: rms[name]}, row_id, seed)
     if pslr is not None:
-        frequency = next((line.frequency for name in PLATFORMS for line in lines[name]), _UNDECLARED_CYCLES / T)
+        frequency = next((line.frequency for name in PLATFORMS for line in lines[name]), None)
         row_id = "mission.vibration.sinusoidal"
         yield row_id, partial(_sinusoidal, collection, model, pslr, amplitude, row_id, frequency)
     if islr is not None:
@@ -83,10 +83,11 @@ def _sinusoidal(
     requirement_db: float,
     limits: dict[str, float],
     row_id: str,
-    frequency: float,
+    declared: float | None,
 ) -> Verdict:
     """Measure the paired echo on the difference from the error-free image, which its sidelobes would bury."""
     blank = _blank(row_id, model, limits, requirement_db)
+    frequency = _UNDECLARED_CYCLES / collection.aperture_time if declared is None else declared
     cycles = frequency * collection.aperture_time
     if cycles < 3:
         return blank._replace(reason=f"{cycles:.3g} cycles per aperture: below three the echoes lie on the mainlobe")
@@ -105,10 +106,11 @@ def _sinusoidal(
     peaks = [float(np.abs(upsampled(cut, _FINE)).max()) for cut in (echo, clean)]
     level = 20 * math.log10(peaks[0] / peaks[1])
     who = "one platform alone" if len(limits) == 1 else "both platforms in phase"
+    assumed = ", a frequency assumed: the file declares no vibration" if declared is None else ""
     return blank._replace(
         measured_db=level,
         verdict=_compare(level - requirement_db),
-        reason=f"echoes of {who}, at {cycles:.3g} cells from the peak{smeared}",
+        reason=f"echoes of {who}, at {cycles:.3g} cells from the peak{smeared}{assumed}",
     )
 
 

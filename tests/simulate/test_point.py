@@ -20,17 +20,16 @@ def section_v():
     return simulate_point(load_mission(str(SECTION_V)))
 
 
-def direction_of_smear(image, spacing: float) -> float:
+def direction_of_smear(image, spacing: tuple[float, float]) -> float:
     """Axis of the region above -6 dB of the peak, from its second moments. [rad], modulo π"""
-    n = image.shape[0]
-    padded = np.zeros((8 * n, 8 * n), dtype=complex)  # eight times finer, by the spectrum
-    start = 4 * n - n // 2
-    padded[start : start + n, start : start + n] = np.fft.fftshift(np.fft.fft2(image))
+    n, m = image.shape
+    padded = np.zeros((8 * n, 8 * m), dtype=complex)  # eight times finer, by the spectrum
+    padded[4 * n - n // 2 :, 4 * m - m // 2 :][:n, :m] = np.fft.fftshift(np.fft.fft2(image))
     power = np.abs(np.fft.ifft2(np.fft.ifftshift(padded))) ** 2
-    bright = np.argwhere(power > power.max() / 4).astype(float)
+    bright = np.argwhere(power > power.max() / 4) * np.array(spacing)
     bright -= bright.mean(axis=0)
     values, vectors = np.linalg.eigh(bright.T @ bright)
-    x, y = vectors[:, np.argmax(values)] * spacing
+    x, y = vectors[:, np.argmax(values)]
     return math.atan2(y, x) % math.pi
 
 
@@ -50,7 +49,7 @@ class TestSectionV:
     def test_figure_5_smears_along_the_line_of_the_points(self, section_v) -> None:
         first, _, last = section_v.points
         line = math.atan2(*(last - first)[::-1]) % math.pi
-        smear = direction_of_smear(section_v.in_scene, section_v.spacing)
+        smear = direction_of_smear(section_v.in_scene, section_v.scene_spacing)
         assert math.degrees(abs(smear - line)) < 1
 
     def test_figure_6_smears_in_cross_range(self, section_v) -> None:
@@ -59,7 +58,7 @@ class TestSectionV:
 
     def test_figure_6_is_figure_5_turned(self, section_v) -> None:
         turned = direction_of_smear(section_v.rotated, section_v.spacing) + section_v.look_azimuth
-        scene = direction_of_smear(section_v.in_scene, section_v.spacing)
+        scene = direction_of_smear(section_v.in_scene, section_v.scene_spacing)
         assert math.degrees(abs((turned - scene + math.pi / 2) % math.pi - math.pi / 2)) < 2
 
     def test_figure_7_is_the_error_free_image_again(self, section_v) -> None:
@@ -130,6 +129,32 @@ class TestRefusals:
         with pytest.raises(SimulationError, match="memory_limit is 1 MB"):
             simulate_point(parse_mission(mission_text(simulation={"memory_limit": "1 MB"}, **smeared)))
 
+    def test_memory_limit_holds_for_the_phase_history_too(self) -> None:
+        """65 536 pulses of 89 frequencies, 5.8 million samples, for images that take 4 MB."""
+        changes = {"collection__pulses": 65536, "simulation": {"memory_limit": "100 MB"}}
+        with pytest.raises(
+            SimulationError, match=r"65536 pulses of \d+ frequencies need about 470.3 MB, .*is 100 MB: raise it"
+        ):
+            simulate_point(parse_mission(mission_text(**changes)))
+
+    @pytest.mark.parametrize("fits", [True, False])
+    def test_memory_is_estimated_and_the_estimate_holds(self, fits: bool) -> None:
+        """Peak of what is allocated, traced, in an image large enough that imports do not count."""
+        import tracemalloc
+
+        text = mission_text(**SATELLITES, simulation={"memory_limit": "140 MB" if fits else "120 MB"})
+        tracemalloc.start()
+        try:
+            if fits:
+                simulate_point(parse_mission(text))
+            else:
+                with pytest.raises(SimulationError, match=r"need about 133\.1 MB"):
+                    simulate_point(parse_mission(text))
+            peak = tracemalloc.get_traced_memory()[1]
+        finally:
+            tracemalloc.stop()
+        assert peak < (140e6 if fits else 20e6)  # nothing is formed before it is known
+
     def test_a_patch_too_close_to_a_platform(self) -> None:
         mission = load_mission(str(ROOT / "specs" / "missions" / "sentinel1_fixed_receiver.yaml"))
         with pytest.raises(SimulationError, match="range cells"):
@@ -147,6 +172,30 @@ def test_window_lowers_the_sidelobes() -> None:
     assert images.clean_response.pslr_db == pytest.approx(-35, abs=0.7)
 
 
+# Fine in range, coarse across: a square patch of square pixels would have 45 times as many.
+SATELLITES = {
+    "platforms": {
+        "transmitter": {"slant_range": 8e5, "azimuth": 0, "elevation": 0.8, "speed": 7500, "motion_azimuth": 1.6},
+        "receiver": {"slant_range": 8e5, "azimuth": 0.01, "elevation": 0.8, "speed": 7500, "motion_azimuth": 1.6},
+    },
+    "radar": {"center_frequency": "9.6 GHz", "bandwidth": "600 MHz"},
+    "collection": {"aperture_time": "0.1 s"},
+}  # fmt: skip
+
+
+def test_patches_are_no_larger_than_the_response_and_progress_tells_all_of_the_work() -> None:
+    told: list[tuple[int, int]] = []
+    images = simulate_point(parse_mission(mission_text(**SATELLITES)), lambda *step: told.append(step))
+    in_range, cross_range = images.spacing
+    assert cross_range > 20 * in_range
+    assert max(images.rotated.shape) < 120  # 32 cells and a margin, three samples each
+    assert images.clean_response.pslr_db == pytest.approx(-13.3, abs=0.1)
+    peak = np.unravel_index(np.argmax(np.abs(images.in_scene)), images.in_scene.shape)
+    assert np.abs(images.in_scene[peak]) == pytest.approx(np.abs(images.error_free).max(), rel=0.01)
+    assert len(told) > 3  # a bar that moves
+    assert {work for _, work in told} == {sum(done for done, _ in told)}
+
+
 class TestCommand:
     def test_summary_plot_and_archive(self, run, tmp_path) -> None:
         result = run("simulate", SECTION_V, "--plot", tmp_path / "v.png", "-o", tmp_path / "v.npz")
@@ -159,7 +208,13 @@ class TestCommand:
     def test_wrong_suffix_and_unusable_mission_are_2(self, run, tmp_path) -> None:
         assert run("simulate", SECTION_V, "--plot", tmp_path / "v.docx").exit_code == 2
         assert run("simulate", tmp_path / "none.yaml").exit_code == 2
-        assert run("simulate", ROOT / "specs" / "missions" / "uav_pair_l_band.yaml").exit_code == 2
+        assert run("simulate", ROOT / "specs" / "missions" / "sentinel1_fixed_receiver.yaml").exit_code == 2
+
+    def test_an_autofocus_that_fails_is_said_to(self, run) -> None:
+        """Beyond its pull-in and over ±0.3 rad of turn the UAV pair's response stays smeared."""
+        said = "autofocus does not restore the response"
+        assert said in run("simulate", ROOT / "specs" / "missions" / "uav_pair_l_band.yaml").stdout
+        assert said not in run("simulate", SECTION_V).stdout
 
     def test_unwritable_target_is_2(self, run, tmp_path) -> None:
         result = run("simulate", SECTION_V, "-o", tmp_path / "no" / "v.npz")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.verdicts import Verdict, with_verdicts
+from bisar_budget.budget.verdicts import Verdict, VerifiedMission, with_verdicts
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.simulate import collection as collection_module
 from bisar_budget.simulate.image_formation import backprojection
@@ -212,19 +212,44 @@ class TestTogether:
         assert math.hypot(*row.displacement_published_m) == pytest.approx(2.0)
         assert row.measured_displacement_m == pytest.approx(row.displacement_m, abs=0.02)  # 4 % of a cell
 
-    def test_location_by_the_full_model_where_25_is_metres_off(self) -> None:
+    @staticmethod
+    def location(model: str, position: list[float], requirement: float = 2) -> Verdict:
         """Climbing and squinted: (25) says more than twice what the image moves by, the full model what it does."""
         platforms = {
             "transmitter": {
-                "position": [12e3, -3e3, 5e3], "velocity": [30, 120, 25], "motion_error": {"position": [1, 1, 1]},
+                "position": [12e3, -3e3, 5e3], "velocity": [30, 120, 25], "motion_error": {"position": position},
             },
             "receiver": {"position": [-2e3, 9e3, 2e3], "velocity": [50, 0, -4]},
         }  # fmt: skip
-        changes = {"platforms": platforms, "collection": {"aperture_time": 3}, "requirements__location_error": 2}
-        by = {m: verdicts("mission.location_error", **changes, allocation__model=m) for m in ("published", "full")}
-        assert by["full"]["mission.location_error"].verdict == "confirmed"
-        assert "the full model and the image" in by["full"]["mission.location_error"].reason
-        assert by["published"]["mission.location_error"].verdict != "confirmed"
+        changes = {"platforms": platforms, "collection": {"aperture_time": 3}, "allocation": {"model": model}}
+        row_id = "mission.location_error"
+        return verdicts(row_id, requirements__location_error=requirement, **changes)[row_id]
+
+    def test_location_by_the_full_model_where_25_is_metres_off(self) -> None:
+        row = self.location("full", [1, 1, 1])
+        assert row.verdict == "confirmed"
+        assert "the full model and the image" in row.reason
+
+    def test_location_that_goes_elsewhere_is_optimistic_although_it_is_shorter(self) -> None:
+        """2 m to the north by (25); 1.3 m to the north-east in the image."""
+        row = self.location("published", [1, 1, 1])
+        assert math.hypot(*row.measured_displacement_m) < 1.5
+        assert row.verdict == "optimistic"
+        assert "(25) does not say where the image goes" in row.reason
+
+    def test_location_that_only_is_shorter_is_conservative_and_says_that_the_number_is_wrong(self) -> None:
+        row = self.location("published", [0, 0, 1])
+        assert math.hypot(*row.displacement_published_m) == pytest.approx(2)
+        assert math.hypot(*row.measured_displacement_m) < 1
+        assert row.verdict == "conservative"
+        assert "(25) does not say where the image goes" in row.reason
+
+    def test_location_of_errors_that_hide_each_other_is_not_confirmed(self) -> None:
+        """Together 0.3 m by (25), an eighth of a pixel off; each alone three metres, and metres off."""
+        row = self.location("published", [1, 1, 1], 0.3)
+        assert "differ by 9.7e-05 and 0.14 pixels" in row.reason
+        assert "transmitter.position.y alone: -2.334 m east, 2.143 m north by (25), -744.2 mm east" in row.reason
+        assert row.verdict != "confirmed"
 
     def test_location_of_errors_that_defocus_is_not_read(self) -> None:
         rows = verdicts("mission.location_error", requirements__location_error=15, **ERRORS)
@@ -234,7 +259,7 @@ class TestTogether:
     def test_location_without_errors_says_so(self) -> None:
         row = verdicts("mission.location_error", requirements__location_error=2)["mission.location_error"]
         assert (row.verdict, row.measured_displacement_m) == ("not_evaluated", None)
-        assert "move nothing" in row.reason
+        assert "no error that moves the image is declared" in row.reason
 
     def test_cubic(self) -> None:
         """Exact ranges and the image agree; Table I holds the range constant and is held to the image."""
@@ -246,7 +271,12 @@ class TestTogether:
 
     def test_cubic_without_errors_says_so(self) -> None:
         row = verdicts("mission.cubic_phase_error", requirements__cubic_phase_error=0.1)
-        assert "no declared error has a cubic phase" in row["mission.cubic_phase_error"].reason
+        assert "no error with a motion is declared" in row["mission.cubic_phase_error"].reason
+
+    def test_location_of_errors_that_move_nothing_says_so(self) -> None:
+        error = {"platforms__receiver__motion_error": {"acceleration": [1e-6, 0, 0]}}
+        row = verdicts("mission.location_error", requirements__location_error=2, **error)["mission.location_error"]
+        assert "move nothing by (25)" in row.reason
 
     def test_worst_case_sums_reach_their_budgets(self) -> None:
         rows = verdicts("*.quadratic_phase_error", allocation__combine="sum", **ERRORS)
@@ -334,6 +364,50 @@ def test_verdicts_do_not_depend_on_the_number_of_processes() -> None:
     assert seen == [row.id for row in both.rows]
 
 
+def _verified(*rows: Verdict) -> VerifiedMission:
+    return VerifiedMission(file="mission.yaml", name="base", rows=rows)
+
+
+class TestNothingVerified:
+    """A gate on whose limits no image gave a verdict has verified nothing, and does not pass."""
+
+    @pytest.fixture
+    def too_few_pulses(self, tmp_path):
+        path = tmp_path / "mission.yaml"
+        path.write_text(mission_text(collection__pulses=20), encoding="utf-8")
+        return path
+
+    def test_verify_exits_with_2_and_says_so(self, run, too_few_pulses) -> None:
+        result = run("verify", too_few_pulses)
+        assert result.exit_code == 2
+        assert "mission.yaml: nothing was verified: 9 rows with a limit" in result.stderr
+        assert "aliases below" in result.stdout  # the reasons
+        document = json.loads(run("verify", too_few_pulses, "--format", "json").stdout)
+        assert document["missions"][0]["status"] == "not_evaluated"
+
+    def test_unverified_wins_over_optimistic(self, run, too_few_pulses) -> None:
+        assert run("verify", SECTION_V, too_few_pulses, "--only", "receiver.velocity.y").exit_code == 2
+
+    def test_check_warns_and_fails_under_strict(self, run, too_few_pulses) -> None:
+        plain = run("check", too_few_pulses, "--verify")
+        assert plain.exit_code == 0
+        assert "warning: " in plain.stdout
+        assert "nothing was verified: 9 rows" in plain.stdout
+        assert "\nNOT EVAL " in plain.stdout
+        assert run("check", too_few_pulses, "--verify", "--strict").exit_code == 1
+        assert run("check", too_few_pulses, "--strict").exit_code == 0  # no images were asked for
+
+    def test_one_verdict_is_enough(self, run) -> None:
+        """Other phases and root-sum-squares never have an image: they do not fail a mission that was verified."""
+        verdict = Verdict(id="timing.quadratic", model="published", boundary_error=1.0, unit="1/s")
+        unknown = _verified(verdict)
+        assert unknown.status == "not_evaluated"
+        assert with_verdicts(findings(), unknown).status == "not_evaluated"
+        confirmed = _verified(verdict, verdict._replace(verdict="confirmed"))
+        assert (confirmed.status, confirmed.doubt) == ("pass", "")
+        assert with_verdicts(findings(), confirmed).status == "pass"
+
+
 class TestCheckWithImages:
     def test_json_carries_the_verdicts_and_a_row_says_when_its_limit_is_optimistic(self, run) -> None:
         result = run("check", SECTION_V, "--verify", "--format", "json")
@@ -368,17 +442,48 @@ class TestCheckWithImages:
             id="receiver.vibration.wideband", model="published", boundary_error=1.0, unit="m", requirement_db=-20,
             measured_db=-20 + 20 * math.log10(excess), verdict="optimistic",
         )  # fmt: skip
-        judged = row_of(with_verdicts(found, (verdict,)), verdict.id)
+        judged = row_of(with_verdicts(found, _verified(verdict)), verdict.id)
         assert row_of(found, verdict.id).status == "pass"
         assert judged.status == status
         assert any("optimistic limit" in note for note in judged.notes)
+
+    @pytest.mark.parametrize(
+        ("verdict_autofocus", "status"), [("confirmed", "pass_with_autofocus"), ("optimistic", "warn")]
+    )
+    def test_a_pass_by_an_autofocus_that_the_image_refutes_is_a_warning(self, verdict_autofocus, status) -> None:
+        changes = {"platforms__receiver__motion_error": {"acceleration": [2e-3, 0, 0]}, "autofocus": {"n_pull": 2}}
+        found = findings(**changes)
+        verdict = Verdict(
+            id="receiver.acceleration.x", model="published", boundary_error=1.0, unit="m/s^2", verdict="confirmed",
+            verdict_autofocus=verdict_autofocus, reason_autofocus="autofocus leaves 0.7 of 0.393 rad",
+        )  # fmt: skip
+        assert row_of(found, verdict.id).status == "pass_with_autofocus"
+        judged = row_of(with_verdicts(found, _verified(verdict)), verdict.id)
+        assert judged.status == status
+
+    @pytest.mark.parametrize(("verdict", "status"), [("conservative", "pass"), ("optimistic", "warn")])
+    def test_a_location_that_the_image_contradicts_is_a_warning(self, verdict: str, status: str) -> None:
+        error = {"platforms__receiver__motion_error": {"position": [1, 0, 0]}}
+        found = findings(requirements__location_error=5, **error)
+        shown = Verdict(
+            id="mission.location_error",
+            model="published",
+            boundary_error=5,
+            unit="m",
+            verdict=verdict,
+            reason="elsewhere",
+        )
+        assert row_of(found, shown.id).status == "pass"
+        assert row_of(with_verdicts(found, _verified(shown)), shown.id).status == status
 
     def test_an_optimistic_limit_without_a_row_is_a_warning_of_the_file(self) -> None:
         verdict = Verdict(
             id="mission.vibration.wideband", model="published", boundary_error=1.0, unit="m", requirement_db=-20,
             measured_db=-17, verdict="optimistic",
         )  # fmt: skip
-        (warning,) = [w for w in with_verdicts(findings(), (verdict,)).warnings if "mission.vibration" in w.message]
+        (warning,) = [
+            w for w in with_verdicts(findings(), _verified(verdict)).warnings if "mission.vibration" in w.message
+        ]
         assert "-17.0 dB" in warning.message
 
     def test_text_and_csv_show_them(self, run) -> None:
@@ -444,3 +549,30 @@ def test_compiled_and_numpy_images_give_the_same_verdicts(monkeypatch) -> None:
     for a, b in zip(fast, plain, strict=True):
         assert a.measured_qpe_rad == pytest.approx(b.measured_qpe_rad, abs=1e-4)  # images are 118 dB apart
         assert a.measured_displacement_m == pytest.approx(b.measured_displacement_m, abs=1e-4)
+
+
+class TestConditions:
+    """What changes how a verdict is to be read stands in the text, not in the JSON alone."""
+
+    def test_window_noise_and_pulses(self, run, tmp_path) -> None:
+        path = tmp_path / "m.yaml"
+        path.write_text(mission_text(simulation={"window": "taylor", "noise": "-30 dB"}, collection__pulses=500))
+        text = " ".join(run("verify", path, "--only", "timing.*").stdout.split())
+        assert "Images: one point, exact ranges, taylor window, no noise (simulation.noise is for `simulate`)" in text
+        assert "pulses as needed (the 500 of collection.pulses must not alias)" in text
+        assert "note: images: one point, exact ranges, taylor window" in " ".join(
+            run("check", path, "--verify").stdout.split()
+        )
+
+    def test_a_frequency_that_the_file_does_not_give_is_said_to_be_assumed(self) -> None:
+        row = verdicts("receiver.vibration.sinusoidal.0", requirements__pslr=-30)["receiver.vibration.sinusoidal.0"]
+        assert "10 cells from the peak" in row.reason
+        assert "assumed: the file declares no vibration" in row.reason
+
+
+@pytest.mark.parametrize(("model", "rule"), [("published", "(25)"), ("full", "the full model")])
+def test_displacement_is_compared_with_the_gating_models(run, tmp_path, model: str, rule: str) -> None:
+    path = tmp_path / "m.yaml"
+    path.write_text(mission_text(allocation={"model": model}), encoding="utf-8")
+    text = " ".join(run("verify", path, "--only", "receiver.velocity.y").stdout.split())
+    assert re.search(rf"displacement of the images: within [\d.]+ \w+ of {re.escape(rule)}, farthest", text)

@@ -619,3 +619,52 @@ class TestTheStricterOfBothModels:
         assert "full model says fail" in published.reason
         assert row(self.found("full", cubic_phase_error=limit), "mission.cubic_phase_error").status == "fail"
         assert row(self.found("full", cubic_phase_error=1.1 * known), "mission.cubic_phase_error").status != "fail"
+
+
+class TestAggregatesThatFail:
+    """The reason names the size, what is allowed and the largest contributor."""
+
+    ERRORS = {
+        "platforms__receiver__motion_error": {"velocity": [0, "60 mm/s", 0], "acceleration": ["0.1 mm/s^2", 0, 0]},
+        "platforms__transmitter__motion_error": {"position": [4, 0, 0]},
+    }
+
+    def reason(self, row_id: str, **changes) -> str:
+        found = row(findings(**self.ERRORS, **changes), row_id)
+        assert found.status in ("fail", "warn")
+        return found.reason
+
+    def test_quadratic_phase(self) -> None:
+        """v_y·ṽ_y/R: 40·0.06/8718 m/s² over 3 s of half aperture, 2π/λ: 0.519 rad; ã_x/2·x/R: 0.0649 rad."""
+        reason = self.reason("receiver.quadratic_phase_error", allocation__combine="sum")
+        assert reason.startswith("QPE 0.584 rad, 0.393 rad allowed; largest: receiver.velocity.y, 0.519 rad; passes")
+
+    def test_location(self) -> None:
+        reason = self.reason("mission.location_error", requirements__location_error=1)
+        assert reason.startswith("displacement of the image ")
+        assert " m, 1 m allowed; largest: receiver.velocity.y, " in reason
+
+    def test_cubic_phase(self) -> None:
+        reason = self.reason("mission.cubic_phase_error", requirements__cubic_phase_error=1e-6)
+        assert "rad, 1e-06 rad allowed; largest: receiver.acceleration.x, " in reason
+        assert reason.endswith("autofocus gain does not apply")
+
+    def test_pull_in(self) -> None:
+        reason = self.reason("mission.autofocus_pull_in", autofocus__n_pull=0.1)
+        assert "QPE 0.584 rad, 0.314 rad allowed; largest: receiver.velocity.y" in reason
+
+
+@pytest.mark.parametrize(
+    ("model", "row_id", "equation"),
+    [
+        ("published", "receiver.velocity.y", "Table II row 2"),
+        ("full", "receiver.velocity.y", "full model"),
+        ("full", "receiver.position.x", "full model"),
+        ("full", "timing.quadratic", "full model"),
+        ("strictest", "receiver.velocity.x", "Table II row 1"),  # the full model allows more
+        ("full", "other.troposphere", "as declared"),
+    ],
+)
+def test_a_row_names_the_model_that_gates_it(model: str, row_id: str, equation: str) -> None:
+    other = [{"name": "troposphere", "quadratic_phase_error": 0.1}]
+    assert row(findings(allocation__model=model, other_errors=other), row_id).equation == equation

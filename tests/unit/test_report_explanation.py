@@ -7,7 +7,7 @@ import pytest
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.mission.load import load_mission, parse_mission
-from bisar_budget.report import formulas
+from bisar_budget.report import explained_full, formulas
 from bisar_budget.report.explanation import explain
 from bisar_budget.theory import render
 from tests.conftest import ROOT, TODAY, mission_text
@@ -46,6 +46,46 @@ def test_table_2_is_what_the_derivation_prints() -> None:
     assert [*ours, formulas.CLOCK_PHASE] == printed
 
 
+def test_the_full_model_s_table_and_equations_are_what_the_derivation_prints() -> None:
+    rows = [row for row in cells("full") if row[0] == "-"]
+    for platform in ("transmitter", "receiver"):
+        for number, row in enumerate([row for row in rows if f"_{platform[0]}(" in row[1]]):
+            kind, axis = ("position", "velocity", "acceleration")[number % 3], "xyz"[number // 3]
+            texts = explained_full.motion_cells(kind, axis, platform)
+            printed = {order: row[2 + order] for order in (0, 1, 2, 4) if row[2 + order] != "-"}
+            assert {order: formula for order, (_, formula) in texts.items()} == printed
+    assert f"φ_2 = {explained_full.PHASE}" in render.derivation("full", "text")
+
+
+def explained_full_model(row_id: str) -> str:
+    errors = {"platforms__receiver__motion_error": {"frame": "look", "position": [1, 2, 3], "velocity": 0.01}}
+    changes = {"allocation__model": "full", "scene__height_error": 3, **errors}
+    return explained(row_id, timing_error={"linear": 1e-12, "quadratic": 1e-13}, **changes)
+
+
+@pytest.mark.parametrize(
+    "row_id",
+    ["receiver.position.x", "receiver.position.line_of_sight", "receiver.velocity.up", "transmitter.acceleration.z",
+     "timing.linear", "timing.quadratic", "mission.terrain"],
+)  # fmt: skip
+def test_every_symbol_of_the_full_model_has_its_number_and_every_number_its_symbol(row_id: str) -> None:
+    """No φ without an equation: what is put in for a symbol stands above, or is a constant of the mission."""
+    text = explained_full_model(row_id)
+    assert "φ_" not in text
+    chain = text[text.index("Full model") :]
+    numbers = dict(re.findall(r"(?m)^    (\S+) = (-?[\d.e+-]+)(?: \S+)?$", chain))
+    assert any(name.startswith("u") for name in numbers) or row_id.startswith("timing")
+    for symbol in re.findall(r"(?:[us\u1e61\u00fc][\u0307\u0308\u20db\u20dc]?)_\w+", chain):
+        assert symbol in numbers or symbol.startswith(("s\u0308", "s\u20dc")) or symbol in ("u_t", "u_r")
+    assert "The published model, for comparison" in text or row_id == "mission.terrain"
+
+
+def test_the_published_model_keeps_the_full_one_as_a_comparison() -> None:
+    text = explained("receiver.velocity.y")
+    assert "for comparison: phase as the line of sight turns" in " ".join(text.split())
+    assert "Determinant of Q" not in text
+
+
 def test_vibration_and_autofocus_are_what_the_derivation_prints() -> None:
     printed, derived = render.derivation("vibration", "text").split("Vibration, first principles")
     assert [cell for cell in formulas.VIBRATION.values() if cell in printed] == list(formulas.VIBRATION.values())
@@ -60,10 +100,22 @@ def evaluated(text: str) -> float:
     return float(eval(text, {"__builtins__": {}}, names))
 
 
+def unbroken(text: str) -> list[str]:
+    """Lines with what was broken put together: it goes on three columns deeper."""
+    lines: list[str] = []
+    for line in text.splitlines():
+        indent = [len(one) - len(one.lstrip()) for one in (lines[-1] if lines else "", line)]
+        if indent[0] >= 4 and indent[1] == indent[0] + 3:
+            lines[-1] += f" {line.lstrip()}"
+        else:
+            lines.append(line)
+    return lines
+
+
 def sums(text: str) -> list[tuple[str, str, float]]:
     """Every `symbol = numbers = value` of an explanation; the symbol may stand in the line above."""
     found, symbol = [], ""
-    for line in text.splitlines():
+    for line in unbroken(text):
         left, *parts = line.split(" = ")
         symbol = left.strip() or symbol
         if line.startswith("    ") and len(parts) >= 2:
@@ -80,7 +132,7 @@ def test_every_row_can_be_repeated_by_hand(path, model: str) -> None:
     for row in found.rows:
         results: dict[str, float] = {}
         for symbol, numbers, value in sums(explain(mission, found, row.id)):
-            sizes = evaluated(re.sub(r"(^|\(|\+ )-", r"\1", numbers))
+            sizes = evaluated(re.sub(r"(^|\(|\+ )-", r"\1", numbers).replace(" - ", " + "))
             assert abs(evaluated(numbers) - value) <= 1e-5 * max(abs(sizes), abs(value)), (row.id, symbol, numbers)
             results[symbol] = value
         assert results or row.allowable is None or row.declared is None

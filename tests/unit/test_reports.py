@@ -197,6 +197,21 @@ def test_every_format_ends_with_one_newline() -> None:
         assert not text.endswith("\n\n")
 
 
+def test_text_shows_what_qualifies_a_pass_without_being_asked() -> None:
+    """Notes on the collection, and of rows that pass; each once, with the rows it is about."""
+    found = findings(**FULL, collection={"aperture_time": 60, "pulses": 900})
+    rows = tuple(
+        row._replace(status="pass", notes=("holds by a hair",)) if row.declared else row for row in found.rows
+    )
+    declared = [row.id for row in rows if row.declared]
+    text = " ".join(render("text", Report("1", (found._replace(rows=rows),)), Style()).split())
+    assert "note: the receiver's line of sight turns by" in text
+    assert "note: collection.pulses: no part in" in text
+    assert f"note: {', '.join(declared)}: holds by a hair" in text
+    silent = [row._replace(status="not_declared", declared=None) for row in rows]
+    assert "by a hair" not in render("text", Report("1", (found._replace(rows=tuple(silent)),)), Style())
+
+
 def test_cells_of_the_table_do_not_touch(run) -> None:
     """An allowable of twelve characters beside a dash read as a negative number; one of percent ran into metres."""
     text = run("check", "specs/missions/drones_same_gnss.yaml").stdout
