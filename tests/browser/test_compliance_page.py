@@ -172,7 +172,9 @@ def test_drawings_and_images_are_seen(show) -> None:
             const box = e.getBoundingClientRect(); return [e.tagName, box.width, box.height, e.naturalWidth]})"""
     )
     assert len(sizes) == 2 + 3 + 1
-    assert all(width > 50 and height > 50 for _, width, height, _ in sizes)
+    assert all(width > 50 and height > 50 for tag, width, height, _ in sizes if tag != "IMG")
+    # Two by three pixels, each drawn three by three.
+    assert {(width, height) for tag, width, height, _ in sizes if tag == "IMG"} == {(6, 9)}
     assert all(natural == 2 for tag, _, _, natural in sizes if tag == "IMG")
 
 
