@@ -136,7 +136,7 @@ def _error_rows(
                 notes = (*notes, beyond.against(qpe_full))
                 doubt = beyond.doubt(qpe_full, limit)
         allowable = _gating(model, published, full)
-        if of_allowable := first_order.allowable_note(source, allowable if allowable is not None else full, limit):
+        if of_allowable := first_order.allowable_note(source, allowable, full, limit):
             notes = (*notes, of_allowable)
         if qpe_published > limit or abs(qpe_full) > limit:
             qpe = abs(source.qpe(model))
@@ -225,7 +225,7 @@ def _undeclared(
     """Row of an error that the file does not declare, as `_judged` would make it: half of all rows are such."""
     allowable = _gating(mission.allocation.model, published, full)
     notes = source.notes
-    if of_allowable := first_order.allowable_note(source, allowable if allowable is not None else full, limit):
+    if of_allowable := first_order.allowable_note(source, allowable, full, limit):
         notes = (*notes, of_allowable)
     return Row._make(
         (
