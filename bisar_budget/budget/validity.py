@@ -105,7 +105,8 @@ class FirstOrder:
 
     def _reach(self, source: ErrorSource) -> float:
         """Bound of how far a unit of an error takes platform and image, over the aperture. [m/unit]"""
-        moves = self._by_constant * abs(source.full.constant) + self._by_linear * abs(source.full.linear)
+        full = source.full
+        moves = self._by_constant * abs(full.constant) + self._by_linear * abs(full.linear)
         return self._edge.get(source.unit, 0.0) + moves
 
     def _cause(self, source: ErrorSource, declared: float) -> str:
