@@ -513,7 +513,10 @@ def _qpe_aggregates(
             limits=(limit, limit),
             qpe=published,
             qpe_full=full,
-            notes=(*correlation_notes(combine, [g for g in groups if owner in (g.platform, "mission")]), *exact_notes),
+            notes=(
+                *correlation_notes(combine, [g for g in groups if owner in (g.platform, "mission")]),
+                *exact_notes,
+            ),
         )
 
 
