@@ -1,6 +1,5 @@
 """The `bisar-budget` command. Everything that costs time to import is imported where it is used."""
 
-import gc
 import os
 import sys
 from collections.abc import Iterable, Iterator, Sequence
@@ -333,8 +332,10 @@ def _checked(
     from bisar_budget.errors import MissionError
     from bisar_budget.mission.load import load_mission
 
-    # The findings of a thousand missions are 10⁵ tuples without a cycle: nothing to collect.
-    gc.disable()
+    if not (verifying or illustrated or drawn):
+        from bisar_budget.budget.fleet import check_files
+
+        return Report(version=__version__, missions=tuple(check_files(files, today, model)))
     missions: list[MissionFindings | UnusableMission] = []
     usable: dict[int, Mission] = {}
     for index, file in enumerate(files):
@@ -353,7 +354,6 @@ def _checked(
     if usable:
         from bisar_budget.budget.verdicts import with_verdicts
 
-        gc.enable()  # images are large
         for index, verified in zip(usable, _verified(list(usable.values()), "*", None), strict=True):
             judged = missions[index]
             if not isinstance(judged, UnusableMission):
