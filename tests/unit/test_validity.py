@@ -234,3 +234,34 @@ def test_a_bound_of_nothing_is_no_division() -> None:
     first_order = FirstOrder(mission, mission.geometry, full_ground(mission, mission.geometry))
     assert all(first_order.beyond(s) is None for s in error_sources(mission, mission.geometry))
     assert not first_order.found
+
+
+@pytest.mark.parametrize(("metres", "is_beyond"), [(0.9, False), (1.8, True)])
+def test_a_displacement_that_first_order_has_wrong_is_beyond_it(metres: float, is_beyond: bool) -> None:
+    """Gradients 13° apart: the phase is right to 0.02 rad, the image is 3.5 % of 9 m elsewhere."""
+    platforms = {
+        "transmitter": {"position": [7336, -14770, 10e3], "velocity": [43, 127, 5], "acceleration": [0.8, 0.7, -0.2]},
+        "receiver": {"position": [-5045, 8599, 2988], "velocity": [-86, 34, 0], "acceleration": [0.2, 0.6, 0.1]},
+    }  # fmt: skip
+    changes = {"platforms": platforms, "collection__aperture_time": 2, "allocation__model": "full"}
+    errors = {f"{TX_ERROR}__position": [metres, 0, 0]}
+    found = row(findings(**changes, **errors), "transmitter.position.x")
+    mission = parse_mission(mission_text(**changes, **errors))
+    error = (lambda t: np.array([metres, 0, 0]) + 0 * t, lambda t: 0 * t * np.ones(3))
+    point, quadratic, _ = brute_force(mission, error, aperture_time=2.0)
+    assert found.qpe_full_rad == pytest.approx(quadratic, abs=0.02)
+    off = math.dist(found.displacement_m, point)
+    assert (off > max(0.1, 0.02 * math.hypot(*point))) == is_beyond
+    assert (found.qpe_exact_rad is not None) == is_beyond
+    assert any("the second order moves the image by" in note for note in found.notes) == is_beyond
+
+
+@pytest.mark.parametrize(("model", "whose"), [("published", "the full model's allowable"), ("full", "the allowable")])
+def test_an_allowable_that_the_gating_model_does_not_have_is_said_to_be_the_other_ones(
+    model: str, whose: str
+) -> None:
+    """The row says no limit; a note that spoke of "the allowable" contradicted it."""
+    found = row(findings(allocation__model=model), "transmitter.velocity.z")
+    (note,) = [note for note in found.notes if "speaks of the first order alone" in note]
+    assert note.startswith(f"{whose} of ")
+    assert (found.allowable is None) == (model == "published")
