@@ -137,7 +137,7 @@ def _error_rows(
                 notes = (*notes, beyond.against(qpe_full))
                 doubt = beyond.doubt(qpe_full, limit)
         allowable = _gating(model, published, full)
-        if of_allowable := first_order.allowable_note(source, allowable if allowable is not None else full, limit):
+        if of_allowable := first_order.allowable_note(source, allowable, full, limit):
             notes = (*notes, of_allowable)
         if qpe_published > limit or abs(qpe_full) > limit:
             qpe = abs(source.qpe(model))
@@ -226,7 +226,7 @@ def _undeclared(
     """Row of an error that the file does not declare, as `_judged` would make it: half of all rows are such."""
     allowable = _gating(mission.allocation.model, published, full)
     notes = source.notes
-    if of_allowable := first_order.allowable_note(source, allowable if allowable is not None else full, limit):
+    if of_allowable := first_order.allowable_note(source, allowable, full, limit):
         notes = (*notes, of_allowable)
     return Row._make(
         (
@@ -344,16 +344,17 @@ def _aggregate_rows(
         moves = [(row_id, move) for row_id, move in published if move is not None]
         moved = max(moved, combined_displacement(moves, combine, groups))
     location_notes: tuple[str, ...] = ()
-    location_doubt = ""
+    location_doubt = _location_doubt(mission, motion, first_order.ground.plane, groups)
     if found and motion:
         exact_moves = [(s.id, _moved_exactly(s, found, first_order.ground.plane)) for s in motion]
-        location_notes, location_doubt = of_members(
+        location_notes, exact_doubt = of_members(
             found,
             motion,
             combined_displacement(exact_moves, combine, groups),
             mission.requirements.location_error,
             "m",
         )
+        location_doubt = location_doubt or exact_doubt
     yield _judged(
         mission,
         id="mission.location_error",
@@ -385,6 +386,9 @@ def _aggregate_rows(
         if found:
             by_exact = math.fsum(abs(s.qpe("full")) for s in _with_exact(declared, found))
             pull_in_notes, pull_in_doubt = of_members(found, declared, by_exact, pull_in, "rad")
+        by_other = math.fsum(abs(s.qpe(other)) for s in declared) if other is not None else 0.0
+        if by_other > pull_in * (1 + UTILIZATION_TOLERANCE):
+            pull_in_doubt = f"the {other} model says beyond it: QPE {by_other:.3g} rad, {pull_in:.3g} rad allowed"
         yield _judged(
             mission,
             id="mission.autofocus_pull_in",
@@ -400,6 +404,22 @@ def _aggregate_rows(
             doubt=pull_in_doubt,
             notes=pull_in_notes,
         )
+
+
+def _location_doubt(
+    mission: Mission, motion: Sequence[ErrorSource], by_full: ImagePlane, groups: Sequence[Correlated]
+) -> str:
+    """Say that the model that does not gate fails the location; else nothing."""
+    model, limit = mission.allocation.model, mission.requirements.location_error
+    if limit is None or model == "strictest" or not motion:
+        return ""
+    other, plane = ("full", by_full) if model == "published" else ("published", image_plane(mission.geometry))
+    moves = [(s.id, plane.displacement(s.by(other), s.declared or 0.0)) for s in motion]
+    known = [(row_id, move) for row_id, move in moves if move is not None]  # (25) may have none at all
+    moved = combined_displacement(known, mission.allocation.combine, groups) if known else 0.0
+    if moved <= limit * (1 + UTILIZATION_TOLERANCE):
+        return ""
+    return f"the {other} model says fail: {moved:.3g} m, {limit:.3g} m allowed"
 
 
 def _exceeded(

@@ -121,8 +121,12 @@ class FirstOrder:
         first, added = source.full.qpe * declared, self._bend(source) * declared * declared
         return "" if abs(added) <= max(FLOOR_RAD, SHARE * abs(first)) else f"the second order adds {added:.2g} rad"
 
-    def allowable_note(self, source: ErrorSource, allowable: float | None, limit: float) -> str:
-        """Say that an allowable, which has a phase of `limit`, lies beyond first order; else nothing."""
+    def allowable_note(self, source: ErrorSource, gating: float | None, full: float | None, limit: float) -> str:
+        """Say that an allowable, which has a phase of `limit`, lies beyond first order; else nothing.
+
+        Of the model that gates; where that has none, of the full model.
+        """
+        allowable, whose = (full, "the full model's") if gating is None else (gating, "the")
         if allowable is None or not source.is_motion:
             return ""
         if allowable * self._reach(source) < FAR_M and allowable * self._edge.get(source.unit, 0.0) < self._harmless:
@@ -131,7 +135,7 @@ class FirstOrder:
         if allowable * bend <= 1:
             return ""
         size, held = (format_quantity(value, source.unit, 2) for value in (allowable, 1 / bend))
-        return f"the allowable of {size} speaks of the first order alone, which holds to about {held}"
+        return f"{whose} allowable of {size} speaks of the first order alone, which holds to about {held}"
 
     @cached_property
     def _aperture(self) -> tuple[tuple[tuple[str, Vector, float], ...], ...]:
