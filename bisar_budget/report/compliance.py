@@ -114,6 +114,13 @@ class MatrixRow(NamedTuple):
     remarks: tuple[str, ...]
 
 
+class Remark(NamedTuple):
+    """What rows of the matrix say besides their numbers."""
+
+    rows: tuple[str, ...]
+    text: str
+
+
 class Share(NamedTuple):
     """What an owner may use of the quadratic phase error, before and after autofocus. [rad]
 
@@ -258,6 +265,7 @@ class MissionPage(NamedTuple):
     head: tuple[tuple[str, str], ...] = ()
     drivers: tuple[Driver, ...] = ()
     matrix: tuple[MatrixRow, ...] = ()
+    remarks: tuple[Remark, ...] = ()
     pictures: tuple[Picture, ...] = ()
     total: str = ""
     gain: float = 1.0
@@ -360,6 +368,25 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
     evidence = {verdict.id: verdict for verdict in found.verdicts or ()}
     file = source_path(found.file, style.root)
     allocation = found.allocation
+    matrix = tuple(
+        MatrixRow(
+            id=row.id,
+            requirement_id=row.requirement_id or "",
+            requirement=_requirement(mission, found, row, sources.get(row.id)),
+            method=_method(found, row, evidence[row.id].verdict if row.id in evidence else None),
+            allowable=_allowable(row),
+            declared=_quantity(row.declared, row.unit),
+            use=None if row.status == "not_evaluated" or row.allowable is None else row.utilization,
+            use_text=_use(row),
+            margin=_margin(None if row.status == "not_evaluated" else row.margin),
+            status=row.status,
+            waiver="; ".join(waiver_notes(row)),
+            line=row.line,
+            remarks=_remarks(row),
+        )
+        for row in rows
+        if row.status != "not_declared"
+    )
     return MissionPage(
         anchor=anchor,
         file=file,
@@ -374,27 +401,10 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
         drivers=tuple(
             _driver(row) for row in judged[:_DRIVERS] if row.status not in ("pass", "waived") or row.utilization
         ),
-        matrix=tuple(
-            MatrixRow(
-                id=row.id,
-                requirement_id=row.requirement_id or "",
-                requirement=_requirement(mission, found, row, sources.get(row.id)),
-                method=_method(found, row, evidence[row.id].verdict if row.id in evidence else None),
-                allowable=_allowable(row),
-                declared=_quantity(row.declared, row.unit),
-                use=None if row.status == "not_evaluated" or row.allowable is None else row.utilization,
-                use_text=_use(row),
-                margin=_margin(row.margin),
-                status=row.status,
-                waiver="; ".join(waiver_notes(row)),
-                line=row.line,
-                remarks=_remarks(row),
-            )
-            for row in rows
-            if row.status != "not_declared"
-        ),
+        matrix=matrix,
+        remarks=tuple(_grouped(matrix)),
         pictures=drawings(found),
-        total=_quantity(allocation.qpe_total, "rad"),
+        total=_limit(allocation.qpe_total, "rad"),
         gain=allocation.autofocus_gain,
         gain_text=_gain(allocation),
         shares=tuple(_shares(allocation)),
@@ -482,7 +492,7 @@ def _probabilities(drawn: "MonteCarlo | None") -> Iterator[Probability]:
     from bisar_budget.report.monte_carlo import held
 
     for one in drawn.requirements:
-        limit = format_quantity(one.limit, one.unit, 3, "down")
+        limit = _limit(one.limit, one.unit)
         sizes = (format_quantity(size, one.unit) for size in (one.sum, one.rss, one.sigma))
         yield Probability(one.id, (limit, *sizes), held(one.probability, one.probability_low, one.probability_high))
     if drawn.probability is not None and len(drawn.requirements) > 1:
@@ -508,9 +518,14 @@ def _quantity(value: float | None, unit: str) -> str:
     return "–" if value is None else format_quantity(value, unit)
 
 
+def _limit(value: float, unit: str) -> str:
+    """Round down, everywhere alike: no limit is larger than it is, and none has two sizes on a page."""
+    return format_quantity(value, unit, 3, "down")
+
+
 def _allowable(row: Row) -> str:
     if row.allowable is not None:
-        return format_quantity(row.allowable, row.unit, 3, "down")
+        return _limit(row.allowable, row.unit)
     is_open = row.status in ("not_evaluated", "info") or row.metric in ("pslr", "islr")
     return "–" if is_open else "no limit"
 
@@ -544,6 +559,15 @@ def _remarks(row: Row) -> tuple[str, ...]:
     return tuple(text for text in (row.reason, *row.notes) if text and text not in waivers)
 
 
+def _grouped(matrix: Sequence[MatrixRow]) -> Iterator[Remark]:
+    """Say once what several rows would say alike."""
+    groups: dict[str, list[str]] = {}
+    for row in matrix:
+        if row.remarks:
+            groups.setdefault("; ".join(row.remarks), []).append(row.id)
+    yield from (Remark(tuple(ids), text) for text, ids in groups.items())
+
+
 def _requirement(mission: Mission, found: MissionFindings, row: Row, source: ErrorSource | None) -> str:
     """Say what the row is held to."""
     allocation, requirements = found.allocation, mission.requirements
@@ -556,22 +580,24 @@ def _requirement(mission: Mission, found: MissionFindings, row: Row, source: Err
         return f"{what} ≤ {value:g} dB, {split.of(row.id.split('.')[0]):.3g} of the power"
     if row.metric == "cubic_phase_error":
         value = requirements.cubic_phase_error
-        return "none stated" if value is None else f"cubic phase ≤ {format_quantity(value, 'rad')}"
+        return "none stated" if value is None else f"cubic phase ≤ {_limit(value, 'rad')}"
     if row.metric == "location_error":
         value = requirements.location_error
-        return "none stated" if value is None else f"displacement ≤ {format_quantity(value, 'm')}"
+        return "none stated" if value is None else f"displacement ≤ {_limit(value, 'm')}"
     if row.id == "mission.autofocus_pull_in":
         return "all QPE together within what autofocus corrects, π·N_pull"
     owner = {"timing": "clock"}.get(row.id.split(".")[0], row.id.split(".")[0]) if source is None else source.owner
     limit = allocation.qpe_limit(owner) * allocation.autofocus_gain
     share = "" if owner == "mission" else f", {allocation.qpe.of(owner):.3g} of the budget"
-    return f"QPE ≤ {format_quantity(limit, 'rad')}{share}"
+    return f"QPE ≤ {_limit(limit, 'rad')}{share}"
 
 
 def _method(found: MissionFindings, row: Row, verdict: str | None) -> str:
     """Say how the row is verified: by analysis, and by the image where one was formed."""
-    by_model = {"published": row.equation, "full": "full model", "strictest": f"{row.equation} and full model"}
-    is_of_model = row.metric in ("quadratic_phase_error",) and row.unit != "rad"
+    is_vibration = row.metric in ("pslr", "islr")
+    full = "first principles" if is_vibration else "full model"
+    by_model = {"published": row.equation, "full": full, "strictest": f"{row.equation} and {full}"}
+    is_of_model = is_vibration or (row.metric == "quadratic_phase_error" and row.unit != "rad")
     analysis = f"analysis: {by_model[found.model] if is_of_model else row.equation}"
     return analysis if verdict is None else f"{analysis}; simulation: {STATUS_WORDS.get(verdict, verdict)}"
 
@@ -592,10 +618,10 @@ def _shares(allocation: Allocation) -> Iterator[Share]:
             if owner == "clock":
                 limit = allocation.qpe_limit(owner)
                 held = "held to the receiver’s"
-                yield Share(owner, held, _quantity(limit, "rad"), _quantity(limit * gain, "rad"), start, 0.0)
+                yield Share(owner, held, _limit(limit, "rad"), _limit(limit * gain, "rad"), start, 0.0)
             continue
         limit = part * allocation.qpe_total
-        yield Share(owner, f"{part:.3g}", _quantity(limit, "rad"), _quantity(limit * gain, "rad"), start, part)
+        yield Share(owner, f"{part:.3g}", _limit(limit, "rad"), _limit(limit * gain, "rad"), start, part)
         start += part
 
 
@@ -681,7 +707,7 @@ def _inputs(mission: Mission, found: MissionFindings, file: str) -> Iterator[Inp
     )
     total = requirements.quadratic_phase_error
     yield given(
-        "quadratic phase error, total", f"{format_quantity(total, 'rad')} ({math.degrees(total):.4g}°)",
+        "quadratic phase error, total", f"{_limit(total, 'rad')} ({math.degrees(total):.4g}°)",
         ("requirements", "quadratic_phase_error"),
     )  # fmt: skip
     optional = (
@@ -697,7 +723,7 @@ def _inputs(mission: Mission, found: MissionFindings, file: str) -> Iterator[Inp
             )
         else:
             yield given(
-                name, f"{value:g} dB" if unit == "dB" else format_quantity(value, unit), ("requirements", key)
+                name, f"{value:g} dB" if unit == "dB" else _limit(value, unit), ("requirements", key)
             )
     allocation = mission.allocation
     split = allocation.split

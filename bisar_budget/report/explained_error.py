@@ -72,7 +72,9 @@ def _turned(mission: Mission, source: ErrorSource, axis: str) -> Iterator[Step]:
         text = " + ".join(f"|{part}|" for part in parts)
         how = "bounds add as magnitudes"
     title = f"Along {axis} from the {error.frame} frame ({', '.join(FRAME_AXES[error.frame])}): {how}"
-    yield from step(title, Sum(f"declared = {text} = {with_unit(abs(source.declared or 0.0), source.unit)}"))
+    size = Sum(f"declared = {text} = {with_unit(abs(source.declared or 0.0), source.unit)}")
+    sign = ("from here on with the sign of the parts’ sum",) if (source.declared or 0.0) < 0 else ()
+    yield from step(title, size, *sign)
 
 
 def _quadratic_form(parts: Sequence[str], correlation: Sequence[Sequence[float]]) -> str:
@@ -93,6 +95,7 @@ def effect(
     """From `declared` to the quadratic phase error; for one unit where nothing is declared."""
     size = 1.0 if source.declared is None else abs(source.declared)
     each = " of one unit" if source.declared is None else ""
+    signed = math.copysign(size, source.declared or 1.0)
     qpe = abs(source.effect.qpe) * size
     platform, kind, axis = (*source.id.split(".", 2), "")[:3]
     gates_by_full = mission.allocation.model != "published" and source.by(mission.allocation.model) is source.full
@@ -101,17 +104,17 @@ def effect(
     if not source.is_motion:
         yield from step("Quadratic phase error, as declared", f"QPE = {size:.6g} rad")
     elif platform == "common":
-        yield from _common_effect(source, sources, size, each)
+        yield from _common_effect(source, sources, signed, each)
     elif source.owner == "mission":
         yield from step("Published model: a height error moves the image, no quadratic term")
     elif source.owner == "clock":
-        yield from _clock_effect(mission, source, size, each)
+        yield from _clock_effect(mission, source, signed, each)
     elif axis in formulas.AXES:
         state = getattr(found.geometry, platform)
-        values = _motion_values(mission, state, platform, kind, axis, size)
+        values = _motion_values(mission, state, platform, kind, axis, signed)
         coefficients = (source.effect.constant, source.effect.linear)
         for order, formula in formulas.motion_coefficients(kind, axis, platform).items():
-            result = coefficients[order] * size if order < 2 else _coefficient(mission, source, order) * size
+            result = signed * (coefficients[order] if order < 2 else _coefficient(mission, source, order))
             yield from step(
                 f"Table I row {2 + 3 * formulas.AXES.index(axis) + list(MOTION_UNITS).index(kind)}{each}",
                 *equation(f"β̃_{order}", formula, values, result, RATES[order]),
@@ -124,9 +127,9 @@ def effect(
     if not source.is_motion:
         return
     if gates_by_full:
-        yield from full_chain(mission, found, source, math.copysign(size, source.declared or 1.0), each)
+        yield from full_chain(mission, found, source, signed, each)
     else:
-        yield from _full(full_ground(mission, found.geometry), source, size, each)
+        yield from _full(full_ground(mission, found.geometry), source, signed, each)
         yield from _displacement(mission, found, source)
 
 
@@ -162,7 +165,7 @@ def _clock_effect(mission: Mission, source: ErrorSource, size: float, each: str)
     lines = equation(f"β̃_{order}", formulas.clock_coefficient(order), values, result, RATES[order])
     yield from step(f"Table I row 1{each}", *lines)
     if order == 2:
-        qpe = abs(source.effect.qpe) * size
+        qpe = abs(source.effect.qpe * size)
         yield from step(f"{source.equation}{each}", *equation("QPE", formulas.CLOCK_PHASE, values, qpe, "rad"))
 
 
@@ -170,7 +173,7 @@ def _common_effect(source: ErrorSource, sources: Mapping[str, ErrorSource], size
     """The effects of both platforms, added with their signs."""
     legs = [sources[source.id.replace("common", platform)] for platform in ("transmitter", "receiver")]
     values = {"φ_t": legs[0].effect.qpe * size, "φ_r": legs[1].effect.qpe * size}
-    qpe = abs(source.effect.qpe) * size
+    qpe = abs(source.effect.qpe * size)
     yield from step(f"{source.equation}{each}, signed", *equation("QPE", "|φ_t + φ_r|", values, qpe, "rad"))
 
 
@@ -201,7 +204,6 @@ def _projected_effect(
 
 def _full(ground: FullGround, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
     """What the full model makes of it, signed as declared."""
-    size = math.copysign(size, source.declared or 1.0)
     moved = ground.moved(source.full) * size
     values = {"φ_turning": source.full.qpe * size - moved, "φ_displaced": moved}
     title = (

@@ -13,7 +13,7 @@ from bisar_budget.budget.sources import PLATFORMS, ErrorSource, full_ground
 from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import formulas
-from bisar_budget.report.formulas import Equation, Step, Sum, equation, step, with_unit
+from bisar_budget.report.formulas import Equation, Step, equation, step
 
 RATES = ("m", "m/s", "m/s²", "m/s³", "m/s⁴")  # units of the range error's coefficients
 _LOOK_RATES = ("", "1/s", "1/s²", "1/s³", "1/s⁴")
@@ -66,13 +66,15 @@ def full_chain(
     else:
         yield from _motion(source, ground.looks, beta, size, each)
     s = [tuple(t + r for t, r in zip(*of_order, strict=True)) for of_order in zip(*ground.looks, strict=True)]
-    moved = (0.0, 0.0)
+    moved: tuple[float, ...] = (0.0, 0.0)
     if beta[0] or beta[1]:
         determinant = s[0][0] * s[1][1] - s[0][1] * s[1][0]
         moved = (
             (-beta[0] * s[1][1] + beta[1] * s[0][1]) / determinant,
             (beta[0] * s[1][0] - beta[1] * s[0][0]) / determinant,
         )
+        # Likewise here: no image moves by less than rounding.
+        moved = tuple(way if abs(way) > ROUNDING * math.hypot(*moved) else 0.0 for way in moved)
         known = {f"{_dotted('s', n)}_{axis}": s[n][i] for n in (0, 1) for i, axis in enumerate("xy")}
         yield from step(
             "Lines of sight of both platforms on the ground, s = u_t + u_r, and their rate", *_numbers(known)
@@ -93,12 +95,13 @@ def full_chain(
         left[n] = beta[n] + added if abs(beta[n] + added) > ROUNDING * abs(beta[n]) else 0.0
         known = dict(zip(names, s[n][:2], strict=True)) | {"x\u0302": moved[0], "y\u0302": moved[1]}
         if not any(moved):
-            left_is = equation(f"β_{n}", f"β̃_{n}", {f"β̃_{n}": beta[n]}, left[n], RATES[n])
-            yield from step(f"The response is not moved: what bends is the error's own term{each}", *left_is)
             continue
         what = "second" if n == 2 else "fourth"
         lines = list(equation(f"β_{n}", formula, known | {f"β̃_{n}": beta[n]}, left[n], RATES[n]))
         yield from step(f"With what the displaced response bends by itself, the {what} derivative of s{each}", *lines)
+    if not any(moved):
+        own = (Equation(f"β_{n}", "", {}, left[n], RATES[n]) for n in (2, 4))
+        yield from step(f"The response is not moved: what bends are the error’s own terms{each}", *own)
     values = {"T": mission.collection.aperture_time, "λ": mission.radar.wavelength, "β_2": left[2], "β_4": left[4]}
     title = f"Full model{each}: the quadratic that fits both best over the aperture, at its edge"
     yield from step(title, *equation("QPE_full", PHASE, values, source.full.qpe * size, "rad"))
@@ -115,8 +118,8 @@ def _unit(name: str) -> str:
     return next(unit for dots, unit in zip(_DOTS[::-1], _LOOK_RATES[::-1], strict=True) if dots in apart)
 
 
-def _numbers(known: dict[str, float]) -> list[Sum]:
-    return [Sum(f"{name} = {with_unit(value, _unit(name))}") for name, value in known.items()]
+def _numbers(known: dict[str, float]) -> list[Equation]:
+    return [Equation(name, "", {}, value, _unit(name)) for name, value in known.items()]
 
 
 def _motion(

@@ -9,11 +9,13 @@ from bisar_budget.budget.findings import MissionFindings, Row
 from bisar_budget.budget.scene import EdgePhases, at
 from bisar_budget.budget.sources import ErrorSource, error_sources, image_plane
 from bisar_budget.budget.vibration import amplitude_share, echo_phase, lines_of, quadratic_part, shared_frequencies
+from bisar_budget.constants import ROUNDING
 from bisar_budget.errors import KeyPath, printable
+from bisar_budget.geometry import dot, without_rounding
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import formulas
 from bisar_budget.report.explained_error import as_written, declaration, effect, missing, place, plane_and_effect
-from bisar_budget.report.formulas import Step, Sum, equation, number, step
+from bisar_budget.report.formulas import Equation, Step, Sum, equation, number, step, with_unit
 from bisar_budget.report.layout import wrapped
 from bisar_budget.report.text_table import WORDS, percent
 from bisar_budget.units import format_quantity
@@ -142,6 +144,7 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[S
     else:
         path = (*path, int(rest[0]), "amplitude") if is_sinusoid else (*path, "rms")
         yield from step(f"Declared in {place(mission, path)}", as_written(mission, path))
+        yield from _line_of_sight(mission, platform, is_sinusoid, rest, row.declared)
     if row.evidence:
         yield from step("Evidence", printable(row.evidence))
     wavelength = mission.radar.wavelength
@@ -153,7 +156,7 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[S
             "q": quadratic_part(line.frequency * mission.collection.aperture_time),
         }
         lines = equation("QPE_full", "2*π*A*q/λ", values, row.qpe_full_rad, "rad")
-        yield from step("Worst-phase quadratic phase, q = 7.5*j_2(π*f*T)", *lines)
+        yield from step("Quadratic phase in the worst phase, q = 7.5·j₂(π·f·T)", *lines)
     requirement = mission.requirements.pslr if is_sinusoid else mission.requirements.islr
     if requirement is None or row.allowable_published is None or row.allowable_full is None:
         return
@@ -175,22 +178,48 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[S
             "Both platforms at one frequency: echoes add in amplitude, its part a",
             *equation("a", formulas.AMPLITUDE_SHARE, shares, part, ""),
         )
+        level = math.sqrt(ratio * (split.transmitter + split.receiver))
         values = {
             "a": part,
             "λ": wavelength,
-            "φ": echo_phase(math.sqrt(ratio * (split.transmitter + split.receiver))),
+            "φ": echo_phase(level),
         }
-        title = "First principles, φ from J_1(φ)/J_0(φ) = sqrt(PSLR*(s_t + s_r)), about 2*sqrt(PSLR)"
+        title = "First principles; φ is the phase whose echoes have this level, J₁(φ)/J₀(φ) = l"
+        powers = {"PSLR": ratio, "s_t": split.transmitter, "s_r": split.receiver}
+        known = [
+            Equation("l", "sqrt(PSLR*(s_t + s_r))", powers, level, ""),
+            Equation("φ", "", {}, values["φ"], "rad"),
+        ]
     else:
-        title = "First principles, independent on both platforms: exp(σ^2) - 1 is the ISLR of a phase σ"
+        title = "First principles, independent on both platforms; a phase of σ rad has the ISLR exp(σ²) − 1"
+        known = []
     lines = equation("full", formulas.FULL_VIBRATION[row.metric], values, row.allowable_full, "m")
-    yield from step(title, *lines)
+    yield from step(title, *known, *lines)
     limits = {"published": row.allowable_published, "full": row.allowable_full}
     model = mission.allocation.model
     chosen = "min(published, full)" if model == "strictest" else model
     yield from step(
         f"Allowable, allocation.model {model}", *equation("allowable", chosen, limits, row.allowable or 0.0, "m")
     )
+
+
+def _line_of_sight(
+    mission: Mission, platform: str, is_sinusoid: bool, rest: Sequence[str], declared: float
+) -> Iterator[Step]:
+    """What of a vibration along three axes is along the line of sight."""
+    body = getattr(mission.platforms, platform)
+    vibration = body.motion_error.vibration
+    value = vibration.sinusoidal[int(rest[0])].amplitude if is_sinusoid else vibration.wideband.rms
+    if not isinstance(value, tuple):
+        return
+    frame = body.state.frame(body.motion_error.frame)
+    axes = without_rounding(tuple(dot(axis, body.state.look) for axis in frame))
+    parts = [f"{number(size)}*{number(along)}" for size, along in zip(value, axes, strict=True)]
+    if is_sinusoid:
+        text, how = " + ".join(f"|{part}|" for part in parts), "axes may vibrate in any phase: projections add"
+    else:
+        text, how = "sqrt(" + " + ".join(f"({part})^2" for part in parts) + ")", "independent axes: squares add"
+    yield from step(f"Along the line of sight, {how}", Sum(f"declared = {text} = {with_unit(declared, 'm')}"))
 
 
 def _shared_frequency(mission: Mission, platform: str, index: int, total: float) -> Iterator[Step]:
@@ -232,7 +261,7 @@ def _cubic_aggregate(
         if source.declared is not None and source.is_motion and (source.is_independent or found.combine == "each")
     ]
     parts = phase_parts(members, "cubic", found.model, found.combine, correlated_errors(mission))
-    yield from _combined("cubic phase", found.combine, [(name, abs(size)) for name, size in parts], row)
+    yield from _combined("Cubic phase", found.combine, [(name, abs(size)) for name, size in parts], row)
     if row.allowable is not None:
         yield from step("Allowable", f"requirements.cubic_phase_error = {row.allowable:.6g} rad")
 
@@ -253,7 +282,7 @@ def _spatial_variance(
     east, north = at(scene.radius, scene.azimuth)
     sizes = [(name, abs(phase)) for name, phase in edge.parts(edge.differences((east, north)))]
     yield from step(
-        f"Full model at the scene’s edge, {east:.6g} m east, {north:.6g} m north of the centre, less there"
+        f"Full model at the scene’s edge, {east:.6g} m east, {north:.6g} m north of the centre, less at the centre"
     )
     yield from _combined("Difference of QPE", found.combine, sizes, row)
     yield from step("Budget of what one autofocus correction leaves", f"total = {found.allocation.qpe_total:.6g} rad")
@@ -282,6 +311,9 @@ def _location_aggregate(
 
 def _combined(symbol: str, rule: str, members: Sequence[tuple[str, float]], row: Row) -> Iterator[Step]:
     title = f"{symbol} of the declared errors, {_RULES[rule]}"
+    # What is left of terms that cancel exactly is rounding.
+    largest = max((size for _, size in members), default=0.0)
+    members = [(name, size if size > ROUNDING * largest else 0.0) for name, size in members]
     if row.declared is None or not members:
         yield from step(title, *_listed(members, "rad"))
         return

@@ -55,7 +55,7 @@ def clock_coefficient(order: int) -> str:
 
 
 class Equation(NamedTuple):
-    """A formula as text, and what it gives for values of its symbols."""
+    """A formula as text, and what it gives for values of its symbols; an empty formula: the result is known."""
 
     symbol: str
     formula: str
@@ -64,8 +64,10 @@ class Equation(NamedTuple):
     unit: str
 
     @property
-    def lines(self) -> tuple[str, str]:
+    def lines(self) -> tuple[str, ...]:
         """The formula, and under it the same with numbers; their equals signs stand above each other."""
+        if not self.formula:
+            return (f"{self.symbol} = {with_unit(self.result, self.unit)}",)
         margin = " " * sum(not combining(letter) for letter in self.symbol)
         numbers = filled(self.formula, self.values)
         return f"{self.symbol} = {self.formula}", f"{margin} = {numbers} = {with_unit(self.result, self.unit)}"

@@ -54,11 +54,11 @@ def _sentence(text: str) -> str:
 
 
 def _equation(part: Equation | str) -> Markup:
-    """One part of a step: a formula of the derivation as MathML, arithmetic and text as text."""
+    """One part of a step: a formula as MathML, words and text as text."""
     if not isinstance(part, Equation):
         text = typeset.readable(part) if isinstance(part, Sum) else printable(part)
         return Markup("<p class=part>{}</p>").format(text)
-    if typeset.is_derived(part):
+    if typeset.is_formula(part):
         mathml = typeset.as_mathml(part)
         return Markup("<p class=part>{} {}</p>").format(Markup(mathml.formula), Markup(mathml.numbers))
     formula, numbers = typeset.as_text(part)

@@ -16,6 +16,7 @@ from bisar_budget.report.formulas import Equation, Sum
 from bisar_budget.resources import resource
 
 _BAR = 20  # characters
+_OPERATOR = re.compile(r"\\operatorname\{(\w+)\}")
 _DESCRIPTION = re.compile("<desc[^>]*>(.*?)</desc>", re.DOTALL)
 
 
@@ -71,15 +72,15 @@ def _bar(part: float | None) -> Markup:
 
 
 def _equation(part: Equation | str) -> Markup:
-    """One part of a step: a formula of the derivation as a block of LaTeX, arithmetic and text as a line."""
+    """One part of a step: a formula as a block of LaTeX, words and text as a line."""
     if not isinstance(part, Equation):
         return _sum(typeset.readable(part)) if isinstance(part, Sum) else Markup(f"- {markdown_text(part)}\n")
-    if typeset.is_derived(part):
+    if part.formula and typeset.is_formula(part):
         formula, numbers = typeset.as_latex(part)
         block = f"\\begin{{aligned}}\n{formula} \\\\\n{numbers}\n\\end{{aligned}}"
-        return Markup(f"\n```math\n{block}\n```\n\n")
+        return Markup(f"\n{_math(block)}\n\n")
     formula, numbers = typeset.as_text(part)
-    return _sum(f"{formula} {numbers}")
+    return _sum(f"{formula} {numbers}".rstrip())
 
 
 def _sum(text: str) -> Markup:
@@ -96,7 +97,13 @@ def _chip(chip: Chip, path: str) -> Markup:
 
 
 def _general(left: str, right: str) -> Markup:
-    return Markup(f"```math\n{typeset.latex_of(left)} = {typeset.latex_of(right)}\n```")
+    return Markup(_math(f"{typeset.latex_of(left)} = {typeset.latex_of(right)}"))
+
+
+def _math(latex: str) -> str:
+    """A block of LaTeX, as GitHub takes it: it refuses `operatorname` ("macros are not allowed")."""
+    latex = _OPERATOR.sub(r"\\mathop{\\mathrm{\1}}", latex)
+    return f"```math\n{latex}\n```"
 
 
 def _description(svg: str) -> str:

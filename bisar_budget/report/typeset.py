@@ -1,6 +1,6 @@
 """Equations of an explanation as MathML and as LaTeX: the formula from the derivation, and the same with numbers.
 
-What is no derived formula (a budget times a share) stays text, in both the same.
+What the derivation has not in one piece is set from its text; words (a budget times a share) stay text.
 """
 
 import re
@@ -10,6 +10,7 @@ from typing import NamedTuple
 from bisar_budget.catalogue import FORMULAS, SYMBOLS
 from bisar_budget.report.escapes import xml_text
 from bisar_budget.report.formulas import Equation, filled, six_digits, with_unit
+from bisar_budget.report.notation import LATEX, MATHML, Language, is_mathematical, symbol, written
 
 _LATEX, _MATHML = 0, 1
 _MINUS = re.compile("(?<!e)-")  # not the one of a power of ten
@@ -22,13 +23,15 @@ class Typeset(NamedTuple):
     numbers: str
 
 
-def is_derived(equation: Equation) -> bool:
-    """Whether the derivation has the formula."""
-    return equation.formula in FORMULAS
+def is_formula(equation: Equation) -> bool:
+    """Whether it is to be set as a formula: one of the derivation, or one in letters."""
+    return not equation.formula or equation.formula in FORMULAS or is_mathematical(equation.formula)
 
 
 def as_text(equation: Equation) -> Typeset:
     """For a reader: · between factors, no carets."""
+    if not equation.formula:
+        return Typeset(readable(equation.lines[0]), "")
     numbers = f"= {filled(equation.formula, equation.values)} = {with_unit(equation.result, equation.unit)}"
     return Typeset(readable(f"{equation.symbol} = {equation.formula}"), readable(numbers))
 
@@ -40,13 +43,20 @@ def readable(text: str) -> str:
 
 def as_mathml(equation: Equation) -> Typeset:
     """Three `math` elements, so that a narrow page can break between them."""
-    formula = FORMULAS[equation.formula][_MATHML]
-    values = {SYMBOLS[name][_MATHML]: value for name, value in equation.values.items() if name in SYMBOLS}
-    numbers = _mathml_filled(formula, values)
     result = f"<mrow>{mathml_number(equation.result)}{_mathml_unit(equation.unit)}</mrow>"
-    symbol = SYMBOLS[equation.symbol][_MATHML] if equation.symbol in SYMBOLS else f"<mi>{equation.symbol}</mi>"
+    left = symbol(equation.symbol, MATHML)
+    if not equation.formula:
+        return Typeset(math(f"<mrow>{left}<mo>=</mo>{result}</mrow>"), "")
+    if equation.formula in FORMULAS:
+        formula = FORMULAS[equation.formula][_MATHML]
+        values = {SYMBOLS[name][_MATHML]: value for name, value in equation.values.items() if name in SYMBOLS}
+        numbers = _mathml_filled(formula, values)
+    else:
+        formula = written(equation.formula, MATHML)
+        cells = {name: (mathml_number(value), value) for name, value in equation.values.items()}
+        numbers = written(equation.formula, MATHML, _bracketed(cells, MATHML))
     return Typeset(
-        math(f"<mrow>{symbol}<mo>=</mo>{formula}</mrow>"),
+        math(f"<mrow>{left}<mo>=</mo>{formula}</mrow>"),
         f"{math(f'<mrow><mo>=</mo>{numbers}</mrow>')} {math(f'<mrow><mo>=</mo>{result}</mrow>')}",
     )
 
@@ -98,12 +108,22 @@ def _mathml_unit(unit: str) -> str:
 
 def as_latex(equation: Equation) -> Typeset:
     """Without delimiters; both parts are aligned at their first `=`."""
-    formula = FORMULAS[equation.formula][_LATEX]
-    values = {SYMBOLS[name][_LATEX]: value for name, value in equation.values.items() if name in SYMBOLS}
-    symbol = SYMBOLS[equation.symbol][_LATEX] if equation.symbol in SYMBOLS else rf"\mathrm{{{equation.symbol}}}"
     unit = rf"\,\mathrm{{{equation.unit.replace('^2', '^{2}')}}}" if equation.unit else ""
     result = f"{latex_number(equation.result)}{unit}"
-    return Typeset(f"{symbol} &= {formula}", f"&= {_latex_filled(formula, values)} = {result}")
+    if equation.formula in FORMULAS:
+        formula = FORMULAS[equation.formula][_LATEX]
+        values = {SYMBOLS[name][_LATEX]: value for name, value in equation.values.items() if name in SYMBOLS}
+        numbers = _latex_filled(formula, values)
+    else:
+        formula = written(equation.formula, LATEX)
+        cells = {name: (latex_number(value), value) for name, value in equation.values.items()}
+        numbers = written(equation.formula, LATEX, _bracketed(cells, LATEX))
+    return Typeset(f"{symbol(equation.symbol, LATEX)} &= {formula}", f"&= {numbers} = {result}")
+
+
+def _bracketed(cells: Mapping[str, tuple[str, float]], language: Language) -> dict[str, str]:
+    """Numbers in their language, negative ones in brackets."""
+    return {name: language.brackets % text if value < 0 else text for name, (text, value) in cells.items()}
 
 
 def _latex_filled(formula: str, values: Mapping[str, float]) -> str:

@@ -28,7 +28,7 @@ _ACCENTS = {
     "dddot": "\u20db",
     "ddddot": "\u20dc",
 }
-_ABOVE = {"tilde": "~", "bar": "¯", "hat": "^", "dot": "˙", "ddot": "¨", "dddot": "⃛", "ddddot": "⃜"}
+_ABOVE = {"tilde": "~", "bar": "¯", "hat": "^", "dot": "˙", "ddot": "¨", "dddot": "...", "ddddot": "...."}
 _COMMANDS = {
     "Delta": r"\Delta{}",
     "PSLR": r"\mathrm{PSLR}",

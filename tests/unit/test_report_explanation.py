@@ -221,3 +221,57 @@ class TestCommand:
     def test_output_file(self, run, tmp_path) -> None:
         run("check", "-", "--explain", "timing.linear", "-o", tmp_path / "x.txt", input=mission_text())
         assert "Table I row 1" in (tmp_path / "x.txt").read_text(encoding="utf-8")
+
+
+def test_a_vibration_along_three_axes_is_projected_before_the_eyes_of_the_reader() -> None:
+    """Its 198 µm stood there without the sum that they come from."""
+    vibration = {"sinusoidal": [{"amplitude": ["200 um", "50 um", "10 um"], "frequency": "15 Hz"}]}
+    vibration["wideband"] = {"rms": ["10 um", "10 um", "5 um"]}
+    changes = {"platforms__transmitter__motion_error": {"vibration": vibration}, "allocation__model": "full"}
+    for row in ("transmitter.vibration.sinusoidal.0", "transmitter.vibration.wideband"):
+        text = explained(row, **changes)
+        ((numbers, value),) = [(numbers, value) for symbol, numbers, value in sums(text) if symbol == "declared"]
+        assert evaluated(numbers) == pytest.approx(value, rel=1e-5)
+        assert "Along the line of sight" in text
+
+
+def test_the_phase_of_the_echoes_is_that_of_both_shares() -> None:
+    """Not 2√PSLR where shares of power leave a reserve."""
+    changes = {
+        "platforms__transmitter__motion_error": {
+            "vibration": {"sinusoidal": [{"amplitude": "20 um", "frequency": "15 Hz"}]}
+        },
+        "allocation__split": {"transmitter": 0.4, "receiver": 0.3, "reserve": 0.3},
+        "requirements__pslr": "-30 dB",
+    }
+    text = explained("transmitter.vibration.sinusoidal.0", **changes)
+    levels = {symbol: value for symbol, _, value in sums(text)}
+    assert levels["l"] == pytest.approx(math.sqrt(1e-3 * 0.7), rel=1e-5)
+    (phase,) = re.findall(r"φ = (\S+) rad", text)
+    assert float(phase) == pytest.approx(2 * levels["l"], rel=1e-3)  # J₁/J₀ is φ/2·(1 + φ²/8 + …)
+    assert "2*sqrt(PSLR)" not in text
+
+
+@pytest.mark.parametrize("model", ["published", "full"])
+def test_both_models_start_from_the_same_sign(model: str) -> None:
+    """A negative error was put into Table I as a positive one, and into the full model as it is."""
+    changes = {"platforms__receiver__motion_error": {"position": "-2 m"}, "allocation__model": model}
+    text = explained("receiver.position.x", **changes)
+    values = [value for symbol, _, value in sums(text) if symbol == "β̃_0"]
+    assert len(values) == (2 if model == "full" else 1)
+    assert values == pytest.approx([values[0]] * len(values), rel=1e-5)
+    assert values[0] > 0  # the receiver is east of the scene: measured too far west, its range is measured too short
+
+
+def test_what_is_left_of_rounding_is_not_listed() -> None:
+    """`common.position.x  2.08167e-17 rad` is no difference of phases."""
+    changes = {
+        "common_motion_error": {"position": "3 m", "velocity": "1 mm/s"},
+        "scene": {"radius": "800 m"},
+        "allocation__model": "full",
+        "allocation__combine": "rss",
+    }
+    text = explained("mission.spatial_variance", **changes)
+    assert "common.velocity.x" in text
+    assert not re.search(r"e-1[4-9]", text)
+    assert not re.search(r"e-1[4-9] m$", explained("common.position.y", **changes), re.MULTILINE)

@@ -11,7 +11,7 @@ from bisar_budget.catalogue import FORMULAS, SYMBOLS
 from bisar_budget.mission.load import load_mission
 from bisar_budget.report import typeset
 from bisar_budget.report.explanation import chain, collection_chain
-from bisar_budget.report.formulas import Equation
+from bisar_budget.report.formulas import Equation, filled
 from tests.conftest import TODAY
 from tests.unit.test_report_explanation import MISSIONS
 
@@ -27,7 +27,7 @@ def derived_equations(model: str = "published") -> list[tuple[str, Equation]]:
                 (f"{path.stem} {name}", part)
                 for step in steps
                 for part in step.parts
-                if isinstance(part, Equation) and typeset.is_derived(part)
+                if isinstance(part, Equation) and part.formula in FORMULAS
             ]
     return found
 
@@ -132,3 +132,49 @@ def test_atan2_is_no_arctan() -> None:
     _, mathml = next(value for key, value in FORMULAS.items() if key.startswith("atan2"))
     assert "<mi>atan2</mi>" in mathml
     assert "<mo>,</mo>" in mathml
+
+
+@pytest.mark.parametrize(
+    "formula",
+    [
+        "(-β̃_0*ṡ_y + β̃_1*s_y)/(det Q)",
+        "β̃_2 + (s\u0308_x*x\u0302 + s\u0308_y*ŷ)/2",
+        "-ã_dr*ü_dr/4",
+        "-p̃_x*(u\u20dc_xt + u\u20dc_xr)/24",
+        "|φ_t + φ_r|",
+        "a*λ*φ/(2*π)",
+        "sqrt(s_k)/(sqrt(s_t) + sqrt(s_r))",
+        "s_x*ṡ_y - s_y*ṡ_x",
+        "2*T^4*b_4/(3*λ) - T^2/c",
+        "a/b/c*d",
+    ],
+)
+def test_formulas_that_no_table_has_are_typeset_from_their_text(formula: str) -> None:
+    """Read back from MathML and LaTeX they give what the text gives; the full model's were raw text before."""
+    names = set(re.findall(r"det Q|[^\W\d][\w\u0300-\u036f\u20db-\u20dc]*", formula)) - {"sqrt", "π"}
+    values = {name: (-1) ** n * (0.37 + n) * 10.0 ** (-3 * (n % 3)) for n, name in enumerate(sorted(names))}
+    values |= {name: abs(value) for name, value in values.items() if name.startswith("s_")}
+    text = re.sub(r"\|([^|]*)\|", r"abs(\1)", filled(formula, values)).replace("^", "**").replace("π", "pi")
+    want = value_of(text)
+    equation = Equation("x", formula, values, want, "m")
+    assert typeset.is_formula(equation)
+    assert formula not in FORMULAS
+    mathml = typeset.as_mathml(equation)
+    numbers = ElementTree.fromstring(f"<p>{mathml.numbers}</p>")[0][0][1]
+    assert value_of(python_of_mathml(numbers)) == pytest.approx(want, rel=1e-12)
+    latex = typeset.as_latex(equation)
+    assert value_of(python_of_latex(latex.numbers.split("= ")[1])) == pytest.approx(want, rel=1e-12)
+    assert "_" not in mathml.formula
+    assert not re.search(r"[^\x00-\x7f]", latex.formula)
+
+
+def test_words_stay_text() -> None:
+    for formula in ("total*share*gain", "limit/(QPE/unit)", "min(published, full)", "10^(dB/10)"):
+        assert not typeset.is_formula(Equation("x", formula, {}, 0.0, ""))
+
+
+def test_a_name_with_an_underscore_has_a_subscript() -> None:
+    """`\\mathrm{QPE_full}` puts the f alone below the line."""
+    equation = Equation("QPE_full", "φ_turning + φ_displaced", {"φ_turning": 1.0, "φ_displaced": -2.0}, -1.0, "rad")
+    assert typeset.as_latex(equation).formula.startswith(r"\mathrm{QPE}_{\mathrm{full}} &= \phi_{\mathrm{turning}}")
+    assert "<msub><mi>QPE</mi><mi>full</mi></msub>" in typeset.as_mathml(equation).formula
