@@ -1,5 +1,7 @@
 """Beyond first order: exact ranges without NumPy, against NumPy; which rows carry them, both sides of each bound."""
 
+import csv
+import io
 import math
 import subprocess
 import sys
@@ -10,10 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bisar_budget.budget.exact_ranges import ExactRanges
+from bisar_budget.budget.findings import Report
 from bisar_budget.budget.sources import error_sources, full_ground
 from bisar_budget.budget.validity import FirstOrder
 from bisar_budget.geometry import norm
 from bisar_budget.mission.load import parse_mission
+from bisar_budget.report import Style, render
 from bisar_budget.units import SPEED, parse_quantity
 from tests.conftest import ROOT, findings, mission_text, row
 
@@ -265,3 +269,15 @@ def test_an_allowable_that_the_gating_model_does_not_have_is_said_to_be_the_othe
     (note,) = [note for note in found.notes if "speaks of the first order alone" in note]
     assert note.startswith(f"{whose} of ")
     assert (found.allowable is None) == (model == "published")
+
+
+def test_csv_carries_the_phase_by_exact_ranges_and_the_margin_of_the_published_rule() -> None:
+    report = Report("1", (findings(**{f"{TX_ERROR}__velocity": [0, 0, 3]}, requirements={"pslr": "-30 dB"}),))
+    rows = {line["id"]: line for line in csv.DictReader(io.StringIO(render("csv", report, Style())))}
+    beyond = row(report.missions[0], "transmitter.velocity.z")
+    assert beyond.qpe_exact_rad is not None
+    assert float(rows[beyond.id]["qpe_exact_rad"]) == beyond.qpe_exact_rad
+    assert rows["receiver.velocity.x"]["qpe_exact_rad"] == ""
+    # Half of the power against half of the amplitude: 3 dB, but for J₁/J₀ that is above φ/2.
+    margin = float(rows["receiver.vibration.sinusoidal.0"]["published_margin_db"])
+    assert margin == pytest.approx(10 * math.log10(2), abs=0.01)
