@@ -1,8 +1,9 @@
 """Hold a mission's declared errors to its allocated budget: one row for each, and what the rows add up to."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import date
+from functools import partial
 from typing import TYPE_CHECKING
 
 from bisar_budget.budget import vibration
@@ -136,7 +137,7 @@ def _error_rows(
                 notes = (*notes, beyond.against(qpe_full))
                 doubt = beyond.doubt(qpe_full, limit)
         allowable = _gating(model, published, full)
-        if of_allowable := first_order.allowable_note(source, allowable if allowable is not None else full, limit):
+        if of_allowable := first_order.allowable_note(source, allowable, full, limit):
             notes = (*notes, of_allowable)
         if qpe_published > limit or abs(qpe_full) > limit:
             qpe = abs(source.qpe(model))
@@ -225,7 +226,7 @@ def _undeclared(
     """Row of an error that the file does not declare, as `_judged` would make it: half of all rows are such."""
     allowable = _gating(mission.allocation.model, published, full)
     notes = source.notes
-    if of_allowable := first_order.allowable_note(source, allowable if allowable is not None else full, limit):
+    if of_allowable := first_order.allowable_note(source, allowable, full, limit):
         notes = (*notes, of_allowable)
     return Row._make(
         (
@@ -316,8 +317,9 @@ def _aggregate_rows(
         cubic_notes, exact_doubt = of_members(found, motion, by_exact, cubic_limit, "rad")
         cubic_doubt = cubic_doubt or exact_doubt
     cubic_phase = combined_phase(motion, "cubic", model, combine, groups) if motion else None
-    cubic_parts = phase_parts(motion, "cubic", model, combine, groups)
-    over = _exceeded("cubic phase", cubic_phase, cubic_limit, "rad", cubic_parts)
+    over = _exceeded(
+        "cubic phase", cubic_phase, cubic_limit, "rad", lambda: phase_parts(motion, "cubic", model, combine, groups)
+    )
     yield _judged(
         mission,
         id="mission.cubic_phase_error",
@@ -341,18 +343,18 @@ def _aggregate_rows(
         published = [(s.id, by_25.displacement(s.effect, s.declared or 0.0)) for s in motion]
         moves = [(row_id, move) for row_id, move in published if move is not None]
         moved = max(moved, combined_displacement(moves, combine, groups))
-    lengths = [(row_id, math.hypot(*move)) for row_id, move in displacement_parts(known, combine, groups)]
     location_notes: tuple[str, ...] = ()
-    location_doubt = ""
+    location_doubt = _location_doubt(mission, motion, first_order.ground.plane, groups)
     if found and motion:
         exact_moves = [(s.id, _moved_exactly(s, found, first_order.ground.plane)) for s in motion]
-        location_notes, location_doubt = of_members(
+        location_notes, exact_doubt = of_members(
             found,
             motion,
             combined_displacement(exact_moves, combine, groups),
             mission.requirements.location_error,
             "m",
         )
+        location_doubt = location_doubt or exact_doubt
     yield _judged(
         mission,
         id="mission.location_error",
@@ -366,15 +368,27 @@ def _aggregate_rows(
         not_evaluated=plane.degeneracy if model == "published" else "",
         is_declared=bool(motion),
         info="" if mission.requirements.location_error is not None else NO_REQUIREMENT,
-        over=_exceeded("displacement of the image", moved, mission.requirements.location_error, "m", lengths),
+        over=_exceeded(
+            "displacement of the image",
+            moved,
+            mission.requirements.location_error,
+            "m",
+            lambda: [(row_id, math.hypot(*move)) for row_id, move in displacement_parts(known, combine, groups)],
+        ),
         doubt=location_doubt,
         notes=(*notes, *location_notes),
     )
     if allocation.n_pull is not None:
         pull_in = math.pi * allocation.n_pull
         total = math.fsum(abs(s.qpe(model)) for s in declared) if declared else None
-        by_exact = math.fsum(abs(s.qpe("full")) for s in _with_exact(declared, found))
-        pull_in_notes, pull_in_doubt = of_members(found, declared, by_exact, pull_in, "rad")
+        pull_in_notes: tuple[str, ...] = ()
+        pull_in_doubt = ""
+        if found:
+            by_exact = math.fsum(abs(s.qpe("full")) for s in _with_exact(declared, found))
+            pull_in_notes, pull_in_doubt = of_members(found, declared, by_exact, pull_in, "rad")
+        by_other = math.fsum(abs(s.qpe(other)) for s in declared) if other is not None else 0.0
+        if by_other > pull_in * (1 + UTILIZATION_TOLERANCE):
+            pull_in_doubt = f"the {other} model says beyond it: QPE {by_other:.3g} rad, {pull_in:.3g} rad allowed"
         yield _judged(
             mission,
             id="mission.autofocus_pull_in",
@@ -385,20 +399,36 @@ def _aggregate_rows(
             path=("autofocus", "n_pull"),
             equation="Section VI",
             never_fails=True,
-            over=_exceeded("QPE", total, pull_in, "rad", [(s.id, abs(s.qpe(model))) for s in declared])
+            over=_exceeded("QPE", total, pull_in, "rad", lambda: [(s.id, abs(s.qpe(model))) for s in declared])
             + "; autofocus corrects one total, not each error its own",
             doubt=pull_in_doubt,
             notes=pull_in_notes,
         )
 
 
-def _exceeded(
-    what: str, size: float | None, limit: float | None, unit: str, members: Sequence[tuple[str, float]]
+def _location_doubt(
+    mission: Mission, motion: Sequence[ErrorSource], by_full: ImagePlane, groups: Sequence[Correlated]
 ) -> str:
-    """Say how large an aggregate is, what is allowed, and which of its members is the largest."""
-    if size is None or limit is None or not members:
+    """Say that the model that does not gate fails the location; else nothing."""
+    model, limit = mission.allocation.model, mission.requirements.location_error
+    if limit is None or model == "strictest" or not motion:
         return ""
-    row_id, largest = max(members, key=lambda member: abs(member[1]))
+    other, plane = ("full", by_full) if model == "published" else ("published", image_plane(mission.geometry))
+    moves = [(s.id, plane.displacement(s.by(other), s.declared or 0.0)) for s in motion]
+    known = [(row_id, move) for row_id, move in moves if move is not None]  # (25) may have none at all
+    moved = combined_displacement(known, mission.allocation.combine, groups) if known else 0.0
+    if moved <= limit * (1 + UTILIZATION_TOLERANCE):
+        return ""
+    return f"the {other} model says fail: {moved:.3g} m, {limit:.3g} m allowed"
+
+
+def _exceeded(
+    what: str, size: float | None, limit: float | None, unit: str, members: Callable[[], Sequence[tuple[str, float]]]
+) -> str:
+    """Say how large an aggregate is, what is allowed, and which of its members is the largest; nothing if inside."""
+    if size is None or limit is None or size <= limit:
+        return ""
+    row_id, largest = max(members(), key=lambda member: abs(member[1]))
     return f"{what} {size:.3g} {unit}, {limit:.3g} {unit} allowed; largest: {row_id}, {abs(largest):.3g} {unit}"
 
 
@@ -465,21 +495,27 @@ def _qpe_aggregates(
         owners.insert(2, "clock")  # else it counts with the receiver
     for owner in owners:
         members = [s for s in declared if owner == "mission" or allocation.qpe.includes(s.owner, owner)]
-        qpe, published, full = (
-            combined_phase(members, "qpe", of, combine, groups) if members else None
-            for of in (model, "published", "full")
+        published, full = (
+            combined_phase(members, "qpe", of, combine, groups) if members else None for of in ("published", "full")
         )
+        qpe = published if model == "published" else full
+        if model == "strictest" and members:
+            qpe = combined_phase(members, "qpe", model, combine, groups)
         limit = allocation.qpe_limit(owner) * gain
         over = ""
         if qpe is not None:
-            exceeded = _exceeded("QPE", qpe, limit, "rad", phase_parts(members, "qpe", model, combine, groups))
+            parts = partial(phase_parts, members, "qpe", model, combine, groups)
+            exceeded = _exceeded("QPE", qpe, limit, "rad", parts)
             over = f"{exceeded}; passes with autofocus from n_pull {allocation.n_pull_needed(qpe, owner):g}"
         other = {"published": ("full", full), "full": ("published", published)}.get(model)
         doubt = ""
         if other is not None and other[1] is not None and other[1] > limit * (1 + UTILIZATION_TOLERANCE):
             doubt = f"the {other[0]} model says fail: {other[1]:.3g} rad, {limit:.3g} rad allowed"
-        by_exact = combined_phase(_with_exact(members, found), "qpe", "full", combine, groups)
-        notes, exact_doubt = of_members(found, members, by_exact, limit, "rad")
+        exact_notes: tuple[str, ...] = ()
+        exact_doubt = ""
+        if found:
+            by_exact = combined_phase(_with_exact(members, found), "qpe", "full", combine, groups)
+            exact_notes, exact_doubt = of_members(found, members, by_exact, limit, "rad")
         yield _judged(
             mission,
             id=f"{'timing' if owner == 'clock' else owner}.quadratic_phase_error",
@@ -497,7 +533,10 @@ def _qpe_aggregates(
             limits=(limit, limit),
             qpe=published,
             qpe_full=full,
-            notes=(*correlation_notes(combine, [g for g in groups if owner in (g.platform, "mission")]), *notes),
+            notes=(
+                *correlation_notes(combine, [g for g in groups if owner in (g.platform, "mission")]),
+                *exact_notes,
+            ),
         )
 
 

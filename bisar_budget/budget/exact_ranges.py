@@ -8,19 +8,21 @@ has it; quadratic and cubic phase are those of the cubic fitted to what remains,
 
 import math
 from collections.abc import Iterable
-from functools import cache
+from functools import cache, cached_property
+from math import hypot
 from operator import mul
 from typing import NamedTuple
 
 from bisar_budget.budget.sources import ErrorSource
-from bisar_budget.geometry import BistaticGeometry, GroundVector
+from bisar_budget.geometry import BistaticGeometry, GroundVector, Vector
 
 _NODES = 16  # more change nothing, up to turns of ±1 rad
 _ORDER = 6  # of the projection, of which value and slope at the midpoint are taken
-_ITERATIONS = 20
+_ITERATIONS = 60
 _SETTLED_M = 1e-6
 
 Weights = tuple[float, ...]
+Track = list[Vector]  # positions at the nodes
 
 
 class ExactPhases(NamedTuple):
@@ -46,18 +48,18 @@ class ExactRanges:
 
         None where the iteration finds no ground point with the recorded history.
         """
-        measured = {name: [list(at) for at in track] for name, track in self.tracks.items()}
+        measured = dict(self.tracks)
         recorded = list(self.recorded)
         for source, size in errors:
-            for name, track in measured.items():
-                if source.moves(name) and source.is_position:
-                    x, y, z = source.direction
-                    for at, tau in zip(track, self.times, strict=True):
-                        by = size * source.power(tau)
-                        at[0] += by * x
-                        at[1] += by * y
-                        at[2] += by * z
-            if not source.is_position:  # a clock, or a phase as such: its polynomial is exact
+            if source.is_position:
+                x, y, z = (size * part for part in source.direction)
+                powers = [source.power(tau) for tau in self.times]
+                for name, track in measured.items():
+                    if source.moves(name):
+                        measured[name] = [
+                            (a + p * x, b + p * y, c + p * z) for (a, b, c), p in zip(track, powers, strict=True)
+                        ]
+            else:  # a clock, or a phase as such: its polynomial is exact
                 for index, (tau, node) in enumerate(zip(self.times, _quadrature()[0], strict=True)):
                     term = source.effect
                     edge = term.qpe * node**2 + term.cubic * node**3
@@ -65,35 +67,45 @@ class ExactRanges:
                     recorded[index] += size * metres
         return self._settled(recorded, *measured.values())
 
-    def _settled(self, recorded: list[float], *tracks: list[list[float]]) -> ExactPhases | None:
-        """Newton's method for the point; the slope of a track's range is minus its direction."""
+    @cached_property
+    def _rates(self) -> tuple[float, float, float, float]:
+        """What a step east and north of the scene centre does to the constant and linear term of the history."""
+        _, at_midpoint, per_half, _, _ = _quadrature()
+        slopes = []
+        for axis in (0, 1):  # the slope of a track's range is minus its direction
+            along = [
+                -t[axis] / math.hypot(*t) - r[axis] / math.hypot(*r)
+                for t, r in zip(*self.tracks.values(), strict=True)
+            ]
+            slopes += [_sum(at_midpoint, along), _sum(per_half, along)]
+        a, c, b, d = slopes
+        return a, b, c, d
+
+    def _settled(self, recorded: list[float], *tracks: Track) -> ExactPhases | None:
+        """Newton's method for the point, with the slopes at the scene centre, which turn little on the way there."""
         _, at_midpoint, per_half, quadratic, cubic = _quadrature()
+        a, b, c, d = self._rates
+        determinant = a * d - b * c
+        if not determinant:
+            return None
+        first, second = tracks
         east = north = 0.0
         for _ in range(_ITERATIONS):
-            left, by_east, by_north = list(recorded), [0.0] * _NODES, [0.0] * _NODES
-            for track in tracks:
-                for index, (x, y, z) in enumerate(track):
-                    dx, dy = x - east, y - north
-                    distance = math.sqrt(dx * dx + dy * dy + z * z)
-                    if not distance:
-                        return None  # the iteration has run into a platform
-                    left[index] -= distance
-                    by_east[index] -= dx / distance
-                    by_north[index] -= dy / distance
-            a, b = _sum(at_midpoint, by_east), _sum(at_midpoint, by_north)
-            c, d = _sum(per_half, by_east), _sum(per_half, by_north)
+            left = [
+                whole - hypot(x - east, y - north, z) - hypot(u - east, v - north, w)
+                for whole, (x, y, z), (u, v, w) in zip(recorded, first, second, strict=True)
+            ]
             constant, linear = _sum(at_midpoint, left), _sum(per_half, left)
-            determinant = a * d - b * c
-            if not determinant or not math.isfinite(determinant):
-                return None
             step_east, step_north = (
                 (d * constant - b * linear) / determinant,
                 (a * linear - c * constant) / determinant,
             )
             east, north = east + step_east, north + step_north
-            if math.hypot(step_east, step_north) < _SETTLED_M:
+            if abs(step_east) + abs(step_north) < _SETTLED_M:
                 scale = 2 * math.pi / self.wavelength
                 return ExactPhases((east, north), scale * _sum(quadratic, left), scale * _sum(cubic, left))
+            if not math.isfinite(east + north):
+                return None
         return None
 
 

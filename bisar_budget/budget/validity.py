@@ -85,6 +85,7 @@ class FirstOrder:
         self._by_constant, self._by_linear = math.hypot(a, c) / determinant, math.hypot(b, d) / determinant
         self._edge = {"m": 1.0, "m/s": self.T / 2, "m/s^2": self.T**2 / 8}  # of a unit of it at the aperture edge
         self._strain = _strain(geometry, self.T)
+        self._bends: dict[str, float] = {}
         self.found: dict[str, Beyond] = {}  # by row id, of the errors asked about
 
     @cached_property
@@ -105,7 +106,8 @@ class FirstOrder:
 
     def _reach(self, source: ErrorSource) -> float:
         """Bound of how far a unit of an error takes platform and image, over the aperture. [m/unit]"""
-        moves = self._by_constant * abs(source.full.constant) + self._by_linear * abs(source.full.linear)
+        full = source.full
+        moves = self._by_constant * abs(full.constant) + self._by_linear * abs(full.linear)
         return self._edge.get(source.unit, 0.0) + moves
 
     def _cause(self, source: ErrorSource, declared: float) -> str:
@@ -116,22 +118,24 @@ class FirstOrder:
         moved = math.hypot(*(self.ground.plane.displacement(source.full, declared) or (0.0, 0.0)))
         if moved > FAR_M:
             return f"it moves the image by {moved:.3g} m"
-        first, added = source.full.qpe * declared, self.second(source, declared).qpe
+        first, added = source.full.qpe * declared, self._bend(source) * declared * declared
         return "" if abs(added) <= max(FLOOR_RAD, SHARE * abs(first)) else f"the second order adds {added:.2g} rad"
 
-    def allowable_note(self, source: ErrorSource, allowable: float | None, limit: float) -> str:
-        """Say that an allowable, which has a phase of `limit`, lies beyond first order; else nothing."""
+    def allowable_note(self, source: ErrorSource, gating: float | None, full: float | None, limit: float) -> str:
+        """Say that an allowable, which has a phase of `limit`, lies beyond first order; else nothing.
+
+        Of the model that gates; where that has none, of the full model.
+        """
+        allowable, whose = (full, "the full model's") if gating is None else (gating, "the")
         if allowable is None or not source.is_motion:
             return ""
         if allowable * self._reach(source) < FAR_M and allowable * self._edge.get(source.unit, 0.0) < self._harmless:
             return ""  # the second order of what stays that near is a constant and a slope
-        constant, linear, quadratic = self._second(source, 1.0)  # it grows with the square of the error
-        added = quadratic + self.ground.quadratic[0] * constant + self.ground.quadratic[1] * linear
-        bend = math.sqrt(abs(added) / max(FLOOR_RAD, SHARE * limit))
+        bend = math.sqrt(abs(self._bend(source)) / max(FLOOR_RAD, SHARE * limit))
         if allowable * bend <= 1:
             return ""
         size, held = (format_quantity(value, source.unit, 2) for value in (allowable, 1 / bend))
-        return f"the allowable of {size} speaks of the first order alone, which holds to about {held}"
+        return f"{whose} allowable of {size} speaks of the first order alone, which holds to about {held}"
 
     @cached_property
     def _aperture(self) -> tuple[tuple[tuple[str, Vector, float], ...], ...]:
@@ -142,14 +146,27 @@ class FirstOrder:
 
     def second(self, source: ErrorSource, size: float) -> Effect:
         """What the second order adds to an error of a size: displacement and quadratic phase."""
-        return self.ground.effective([(*self._second(source, size), 0.0)])[0]
+        constant, linear, quadratic = (term * size * size for term in self._second(source))
+        return self.ground.effective([(constant, linear, quadratic, 0.0)])[0]
 
-    def _second(self, source: ErrorSource, size: float) -> tuple[float, float, float]:
-        """Constant and linear term of the second order, and its quadratic phase, before they move the image."""
-        east, north = self.ground.plane.displacement(source.full, size) or (0.0, 0.0)
+    def _bend(self, source: ErrorSource) -> float:
+        """Quadratic phase that the second order adds; it grows with the square of the error. [rad/unit²]"""
+        if source.id not in self._bends:
+            constant, linear, quadratic = self._second(source)
+            by_constant, by_linear = self.ground.quadratic
+            self._bends[source.id] = quadratic + by_constant * constant + by_linear * linear
+        return self._bends[source.id]
+
+    def _second(self, source: ErrorSource) -> tuple[float, float, float]:
+        """Of a unit: constant, linear term and quadratic phase of the second order, before they move the image."""
+        east, north = self.ground.plane.displacement(source.full, 1.0) or (0.0, 0.0)
         x, y, z = source.direction
-        edge = size * self._edge.get(source.unit, 0.0)
-        own = (-edge if source.unit == "m/s" else edge, edge if source.unit == "m" else 0.0, edge)
+        edge = self._edge.get(source.unit, 0.0)
+        own = (
+            -edge if source.unit == "m/s" else edge,
+            edge if source.unit == "m" else 0.0,
+            edge,
+        )  # start, middle, end
         errors = []
         for power, platforms in zip(own, self._aperture, strict=True):
             total = 0.0

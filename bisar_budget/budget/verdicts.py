@@ -10,8 +10,8 @@ from bisar_budget.geometry import GroundVector
 class Verdict(NamedTuple):
     """What the image says of one limit. None where a value does not exist; `reason` says why.
 
-    Phases are magnitudes at the aperture edge [rad]: by the full model's closed form, predicted from exact
-    ranges, and measured, `…_inside` and `…_beyond` at 0.9 and 1.1 times the limit. Displacements are on the
+    Phases are magnitudes at the aperture edge [rad]: by Table II, by the full model's closed form, predicted from
+    exact ranges, and measured, `…_inside` and `…_beyond` at 0.9 and 1.1 times the limit. Displacements are on the
     ground (east, north) [m]: `displacement_m` by exact ranges, `…_published_m` by (25), `…_full_m` by the full
     model. The smear azimuth is that of a line, from 0 to π; `…_published_rad` by (31). For vibration
     `measured_db` stands against `requirement_db`. With autofocus the row is formed again at
@@ -23,6 +23,7 @@ class Verdict(NamedTuple):
     boundary_error: float
     unit: str
     budget_rad: float | None = None
+    published_qpe_rad: float | None = None
     full_qpe_rad: float | None = None
     predicted_qpe_rad: float | None = None
     measured_qpe_rad: float | None = None

@@ -324,6 +324,8 @@ def _margin(allowed: VibrationLimits | None) -> tuple[str, ...]:
     """How far the published rule stays inside first principles, said of every limit."""
     if allowed is None:
         return ()
+    if abs(allowed.margin_db) < 0.005:
+        return ("the published rule is that of first principles, to 0.01 dB",)
     side = "inside" if allowed.margin_db >= 0 else "beyond"
     return (f"the published rule is {abs(allowed.margin_db):.2f} dB {side} first principles",)
 

@@ -205,6 +205,7 @@ class Evidence(NamedTuple):
     id: str
     limit: str
     budget: str
+    published: str
     full: str
     exact: str
     image: str
@@ -752,8 +753,8 @@ def _sources(rows: Sequence[Row]) -> tuple[Source, ...]:
 
 def _evidence(found: MissionFindings) -> Iterator[Evidence]:
     for verdict in found.verdicts or ():
-        limit, *numbers = (verification.limit(verdict), *verification.numbers(verdict))
+        limit, numbers = verification.limit(verdict), verification.numbers(verdict)
         refocused = verification.refocused_cells(verdict) if verdict.verdict_autofocus else ()
-        reasons = tuple(reason for reason in (verdict.reason, verdict.reason_autofocus) if reason)
-        budget, full, exact, image = numbers
-        yield Evidence(verdict.id, limit, budget, full, exact, image, verdict.verdict, refocused, reasons)
+        with_autofocus = verdict.reason_autofocus and f"with autofocus: {verdict.reason_autofocus}"
+        reasons = tuple(reason for reason in (verdict.reason, with_autofocus) if reason)
+        yield Evidence(verdict.id, limit, *numbers, verdict.verdict, refocused, reasons)

@@ -17,6 +17,7 @@ WORDS = {
     "conservative": "conservative",
     "not_evaluated": "not eval",
 }
+_OTHER = {"published": "full", "full": "II", "strictest": "other"}
 _ANSI = {"optimistic": "1;31", "confirmed": "32", "conservative": "33", "not_evaluated": "35"}
 
 
@@ -64,15 +65,23 @@ def _mission(mission: VerifiedMission, style: Style) -> list[str]:
 
 
 def evidence(rows: Sequence[Verdict], style: Style) -> list[str]:
-    """Table of the verdicts, with autofocus a second one, and what there is to say about them."""
-    cells = [(printable(row.id), limit(row), *numbers(row), WORDS[row.verdict]) for row in rows]
-    lines = table([("row", "limit", "budget", "full", "exact", "image", "verdict"), *cells])
+    """Table of the verdicts, with autofocus a second one, and what there is to say about them.
+
+    Of a phase the model that gates says the budget; beside it stands what the other one says.
+    """
+    other = next((_OTHER[row.model] for row in rows), "full")
+    lines = table([("row", "limit", "budget", other, "exact", "image", "verdict"), *map(_cells, rows)])
     refocused = [(printable(row.id), *refocused_cells(row)) for row in rows if row.verdict_autofocus]
     if refocused:
         lines += ["", "At the limit with autofocus, refocused:", ""]
         lines += table([("row", "limit", "budget", "residual", "loss", "verdict"), *refocused])
     lines = [_coloured(line, style) for line in lines]
-    reasons = [f"{row.id}: {reason}" for row in rows for reason in (row.reason, row.reason_autofocus) if reason]
+    reasons = [
+        f"{row.id}{which}: {reason}"
+        for row in rows
+        for which, reason in (("", row.reason), (", with autofocus", row.reason_autofocus))
+        if reason
+    ]
     asides = [line for text in (*geometry_remarks(rows), *reasons) for line in wrapped(f"  {text}", "    ")]
     return [*lines, "", *asides] if asides else lines
 
@@ -105,24 +114,35 @@ def geometry_remarks(rows: Sequence[Verdict]) -> Iterator[str]:
         yield f"smear of the images: within {math.degrees(angle):.2g} deg of (31), farthest {row_id}"
 
 
+def _cells(row: Verdict) -> tuple[str, ...]:
+    budget, published, full, exact, image = numbers(row)
+    other = {"published": full, "full": published, "strictest": _phase(_smaller(row))}[row.model]
+    return printable(row.id), limit(row), budget, other, exact, image, WORDS[row.verdict]
+
+
+def _smaller(row: Verdict) -> float | None:
+    phases = [phase for phase in (row.published_qpe_rad, row.full_qpe_rad) if phase is not None]
+    return min(phases, default=None)
+
+
 def limit(row: Verdict) -> str:
     """The error that the image was formed with."""
     return format_quantity(row.boundary_error, row.unit)
 
 
-def numbers(row: Verdict) -> tuple[str, str, str, str]:
-    """Budget, what the full model and exact ranges predict, what the image shows; phases in rad."""
+def numbers(row: Verdict) -> tuple[str, str, str, str, str]:
+    """Budget, what Table II, the full model and exact ranges predict, what the image shows; phases in rad."""
     if row.requirement_db is not None:
-        return f"{row.requirement_db:g} dB", "-", "-", _decibel(row.measured_db)
+        return f"{row.requirement_db:g} dB", "-", "-", "-", _decibel(row.measured_db)
     if row.unit == "m" and row.budget_rad is None:
         moves = (row.displacement_m, row.measured_displacement_m)
         exact, image = ("-" if move is None else format_quantity(math.hypot(*move), "m") for move in moves)
-        return limit(row), "-", exact, image
+        return limit(row), "-", "-", exact, image
     if row.measured_cubic_rad is not None:
-        return _phase(row.budget_rad), "-", _phase(row.predicted_cubic_rad), _phase(row.measured_cubic_rad)
-    phases = (row.budget_rad, row.full_qpe_rad, row.predicted_qpe_rad, row.measured_qpe_rad)
-    budget, full, exact, image = (_phase(phase) for phase in phases)
-    return budget, full, exact, image
+        cubic = (_phase(row.predicted_cubic_rad), _phase(row.measured_cubic_rad))
+        return _phase(row.budget_rad), "-", "-", *cubic
+    by_model = (_phase(row.published_qpe_rad), _phase(row.full_qpe_rad))
+    return _phase(row.budget_rad), *by_model, _phase(row.predicted_qpe_rad), _phase(row.measured_qpe_rad)
 
 
 def refocused_cells(row: Verdict) -> tuple[str, str, str, str, str]:

@@ -203,7 +203,10 @@ class Study:
     def _judged_phase(self, blank: Verdict, sizes: Sequence[tuple[ErrorSource, float]], scale: float) -> Verdict:
         """Form the images of errors at the limit and on both sides, and hold the phase to the budget."""
         budget = blank.budget_rad or 0.0
-        blank = blank._replace(full_qpe_rad=abs(math.fsum(s.full.qpe * scale * size for s, size in sizes)))
+        by_table, by_full = (
+            abs(math.fsum(s.by(of).qpe * scale * size for s, size in sizes)) for of in ("published", "full")
+        )
+        blank = blank._replace(published_qpe_rad=by_table, full_qpe_rad=by_full)
         try:
             errors = self._scaled(sizes, scale)
             effect = self.collection.effect(errors)

@@ -7,11 +7,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from bisar_budget import cli
 from bisar_budget.budget.check import check_mission
 from bisar_budget.budget.findings import Report
 from bisar_budget.budget.image_evidence import FLOOR_DB, ImageEvidence, rows_worth_showing
 from bisar_budget.budget.verdicts import Verdict
+from bisar_budget.cli.check import check_all
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.report import Style, json_document
 from bisar_budget.simulate.collection import RANGE_CELLS, Chip, Errors
@@ -225,9 +225,10 @@ class TestRowsWorthShowing:
 @pytest.mark.parametrize("illustrated", [True, False])
 def test_only_a_report_that_shows_images_keeps_them(illustrated: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        cli, "_verified", lambda missions, *_: [verify_mission(m, "transmitter.acceleration.x") for m in missions]
+        "bisar_budget.cli.verify.verify_all",
+        lambda missions, *_: [verify_mission(m, "transmitter.acceleration.x") for m in missions],
     )
-    report = cli._checked([str(SECTION_V)], TODAY, None, True, illustrated)
+    report = check_all([str(SECTION_V)], TODAY, None, True, illustrated)
     (mission,) = report.missions
     assert [one.verdict.id for one in mission.image_evidence] == ["transmitter.acceleration.x"] * illustrated
     # Images are no part of the JSON contract.

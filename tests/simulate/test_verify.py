@@ -576,3 +576,36 @@ def test_displacement_is_compared_with_the_gating_models(run, tmp_path, model: s
     path.write_text(mission_text(allocation={"model": model}), encoding="utf-8")
     text = " ".join(run("verify", path, "--only", "receiver.velocity.y").stdout.split())
     assert re.search(rf"displacement of the images: within [\d.]+ \w+ of {re.escape(rule)}, farthest", text)
+
+
+@pytest.mark.parametrize(("model", "header"), [("published", "full"), ("full", "II"), ("strictest", "other")])
+def test_beside_the_budget_stands_what_the_other_model_says(run, tmp_path, model: str, header: str) -> None:
+    """Table II row 2 by hand, of the receiver of the base mission: 2π/λ·v_y·ṽ_y/R·(T/2)²."""
+    path, row_id = tmp_path / "m.yaml", "receiver.velocity.y"
+    path.write_text(mission_text(allocation={"model": model}), encoding="utf-8")
+    found = verdicts(row_id, allocation={"model": model})[row_id]
+    by_hand = 2 * math.pi / 0.0299792458 * 40 * found.boundary_error / math.sqrt(76e6) * 9
+    assert found.published_qpe_rad == pytest.approx(by_hand, rel=1e-9)
+    assert found.published_qpe_rad < 0.97 * found.full_qpe_rad
+    assert found.budget_rad == pytest.approx(by_hand if model == "published" else found.full_qpe_rad)
+    assert found.measured_qpe_rad == pytest.approx(found.full_qpe_rad, rel=0.05)
+    lines = [line.split() for line in run("verify", path, "--only", row_id).stdout.splitlines() if line]
+    other = found.full_qpe_rad if model == "published" else found.published_qpe_rad
+    assert next(line for line in lines if line[0] == "row")[2:4] == ["budget", header]
+    assert next(line for line in lines if line[0] == row_id)[3:5] == ["0.393", f"{other:.3f}"]
+
+
+def test_a_reason_of_the_refocused_image_says_that_it_is_about_it(run, tmp_path) -> None:
+    """The limit itself is confirmed; the one with autofocus is beyond first order."""
+    path = tmp_path / "m.yaml"
+    path.write_text(
+        mission_text(
+            allocation={"model": "full"},
+            autofocus={"n_pull": 60},
+            platforms__receiver={"position": [4e3, 3e3, 1.5e3], "velocity": [-50, 20, 1]},
+        ),
+        encoding="utf-8",
+    )
+    text = " ".join(run("verify", path, "--only", "receiver.velocity.x").stdout.split())
+    assert re.search(r"receiver\.velocity\.x [\d. m/s]+ confirmed", text)
+    assert "receiver.velocity.x, with autofocus: the error at the limit is beyond first order" in text

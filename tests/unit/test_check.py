@@ -611,6 +611,34 @@ class TestTheStricterOfBothModels:
         assert moved["published"] > 2 * moved["full"]
         assert moved["strictest"] == pytest.approx(max(moved["published"], moved["full"]))
 
+    @pytest.mark.parametrize(("factor", "status"), [(0.99, "warn"), (1.01, "pass")])
+    @pytest.mark.parametrize(("gating", "other", "radial"), [("full", "published", 100), ("published", "full", -100)])
+    def test_location_that_the_other_model_fails_is_a_warning(self, gating, other, radial, factor, status) -> None:
+        """Of the two displacements the gating model's is the smaller, and the requirement is about the larger one."""
+        changes = {
+            "platforms__transmitter": {"position": [12e3, 0, 5e3], "velocity": [radial, 100, 0]},
+            "platforms__receiver__motion_error": {"velocity": [0.05, 0, 0]},
+            "allocation__warn_above": 0.99,
+        }
+        moved = {
+            model: row(findings(**changes, allocation__model=model), "mission.location_error").declared
+            for model in (gating, other)
+        }
+        assert moved[gating] < 0.9 * moved[other]
+        changes["requirements__location_error"] = factor * moved[other]
+        found = row(findings(**changes, allocation__model=gating), "mission.location_error")
+        assert found.status == status
+        assert (found.reason or "").startswith(f"the {other} model says fail: ") == (status == "warn")
+
+    @pytest.mark.parametrize(("factor", "status"), [(0.99, "warn"), (1.01, "pass")])
+    def test_pull_in_that_only_the_full_model_exceeds_is_a_warning(self, factor: float, status: str) -> None:
+        """Position errors have no quadratic phase in Table I."""
+        known = math.fsum(abs(r.qpe_full_rad) for r in self.found("full").rows if r.declared and ".position." in r.id)
+        changes = {"platforms": self.PLATFORMS, "collection": {"aperture_time": 5}}
+        found = row(findings(**changes, autofocus__n_pull=factor * known / math.pi), "mission.autofocus_pull_in")
+        assert (found.status, found.declared) == (status, 0)
+        assert (found.reason or "").startswith("the full model says beyond it: QPE ") == (status == "warn")
+
     def test_cubic_phase_that_only_the_full_model_knows_is_a_warning(self) -> None:
         known = row(self.found("full"), "mission.cubic_phase_error").declared
         limit = known / 1.4

@@ -5,7 +5,7 @@ import shlex
 
 import pytest
 
-from bisar_budget.cli import check
+from bisar_budget.cli.check import check
 from bisar_budget.report import FORMATS, format_of
 from tests.conftest import ROOT
 

@@ -15,7 +15,7 @@ from markdown_it import MarkdownIt
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.budget.findings import Report, UnusableMission
-from bisar_budget.cli import cli
+from bisar_budget.cli.check import check
 from bisar_budget.errors import Fault
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.report import FORMATS, SUFFIXES, Style, escapes, format_of, render
@@ -61,7 +61,7 @@ def needs(*missions):
 
 
 def test_the_command_knows_every_format() -> None:
-    (choice,) = [p.type.choices for p in cli.commands["check"].params if p.name == "format_name"]
+    (choice,) = [p.type.choices for p in check.params if p.name == "format_name"]
     assert list(choice) == list(FORMATS)
     assert set(SUFFIXES.values()) == set(FORMATS) - {"github"}
 

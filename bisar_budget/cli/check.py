@@ -1,0 +1,397 @@
+"""`bisar-budget check`: the gate, its defaults, its reports."""
+
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from datetime import date, datetime
+from typing import TYPE_CHECKING, Any
+
+import click
+from click.core import ParameterSource
+
+from bisar_budget import __version__
+from bisar_budget.cli.streams import (
+    EXIT_BROKEN,
+    FILE,
+    complain,
+    day_of_run,
+    deliver,
+    expand,
+    is_terminal,
+    load_all,
+    print_text,
+    spare,
+    wants_color,
+    write_file,
+)
+from bisar_budget.constants import MAX_DRAWS
+from bisar_budget.errors import printable
+
+if TYPE_CHECKING:
+    from bisar_budget.budget.findings import MissionFindings, Option, Report
+    from bisar_budget.mission.model import Mission
+    from bisar_budget.report import Style
+
+
+class _Gate(click.Command):
+    """A command whose options default to the project's settings; BISAR_BUDGET_… stands above them."""
+
+    def make_context(self, *args: Any, **extra: Any) -> click.Context:
+        try:
+            return super().make_context(*args, default_map=self._defaults(), **extra)
+        except click.BadParameter as error:
+            if error.ctx is not None and error.param is not None and error.param.envvar:
+                source = error.ctx.get_parameter_source(str(error.param.name))
+                if source is ParameterSource.ENVIRONMENT:
+                    error.param_hint = str(error.param.envvar)  # not the option that nobody wrote
+            raise
+
+    def _defaults(self) -> dict[str, Any]:
+        from bisar_budget.settings import TABLE, SettingsError, project_settings
+
+        options = {p.opts[0].removeprefix("--"): p for p in self.params if isinstance(p, click.Option) and p.envvar}
+        known = ["BISAR_BUDGET_DEBUG", *(str(option.envvar) for option in options.values())]
+        for name in os.environ:
+            if name.startswith("BISAR_BUDGET_") and name not in known:
+                raise click.UsageError(f"{printable(name)}: is not a known variable; known: {', '.join(known)}.")
+        try:
+            settings = project_settings(os.getcwd())
+        except SettingsError as error:
+            raise click.UsageError(printable(str(error))) from None
+        except OSError:  # somebody removed the current folder
+            settings = None
+        defaults = {}
+        for key, value in settings.values.items() if settings else ():
+            option = options[key]
+            try:
+                for item in value if isinstance(value, list) else [value]:
+                    option.type.convert(item, option, None)
+                    if key == "report":
+                        _format_of(item)
+            except click.UsageError as error:
+                raise click.UsageError(f"{settings.file}: {TABLE}.{key}: {error.message}") from None  # type: ignore[union-attr]
+            defaults[str(option.name)] = value
+        return defaults
+
+
+class _Draws(click.ParamType[int]):
+    """A number of draws: 1000000 or 1e6."""
+
+    name = "number"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        from decimal import Decimal, InvalidOperation
+
+        try:
+            number = Decimal(str(value).strip())
+        except InvalidOperation:
+            number = Decimal(0)
+        if not (number.is_finite() and 1 <= number <= MAX_DRAWS and number == int(number)):
+            accepted = f"must be a whole number of draws from 1 to {MAX_DRAWS:,}, such as 100000 or 1e6"
+            self.fail(f"{printable(str(value))}: {accepted}.", param, ctx)
+        return int(number)
+
+
+@click.command(cls=_Gate)
+@click.argument("missions", type=FILE, nargs=-1, required=True, metavar="MISSION...")
+@click.option(
+    "--format",
+    "format_name",
+    envvar="BISAR_BUDGET_FORMAT",
+    type=click.Choice(["text", "json", "csv", "junit", "sarif", "github", "needs", "html", "markdown"]),
+    default="text",
+    show_default=True,
+    help="Format of the report; github: annotations of a pull request, needs: for Sphinx-Needs, html and "
+    "markdown: a compliance report for a review board.",
+)
+@click.option(
+    "-o", "--output", type=FILE, metavar="FILE", help="Write the report to FILE instead of standard output."
+)
+@click.option(
+    "--report",
+    "reports",
+    envvar="BISAR_BUDGET_REPORT",
+    type=FILE,
+    multiple=True,
+    metavar="FILE",
+    help="Also write a report to FILE, in the format of its suffix: .html, .md, .txt, .json, .csv, .xml (JUnit), "
+    ".sarif or .needs.json. Repeatable.",
+)
+@click.option(
+    "--strict/--no-strict",
+    envvar="BISAR_BUDGET_STRICT",
+    help="Fail on warnings and on rows that could not be evaluated.",
+)
+@click.option(
+    "--exit-zero/--no-exit-zero",
+    envvar="BISAR_BUDGET_EXIT_ZERO",
+    help="Exit with 0 even if a requirement is broken.",
+)
+@click.option(
+    "--model",
+    envvar="BISAR_BUDGET_MODEL",
+    type=click.Choice(["published", "full", "strictest"]),
+    help="Model that gates, over the mission file's.",
+)
+@click.option(
+    "--date",
+    "today",
+    type=click.DateTime(["%Y-%m-%d"]),
+    help="Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC). Only a day that is given "
+    "stands in a compliance report.",
+)
+@click.option("--verify", "verifying", is_flag=True, help="Form images at the limits too and add what they show.")
+@click.option(
+    "--monte-carlo",
+    "draws",
+    envvar="BISAR_BUDGET_MONTE_CARLO",
+    type=_Draws(),
+    metavar="N",
+    help="Also draw the declared errors N times from their distributions and say how often each requirement holds.",
+)
+@click.option(
+    "--seed",
+    envvar="BISAR_BUDGET_SEED",
+    type=click.IntRange(0, 2**53),
+    metavar="S",
+    help="Seed of --monte-carlo (default: simulation.seed of the mission file, else 1).",
+)
+@click.option("-q", "--quiet", is_flag=True, help="One line per mission.")
+@click.option("-v", "--verbose", is_flag=True, help="Reason, equation, displacement and evidence of every row.")
+@click.option(
+    "--explain",
+    metavar="ID",
+    help="Instead of the report, show how the row ID comes to its status: from the line of the file through "
+    "the equations, with the numbers put in, to the verdict. Exits with 0.",
+)
+@click.option(
+    "--color",
+    envvar="BISAR_BUDGET_COLOR",
+    type=click.Choice(["auto", "always", "never"]),
+    default="auto",
+    show_default=True,
+    help="Colour the text; auto: on a terminal, unless NO_COLOR is set.",
+)
+def check(
+    missions: Sequence[str],
+    format_name: str,
+    output: str | None,
+    reports: Sequence[str],
+    strict: bool,
+    exit_zero: bool,
+    model: str | None,
+    today: datetime | None,
+    verifying: bool,
+    draws: int | None,
+    seed: int | None,
+    quiet: bool,
+    verbose: bool,
+    explain: str | None,
+    color: str,
+) -> None:
+    """Check mission files against their requirements.
+
+    MISSION is a YAML file, a glob pattern, or - for standard input. Exit code: 0 all met,
+    1 a requirement is broken, 2 wrong usage or an unusable mission file, 3 a fault of the tool.
+
+    Defaults of --format, --report, --strict, --exit-zero, --model, --monte-carlo, --seed and --color:
+    [tool.bisar-budget] in the nearest pyproject.toml, and over it the variables BISAR_BUDGET_FORMAT and so on.
+    """
+    from bisar_budget.report import ILLUSTRATED, Style, render
+
+    written = [(name, _format_of(name)) for name in reports]
+    files = expand(missions)
+    spare(files, [output, *reports])
+    given = click.get_current_context().get_parameter_source
+    if seed is not None and draws is None and given("seed") is ParameterSource.COMMANDLINE:
+        raise click.UsageError("--seed is that of --monte-carlo N: give both.")
+    if explain is not None:
+        if any(given(name) is ParameterSource.COMMANDLINE for name in ("format_name", "reports", "draws")):
+            raise click.UsageError("--explain writes text: it excludes --format, --report and --monte-carlo.")
+        _explain(files, explain, today.date() if today else day_of_run(), model, output)
+        return
+    illustrated = any(name in ILLUSTRATED for name in (format_name, *(name for _, name in written)))
+    drawn = None if draws is None else (draws, seed)
+    report = check_all(files, today.date() if today else day_of_run(), model, verifying, illustrated, drawn)
+    report = report._replace(options=tuple(_options()), day=_given_day(today))
+    if format_name != "text" or output is not None or quiet or not is_terminal():
+        _say_faults(report)
+    style = Style(verbosity=-1 if quiet else 1 if verbose else 0, root=_repository())
+    for path, its_format in written:
+        _write_report(path, its_format, report, style)
+    use_color = color == "always" or (color == "auto" and output is None and wants_color())
+    style = style._replace(color=use_color)
+    if output is None:
+        print_text(render(format_name, report, style))
+    else:
+        _write_report(output, format_name, report, style)
+    if format_name == "github":
+        _append_step_summary(report, style)
+    code = report.exit_code(strict)
+    sys.exit(0 if exit_zero and code == EXIT_BROKEN else code)
+
+
+def _options() -> "Iterator[Option]":
+    """Say what the options that bear on the result are, and where each came from."""
+    from bisar_budget.budget.findings import Option
+
+    context = click.get_current_context()
+    origins = {
+        ParameterSource.COMMANDLINE: "command line",
+        ParameterSource.DEFAULT_MAP: "pyproject.toml",
+        ParameterSource.DEFAULT: "default",
+    }
+    for parameter in context.command.params:
+        name, value = str(parameter.name), context.params[str(parameter.name)]
+        source = context.get_parameter_source(name)
+        origin = origins.get(source, f"environment, {parameter.envvar}") if source else "default"
+        if name == "model":
+            yield Option("--model", value or "as each file says", origin)
+        elif name == "today":
+            day = _given_day(value)
+            if value is None and day is not None:
+                origin = "environment, SOURCE_DATE_EPOCH"
+            yield Option("--date", day.isoformat() if day else "the day of the run, which is not recorded", origin)
+        elif name == "draws":
+            yield Option("--monte-carlo", "no" if value is None else f"{value:,} draws", origin)
+        elif name == "seed" and context.params["draws"] is not None:
+            yield Option("--seed", "of each file" if value is None else str(value), origin)
+        elif name in ("strict", "exit_zero", "verifying"):
+            yield Option(parameter.opts[0], "yes" if value else "no", origin)
+
+
+def _given_day(today: datetime | None) -> date | None:
+    """The day that the command line or the environment gives; a report has no other, so as to be reproducible."""
+    if today is not None:
+        return today.date()
+    return day_of_run() if os.environ.get("SOURCE_DATE_EPOCH") else None
+
+
+def check_all(
+    files: Sequence[str],
+    today: date,
+    model: str | None,
+    verifying: bool,
+    illustrated: bool = False,
+    drawn: tuple[int, int | None] | None = None,
+) -> "Report":
+    """Check every file; `verifying` adds verdicts of images. `illustrated` keeps the missions, and the images.
+
+    `drawn` is the number of draws of a Monte Carlo and their seed.
+    """
+    from bisar_budget.budget.check import check_mission
+    from bisar_budget.budget.findings import Report, UnusableMission
+    from bisar_budget.errors import MissionError
+    from bisar_budget.mission.load import load_mission
+
+    if not (verifying or illustrated or drawn):
+        from bisar_budget.budget.fleet import check_files
+
+        return Report(version=__version__, missions=tuple(check_files(files, today, model)))
+    missions: list[MissionFindings | UnusableMission] = []
+    usable: dict[int, Mission] = {}
+    for index, file in enumerate(files):
+        try:
+            mission = load_mission(file, model)
+            found = check_mission(mission, today)
+            if drawn is not None:
+                from bisar_budget.budget.monte_carlo import monte_carlo
+
+                found = found._replace(monte_carlo=monte_carlo(mission, *drawn))
+            missions.append(found if illustrated else found._replace(mission=None))
+            if verifying:
+                usable[index] = mission
+        except MissionError as error:
+            missions.append(UnusableMission(file=file, faults=error.faults, data=error.data))
+    if usable:
+        from bisar_budget.budget.verdicts import with_verdicts
+        from bisar_budget.cli.verify import verify_all
+
+        for index, verified in zip(usable, verify_all(list(usable.values()), "*", None), strict=True):
+            judged = missions[index]
+            if not isinstance(judged, UnusableMission):
+                judged = with_verdicts(judged, verified)
+                missions[index] = _illustrated(usable[index], judged) if illustrated else judged
+    return Report(version=__version__, missions=tuple(missions))
+
+
+def _illustrated(mission: "Mission", found: "MissionFindings") -> "MissionFindings":
+    """Add the images of the rows that decide most."""
+    from bisar_budget.simulate.image_evidence import form_image_evidence
+
+    return found._replace(image_evidence=form_image_evidence(mission, found))
+
+
+def _explain(files: Sequence[str], row_id: str, today: date, model: str | None, output: str | None) -> None:
+    """Explain a row in every mission that has it."""
+    from bisar_budget.budget.check import check_mission
+    from bisar_budget.mission.readers import did_you_mean
+    from bisar_budget.report.explanation import explain
+
+    texts: list[str] = []
+    known: dict[str, None] = {}
+    for mission in load_all(files, model):
+        found = check_mission(mission, today)
+        known |= dict.fromkeys(row.id for row in found.rows)
+        if any(row.id == row_id for row in found.rows):
+            texts.append(explain(mission, found, row_id))
+    if not texts:
+        hint = did_you_mean(row_id, tuple(known))
+        raise click.UsageError(f"--explain {printable(row_id)}: no row has this id. {hint or 'A check lists them.'}")
+    deliver("\n".join(texts), output)
+
+
+def _format_of(name: str) -> str:
+    from bisar_budget.report import SUFFIXES, format_of
+
+    format_name = format_of(name)
+    if format_name is None:
+        raise click.UsageError(f"--report {name}: the suffix must be one of {', '.join(SUFFIXES)}")
+    return format_name
+
+
+def _repository() -> str:
+    """Folder that reports name files from: GitHub's checkout, else the current folder."""
+    with suppress(OSError):  # somebody removed it under us
+        return os.path.abspath(os.environ.get("GITHUB_WORKSPACE") or os.getcwd())
+    return ""
+
+
+def _append_step_summary(report: "Report", style: "Style") -> None:
+    """Add to the page of the run on GitHub; that it cannot be written changes no exit code."""
+    path = os.environ.get("GITHUB_STEP_SUMMARY")
+    if not path:
+        return
+    from bisar_budget.report.github import step_summary
+
+    try:
+        with open(path, "a", encoding="utf-8", errors="backslashreplace", newline="\n") as file:
+            file.write(step_summary(report, style))
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        complain(f"Warning: cannot write the step summary {printable(path)}: {reason}")
+
+
+def _say_faults(report: "Report") -> None:
+    from bisar_budget.budget.findings import UnusableMission
+    from bisar_budget.errors import MissionError
+
+    for mission in report.missions:
+        if isinstance(mission, UnusableMission):
+            for line in MissionError(mission.file, mission.faults).lines():
+                complain(line)
+
+
+def _write_report(path: str, format_name: str, report: "Report", style: "Style") -> None:
+    """Write a report to a file, its pictures first: a text never names a picture that is not there."""
+    from bisar_budget.report import WITH_PICTURES, pictures, render
+
+    folder = ""
+    if format_name in WITH_PICTURES and path != "-" and (os.path.isfile(path) or not os.path.exists(path)):
+        folder = f"{os.path.splitext(path)[0]}.assets"
+    style = style._replace(assets=os.path.basename(folder))
+    text = render(format_name, report, style)
+    for name, content in pictures(format_name, report, style).items():
+        write_file(os.path.join(folder, name), content)
+    write_file(path, text)

@@ -1,0 +1,67 @@
+"""`bisar-budget derive`: the tables as derived, and what is generated from them."""
+
+import sys
+
+import click
+
+from bisar_budget.cli.streams import EXIT_BROKEN, print_text, write_file
+
+
+@click.command()
+@click.option(
+    "--table",
+    type=click.Choice(["all", "equations", "I", "II", "vibration", "full"]),
+    default="all",
+    show_default=True,
+    help="What to derive.",
+)
+@click.option(
+    "--format",
+    "format_name",
+    type=click.Choice(["text", "latex", "markdown", "mathml"]),
+    default="text",
+    show_default=True,
+    help="How to write it.",
+)
+@click.option("--check", "check_only", is_flag=True, help="Fail if a generated file is not what it gives.")
+@click.option("--write", is_flag=True, help="Rewrite the generated files: evaluators and formulas.")
+def derive(table: str, format_name: str, check_only: bool, write: bool) -> None:
+    """Derive the paper's tables from the geometry and print them.
+
+    Rigling & Moses, Tables I and II, the equations before them, vibration limits; and the full model.
+    Equation and table numbers are the paper's.
+    """
+    if check_only and write:
+        raise click.UsageError("--check and --write exclude each other.")
+    if check_only or write:
+        _generated(write)
+        return
+    from bisar_budget.theory import render
+
+    print_text(render.derivation(table, format_name))
+
+
+def _generated(write: bool) -> None:
+    import difflib
+
+    from bisar_budget.theory import emit, emit_catalogue
+
+    derived_with = f"(SymPy {emit.SYMPY_VERSION})"
+    is_current = True
+    for generated in (emit, emit_catalogue):
+        name, today = generated.TARGET.name, generated.source()
+        if write:
+            write_file(str(generated.TARGET), today)
+            click.echo(f"Wrote {name} {derived_with}.")
+            continue
+        committed = generated.TARGET.read_text(encoding="utf-8")
+        if committed == today:
+            click.echo(f"{name} is what the derivation gives {derived_with}.")
+            continue
+        is_current = False
+        pair = (committed.splitlines(), today.splitlines())
+        print_text("\n".join(difflib.unified_diff(*pair, "committed", "derived", lineterm="", n=1)) + "\n")
+        differs = f"{name} differs from the derivation {derived_with}"
+        click.echo(f"{differs}; `bisar-budget derive --write` rewrites it.", err=True)
+    if not is_current:
+        sys.exit(EXIT_BROKEN)

@@ -1,0 +1,114 @@
+"""`bisar-budget diff`: what a change to a mission does to every margin."""
+
+import sys
+from collections.abc import Sequence
+from datetime import datetime
+from typing import Any
+
+import click
+
+from bisar_budget import __version__
+from bisar_budget.cli.streams import (
+    EXIT_BROKEN,
+    EXIT_USAGE,
+    FILE,
+    complain,
+    day_of_run,
+    deliver,
+    expand,
+    fail,
+    spare,
+)
+from bisar_budget.errors import printable
+
+
+class _Part(click.ParamType[float]):
+    """A part of something: `10%` or 0.1."""
+
+    name = "percent"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        from bisar_budget.errors import InvalidValueError
+        from bisar_budget.units import RATIO, parse_quantity
+
+        try:
+            part = parse_quantity(value, RATIO)
+        except InvalidValueError:
+            part = -1.0
+        if not 0 <= part <= 1:
+            self.fail(f"{printable(str(value))}: must be 0% to 100%, such as 10% or 0.1.", param, ctx)
+        return part
+
+
+@click.command()
+@click.argument("files", type=FILE, nargs=-1, required=True, metavar="OLD NEW | MISSION...")
+@click.option("--base", metavar="REV", help="Compare each MISSION with itself in this git revision.")
+@click.option(
+    "--fail-on-erosion",
+    "tolerated",
+    type=_Part(),
+    metavar="PERCENT",
+    help="Exit with 1 if a row fails that did not, or uses up more than this part of what was left of its limit.",
+)
+@click.option(
+    "--format",
+    "format_name",
+    type=click.Choice(["text", "markdown", "json"]),
+    default="text",
+    show_default=True,
+    help="Format of the comparison.",
+)
+@click.option("-o", "--output", type=FILE, metavar="FILE", help="Write to FILE instead of standard output.")
+@click.option(
+    "--date",
+    "today",
+    type=click.DateTime(["%Y-%m-%d"]),
+    help="Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC).",
+)
+def diff(
+    files: Sequence[str],
+    base: str | None,
+    tolerated: float | None,
+    format_name: str,
+    output: str | None,
+    today: datetime | None,
+) -> None:
+    """Show what a change to a mission does to every margin.
+
+    Compares two mission files, or each with itself in a git revision.
+
+    Rows are sorted by erosion: the part of what was left of a limit that the change uses up, (u2 - u1)/(1 - u1)
+    with the utilizations before and after. Exit code: 0, or 1 with --fail-on-erosion, 2 for wrong usage,
+    an unusable file or an unknown revision.
+    """
+    from bisar_budget.budget.check import check_mission
+    from bisar_budget.errors import MissionError
+    from bisar_budget.mission.load import load_mission, parse_mission
+    from bisar_budget.mission.revision import RevisionError, file_at
+    from bisar_budget.report import difference
+    from bisar_budget.report.comparison import compare
+
+    if base is None and len(files) != 2:
+        raise click.UsageError("give two mission files, OLD and NEW, or mission files and --base REV.")
+    spare(files, [output])
+    day = today.date() if today else day_of_run()
+    pairs = [(files[0], files[1])] if base is None else [(file, file) for file in expand(files)]
+    changes = []
+    for before, after in pairs:
+        try:
+            old = load_mission(before) if base is None else parse_mission(file_at(before, base), f"{base}:{before}")
+            new = load_mission(after)
+        except RevisionError as error:
+            fail(str(error))
+        except MissionError as error:
+            for line in error.lines():
+                complain(line)
+            sys.exit(EXIT_USAGE)
+        changes.append(compare(check_mission(old, day), check_mission(new, day)))
+    if format_name == "json":
+        text = difference.as_json(__version__, changes, tolerated)
+    else:
+        text = (difference.as_text if format_name == "text" else difference.as_markdown)(changes, tolerated)
+    deliver(text, output)
+    is_refused = tolerated is not None and any(change.broken(tolerated) for change in changes)
+    sys.exit(EXIT_BROKEN if is_refused else 0)

@@ -1,0 +1,54 @@
+"""`bisar-budget init` and `bisar-budget schema`: to start a mission file from, and to write it with."""
+
+import os
+
+import click
+
+from bisar_budget.cli.streams import FILE, complain, deliver, fail, print_text, write_file
+
+
+@click.command()
+@click.argument("file", type=FILE, default="mission.yaml")
+@click.option("--name", default="My bistatic mission", show_default=True, help="Name of the mission.")
+@click.option("--force", is_flag=True, help="Replace an existing file.")
+def init(file: str, name: str, force: bool) -> None:
+    """Write a commented mission file to start from.
+
+    FILE is mission.yaml by default, - for standard output.
+    """
+    import json
+
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    from bisar_budget.errors import InvalidValueError
+    from bisar_budget.mission.readers import Text
+    from bisar_budget.resources import resource
+
+    try:
+        Text().leaf(name)
+    except InvalidValueError as error:
+        raise click.UsageError(f"--name {error}") from None
+    environment = Environment(
+        loader=FileSystemLoader(resource("templates")), undefined=StrictUndefined, keep_trailing_newline=True
+    )
+    text = environment.get_template("mission.yaml.j2").render(name=json.dumps(name, ensure_ascii=False))
+    if file == "-":
+        print_text(text)
+        return
+    if os.path.exists(file) and not force:
+        fail(f"{file} exists; --force replaces it")
+    write_file(file, text)
+    complain(f"Wrote {file}. Next: bisar-budget check {file}")
+    complain("For completion and checks in an editor: bisar-budget schema -o mission.schema.json beside it.")
+
+
+@click.command()
+@click.option("-o", "--output", type=FILE, metavar="FILE", help="Write to FILE instead of standard output.")
+def schema(output: str | None) -> None:
+    """Print the JSON Schema of the mission file, for editors."""
+    import json
+
+    from bisar_budget.mission.schema import mission_schema
+
+    text = json.dumps(mission_schema(), indent=2) + "\n"
+    deliver(text, output)

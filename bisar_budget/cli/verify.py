@@ -1,0 +1,92 @@
+"""`bisar-budget verify`: images at the limits."""
+
+import os
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import click
+
+from bisar_budget import __version__
+from bisar_budget.cli.streams import (
+    EXIT_BROKEN,
+    EXIT_USAGE,
+    FILE,
+    complain,
+    deliver,
+    expand,
+    load_all,
+    spare,
+    wants_color,
+)
+from bisar_budget.errors import printable
+
+if TYPE_CHECKING:
+    from click._termui_impl import ProgressBar
+
+    from bisar_budget.budget.verdicts import VerifiedMission
+    from bisar_budget.mission.model import Mission
+
+
+@click.command()
+@click.argument("missions", type=FILE, nargs=-1, required=True, metavar="MISSION...")
+@click.option("--only", default="*", metavar="GLOB", help="Verify only the rows whose id matches.")
+@click.option(
+    "--format",
+    "format_name",
+    type=click.Choice(["text", "json"]),
+    default="text",
+    show_default=True,
+    help="Format of the verdicts.",
+)
+@click.option("-o", "--output", type=FILE, metavar="FILE", help="Write to FILE instead of standard output.")
+@click.option(
+    "--jobs",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Processes to use; default: the cores, or 1 with the extra `fast`, which uses them itself.",
+)
+def verify(missions: Sequence[str], only: str, format_name: str, output: str | None, jobs: int | None) -> None:
+    """Form images at the limits and measure whether they are true.
+
+    The data come from exact ranges, and the phase is measured in the image. A limit is confirmed if the
+    image shows its budget within 5 %, optimistic if it shows more, conservative if less. With autofocus
+    each limit is formed again with its gain and refocused. Exit code: 0, or 1 if a limit is optimistic, 2
+    for wrong usage, an unusable file, or a mission on whose limits no image gave a verdict.
+    """
+    from bisar_budget.report import Style, verification
+
+    files = expand(missions)
+    spare(files, [output])
+    verified = verify_all(load_all(files), only, jobs)
+    if format_name == "json":
+        text = verification.as_json(__version__, verified)
+    else:
+        text = verification.as_text(verified, Style(color=output is None and wants_color()))
+    deliver(text, output)
+    doubts = [mission for mission in verified if mission.doubt]
+    for mission in doubts:
+        complain(f"{printable(mission.file)}: {mission.doubt}")
+    if doubts:
+        sys.exit(EXIT_USAGE)
+    sys.exit(EXIT_BROKEN if any(mission.status == "fail" for mission in verified) else 0)
+
+
+def verify_all(missions: "Sequence[Mission]", only: str, jobs: int | None) -> "list[VerifiedMission]":
+    """Verify missions, with a progress bar where somebody watches."""
+    from bisar_budget.simulate.image_formation import is_compiled
+    from bisar_budget.simulate.verify import rows_to_verify, verify_mission
+
+    total = sum(len(rows_to_verify(mission, only)) for mission in missions)
+    if not total and only != "*":
+        raise click.UsageError(f"--only {printable(only)}: no row with a limit has such an id, nothing was verified.")
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    jobs = jobs or (1 if is_compiled() else cores)
+    with progress_bar(total) as bar:
+        return [verify_mission(mission, only, jobs, lambda row_id: bar.update(1)) for mission in missions]
+
+
+def progress_bar(total: int = 1) -> "ProgressBar[int]":
+    """Bar on standard error, where somebody watches."""
+    watched = sys.stderr is not None and sys.stderr.isatty()
+    return click.progressbar(length=total, label="Forming images", file=sys.stderr, hidden=not watched)
