@@ -367,6 +367,7 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
     judged = [row for row in rows if row.status in _JUDGED]
     evidence = {verdict.id: verdict for verdict in found.verdicts or ()}
     file = source_path(found.file, style.root)
+    placed = mission if mission.file == file else mission._replace(file=file)  # the same name in every section
     allocation = found.allocation
     matrix = tuple(
         MatrixRow(
@@ -425,7 +426,7 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
         collection=tuple(collection_chain(found)),
         general=tuple(General(*equation) for equation in EQUATIONS if equation[0] not in ("(11)", "(31)")),
         derivations=tuple(
-            Derivation(row.id, row.status, row.line, tuple(chain(mission, found, row)))
+            Derivation(row.id, row.status, row.line, tuple(chain(placed, found, row)))
             for row in rows
             if row.status != "not_declared"
         ),
@@ -722,9 +723,7 @@ def _inputs(mission: Mission, found: MissionFindings, file: str) -> Iterator[Inp
                 name, "none: computed, not judged" if unit != "dB" else "none: not evaluated", "not in the file"
             )
         else:
-            yield given(
-                name, f"{value:g} dB" if unit == "dB" else _limit(value, unit), ("requirements", key)
-            )
+            yield given(name, f"{value:g} dB" if unit == "dB" else _limit(value, unit), ("requirements", key))
     allocation = mission.allocation
     split = allocation.split
     yield given("split", split if isinstance(split, str) else "shares of the file", ("allocation", "split"))

@@ -212,8 +212,8 @@ def _line_of_sight(
     value = vibration.sinusoidal[int(rest[0])].amplitude if is_sinusoid else vibration.wideband.rms
     if not isinstance(value, tuple):
         return
-    frame = body.state.frame(body.motion_error.frame)
-    axes = without_rounding(tuple(dot(axis, body.state.look) for axis in frame))
+    u, v, w = (dot(axis, body.state.look) for axis in body.state.frame(body.motion_error.frame))
+    axes = without_rounding((u, v, w))
     parts = [f"{number(size)}*{number(along)}" for size, along in zip(value, axes, strict=True)]
     if is_sinusoid:
         text, how = " + ".join(f"|{part}|" for part in parts), "axes may vibrate in any phase: projections add"

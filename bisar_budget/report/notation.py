@@ -149,7 +149,7 @@ def symbol(name: str, language: Language) -> str:
         return SYMBOLS[name][language is MATHML]
     head, _, below = name.partition("_")
     spelled = normalize("NFD", head)
-    letter, *accents = spelled if len(normalize("NFC", head)) == 1 or combining(spelled[1]) else (head,)
+    letter, *accents = tuple(spelled) if len(normalize("NFC", head)) == 1 or combining(spelled[1]) else (head,)
     if language is LATEX:
         text = _GREEK.get(letter, letter) if len(letter) == 1 else rf"\mathrm{{{letter}}}"
         for accent in accents:

@@ -592,3 +592,12 @@ def test_markdown_has_no_macro_that_github_refuses() -> None:
     text = markdown(findings())
     assert r"\mathop{\mathrm{det}} Q" in text
     assert r"\operatorname" not in text
+
+
+def test_the_file_has_one_name_in_every_section() -> None:
+    """A path given as absolute was relative in the head and absolute in the formulas: bytes of the machine."""
+    (page,) = compliance(report(found_in(SECTION_V)), Style(root=str(ROOT))).missions
+    assert page.file == "specs/missions/rigling_moses_section_v.yaml"
+    titles = [step.title for derivation in page.derivations for step in derivation.steps]
+    assert any(f"Declared in {page.file}:" in title for title in titles)
+    assert not [title for title in titles if str(ROOT) in title]
