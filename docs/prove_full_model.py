@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from bisar_budget.budget.sources import full_ground
-from bisar_budget.budget.validity import FLOOR_RAD, SHARE, FirstOrder
+from bisar_budget.budget.validity import FLOOR_M, FLOOR_RAD, SHARE, FirstOrder
 from bisar_budget.errors import MissionError
 from bisar_budget.geometry import norm
 from bisar_budget.mission.load import parse_mission
@@ -88,7 +88,7 @@ def against_exact_ranges() -> Iterator[str]:
                 or math.sin(geometry.gradient_angle) < 0.2
                 or abs(second.qpe) > max(FLOOR_RAD, SHARE * abs(first))
                 or math.hypot(*(ground.plane.displacement(second, 1.0) or (0.0, 0.0)))
-                > max(0.1, SHARE * moves * size)
+                > max(FLOOR_M, SHARE * moves * size)
             )
             if is_outside:
                 outside += 1

@@ -3,9 +3,9 @@
 Of two platforms at R_k the range error has −Σ|P⊥(r̃_k − x̂)|²/2R_k in second order, P⊥ being the part across the line
 of sight. Against exact ranges on 500 random collections every row whose second-order phase stays below 2 % or
 0.02 rad agrees with the full model within 2 % or 0.02 rad, and beyond it this phase is the difference
-(`tests/simulate/test_full_model.py`). A declared error beyond that, or that moves the image by more than 10 m, or
-in a collection whose gradients are nearly parallel or whose lines of sight turn far, gets its phase from exact
-ranges. Derived here.
+(`tests/simulate/test_full_model.py`); so does the displacement, within 2 % or 0.1 m. A declared error beyond that, or
+that moves the image by more than 10 m, or in a collection whose gradients are nearly parallel or whose lines of sight
+turn far, gets its phase from exact ranges. Derived here.
 """
 
 import math
@@ -21,7 +21,8 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.units import format_quantity
 
 FLOOR_RAD = 0.02
-SHARE = 0.02  # of the first-order phase
+FLOOR_M = 0.1  # of displacement, a fifth of a resolution cell
+SHARE = 0.02  # of the first-order phase, and of the displacement
 FAR_M = 10.0  # of displacement; beyond, 5 % of random geometries are off by more than 0.15 rad
 LONG_APERTURE_RAD = 0.3  # half the turn of a line of sight; beyond, sixth powers show
 _TURNING_RAD = 0.1  # the quartic term is 1 % of the quadratic there
@@ -85,7 +86,7 @@ class FirstOrder:
         self._by_constant, self._by_linear = math.hypot(a, c) / determinant, math.hypot(b, d) / determinant
         self._edge = {"m": 1.0, "m/s": self.T / 2, "m/s^2": self.T**2 / 8}  # of a unit of it at the aperture edge
         self._strain = _strain(geometry, self.T)
-        self._bends: dict[str, float] = {}
+        self._bends: dict[str, tuple[float, float]] = {}
         self.found: dict[str, Beyond] = {}  # by row id, of the errors asked about
 
     @cached_property
@@ -118,8 +119,11 @@ class FirstOrder:
         moved = math.hypot(*(self.ground.plane.displacement(source.full, declared) or (0.0, 0.0)))
         if moved > FAR_M:
             return f"it moves the image by {moved:.3g} m"
-        first, added = source.full.qpe * declared, self._bend(source) * declared * declared
-        return "" if abs(added) <= max(FLOOR_RAD, SHARE * abs(first)) else f"the second order adds {added:.2g} rad"
+        first, (added, drift) = source.full.qpe * declared, self._bend(source)
+        if abs(added) * declared * declared > max(FLOOR_RAD, SHARE * abs(first)):
+            return f"the second order adds {added * declared * declared:.2g} rad"
+        farther = drift * declared * declared
+        return f"the second order moves the image by {farther:.2g} m" if farther > max(FLOOR_M, SHARE * moved) else ""
 
     def allowable_note(self, source: ErrorSource, gating: float | None, full: float | None, limit: float) -> str:
         """Say that an allowable, which has a phase of `limit`, lies beyond first order; else nothing.
@@ -131,7 +135,7 @@ class FirstOrder:
             return ""
         if allowable * self._reach(source) < FAR_M and allowable * self._edge.get(source.unit, 0.0) < self._harmless:
             return ""  # the second order of what stays that near is a constant and a slope
-        bend = math.sqrt(abs(self._bend(source)) / max(FLOOR_RAD, SHARE * limit))
+        bend = math.sqrt(abs(self._bend(source)[0]) / max(FLOOR_RAD, SHARE * limit))
         if allowable * bend <= 1:
             return ""
         size, held = (format_quantity(value, source.unit, 2) for value in (allowable, 1 / bend))
@@ -149,12 +153,16 @@ class FirstOrder:
         constant, linear, quadratic = (term * size * size for term in self._second(source))
         return self.ground.effective([(constant, linear, quadratic, 0.0)])[0]
 
-    def _bend(self, source: ErrorSource) -> float:
-        """Quadratic phase that the second order adds; it grows with the square of the error. [rad/unit²]"""
+    def _bend(self, source: ErrorSource) -> tuple[float, float]:
+        """Quadratic phase that the second order adds, and how far it moves the image. [rad/unit²], [m/unit²]
+
+        Both grow with the square of the error.
+        """
         if source.id not in self._bends:
             constant, linear, quadratic = self._second(source)
             by_constant, by_linear = self.ground.quadratic
-            self._bends[source.id] = quadratic + by_constant * constant + by_linear * linear
+            drift = self.ground.plane.displacement(Effect(constant, linear, 0.0, 0.0), 1.0) or (0.0, 0.0)
+            self._bends[source.id] = (quadratic + by_constant * constant + by_linear * linear, math.hypot(*drift))
         return self._bends[source.id]
 
     def _second(self, source: ErrorSource) -> tuple[float, float, float]:

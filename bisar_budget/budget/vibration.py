@@ -252,8 +252,15 @@ def _line(
             f"{cubic:.3g} rad"
         )
         return case._replace(notes=tuple(notes), not_evaluated=case.missing or slow, doubt="", qpe=qpe)
-    notes.append(f"{cycles:.3g} cycles per aperture: below three it also is {worst}; the same motion, in no sum")
-    doubt = f"also {worst}" if qpe > limit * (1 + UTILIZATION_TOLERANCE) else ""
+    or_cubic = f"or a cubic of {cubic:.3g} rad"
+    allowed_cubic = mission.requirements.cubic_phase_error
+    if allowed_cubic is not None:
+        or_cubic += f", {allowed_cubic:.3g} rad allowed"
+    notes.append(
+        f"{cycles:.3g} cycles per aperture: below three it also is {worst}, {or_cubic}; the same motion, in no sum"
+    )
+    breaks_cubic = allowed_cubic is not None and cubic > allowed_cubic * (1 + UTILIZATION_TOLERANCE)
+    doubt = f"also {worst}, {or_cubic}" if breaks_cubic or qpe > limit * (1 + UTILIZATION_TOLERANCE) else ""
     together = _with_the_other_platform(mission, name, line, lines)
     return case._replace(
         notes=(*notes, *together.notes),

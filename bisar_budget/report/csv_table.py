@@ -32,6 +32,8 @@ COLUMNS = (
     "notes",
     "evidence",
     "verdict",
+    "qpe_exact_rad",
+    "published_margin_db",
 )
 
 
@@ -86,6 +88,8 @@ def _rows(mission: MissionFindings) -> Iterator[list[object]]:
             "; ".join(row.notes),
             _text(row.evidence),
             verdicts.get(row.id),
+            row.qpe_exact_rad,
+            row.published_margin_db,
         ]
 
 

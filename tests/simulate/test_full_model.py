@@ -7,7 +7,7 @@ import pytest
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.budget.sources import error_sources, full_ground
-from bisar_budget.budget.validity import FLOOR_RAD, SHARE, FirstOrder
+from bisar_budget.budget.validity import FLOOR_M, FLOOR_RAD, SHARE, FirstOrder
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.errors import MissionError
 from bisar_budget.geometry import norm
@@ -19,7 +19,6 @@ from tests.conftest import TODAY, findings, mission_text
 from tests.conftest import row as row_of
 from tests.simulate.conftest import collection, platform
 
-FLOOR_M = 0.1  # of shift, a fifth of a resolution cell
 NEAR_M = 10.0  # of displacement; farther the next order but one begins to show
 LONG_RAD = 0.3  # half turn of a line of sight
 

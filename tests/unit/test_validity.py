@@ -1,5 +1,7 @@
 """Beyond first order: exact ranges without NumPy, against NumPy; which rows carry them, both sides of each bound."""
 
+import csv
+import io
 import math
 import subprocess
 import sys
@@ -10,10 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bisar_budget.budget.exact_ranges import ExactRanges
+from bisar_budget.budget.findings import Report
 from bisar_budget.budget.sources import error_sources, full_ground
 from bisar_budget.budget.validity import FirstOrder
 from bisar_budget.geometry import norm
 from bisar_budget.mission.load import parse_mission
+from bisar_budget.report import Style, render
 from bisar_budget.units import SPEED, parse_quantity
 from tests.conftest import ROOT, findings, mission_text, row
 
@@ -234,3 +238,46 @@ def test_a_bound_of_nothing_is_no_division() -> None:
     first_order = FirstOrder(mission, mission.geometry, full_ground(mission, mission.geometry))
     assert all(first_order.beyond(s) is None for s in error_sources(mission, mission.geometry))
     assert not first_order.found
+
+
+@pytest.mark.parametrize(("metres", "is_beyond"), [(0.9, False), (1.8, True)])
+def test_a_displacement_that_first_order_has_wrong_is_beyond_it(metres: float, is_beyond: bool) -> None:
+    """Gradients 13° apart: the phase is right to 0.02 rad, the image is 3.5 % of 9 m elsewhere."""
+    platforms = {
+        "transmitter": {"position": [7336, -14770, 10e3], "velocity": [43, 127, 5], "acceleration": [0.8, 0.7, -0.2]},
+        "receiver": {"position": [-5045, 8599, 2988], "velocity": [-86, 34, 0], "acceleration": [0.2, 0.6, 0.1]},
+    }  # fmt: skip
+    changes = {"platforms": platforms, "collection__aperture_time": 2, "allocation__model": "full"}
+    errors = {f"{TX_ERROR}__position": [metres, 0, 0]}
+    found = row(findings(**changes, **errors), "transmitter.position.x")
+    mission = parse_mission(mission_text(**changes, **errors))
+    error = (lambda t: np.array([metres, 0, 0]) + 0 * t, lambda t: 0 * t * np.ones(3))
+    point, quadratic, _ = brute_force(mission, error, aperture_time=2.0)
+    assert found.qpe_full_rad == pytest.approx(quadratic, abs=0.02)
+    off = math.dist(found.displacement_m, point)
+    assert (off > max(0.1, 0.02 * math.hypot(*point))) == is_beyond
+    assert (found.qpe_exact_rad is not None) == is_beyond
+    assert any("the second order moves the image by" in note for note in found.notes) == is_beyond
+
+
+@pytest.mark.parametrize(("model", "whose"), [("published", "the full model's allowable"), ("full", "the allowable")])
+def test_an_allowable_that_the_gating_model_does_not_have_is_said_to_be_the_other_ones(
+    model: str, whose: str
+) -> None:
+    """The row says no limit; a note that spoke of "the allowable" contradicted it."""
+    found = row(findings(allocation__model=model), "transmitter.velocity.z")
+    (note,) = [note for note in found.notes if "speaks of the first order alone" in note]
+    assert note.startswith(f"{whose} of ")
+    assert (found.allowable is None) == (model == "published")
+
+
+def test_csv_carries_the_phase_by_exact_ranges_and_the_margin_of_the_published_rule() -> None:
+    report = Report("1", (findings(**{f"{TX_ERROR}__velocity": [0, 0, 3]}, requirements={"pslr": "-30 dB"}),))
+    rows = {line["id"]: line for line in csv.DictReader(io.StringIO(render("csv", report, Style())))}
+    beyond = row(report.missions[0], "transmitter.velocity.z")
+    assert beyond.qpe_exact_rad is not None
+    assert float(rows[beyond.id]["qpe_exact_rad"]) == beyond.qpe_exact_rad
+    assert rows["receiver.velocity.x"]["qpe_exact_rad"] == ""
+    # Half of the power against half of the amplitude: 3 dB, but for J₁/J₀ that is above φ/2.
+    margin = float(rows["receiver.vibration.sinusoidal.0"]["published_margin_db"])
+    assert margin == pytest.approx(10 * math.log10(2), abs=0.01)

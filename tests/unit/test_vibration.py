@@ -266,3 +266,30 @@ class TestVector:
 def test_amplitude_shares_of_both_platforms_sum_to_one() -> None:
     split = Split(transmitter=0.6, receiver=0.2, clock=0.1, reserve=0.1)
     assert sum(vibration.amplitude_share(split, p) for p in ("transmitter", "receiver")) == pytest.approx(1)
+
+
+@pytest.mark.parametrize(("allowed", "status"), [(0.99, "warn"), (1.01, "pass")])
+def test_a_slow_vibration_that_breaks_the_cubic_requirement_is_a_warning(allowed: float, status: str) -> None:
+    """At 1.5 cycles per aperture the worst cubic is three times the worst quadratic: of sin(πnx), by a fit."""
+    x = np.linspace(-1, 1, 4001)
+    cubic = 2.5 * np.polynomial.legendre.legfit(x, np.sin(1.5 * math.pi * x), 9)[3]  # P₃ is 5x³/2 - …
+    phase = 2 * math.pi * 1e-4 / LAMBDA * abs(float(cubic))
+    lines = {"sinusoidal": [{"amplitude": 1e-4, "frequency": 1.5 / T}]}
+    requirements = {"pslr": "-25 dB", "cubic_phase_error": allowed * phase}
+    found = row(
+        findings(requirements=requirements, **{ERROR.format("transmitter"): lines}),
+        "transmitter.vibration.sinusoidal.0",
+    )
+    assert found.status == status
+    text = found.reason if status == "warn" else found.notes[-1]
+    assert f"or a cubic of {phase:.3g} rad, {allowed * phase:.3g} rad allowed" in text
+
+
+def test_rules_that_agree_are_not_said_to_be_0_db_apart() -> None:
+    """At -30 dB ISLR and λ√(ISLR/2)/2π differ from first principles by 0.002 dB."""
+    notes = {
+        islr: row(findings(requirements={"islr": islr}), "receiver.vibration.wideband").notes
+        for islr in ("-30 dB", "-20 dB")
+    }
+    assert notes["-30 dB"] == ("the published rule is that of first principles, to 0.01 dB",)
+    assert notes["-20 dB"] == ("the published rule is 0.02 dB beyond first principles",)
