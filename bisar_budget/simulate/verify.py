@@ -120,6 +120,8 @@ class Study:
             yield "mission.location_error", partial(self._location, requirements.location_error)
         if self.allocation.n_pull is not None:
             yield "mission.autofocus_pull_in", partial(self._pull_in, self.allocation.n_pull)
+        if self.mission.scene.radius is not None and self.model != "published":
+            yield "mission.spatial_variance", self._edge
 
     def _aggregates(self) -> Iterator[tuple[str, Callable[[], Verdict]]]:
         owners = ["transmitter", "receiver", "mission"]
@@ -151,6 +153,14 @@ class Study:
             "acceleration": MotionError(acceleration=(x, y, z)),
         }[kind]
         return Errors(transmitter=error, receiver=error) if owner == "common" else Errors().of(owner, error)
+
+    def _edge(self) -> Verdict:
+        """Difference between two places of the scene; what images and exact ranges say of it is in the tests."""
+        total = self.allocation.qpe_total
+        blank = Verdict(
+            id="mission.spatial_variance", model=self.model, boundary_error=total, unit="rad", budget_rad=total
+        )
+        return blank._replace(reason="the difference of two places of the scene: images are formed of its centre")
 
     def _scaled(self, sizes: Sequence[tuple[ErrorSource, float]], scale: float) -> Errors:
         return superposed(self.errors(source, scale * size) for source, size in sizes)

@@ -32,6 +32,16 @@ def test_every_row_with_a_limit_has_a_verdict_or_a_reason(path) -> None:
     assert [row_id for row_id in rows_to_verify(mission) if not row_id.startswith("mission.vibration")] == limited
 
 
+def test_the_scenes_edge_has_a_reason() -> None:
+    """Its row has a limit, and no image of one point shows a difference between two."""
+    mission = parse_mission(mission_text(scene={"radius": "250 m"}, allocation={"model": "full"}))
+    limited = [row.id for row in check_mission(mission, date(2026, 1, 1)).rows if row.allowable is not None]
+    assert rows_to_verify(mission) == limited
+    (row,) = verify_mission(mission, "mission.spatial_variance").rows
+    assert (row.verdict, row.budget_rad) == ("not_evaluated", pytest.approx(math.pi / 4))
+    assert "two places" in row.reason
+
+
 def test_acceleration_and_clock_limits_of_section_v() -> None:
     rows = {row.id: row for row in verify_mission(load_mission(str(SECTION_V))).rows}
     assert set(rows) == {
