@@ -587,6 +587,8 @@ def _requirement(mission: Mission, found: MissionFindings, row: Row, source: Err
         return "none stated" if value is None else f"displacement ≤ {_limit(value, 'm')}"
     if row.id == "mission.autofocus_pull_in":
         return "all QPE together within what autofocus corrects, π·N_pull"
+    if row.id == "mission.spatial_variance":  # one correction for the whole scene: no gain
+        return f"QPE differs over the scene by ≤ {_limit(allocation.qpe_total, 'rad')}"
     owner = {"timing": "clock"}.get(row.id.split(".")[0], row.id.split(".")[0]) if source is None else source.owner
     limit = allocation.qpe_limit(owner) * allocation.autofocus_gain
     share = "" if owner == "mission" else f", {allocation.qpe.of(owner):.3g} of the budget"
@@ -597,7 +599,8 @@ def _method(found: MissionFindings, row: Row, verdict: str | None) -> str:
     """Say how the row is verified: by analysis, and by the image where one was formed."""
     is_vibration = row.metric in ("pslr", "islr")
     full = "first principles" if is_vibration else "full model"
-    by_model = {"published": row.equation, "full": full, "strictest": f"{row.equation} and {full}"}
+    both = full if row.equation == full else f"{row.equation} and {full}"
+    by_model = {"published": row.equation, "full": full, "strictest": both}
     is_of_model = is_vibration or (row.metric == "quadratic_phase_error" and row.unit != "rad")
     analysis = f"analysis: {by_model[found.model] if is_of_model else row.equation}"
     return analysis if verdict is None else f"{analysis}; simulation: {STATUS_WORDS.get(verdict, verdict)}"

@@ -601,3 +601,17 @@ def test_the_file_has_one_name_in_every_section() -> None:
     titles = [step.title for derivation in page.derivations for step in derivation.steps]
     assert any(f"Declared in {page.file}:" in title for title in titles)
     assert not [title for title in titles if str(ROOT) in title]
+
+
+def test_the_requirement_of_the_scenes_edge_is_its_allowable() -> None:
+    """One autofocus correction serves the whole scene, so that its gain has no part."""
+    changes = {
+        "scene": {"radius": "250 m"},
+        "autofocus": {"n_pull": 4},
+        "allocation__model": "strictest",
+        "platforms__transmitter__motion_error": {"velocity": "5 mm/s"},
+    }
+    (page,) = compliance(report(findings(**changes)), Style()).missions
+    (row,) = [row for row in page.matrix if row.id == "mission.spatial_variance"]
+    assert row.allowable in row.requirement
+    assert row.method == "analysis: full model"
