@@ -16,7 +16,6 @@ from bisar_budget.report.formulas import Equation, Sum
 from bisar_budget.resources import resource
 
 _BAR = 20  # characters
-_OPERATOR = re.compile(r"\\operatorname\{(\w+)\}")
 _DESCRIPTION = re.compile("<desc[^>]*>(.*?)</desc>", re.DOTALL)
 
 
@@ -101,8 +100,7 @@ def _general(left: str, right: str) -> Markup:
 
 
 def _math(latex: str) -> str:
-    """A block of LaTeX, as GitHub takes it: it refuses `operatorname` ("macros are not allowed")."""
-    latex = _OPERATOR.sub(r"\\mathop{\\mathrm{\1}}", latex)
+    """A block of LaTeX, as GitHub takes it."""
     return f"```math\n{latex}\n```"
 
 

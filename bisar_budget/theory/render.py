@@ -38,6 +38,11 @@ _COMMANDS = {
 }
 
 
+def _operator(name: str) -> str:
+    r"""Name of an operator in LaTeX; GitHub refuses `\operatorname` ("macros are not allowed")."""
+    return rf"\mathop{{\mathrm{{{name}}}}}"
+
+
 @dataclass(frozen=True)
 class _Name:
     """A symbol's name taken apart: `vtilde_xt` is v with a tilde and the subscript xt."""
@@ -63,7 +68,7 @@ class _Name:
         head = f"\\{self.letter}" if self.letter in _GREEK else _COMMANDS.get(self.letter, self.letter)
         for operator in ("det", "adj"):
             if head.startswith(operator):
-                head = rf"\operatorname{{{operator}}} {head.removeprefix(operator)}"
+                head = rf"{_operator(operator)} {head.removeprefix(operator)}"
         if head.startswith("Delta"):
             head = r"\Delta " + head.removeprefix("Delta")
         if self.accent:
@@ -107,7 +112,7 @@ class _Latex(LatexPrinter):  # type: ignore[misc]
         return rf"{_Name.of(expr.func.__name__).latex()}\left({arguments}\right)"
 
     def _print_atan2(self, expr: Basic, exp: str | None = None) -> str:
-        return rf"\operatorname{{atan2}}\left({', '.join(self._print(argument) for argument in expr.args)}\right)"
+        return rf"{_operator('atan2')}\left({', '.join(self._print(argument) for argument in expr.args)}\right)"
 
     def _print_Abs(self, expr: Basic, exp: str | None = None) -> str:
         # A bare | would end the cell of a Markdown table.

@@ -308,6 +308,12 @@ class TestDerive:
         text = run("derive", "--table", "II", "--format", "latex").stdout
         assert r"\frac{\pi T^{2} \left\lvert v_{xt} \tilde{v}_{xt} \right\rvert}{2 R_{t} \lambda}" in text
 
+    def test_markdown_has_no_macro_that_github_refuses(self, run) -> None:
+        for table in ("all", "full"):
+            text = run("derive", "--format", "markdown", "--table", table).stdout
+            assert r"\mathop{\mathrm{" in text
+            assert "operatorname" not in text
+
     def test_mathml_is_well_formed(self, run) -> None:
         from xml.etree import ElementTree
 

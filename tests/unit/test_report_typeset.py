@@ -56,7 +56,7 @@ def python_of_mathml(node: ElementTree.Element) -> str:
 
 
 def python_of_latex(text: str) -> str:
-    text = text.replace(r"\operatorname{atan2}", "atan2")
+    text = text.replace(r"\mathop{\mathrm{atan2}}", "atan2")
     text = text.replace(r"\left\lvert", "abs(").replace(r"\right\rvert", ")").replace(r"\left(", "(")
     text = text.replace(r"\right)", ")").replace(r"\cdot", "*").replace(r"\pi", "pi")
     while True:
