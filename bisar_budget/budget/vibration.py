@@ -204,8 +204,32 @@ def shared_frequencies(lines: Sequence[Line | Sinusoid], aperture_time_s: float)
     return found
 
 
-def _path(name: str) -> KeyPath:
-    return ("platforms", name, "motion_error", "vibration")
+def _row(
+    mission: Mission, allowed: VibrationLimits | None, metric: str, name: str, own_id: str, *path: str | int
+) -> VibrationCase:
+    """What every row of a platform's vibration has, before anything is declared."""
+    error: MotionError = getattr(mission.platforms, name).motion_error
+    what, kind = ("paired echoes", "sinusoidal") if metric == "pslr" else ("power spread", "wideband")
+    missing = "" if allowed else f"no requirements.{metric} to hold it to"
+    rule = {
+        "published": f"Section V, {kind}",
+        "full": "first principles",
+        "strictest": f"Section V, {kind} and first principles",
+    }[mission.allocation.model]
+    return VibrationCase(
+        id=f"{name}.vibration.{own_id}",
+        metric=metric,
+        declared=None,
+        limits=allowed,
+        path=("platforms", name, "motion_error", "vibration", kind, *path),
+        equation=rule,
+        missing=missing,
+        not_evaluated=missing,
+        doubt="",
+        over=f"{what} above the platform's share of {metric.upper()} ({rule})",
+        evidence=error.source,
+        notes=_margin(allowed),
+    )
 
 
 def _line(
@@ -218,20 +242,7 @@ def _line(
     lines: dict[str, list[Line]],
 ) -> VibrationCase:
     error: MotionError = getattr(mission.platforms, name).motion_error
-    case = VibrationCase(
-        id=f"{name}.vibration.sinusoidal.{index}",
-        metric="pslr",
-        declared=None,
-        limits=allowed,
-        path=(*_path(name), "sinusoidal", index, "amplitude"),
-        equation="Section V, sinusoidal",
-        missing="" if allowed else "no requirements.pslr to hold it to",
-        not_evaluated="",
-        doubt="",
-        over="paired echoes above the platform's share of PSLR (Section V)",
-        evidence=error.source,
-        notes=_margin(allowed),
-    )
+    case = _row(mission, allowed, "pslr", name, f"sinusoidal.{index}", index, "amplitude")
     if line is None:
         return case
     case = _with_doubt(case._replace(declared=line.amplitude), mission.allocation.model)
@@ -240,9 +251,7 @@ def _line(
     phase = 2 * math.pi * line.amplitude / mission.radar.wavelength
     if cycles >= ECHO_CYCLES:
         together = _with_the_other_platform(mission, name, line, lines)
-        return case._replace(
-            notes=(*notes, *together.notes), doubt=case.doubt or together.doubt, not_evaluated=case.missing
-        )
+        return case._replace(notes=(*notes, *together.notes), doubt=case.doubt or together.doubt)
     qpe, cubic = phase * quadratic_part(cycles), phase * cubic_part(cycles)
     limit = allocation.qpe_limit(name) * allocation.autofocus_gain
     worst = f"in the worst phase a quadratic phase error of {qpe:.3g} rad, {limit:.3g} rad allowed"
@@ -264,7 +273,6 @@ def _line(
     together = _with_the_other_platform(mission, name, line, lines)
     return case._replace(
         notes=(*notes, *together.notes),
-        not_evaluated=case.missing,
         doubt=case.doubt or doubt or together.doubt,
         qpe=qpe,
     )
@@ -279,47 +287,17 @@ def _together(
     numbers: Sequence[int],
 ) -> VibrationCase:
     """Lines of one platform at one frequency: in the worst phase their amplitudes add."""
-    error: MotionError = getattr(mission.platforms, name).motion_error
-    missing = "" if allowed else "no requirements.pslr to hold it to"
     shown = ", ".join(map(str, numbers[:5])) + (f" and {len(numbers) - 5} more" if len(numbers) > 5 else "")
     at = format_quantity(members[0].frequency, "Hz")
-    case = VibrationCase(
-        id=f"{name}.vibration.sinusoidal.sum.{index}",
-        metric="pslr",
-        declared=math.fsum(line.amplitude for line in members),
-        limits=allowed,
-        path=(*_path(name), "sinusoidal", numbers[0], "frequency"),
-        equation="Section V, sinusoidal",
-        missing=missing,
-        not_evaluated=missing,
-        doubt="",
-        over="paired echoes above the platform's share of PSLR (Section V)",
-        evidence=error.source,
-        notes=(
-            f"entries {shown} share {at}, less than one cycle per aperture apart: amplitudes add",
-            *_margin(allowed),
-        ),
-    )
-    return _with_doubt(case, mission.allocation.model)
+    shared = f"entries {shown} share {at}, less than one cycle per aperture apart: amplitudes add"
+    case = _row(mission, allowed, "pslr", name, f"sinusoidal.sum.{index}", numbers[0], "frequency")
+    declared = math.fsum(line.amplitude for line in members)
+    return _with_doubt(case._replace(declared=declared, notes=(shared, *case.notes)), mission.allocation.model)
 
 
 def _noise(mission: Mission, allowed: VibrationLimits | None, name: str, error: MotionError) -> VibrationCase:
     wideband = error.vibration.wideband
-    missing = "" if allowed else "no requirements.islr to hold it to"
-    case = VibrationCase(
-        id=f"{name}.vibration.wideband",
-        metric="islr",
-        declared=None,
-        limits=allowed,
-        path=(*_path(name), "wideband", "rms"),
-        equation="Section V, wideband",
-        missing=missing,
-        not_evaluated=missing,
-        doubt="",
-        over="power spread above the platform's share of ISLR (Section V)",
-        evidence=error.source,
-        notes=_margin(allowed),
-    )
+    case = _row(mission, allowed, "islr", name, "wideband", "rms")
     if wideband is None:
         return case
     rms = along_line_of_sight(wideband.rms, error, getattr(mission.platforms, name).state, "islr")

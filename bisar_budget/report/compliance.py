@@ -597,12 +597,10 @@ def _requirement(mission: Mission, found: MissionFindings, row: Row, source: Err
 
 def _method(found: MissionFindings, row: Row, verdict: str | None) -> str:
     """Say how the row is verified: by analysis, and by the image where one was formed."""
-    is_vibration = row.metric in ("pslr", "islr")
-    full = "first principles" if is_vibration else "full model"
-    both = full if row.equation == full else f"{row.equation} and {full}"
-    by_model = {"published": row.equation, "full": full, "strictest": both}
-    is_of_model = is_vibration or (row.metric == "quadratic_phase_error" and row.unit != "rad")
-    analysis = f"analysis: {by_model[found.model] if is_of_model else row.equation}"
+    analysis = f"analysis: {row.equation}"
+    is_error = row.metric == "quadratic_phase_error" and row.unit != "rad"
+    if found.model == "strictest" and is_error and row.equation != "full model":
+        analysis += " and full model"
     return analysis if verdict is None else f"{analysis}; simulation: {STATUS_WORDS.get(verdict, verdict)}"
 
 

@@ -170,7 +170,8 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[S
     share = split.of(platform)
     values = {name: ratio, "λ": wavelength, "s": share}
     lines = equation("published", formulas.VIBRATION[row.metric], values, row.allowable_published, "m")
-    yield from step(f"{row.equation}, s is the {platform}’s share of power", *lines)
+    kind = "sinusoidal" if is_sinusoid else "wideband"
+    yield from step(f"Section V, {kind}, s is the {platform}’s share of power", *lines)
     if is_sinusoid:
         part = amplitude_share(split, platform)
         shares = {"s_k": share, "s_t": split.transmitter, "s_r": split.receiver}

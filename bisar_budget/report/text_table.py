@@ -159,8 +159,8 @@ def _row(row: Row, style: Style) -> list[str]:
 
 @cache
 def _short_reference(equation: str) -> str:
-    """Shorten `Table II row 4` to `II.4`, `Section V, …` to `V`, `full model` to `full`; others to nothing."""
-    if equation == "full model":
+    """Shorten `Table II row 4` to `II.4`, `Section V, …` to `V`, the full model's to `full`; others to nothing."""
+    if equation in ("full model", "first principles"):
         return "full"
     match = re.match(r"Table (I+)(?: rows? ([\d-]+))?|Section (V?I*)|(\(\d+\))", equation)
     if match is None:

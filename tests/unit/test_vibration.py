@@ -293,3 +293,21 @@ def test_rules_that_agree_are_not_said_to_be_0_db_apart() -> None:
     }
     assert notes["-30 dB"] == ("the published rule is that of first principles, to 0.01 dB",)
     assert notes["-20 dB"] == ("the published rule is 0.02 dB beyond first principles",)
+
+
+@pytest.mark.parametrize(
+    ("model", "sinusoidal", "wideband"),
+    [
+        ("published", "Section V, sinusoidal", "Section V, wideband"),
+        ("full", "first principles", "first principles"),
+        ("strictest", "Section V, sinusoidal and first principles", "Section V, wideband and first principles"),
+    ],
+)
+def test_a_row_names_the_rule_that_gates(model: str, sinusoidal: str, wideband: str) -> None:
+    """A limit from first principles is not the paper's: the reason of a failure says whose it is."""
+    lines = [{"amplitude": "1 mm", "frequency": "10 Hz"} for _ in range(2)]
+    found = vibrating(sinusoidal=lines, wideband="1 mm", allocation__model=model)
+    for name, rule in (("sinusoidal.0", sinusoidal), ("sinusoidal.sum.0", sinusoidal), ("wideband", wideband)):
+        judged = row(found, f"transmitter.vibration.{name}")
+        assert (judged.status, judged.equation) == ("fail", rule)
+        assert judged.reason.endswith(f"({rule})")
