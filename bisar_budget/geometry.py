@@ -92,6 +92,10 @@ class PlatformState:
             (v[2] - u[2] * radial) / R,
         )
 
+    def travelled(self, duration_s: float) -> float:
+        """Bound of the way it makes from the midpoint in a time. [m]"""
+        return norm(self.velocity) * duration_s + norm(self.acceleration) * duration_s**2 / 2
+
     @property
     def azimuth(self) -> float:
         """From east, counter-clockwise, φ of (6). [rad]"""

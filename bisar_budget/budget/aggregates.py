@@ -40,7 +40,7 @@ def aggregate_rows(
     stated = [source for source in sources if source.declared is not None]
     declared = [source for source in stated if source.is_independent]
     if combine != "each":
-        yield from _qpe_aggregates(mission, allocation, declared, groups, first_order.found)
+        yield from _qpe_aggregates(mission, allocation, declared, groups, first_order)
     # `each` looks at single rows, those along the scene's axes included.
     motion = [source for source in (stated if combine == "each" else declared) if source.is_motion]
     cubic_limit, cubic_doubt = mission.requirements.cubic_phase_error, ""
@@ -52,7 +52,7 @@ def aggregate_rows(
     found = first_order.found
     cubic_notes: tuple[str, ...] = ()
     if found and motion:
-        by_exact = combined_phase(_with_exact(motion, found), "cubic", "full", combine, groups)
+        by_exact = combined_phase(first_order.exactly(motion), "cubic", "full", combine, groups)
         cubic_notes, exact_doubt = of_members(found, motion, by_exact, cubic_limit, "rad")
         cubic_doubt = cubic_doubt or exact_doubt
     cubic_phase = combined_phase(motion, "cubic", model, combine, groups) if motion else None
@@ -123,7 +123,7 @@ def aggregate_rows(
         pull_in_notes: tuple[str, ...] = ()
         pull_in_doubt = ""
         if found:
-            by_exact = math.fsum(abs(s.qpe("full")) for s in _with_exact(declared, found))
+            by_exact = math.fsum(abs(s.qpe("full")) for s in first_order.exactly(declared))
             pull_in_notes, pull_in_doubt = of_members(found, declared, by_exact, pull_in, "rad")
         by_other = math.fsum(abs(s.qpe(other)) for s in declared) if other is not None else 0.0
         if by_other > pull_in * (1 + UTILIZATION_TOLERANCE):
@@ -166,7 +166,7 @@ def _qpe_aggregates(
     allocation: Allocation,
     declared: Sequence[ErrorSource],
     groups: Sequence[Correlated],
-    found: Mapping[str, Beyond],
+    first_order: FirstOrder,
 ) -> Iterator[Row]:
     combine, model, gain = mission.allocation.combine, mission.allocation.model, allocation.autofocus_gain
     owners = ["transmitter", "receiver", "mission"]
@@ -192,9 +192,9 @@ def _qpe_aggregates(
             doubt = f"the {other[0]} model says fail: {other[1]:.3g} rad, {limit:.3g} rad allowed"
         exact_notes: tuple[str, ...] = ()
         exact_doubt = ""
-        if found:
-            by_exact = combined_phase(_with_exact(members, found), "qpe", "full", combine, groups)
-            exact_notes, exact_doubt = of_members(found, members, by_exact, limit, "rad")
+        if first_order.found:
+            by_exact = combined_phase(first_order.exactly(members), "qpe", "full", combine, groups)
+            exact_notes, exact_doubt = of_members(first_order.found, members, by_exact, limit, "rad")
         yield judged(
             mission,
             id=f"{'timing' if owner == 'clock' else owner}.quadratic_phase_error",
@@ -227,11 +227,6 @@ def _exceeded(
         return ""
     row_id, largest = max(members(), key=lambda member: abs(member[1]))
     return f"{what} {size:.3g} {unit}, {limit:.3g} {unit} allowed; largest: {row_id}, {abs(largest):.3g} {unit}"
-
-
-def _with_exact(members: Sequence[ErrorSource], found: Mapping[str, Beyond]) -> list[ErrorSource]:
-    """The errors, those beyond first order with effects that give what exact ranges give."""
-    return [found[s.id].in_place_of(s) if s.id in found else s for s in members]
 
 
 def _moved_exactly(source: ErrorSource, found: Mapping[str, Beyond], plane: ImagePlane) -> GroundVector:

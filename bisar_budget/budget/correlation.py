@@ -61,7 +61,7 @@ def phase_parts(
     Of a covariance the six errors are one part under `rss`, else six.
     """
     parts = []
-    if rule == "rss" and groups:
+    if rule == "rss" and groups:  # few missions have any
         left = {source.id: source for source in sources}
         for group in groups:
             if left.keys() >= set(group.ids):
@@ -75,6 +75,8 @@ def combined_phase(
     sources: Sequence[ErrorSource], term: str, model: str, rule: str, groups: Sequence[Correlated]
 ) -> float:
     """Combine the phases of errors by a rule, those of a covariance with their correlations. [rad]"""
+    if not groups:
+        return combine_phases([getattr(source, term)(model) for source in sources], rule)
     return combine_phases([phase for _, phase in phase_parts(sources, term, model, rule, groups)], rule)
 
 

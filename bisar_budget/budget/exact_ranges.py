@@ -9,20 +9,32 @@ has it; quadratic and cubic phase are those of the cubic fitted to what remains,
 import math
 from collections.abc import Iterable
 from functools import cache, cached_property
-from math import hypot
+from math import sqrt
 from operator import mul
 from typing import NamedTuple
 
 from bisar_budget.budget.sources import ErrorSource
-from bisar_budget.geometry import BistaticGeometry, GroundVector, Vector
+from bisar_budget.geometry import BistaticGeometry, GroundVector, Vector, norm
 
-_NODES = 16  # more change nothing, up to turns of ±1 rad
+_NODES = 10  # more change nothing (below 1e-6) where platforms travel, in half an aperture, at most
+_SHORT = 0.5  # of their slant range
+_LONG_NODES = 16  # and beyond; more change less than 1e-3 where they travel 1.25 of it
 _ORDER = 6  # of the projection, of which value and slope at the midpoint are taken
 _ITERATIONS = 60
-_SETTLED_M = 1e-6
+_SETTLED_M = 1e-3  # of the last step, whose effect on the phases is counted to first order
 
 Weights = tuple[float, ...]
 Track = list[Vector]  # positions at the nodes
+
+
+class Quadrature(NamedTuple):
+    """Nodes in -1 to 1, and the weights that give, of samples there, what the fit has."""
+
+    nodes: Weights
+    constant: Weights  # value at the midpoint
+    linear: Weights  # slope there, over the half aperture
+    quadratic: Weights  # at the edge, of the cubic fitted to the samples
+    cubic: Weights
 
 
 class ExactPhases(NamedTuple):
@@ -38,15 +50,19 @@ class ExactRanges:
 
     def __init__(self, geometry: BistaticGeometry, wavelength_m: float, aperture_time_s: float) -> None:
         self.wavelength, self.half = wavelength_m, aperture_time_s / 2
-        self.times = [node * self.half for node in _quadrature()[0]]
         states = {"transmitter": geometry.transmitter, "receiver": geometry.receiver}
+        travelled = max(state.travelled(self.half) / state.slant_range for state in states.values())
+        self.quadrature = _quadrature(_NODES if travelled <= _SHORT else _LONG_NODES)
+        self.times = [node * self.half for node in self.quadrature.nodes]
         self.tracks = {name: [state.at(tau)[0] for tau in self.times] for name, state in states.items()}
-        self.recorded = [math.hypot(*t) + math.hypot(*r) for t, r in zip(*self.tracks.values(), strict=True)]
+        self.recorded = [sum(map(norm, ends)) for ends in zip(*self.tracks.values(), strict=True)]
 
-    def phases(self, errors: Iterable[tuple[ErrorSource, float]]) -> ExactPhases | None:
+    def phases(
+        self, errors: Iterable[tuple[ErrorSource, float]], near: GroundVector = (0.0, 0.0)
+    ) -> ExactPhases | None:
         """Find where errors of given sizes move a point at the scene centre, and what defocuses there.
 
-        None where the iteration finds no ground point with the recorded history.
+        The search starts `near`. None where it finds no ground point with the recorded history.
         """
         measured = dict(self.tracks)
         recorded = list(self.recorded)
@@ -60,41 +76,36 @@ class ExactRanges:
                             (a + p * x, b + p * y, c + p * z) for (a, b, c), p in zip(track, powers, strict=True)
                         ]
             else:  # a clock, or a phase as such: its polynomial is exact
-                for index, (tau, node) in enumerate(zip(self.times, _quadrature()[0], strict=True)):
+                for index, (tau, node) in enumerate(zip(self.times, self.quadrature.nodes, strict=True)):
                     term = source.effect
                     edge = term.qpe * node**2 + term.cubic * node**3
                     metres = term.constant + term.linear * tau + self.wavelength / (2 * math.pi) * edge
                     recorded[index] += size * metres
-        return self._settled(recorded, *measured.values())
+        return self._settled(recorded, measured, near)
 
     @cached_property
-    def _rates(self) -> tuple[float, float, float, float]:
-        """What a step east and north of the scene centre does to the constant and linear term of the history."""
-        _, at_midpoint, per_half, _, _ = _quadrature()
-        slopes = []
-        for axis in (0, 1):  # the slope of a track's range is minus its direction
-            along = [
-                -t[axis] / math.hypot(*t) - r[axis] / math.hypot(*r)
-                for t, r in zip(*self.tracks.values(), strict=True)
-            ]
-            slopes += [_sum(at_midpoint, along), _sum(per_half, along)]
-        a, c, b, d = slopes
-        return a, b, c, d
+    def _slopes(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """What a step of a metre east, and north, of the scene centre does to each term of the history."""
+        tracks = self.tracks.values()
+        east, north = (  # the slope of a track's range is minus its direction
+            [-sum(end[axis] / norm(end) for end in ends) for ends in zip(*tracks, strict=True)] for axis in (0, 1)
+        )
+        _, *terms = self.quadrature
+        return tuple(_sum(term, east) for term in terms), tuple(_sum(term, north) for term in terms)
 
-    def _settled(self, recorded: list[float], *tracks: Track) -> ExactPhases | None:
+    def _settled(self, recorded: list[float], measured: dict[str, Track], near: GroundVector) -> ExactPhases | None:
         """Newton's method for the point, with the slopes at the scene centre, which turn little on the way there."""
-        _, at_midpoint, per_half, quadratic, cubic = _quadrature()
-        a, b, c, d = self._rates
+        _, at_midpoint, per_half, quadratic, cubic = self.quadrature
+        (a, c, *by_east), (b, d, *by_north) = self._slopes
         determinant = a * d - b * c
         if not determinant:
             return None
-        first, second = tracks
-        east = north = 0.0
+        east, north = near
         for _ in range(_ITERATIONS):
-            left = [
-                whole - hypot(x - east, y - north, z) - hypot(u - east, v - north, w)
-                for whole, (x, y, z), (u, v, w) in zip(recorded, first, second, strict=True)
-            ]
+            left = []
+            for whole, (x, y, z), (u, v, w) in zip(recorded, *measured.values(), strict=True):
+                x, y, u, v = x - east, y - north, u - east, v - north
+                left.append(whole - sqrt(x * x + y * y + z * z) - sqrt(u * u + v * v + w * w))
             constant, linear = _sum(at_midpoint, left), _sum(per_half, left)
             step_east, step_north = (
                 (d * constant - b * linear) / determinant,
@@ -103,7 +114,11 @@ class ExactRanges:
             east, north = east + step_east, north + step_north
             if abs(step_east) + abs(step_north) < _SETTLED_M:
                 scale = 2 * math.pi / self.wavelength
-                return ExactPhases((east, north), scale * _sum(quadratic, left), scale * _sum(cubic, left))
+                phases = [
+                    scale * (_sum(term, left) - by_e * step_east - by_n * step_north)
+                    for term, by_e, by_n in zip((quadratic, cubic), by_east, by_north, strict=True)
+                ]
+                return ExactPhases((east, north), *phases)
             if not math.isfinite(east + north):
                 return None
         return None
@@ -115,22 +130,21 @@ def _sum(weights: Weights, samples: list[float]) -> float:
 
 
 @cache
-def _quadrature() -> tuple[Weights, Weights, Weights, Weights, Weights]:
-    """Nodes in -1 to 1, and the weights that give, of samples there: value and slope at 0, x² and x³ of the fit."""
+def _quadrature(count: int) -> Quadrature:
     nodes: list[float] = []
     weights: list[float] = []
-    for k in range(_NODES):
-        x = math.cos(math.pi * (k + 0.75) / (_NODES + 0.5))  # close enough for Newton's method
+    for k in range(count):
+        x = math.cos(math.pi * (k + 0.75) / (count + 0.5))  # close enough for Newton's method
         for _ in range(8):
             before, at = 1.0, x
-            for n in range(2, _NODES + 1):
+            for n in range(2, count + 1):
                 before, at = at, ((2 * n - 1) * x * at - (n - 1) * before) / n
-            slope = _NODES * (x * at - before) / (x * x - 1)
+            slope = count * (x * at - before) / (x * x - 1)
             x -= at / slope
         nodes.append(x)
         weights.append(2 / ((1 - x * x) * slope * slope))
     legendre: list[Weights] = []  # the weights that project on each polynomial
-    last, this = [0.0] * _NODES, [1.0] * _NODES
+    last, this = [0.0] * count, [1.0] * count
     for n in range(_ORDER + 1):
         legendre.append(tuple((2 * n + 1) / 2 * w * p for w, p in zip(weights, this, strict=True)))
         recurred = [((2 * n + 1) * x * p - n * q) / (n + 1) for x, p, q in zip(nodes, this, last, strict=True)]
@@ -139,7 +153,7 @@ def _quadrature() -> tuple[Weights, Weights, Weights, Weights, Weights]:
     def combined(*factors: float) -> Weights:
         return tuple(sum(f * w for f, w in zip(factors, row, strict=True)) for row in zip(*legendre, strict=True))
 
-    return (
+    return Quadrature(
         tuple(nodes),
         combined(1, 0, -1 / 2, 0, 3 / 8, 0, -5 / 16),  # Pₙ(0)
         combined(0, 1, 0, -3 / 2, 0, 15 / 8, 0),  # P′ₙ(0)

@@ -11,12 +11,13 @@ turn far, gets its phase from exact ranges. Derived here.
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
+from operator import add, sub
 from typing import NamedTuple
 
 from bisar_budget.budget.exact_ranges import ExactPhases, ExactRanges
 from bisar_budget.budget.sources import Effect, ErrorSource, FullGround
 from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
-from bisar_budget.geometry import STRAIGHT, BistaticGeometry, GroundVector, Vector, norm, unit
+from bisar_budget.geometry import STRAIGHT, BistaticGeometry, GroundVector, Vector, norm
 from bisar_budget.mission.model import Mission
 from bisar_budget.units import format_quantity
 
@@ -29,6 +30,9 @@ _TURNING_RAD = 0.1  # the quartic term is 1 % of the quadratic there
 _NARROW_SINE = 0.2  # between range and Doppler gradient; displacements grow as its inverse
 _COARSE_CELL_RAD = 1.0  # of phase between points a range cell apart; beyond, a response spreads over cells
 _ABSORBED_RAD = 6.1  # of the same, where the image shows half; measured, uniform window, 8 to 300 MHz
+
+
+SymmetricForm = tuple[float, ...]  # xx, xy, xz, yy, yz, zz
 
 
 class Beyond(NamedTuple):
@@ -52,11 +56,6 @@ class Beyond(NamedTuple):
         """Displacement by exact ranges, likewise. [m]"""
         return (math.nan, math.nan) if self.exact is None else self.exact.displacement
 
-    def in_place_of(self, source: ErrorSource) -> ErrorSource:
-        """The error with phases per unit, of the full model, that give what exact ranges give."""
-        size = source.declared or 1.0
-        return source._replace(full=source.full._replace(qpe=self.qpe / size, cubic=self.cubic / size))
-
     def against(self, qpe_full: float) -> str:
         """Say the phase of both."""
         if self.exact is None:
@@ -78,16 +77,20 @@ class FirstOrder:
     def __init__(self, mission: Mission, geometry: BistaticGeometry, ground: FullGround) -> None:
         self.geometry, self.ground = geometry, ground
         self.wavelength, self.T = mission.radar.wavelength, mission.collection.aperture_time
-        nearest = min(geometry.transmitter.slant_range, geometry.receiver.slant_range)
+        states = (geometry.transmitter, geometry.receiver)
+        nearest = max(0.0, min(state.slant_range - state.travelled(self.T / 2) for state in states))
         # Within this of platform and image the second order cannot reach the floor.
         self._harmless = math.sqrt(FLOOR_RAD * nearest * self.wavelength / (4 * math.pi))
         (a, b), (c, d) = ground.plane.adjugate
         determinant = abs(ground.plane.determinant)
         self._by_constant, self._by_linear = math.hypot(a, c) / determinant, math.hypot(b, d) / determinant
+        # By so much at most, times the square of that, the second order moves the image.
+        self._farthest = (self._by_constant + self._by_linear / self.T) / nearest if nearest else math.inf
         self._edge = {"m": 1.0, "m/s": self.T / 2, "m/s^2": self.T**2 / 8}  # of a unit of it at the aperture edge
         self._strain = _strain(geometry, self.T)
-        self._bends: dict[str, tuple[float, float]] = {}
+        self._bends: dict[str, float] = {}
         self.found: dict[str, Beyond] = {}  # by row id, of the errors asked about
+        self._exact_sources: dict[str, ErrorSource] = {}
 
     @cached_property
     def exact(self) -> ExactRanges:
@@ -102,8 +105,20 @@ class FirstOrder:
         cause = self._cause(source, declared)
         if not cause:
             return None
-        self.found[source.id] = beyond = Beyond(cause, self.exact.phases([(source, declared)]))
+        near = self.ground.plane.displacement(source.full, declared) or (0.0, 0.0)
+        self.found[source.id] = beyond = Beyond(cause, self.exact.phases([(source, declared)], near))
         return beyond
+
+    def exactly(self, sources: Sequence[ErrorSource]) -> list[ErrorSource]:
+        """The same errors; those found beyond first order with phases by exact ranges for the full model's."""
+        return [self._by_exact_ranges(source) if source.id in self.found else source for source in sources]
+
+    def _by_exact_ranges(self, source: ErrorSource) -> ErrorSource:
+        if source.id not in self._exact_sources:
+            beyond, size, effect = self.found[source.id], source.declared or 1.0, source.full
+            by_exact = Effect(effect.constant, effect.linear, beyond.qpe / size, beyond.cubic / size)
+            self._exact_sources[source.id] = source._replace(full=by_exact)
+        return self._exact_sources[source.id]
 
     def _reach(self, source: ErrorSource) -> float:
         """Bound of how far a unit of an error takes platform and image, over the aperture. [m/unit]"""
@@ -114,16 +129,20 @@ class FirstOrder:
     def _cause(self, source: ErrorSource, declared: float) -> str:
         if self._strain and (source.full.qpe or source.is_position):
             return self._strain
-        if abs(declared) * self._reach(source) < self._harmless:
+        reach = self._reach(source)
+        if abs(declared) * reach < self._harmless:
             return ""  # a bound on what follows
         moved = math.hypot(*(self.ground.plane.displacement(source.full, declared) or (0.0, 0.0)))
         if moved > FAR_M:
             return f"it moves the image by {moved:.3g} m"
-        first, (added, drift) = source.full.qpe * declared, self._bend(source)
-        if abs(added) * declared * declared > max(FLOOR_RAD, SHARE * abs(first)):
-            return f"the second order adds {added * declared * declared:.2g} rad"
-        farther = drift * declared * declared
-        return f"the second order moves the image by {farther:.2g} m" if farther > max(FLOOR_M, SHARE * moved) else ""
+        first, added = source.full.qpe * declared, self._bend(source) * declared * declared
+        if abs(added) > max(FLOOR_RAD, SHARE * abs(first)):
+            return f"the second order adds {added:.2g} rad"
+        allowed = max(FLOOR_M, SHARE * moved)
+        if self._farthest * (declared * reach) ** 2 <= allowed:
+            return ""  # likewise a bound
+        farther = self._drift(source) * declared * declared
+        return f"the second order moves the image by {farther:.2g} m" if farther > allowed else ""
 
     def allowable_note(self, source: ErrorSource, gating: float | None, full: float | None, limit: float) -> str:
         """Say that an allowable, which has a phase of `limit`, lies beyond first order; else nothing.
@@ -135,60 +154,100 @@ class FirstOrder:
             return ""
         if allowable * self._reach(source) < FAR_M and allowable * self._edge.get(source.unit, 0.0) < self._harmless:
             return ""  # the second order of what stays that near is a constant and a slope
-        bend = math.sqrt(abs(self._bend(source)[0]) / max(FLOOR_RAD, SHARE * limit))
+        bend = math.sqrt(abs(self._bend(source)) / max(FLOOR_RAD, SHARE * limit))
         if allowable * bend <= 1:
             return ""
         size, held = (format_quantity(value, source.unit, 2) for value in (allowable, 1 / bend))
         return f"{whose} allowable of {size} speaks of the first order alone, which holds to about {held}"
 
     @cached_property
-    def _aperture(self) -> tuple[tuple[tuple[str, Vector, float], ...], ...]:
-        """Of start, middle and end: each platform's name, line of sight and range."""
-        states = (("transmitter", self.geometry.transmitter), ("receiver", self.geometry.receiver))
-        tracks = [[(name, state.at(tau)[0]) for name, state in states] for tau in (-self.T / 2, 0.0, self.T / 2)]
-        return tuple([tuple([(name, unit(at), norm(at)) for name, at in track]) for track in tracks])
+    def _across(self) -> dict[str, list[SymmetricForm]]:
+        """(I − uuᵀ)/2R at start, middle and end, of each platform and, for what moves both, their sum."""
+        states = {"transmitter": self.geometry.transmitter, "receiver": self.geometry.receiver}
+        times = (-self.T / 2, 0.0, self.T / 2)
+        forms = {name: [_across(state.at(tau)[0]) for tau in times] for name, state in states.items()}
+        both = [tuple(map(add, *pair)) for pair in zip(*forms.values(), strict=True)]
+        return {**forms, "mission": both}
 
     def second(self, source: ErrorSource, size: float) -> Effect:
         """What the second order adds to an error of a size: displacement and quadratic phase."""
-        constant, linear, quadratic = (term * size * size for term in self._second(source))
+        k = 2 * math.pi / self.wavelength
+        of_terms = ((0.0, 1.0, 0.0), (-1 / self.T, 0.0, 1 / self.T), (k / 2, -k, k / 2))
+        constant, linear, quadratic = (
+            self._of_a_unit(SecondOrder(self._across, weights), source) * size * size for weights in of_terms
+        )
         return self.ground.effective([(constant, linear, quadratic, 0.0)])[0]
 
-    def _bend(self, source: ErrorSource) -> tuple[float, float]:
-        """Quadratic phase that the second order adds, and how far it moves the image. [rad/unit²], [m/unit²]
-
-        Both grow with the square of the error.
-        """
+    def _bend(self, source: ErrorSource) -> float:
+        """Quadratic phase that the second order adds, what it moves the image by included. [rad/unit²]"""
         if source.id not in self._bends:
-            constant, linear, quadratic = self._second(source)
-            by_constant, by_linear = self.ground.quadratic
-            drift = self.ground.plane.displacement(Effect(constant, linear, 0.0, 0.0), 1.0) or (0.0, 0.0)
-            self._bends[source.id] = (quadratic + by_constant * constant + by_linear * linear, math.hypot(*drift))
+            self._bends[source.id] = self._of_a_unit(self._phase, source)
         return self._bends[source.id]
 
-    def _second(self, source: ErrorSource) -> tuple[float, float, float]:
-        """Of a unit: constant, linear term and quadratic phase of the second order, before they move the image."""
-        east, north = self.ground.plane.displacement(source.full, 1.0) or (0.0, 0.0)
-        x, y, z = source.direction
-        edge = self._edge.get(source.unit, 0.0)
-        own = (
-            -edge if source.unit == "m/s" else edge,
-            edge if source.unit == "m" else 0.0,
-            edge,
-        )  # start, middle, end
-        errors = []
-        for power, platforms in zip(own, self._aperture, strict=True):
-            total = 0.0
-            for name, (u, v, w), R in platforms:
-                if source.moves(name):
-                    a, b, c = power * x - east, power * y - north, power * z
-                else:
-                    a, b, c = -east, -north, 0.0
-                along = a * u + b * v + c * w
-                total -= (a * a + b * b + c * c - along * along) / (2 * R)
-            errors.append(total)
-        before, middle, after = errors
-        quadratic = 2 * math.pi / self.wavelength * ((before + after) / 2 - middle)
-        return middle, (after - before) / self.T, quadratic
+    def _drift(self, source: ErrorSource) -> float:
+        """How far the second order moves the image. [m/unit²]"""
+        return math.hypot(*(self._of_a_unit(along, source) for along in self._displacement))
+
+    def _of_a_unit(self, second: "SecondOrder", source: ErrorSource) -> float:
+        moved = self.ground.plane.displacement(source.full, 1.0) or (0.0, 0.0)
+        return second.of(source, self._edge.get(source.unit, 0.0), moved)
+
+    @cached_property
+    def _phase(self) -> "SecondOrder":
+        k = math.pi / self.wavelength
+        by_constant, by_linear = self.ground.quadratic
+        by_slope = by_linear / self.T
+        return SecondOrder(self._across, (k - by_slope, by_constant - 2 * k, k + by_slope))
+
+    @cached_property
+    def _displacement(self) -> tuple["SecondOrder", ...]:
+        """East and north."""
+        scale = 1 / self.ground.plane.determinant
+        return tuple(
+            SecondOrder(self._across, (-b * scale / self.T, a * scale, b * scale / self.T))
+            for a, b in self.ground.plane.adjugate
+        )
+
+
+class SecondOrder:
+    """A weighted sum of the second order of the range error at start, middle and end of the aperture.
+
+    The second order at one time is −Σwᵀ(I − uuᵀ)w/2R over both platforms, w being the platform's error, of power p
+    along d, less the displacement x̂ on the ground. Multiplied out, and summed with its weight, it is a form of x̂, one
+    of d and x̂, and one of d; in `ends` and `slope` the weights are those of errors that vanish in the middle.
+    """
+
+    def __init__(self, across: Mapping[str, Sequence[SymmetricForm]], weights: tuple[float, float, float]) -> None:
+        start, middle, end = weights
+        self._forms: dict[str, dict[str, tuple[Sequence[float], Sequence[float]]]] = {}
+        for owner, (first, second, third) in across.items():
+            before, after = [start * x for x in first], [end * x for x in third]
+            ends, slope = list(map(add, before, after)), list(map(sub, after, before))
+            whole = [x + middle * y for x, y in zip(ends, second, strict=True)]
+            self._forms[owner] = {"m": (whole, whole), "m/s": (ends, slope), "m/s^2": (ends, ends)}
+        self._of_displacement = self._forms["mission"]["m"][0]
+
+    def of(self, source: ErrorSource, edge: float, displacement: GroundVector) -> float:
+        """Of a unit error that is `edge` at the aperture edge and moves the image by `displacement`."""
+        east, north = displacement
+        xx, xy, _, yy, _, _ = self._of_displacement
+        total = east * (xx * east + 2 * xy * north) + yy * north * north
+        if source.is_position:
+            x, y, z = source.direction
+            squared, mixed = self._forms[source.owner][source.unit]
+            xx, xy, xz, yy, yz, zz = mixed
+            moved = east * (xx * x + xy * y + xz * z) + north * (xy * x + yy * y + yz * z)
+            xx, xy, xz, yy, yz, zz = squared
+            own = x * (xx * x + 2 * (xy * y + xz * z)) + y * (yy * y + 2 * yz * z) + zz * z * z
+            total += edge * (edge * own - 2 * moved)
+        return -total
+
+
+def _across(position: Vector) -> SymmetricForm:
+    x, y, z = position
+    R = norm(position)
+    u, v, w, h = x / R, y / R, z / R, 0.5 / R
+    return (h - h * u * u, -h * u * v, -h * u * w, h - h * v * v, -h * v * w, h - h * w * w)
 
 
 def of_members(

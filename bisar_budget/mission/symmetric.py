@@ -2,14 +2,15 @@
 
 import math
 from collections.abc import Sequence
+from operator import mul
 
 _SWEEPS = 30  # convergence is quadratic: a 6 x 6 takes about five
 
 
 def quadratic_form(matrix: Sequence[Sequence[float]], vector: Sequence[float]) -> float:
     """Σ mᵢⱼ vᵢ vⱼ of a positive semi-definite matrix (n, n); what rounding leaves below zero is zero."""
-    terms = [m * vector[i] * v for i, row in enumerate(matrix) for m, v in zip(row, vector, strict=True)]
-    return max(0.0, math.fsum(terms))
+    total: float = sum([v * sum(map(mul, row, vector)) for row, v in zip(matrix, vector, strict=True) if v])
+    return max(0.0, total)
 
 
 def exceed(matrix: Sequence[Sequence[float]], floor: float) -> bool:
