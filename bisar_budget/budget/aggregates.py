@@ -155,7 +155,9 @@ def _location_doubt(
     other, plane = ("full", by_full) if model == "published" else ("published", image_plane(mission.geometry))
     moves = [(s.id, plane.displacement(s.by(other), s.declared or 0.0)) for s in motion]
     known = [(row_id, move) for row_id, move in moves if move is not None]  # (25) may have none at all
-    moved = combined_displacement(known, mission.allocation.combine, groups) if known else 0.0
+    if sum([math.hypot(x, y) for _, (x, y) in known]) <= limit:
+        return ""  # by any rule
+    moved = combined_displacement(known, mission.allocation.combine, groups)
     if moved <= limit * (1 + UTILIZATION_TOLERANCE):
         return ""
     return f"the {other} model says fail: {moved:.3g} m, {limit:.3g} m allowed"

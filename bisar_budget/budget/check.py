@@ -265,7 +265,8 @@ def _vibration_rows(mission: Mission, allocation: Allocation) -> Iterator[Row]:
             qpe_full=case.qpe,
             evidence=case.evidence,
             notes=case.notes,
-        )._replace(published_margin_db=None if allowed is None else allowed.margin_db)
+            published_margin_db=None if allowed is None else allowed.margin_db,
+        )
 
 
 def _scene_row(

@@ -30,10 +30,10 @@ def largest_signed_sum(vectors: Sequence[GroundVector]) -> float:
     half of the outline; the other half is its mirror image.
     """
     upper = [(x, y) if (y, x) > (0, 0) else (-x, -y) for x, y in vectors]
-    upper.sort(key=lambda vector: math.atan2(vector[1], vector[0]))
-    x, y = math.fsum(v[0] for v in upper), math.fsum(v[1] for v in upper)
-    longest = math.hypot(x, y)
+    upper = [vector for _, vector in sorted([(math.atan2(y, x), (x, y)) for x, y in upper])]
+    x, y = sum([x for x, _ in upper]), sum([y for _, y in upper])
+    corners = [x * x + y * y]
     for step_x, step_y in upper:
         x, y = x - 2 * step_x, y - 2 * step_y
-        longest = max(longest, math.hypot(x, y))
-    return longest
+        corners.append(x * x + y * y)
+    return math.sqrt(max(corners))

@@ -34,6 +34,7 @@ def judged(
     evidence: str | None = None,
     is_independent: bool = True,
     notes: tuple[str, ...] = (),
+    published_margin_db: float | None = None,
 ) -> Row:
     """Judge one row; see `judgement`."""
     utilization, margin, status, reason, notes = judgement(
@@ -70,6 +71,8 @@ def judged(
         mission.requirement_ids.get(id),
         evidence,
         is_independent,
+        None,
+        published_margin_db,
     )
 
 

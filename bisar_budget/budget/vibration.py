@@ -13,6 +13,7 @@ the second where σ² is small; the same noise on both platforms would add 3 dB.
 
 import math
 from collections.abc import Iterator, Sequence
+from functools import cache
 from typing import NamedTuple
 
 from bisar_budget import evaluators
@@ -209,26 +210,38 @@ def _row(
 ) -> VibrationCase:
     """What every row of a platform's vibration has, before anything is declared."""
     error: MotionError = getattr(mission.platforms, name).motion_error
+    case = _blank(metric, name, own_id, path, mission.allocation.model)
+    if allowed is None and error.source is None:
+        return case
+    missing = "" if allowed else case.missing
+    return case._replace(
+        limits=allowed, missing=missing, not_evaluated=missing, evidence=error.source, notes=_margin(allowed)
+    )
+
+
+@cache
+def _blank(metric: str, name: str, own_id: str, path: KeyPath, model: str) -> VibrationCase:
+    """The row of a mission that says nothing of vibration."""
     what, kind = ("paired echoes", "sinusoidal") if metric == "pslr" else ("power spread", "wideband")
-    missing = "" if allowed else f"no requirements.{metric} to hold it to"
+    missing = f"no requirements.{metric} to hold it to"
     rule = {
         "published": f"Section V, {kind}",
         "full": "first principles",
         "strictest": f"Section V, {kind} and first principles",
-    }[mission.allocation.model]
+    }[model]
     return VibrationCase(
         id=f"{name}.vibration.{own_id}",
         metric=metric,
         declared=None,
-        limits=allowed,
+        limits=None,
         path=("platforms", name, "motion_error", "vibration", kind, *path),
         equation=rule,
         missing=missing,
         not_evaluated=missing,
         doubt="",
         over=f"{what} above the platform's share of {metric.upper()} ({rule})",
-        evidence=error.source,
-        notes=_margin(allowed),
+        evidence=None,
+        notes=(),
     )
 
 

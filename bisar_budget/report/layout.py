@@ -7,17 +7,17 @@ WIDTH = 80
 
 def wrapped(text: str, indent: str) -> list[str]:
     """Break at spaces before 80 columns; a word that is longer stays whole, so that a path can be copied."""
-    if len(text) <= WIDTH:
-        return [text]
-    first, *words = text.split(" ")
-    lines, line = [], first
-    for word in words:
-        if len(line) + 1 + len(word) > WIDTH and line.strip():
-            lines.append(line)
-            line = indent + word
-        else:
-            line += f" {word}"
-    return [*lines, line]
+    lines = []
+    while len(text) > WIDTH:
+        margin = len(text) - len(text.lstrip(" "))
+        space = text.rfind(" ", margin, WIDTH + 1)
+        if space < 0:
+            space = text.find(" ", max(margin, WIDTH + 1))
+        if space < 0:
+            break
+        lines.append(text[:space])
+        text = indent + text[space + 1 :]
+    return [*lines, text]
 
 
 def wrapped_counts(text: str) -> list[str]:

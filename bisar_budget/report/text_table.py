@@ -193,8 +193,7 @@ def percent(ratio: float) -> str:
 
 def _cells(status: str, row: str, declared: str, allowable: str, use: str, reference: str) -> str:
     # A blank of its own between cells: a wide one shifts the rest, it does not touch its neighbour.
-    left = status.ljust(8) + " " + row.ljust(34)
-    return f"{left} {declared.rjust(11)} {allowable.rjust(11)} {use.rjust(7)} {reference}".rstrip()
+    return f"{status:<8} {row:<34} {declared:>11} {allowable:>11} {use:>7} {reference}".rstrip()
 
 
 def _details(row: Row, mission: MissionFindings, style: Style) -> list[str]:
