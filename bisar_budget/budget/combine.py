@@ -32,8 +32,8 @@ def largest_signed_sum(vectors: Sequence[GroundVector]) -> float:
     upper = [(x, y) if (y, x) > (0, 0) else (-x, -y) for x, y in vectors]
     upper = [vector for _, vector in sorted([(math.atan2(y, x), (x, y)) for x, y in upper])]
     x, y = sum([x for x, _ in upper]), sum([y for _, y in upper])
-    corners = [x * x + y * y]
+    corners = [math.hypot(x, y)]
     for step_x, step_y in upper:
         x, y = x - 2 * step_x, y - 2 * step_y
-        corners.append(x * x + y * y)
-    return math.sqrt(max(corners))
+        corners.append(math.hypot(x, y))
+    return max(corners)

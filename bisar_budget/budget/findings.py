@@ -1,6 +1,6 @@
 """What a check finds, as frozen data. Field names and order are those of the JSON contract."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from datetime import date
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -143,12 +143,13 @@ class Report(NamedTuple):
         """Worst status of the missions."""
         return worst(mission.status for mission in self.missions)
 
-    def exit_code(self, strict: bool) -> int:
-        """Return 2 if a file is unusable, 1 if a requirement is broken, else 0; `strict` breaks on doubt too."""
-        failing = ("fail", "not_evaluated", "warn") if strict else ("fail",)
-        if any(mission.status == "error" for mission in self.missions):
-            return 2
-        return 1 if any(mission.status in failing for mission in self.missions) else 0
+
+def exit_code(statuses: Container[str], strict: bool) -> int:
+    """Return 2 if a file is unusable, 1 if a requirement is broken, else 0; `strict` breaks on doubt too."""
+    if "error" in statuses:
+        return 2
+    failing = ("fail", "not_evaluated", "warn") if strict else ("fail",)
+    return 1 if any(status in statuses for status in failing) else 0
 
 
 def worst(statuses: Iterable[str]) -> str:

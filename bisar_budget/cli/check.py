@@ -2,9 +2,10 @@
 
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from datetime import date, datetime
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -29,7 +30,7 @@ from bisar_budget.constants import MAX_DRAWS
 from bisar_budget.errors import printable
 
 if TYPE_CHECKING:
-    from bisar_budget.budget.findings import MissionFindings, Option, Report
+    from bisar_budget.budget.findings import MissionFindings, Option, Report, UnusableMission
     from bisar_budget.mission.model import Mission
     from bisar_budget.report import Style
 
@@ -198,6 +199,7 @@ def check(
     Defaults of --format, --report, --strict, --exit-zero, --model, --monte-carlo, --seed and --color:
     [tool.bisar-budget] in the nearest pyproject.toml, and over it the variables BISAR_BUDGET_FORMAT and so on.
     """
+    from bisar_budget.budget.findings import exit_code
     from bisar_budget.report import ILLUSTRATED, Style, render
 
     written = [(name, _format_of(name)) for name in reports]
@@ -213,22 +215,34 @@ def check(
         return
     illustrated = any(name in ILLUSTRATED for name in (format_name, *(name for _, name in written)))
     drawn = None if draws is None else (draws, seed)
-    report = check_all(files, today.date() if today else day_of_run(), model, verifying, illustrated, drawn)
-    report = report._replace(options=tuple(_options()), day=_given_day(today))
-    if format_name != "text" or output is not None or quiet or not is_terminal():
-        _say_faults(report)
-    style = Style(verbosity=-1 if quiet else 1 if verbose else 0, root=_repository())
-    for path, its_format in written:
-        _write_report(path, its_format, report, style)
+    day = today.date() if today else day_of_run()
     use_color = color == "always" or (color == "auto" and output is None and wants_color())
-    style = style._replace(color=use_color)
-    if output is None:
-        print_text(render(format_name, report, style))
+    style = Style(color=use_color, verbosity=-1 if quiet else 1 if verbose else 0, root=_repository())
+    says_faults = format_name != "text" or output is not None or quiet or not is_terminal()
+    if format_name == "text" and not (written or verifying or drawn):
+        from bisar_budget.budget.fleet import check_files
+        from bisar_budget.report.text_table import block, joined
+
+        blocks = check_files(files, day, model, partial(block, style=style))
+        if says_faults:
+            _say_faults(block.unusable for block in blocks)
+        deliver(joined(blocks, style), output)
+        statuses = {block.status for block in blocks}
     else:
-        _write_report(output, format_name, report, style)
-    if format_name == "github":
-        _append_step_summary(report, style)
-    code = report.exit_code(strict)
+        report = check_all(files, day, model, verifying, illustrated, drawn)
+        report = report._replace(options=tuple(_options()), day=_given_day(today))
+        if says_faults:
+            _say_faults(report.missions)
+        for path, its_format in written:
+            _write_report(path, its_format, report, style._replace(color=False))
+        if output is None:
+            print_text(render(format_name, report, style))
+        else:
+            _write_report(output, format_name, report, style)
+        if format_name == "github":
+            _append_step_summary(report, style)
+        statuses = {mission.status for mission in report.missions}
+    code = exit_code(statuses, strict)
     sys.exit(0 if exit_zero and code == EXIT_BROKEN else code)
 
 
@@ -286,9 +300,9 @@ def check_all(
     from bisar_budget.mission.load import load_mission
 
     if not (verifying or illustrated or drawn):
-        from bisar_budget.budget.fleet import check_files
+        from bisar_budget.budget.fleet import check_files, without_mission
 
-        return Report(version=__version__, missions=tuple(check_files(files, today, model)))
+        return Report(version=__version__, missions=tuple(check_files(files, today, model, without_mission)))
     missions: list[MissionFindings | UnusableMission] = []
     usable: dict[int, Mission] = {}
     for index, file in enumerate(files):
@@ -373,11 +387,11 @@ def _append_step_summary(report: "Report", style: "Style") -> None:
         complain(f"Warning: cannot write the step summary {printable(path)}: {reason}")
 
 
-def _say_faults(report: "Report") -> None:
+def _say_faults(missions: "Iterable[MissionFindings | UnusableMission | None]") -> None:
     from bisar_budget.budget.findings import UnusableMission
     from bisar_budget.errors import MissionError
 
-    for mission in report.missions:
+    for mission in missions:
         if isinstance(mission, UnusableMission):
             for line in MissionError(mission.file, mission.faults).lines():
                 complain(line)

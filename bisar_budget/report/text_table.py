@@ -2,10 +2,11 @@
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cache
+from typing import NamedTuple
 
-from bisar_budget.budget.findings import MissionFindings, Report, Row, UnusableMission, worst_first
+from bisar_budget.budget.findings import MissionFindings, Report, Row, UnusableMission, worst, worst_first
 from bisar_budget.errors import printable
 from bisar_budget.geometry import PlatformState
 from bisar_budget.report import Style
@@ -42,15 +43,31 @@ _MODELS = {
 _EXPLAINED = ("fail", "not_evaluated", "warn", "waived", "pass_with_autofocus")
 
 
+class Block(NamedTuple):
+    """What the report for a terminal says of one mission; `unusable` is a file that cannot be used."""
+
+    status: str
+    text: str
+    unusable: UnusableMission | None = None
+
+
 def render(report: Report, style: Style) -> str:
     """Write the report for reading, at most 80 columns where the file's own names allow it."""
-    blocks = [
-        "\n".join(_unusable(mission, style) if isinstance(mission, UnusableMission) else _mission(mission, style))
-        for mission in report.missions
-    ]
-    text = ("\n" if style.verbosity < 0 else "\n\n").join(blocks)
-    if len(report.missions) > 1:
-        text += "\n\n" + _overall(report, style)
+    return joined([block(mission, style) for mission in report.missions], style)
+
+
+def block(mission: MissionFindings | UnusableMission, style: Style) -> Block:
+    """Write the part of one mission."""
+    if isinstance(mission, UnusableMission):
+        return Block(mission.status, "\n".join(_unusable(mission, style)), mission)
+    return Block(mission.status, "\n".join(_mission(mission, style)))
+
+
+def joined(blocks: Sequence[Block], style: Style) -> str:
+    """Write the report from its parts."""
+    text = ("\n" if style.verbosity < 0 else "\n\n").join(block.text for block in blocks)
+    if len(blocks) > 1:
+        text += "\n\n" + _overall([block.status for block in blocks], style)
     return text + "\n"
 
 
@@ -234,10 +251,9 @@ def _summary(mission: MissionFindings) -> str:
     return f"{WORDS[mission.status]} {printable(mission.file)}: {counts}"
 
 
-def _overall(report: Report, style: Style) -> str:
-    statuses = [mission.status for mission in report.missions]
+def _overall(statuses: Sequence[str], style: Style) -> str:
     counts = ", ".join(f"{statuses.count(status)} {WORDS[status]}" for status in WORDS if status in statuses)
-    return f"{_word(report.status, style)} {len(statuses)} missions: {counts}"
+    return f"{_word(worst(statuses), style)} {len(statuses)} missions: {counts}"
 
 
 def _lead(line: str, status: str, style: Style) -> str:

@@ -27,10 +27,10 @@ def files(tmp_path):
 
 @pytest.mark.parametrize("cores", [2, 3, 16])
 def test_every_format_says_the_same_for_any_number_of_processes(files, monkeypatch, cores: int) -> None:
-    one = fleet.check_files(files, DAY)
+    one = fleet.check_files(files, DAY, None, fleet.without_mission)
     monkeypatch.setattr(fleet, "MANY", 2)
     monkeypatch.setattr(fleet, "_cores", lambda: cores)
-    several = fleet.check_files(files, DAY)
+    several = fleet.check_files(files, DAY, None, fleet.without_mission)
     assert [found.file for found in several] == files
     assert [found.status for found in several].count("error") == 2
     for format_name in ("text", "json", "sarif", "junit", "csv"):  # SARIF knows each value's column
@@ -40,8 +40,8 @@ def test_every_format_says_the_same_for_any_number_of_processes(files, monkeypat
 
 def test_standard_input_is_read_once_by_one_process(monkeypatch) -> None:
     monkeypatch.setattr(fleet, "MANY", 1)
-    monkeypatch.setattr(fleet, "_checked", lambda files, today, model: list(files))
-    assert fleet.check_files(["a", "-", "b"], DAY) == ["a", "-", "b"]
+    monkeypatch.setattr(fleet, "_checked", lambda files, today, model, keep: list(files))
+    assert fleet.check_files(["a", "-", "b"], DAY, None, fleet.without_mission) == ["a", "-", "b"]
 
 
 def test_the_command_checks_a_fleet(run, files, monkeypatch) -> None:
