@@ -12,13 +12,14 @@ and with a correction that has its own bound, an edge whose phase itself exceeds
 
 import math
 from collections.abc import Sequence
+from itertools import chain
 from typing import NamedTuple
 
 from bisar_budget import evaluators
 from bisar_budget.budget.allocation import Allocation
 from bisar_budget.budget.combine import combine_phases
 from bisar_budget.budget.correlation import correlated_errors, phase_parts
-from bisar_budget.budget.sources import MOTION_UNITS, PLATFORMS, Effect, ErrorSource, full_ground
+from bisar_budget.budget.sources import MOTION_UNITS, PLATFORMS, ErrorSource, full_ground
 from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
 from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState
 from bisar_budget.mission.model import Mission
@@ -28,6 +29,7 @@ RIM_POINTS = 8
 _FARTHEST = 0.5  # of the nearest slant range: the search for a radius ends there
 _PRECISION = 1e-3  # of the radius
 _TURNS = 3  # of the azimuth along which it is searched
+_PER_PLATFORM = 9  # unit errors: position, velocity, acceleration along each axis
 _CLOCK_TERMS = ("constant", "linear", "quadratic", "cubic")
 
 
@@ -66,7 +68,7 @@ class SceneEdge(NamedTuple):
         return f"out to {format_quantity(self.autofocus_radius, 'm', 3, 'down')}"
 
 
-class EdgePhases:
+class ScenePhases:
     """Quadratic phases of the declared errors at any point of the scene."""
 
     def __init__(self, mission: Mission, geometry: BistaticGeometry, members: Sequence[ErrorSource]) -> None:
@@ -74,6 +76,10 @@ class EdgePhases:
         self.combine = mission.allocation.combine
         self.centre = [source.qpe("full") for source in members]
         self.groups = correlated_errors(mission) if self.combine == "rss" else ()
+        self.clock = evaluators.published_clock(
+            SPEED_OF_LIGHT, mission.radar.wavelength, mission.collection.aperture_time
+        )
+        self.terms = [self._terms(source) for source in members]
 
     def geometry_at(self, point: GroundVector) -> BistaticGeometry:
         """Both platforms as a point of the ground has them."""
@@ -92,28 +98,33 @@ class EdgePhases:
         """Quadratic phase of each error there, signed. [rad]"""
         wavelength, T = self.mission.radar.wavelength, self.mission.collection.aperture_time
         ground = full_ground(self.mission, self.geometry_at(point))
-        motion = {}
-        for name, looks in zip(PLATFORMS, ground.looks, strict=True):
-            rows = evaluators.full_motion(*(*[part for look in looks for part in look], wavelength, T))
-            motion[name] = [effect.qpe for effect in ground.effective(rows)]
-        clock: list[Effect] = []
-        found = []
-        for source, centre in zip(self.members, self.centre, strict=True):
-            if source.is_position:
-                x, y, z = source.direction
-                first = 3 * _KINDS[source.unit]
-                total = 0.0
-                for name in PLATFORMS:
-                    if source.moves(name):
-                        along = motion[name][first : first + 3]
-                        total += along[0] * x + along[1] * y + along[2] * z
-                found.append(total * (source.declared or 0.0))
-            elif source.owner == "clock":
-                clock = clock or ground.effective(evaluators.published_clock(SPEED_OF_LIGHT, wavelength, T))
-                found.append(clock[_CLOCK_TERMS.index(source.id.rpartition(".")[2])].qpe * (source.declared or 0.0))
-            else:
-                found.append(centre)  # a phase as such
-        return found
+        transmitter, receiver = (
+            evaluators.full_motion(*(*chain.from_iterable(looks), wavelength, T)) for looks in ground.looks
+        )
+        of_a_unit = ground.quadratic_phases((*transmitter, *receiver, *self.clock))
+        return [
+            centre if terms is None else sum([of_a_unit[unit] * size for unit, size in terms])
+            for terms, centre in zip(self.terms, self.centre, strict=True)
+        ]
+
+    def _terms(self, source: ErrorSource) -> list[tuple[int, float]] | None:
+        """An error as unit errors, by their place among those of both platforms and the clock, and how much of each.
+
+        None for a phase as such, which is the same everywhere.
+        """
+        size = source.declared or 0.0
+        if source.owner == "clock":
+            return [(2 * _PER_PLATFORM + _CLOCK_TERMS.index(source.id.rpartition(".")[2]), size)]
+        if not source.is_position:
+            return None
+        first = 3 * _KINDS[source.unit]
+        return [
+            (_PER_PLATFORM * platform + first + axis, part * size)
+            for platform, name in enumerate(PLATFORMS)
+            if source.moves(name)
+            for axis, part in enumerate(source.direction)
+            if part
+        ]
 
     def differences(self, point: GroundVector) -> list[float]:
         """Of each error, its phase there less that at the centre. [rad]"""
@@ -203,7 +214,7 @@ def scene_edge(
     members = [source for source in sources if source.declared is not None and source.is_motion]
     if radius is None or not members:
         return None
-    edge = EdgePhases(mission, geometry, members)
+    edge = ScenePhases(mission, geometry, members)
     searched = _FARTHEST * min(geometry.transmitter.slant_range, geometry.receiver.slant_range)
     if reason := _no_image(edge, radius):
         return SceneEdge(radius, math.nan, 0.0, None, searched, reason, "")
@@ -214,7 +225,7 @@ def scene_edge(
     return SceneEdge(radius, rim.difference, rim.azimuth, reach, searched, "", doubt)
 
 
-def _no_image(edge: EdgePhases, radius: float) -> str:
+def _no_image(edge: ScenePhases, radius: float) -> str:
     """Say where on the rim no image can be formed; else nothing."""
     for k in range(RIM_POINTS):
         azimuth = 2 * math.pi * k / RIM_POINTS
@@ -227,7 +238,7 @@ def _no_image(edge: EdgePhases, radius: float) -> str:
     return ""
 
 
-def _autofocus_radius(edge: EdgePhases, radius: float, rim: Rim, total: float, searched: float) -> float | None:
+def _autofocus_radius(edge: ScenePhases, radius: float, rim: Rim, total: float, searched: float) -> float | None:
     """Radius at which the largest difference reaches the total, to a thousandth; None if it does not by `searched`.
 
     Along the worst azimuth, and again where the rim at the radius found has a worse one.
@@ -259,7 +270,7 @@ def _autofocus_radius(edge: EdgePhases, radius: float, rim: Rim, total: float, s
     return low
 
 
-def _over_at_the_edge(edge: EdgePhases, allocation: Allocation, rim: Rim) -> str:
+def _over_at_the_edge(edge: ScenePhases, allocation: Allocation, rim: Rim) -> str:
     """Say which error is inside its limit at the centre and over it at the edge; else nothing."""
     gain, rule = allocation.autofocus_gain, edge.combine
     owners = ["transmitter", "receiver", "clock", "mission"]

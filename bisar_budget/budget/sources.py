@@ -161,6 +161,14 @@ class FullGround(NamedTuple):
             effects.append(Effect._make((constant, linear, qpe, cubic)))
         return effects
 
+    def quadratic_phases(self, rows: Iterable[tuple[float, ...]]) -> list[float]:
+        """Those of `effective` alone, for a point of the scene among many. [rad/unit]"""
+        by_constant, by_linear = self.quadratic
+        return [
+            qpe if abs(qpe := own + (by_constant * constant + by_linear * linear)) > ROUNDING * abs(own) else 0.0
+            for constant, linear, own, _ in rows
+        ]
+
     def moved(self, effect: Effect) -> float:
         """Quadratic phase that the displacement of the image adds, within that of the effect. [rad/unit]"""
         return self.quadratic[0] * effect.constant + self.quadratic[1] * effect.linear

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from bisar_budget.budget.allocation import Allocation
 from bisar_budget.budget.correlation import correlated_errors, displacement_parts, phase_parts
 from bisar_budget.budget.findings import MissionFindings, Row
-from bisar_budget.budget.scene import EdgePhases, at
+from bisar_budget.budget.scene import ScenePhases, at
 from bisar_budget.budget.sources import ErrorSource, error_sources, image_plane
 from bisar_budget.budget.vibration import amplitude_share, echo_phase, lines_of, quadratic_part, shared_frequencies
 from bisar_budget.constants import ROUNDING
@@ -279,7 +279,7 @@ def _spatial_variance(
         for source in sources
         if source.declared is not None and source.is_motion and (source.is_independent or found.combine == "each")
     ]
-    edge = EdgePhases(mission, found.geometry, members)
+    edge = ScenePhases(mission, found.geometry, members)
     east, north = at(scene.radius, scene.azimuth)
     sizes = [(name, abs(phase)) for name, phase in edge.parts(edge.differences((east, north)))]
     yield from step(

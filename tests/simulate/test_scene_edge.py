@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.scene import EdgePhases, at
+from bisar_budget.budget.scene import ScenePhases, at
 from bisar_budget.budget.validity import FirstOrder
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.load import parse_mission
@@ -54,7 +54,7 @@ def test_phases_at_the_edge_are_those_of_exact_ranges(squint: float, radius: flo
         size = math.pi / 8 / abs(source.full.qpe) if source.full.qpe else 0.0
         if not size or abs(first_order.second(source, size).qpe) > 0.002:
             continue
-        edge = EdgePhases(mission, mission.geometry, [source._replace(declared=size)])
+        edge = ScenePhases(mission, mission.geometry, [source._replace(declared=size)])
         centre = exact_at(mission, source, size, (0.0, 0.0)).quadratic
         for azimuth in np.arange(8) * math.pi / 4:
             point = at(radius, azimuth)
@@ -74,7 +74,7 @@ def test_images_at_the_edge_show_them(row_id: str, radius: float, azimuth: float
     study = Study(mission)
     source = next(s for s in study.sources if s.id == row_id)
     size = math.pi / 8 / abs(source.full.qpe)
-    edge = EdgePhases(mission, mission.geometry, [source._replace(declared=size)])
+    edge = ScenePhases(mission, mission.geometry, [source._replace(declared=size)])
     measured = []
     for point in ((0.0, 0.0), at(radius, azimuth)):
         moved = exact_at(mission, source, size, point).displacement
@@ -122,7 +122,7 @@ class TestRow:
         mission = parse_mission(mission_text(scene={"radius": 500}, allocation__model="full", **self.VELOCITY))
         found = check_mission(mission, TODAY)
         source = next(s for s in Study(mission).sources if s.id == "receiver.velocity.y")
-        edge = EdgePhases(mission, mission.geometry, [source])
+        edge = ScenePhases(mission, mission.geometry, [source])
         worst = max(edge.difference(500, math.radians(degrees / 2)) for degrees in range(720))
         assert row(found, "mission.spatial_variance").declared == pytest.approx(worst, rel=1e-3)
 
@@ -132,7 +132,7 @@ class TestRow:
         found = self.found(300, allocation__combine=rule, **errors)
         mission = parse_mission(mission_text(**errors))
         members = [s for s in Study(mission).sources if s.declared]
-        edge = EdgePhases(mission, mission.geometry, members)
+        edge = ScenePhases(mission, mission.geometry, members)
         join = {"each": lambda d: np.abs(d).max(), "sum": lambda d: np.abs(d).sum(), "rss": np.linalg.norm}[rule]
         worst = max(join(edge.differences(at(300, math.radians(degrees)))) for degrees in range(360))
         variance = row(found, "mission.spatial_variance")
@@ -151,7 +151,7 @@ class TestRow:
         sources = {s.id: s for s in Study(mission).sources}
         names = [f"receiver.{kind}.{axis}" for kind in ("position", "velocity") for axis in "xyz"]
         members = [sources[name]._replace(declared=size) for name, size in zip(names, sigmas, strict=True)]
-        edge = EdgePhases(mission, mission.geometry, members)
+        edge = ScenePhases(mission, mission.geometry, members)
         differences = np.array([edge.differences(at(500, math.radians(degrees))) for degrees in range(360)])
         worst = math.sqrt(max(np.einsum("ki,ij,kj->k", differences, correlation, differences)))
         assert variance.declared == pytest.approx(worst, rel=1e-3)
