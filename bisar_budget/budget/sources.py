@@ -268,7 +268,7 @@ def _motion(
                     name,
                     unit,
                     on_axis,
-                    own_path if in_scene else path,
+                    own_path if in_scene and declared is not None else path,
                     effects[axis],
                     full[axis],
                     _AXES[axis],

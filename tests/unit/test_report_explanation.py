@@ -184,7 +184,7 @@ def test_a_frame_is_turned_before_the_eyes_of_the_reader() -> None:
 def test_an_undeclared_row_says_so_and_has_its_allowable() -> None:
     text = explained("transmitter.velocity.y")
     assert text.startswith("not decl transmitter.velocity.y of base")
-    assert "no platforms.transmitter.motion_error.velocity[1]" in text
+    assert "no platforms.transmitter.motion_error.velocity (the" in text
     assert "allowable = limit/(QPE/unit)" in text
 
 
