@@ -9,11 +9,9 @@ Points and white clutter on 1024 x 1024 pixels, the aperture half of the samplin
 
 import argparse
 import math
-import time
-from collections.abc import Callable
 
 import numpy as np
-from run import in_turn
+from run import clock, in_turn
 
 from bisar_budget.simulate.autofocus import phase_gradient_autofocus
 
@@ -41,15 +39,6 @@ def left(estimate: np.ndarray, phase: np.ndarray) -> float:
     return float(np.std(error - np.polyval(np.polyfit(bins, error, 1), bins)))
 
 
-def clock(function: Callable[[], object]) -> Callable[[], float]:
-    def run() -> float:
-        start = time.perf_counter()
-        function()
-        return time.perf_counter() - start
-
-    return run
-
-
 def main(runs: int) -> None:
     from fastsar.autofocus import pga
 
@@ -58,7 +47,7 @@ def main(runs: int) -> None:
         image, phase = scene(points, ratio_db)
         columns = np.ascontiguousarray(image.T)  # fastsar's own layout: azimuth along the first axis
         ours = left(phase_gradient_autofocus(image).phase, phase)
-        a, b, c = in_turn(
+        (a,), (b,), (c,) = in_turn(
             runs,
             clock(lambda image=image: phase_gradient_autofocus(image)),
             clock(lambda columns=columns: pga(columns)),

@@ -21,50 +21,59 @@ from collections.abc import Callable
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
+# Without what would keep Python from it, or would have it done before.
+ENVIRONMENT = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
 MISSION = ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml"
 
 
-def in_turn(runs: int, *tasks: Callable[[], float]) -> list[float]:
-    """Median of each task's own figure over `runs` rounds, the tasks taking turns; one round of warm-up."""
-    figures: list[list[float]] = [[] for _ in tasks]
+Times = tuple[float, ...]
+
+
+def in_turn(runs: int, *tasks: Callable[[], Times]) -> list[Times]:
+    """Medians of each task's own figures over `runs` rounds, the tasks taking turns; one round of warm-up."""
+    figures: list[list[Times]] = [[] for _ in tasks]
     for index in range(runs + 1):
         for task, kept in zip(tasks, figures, strict=True):
             value = task()
             if index:
                 kept.append(value)
-    return [statistics.median(kept) for kept in figures]
+    return [tuple(statistics.median(column) for column in zip(*kept, strict=True)) for kept in figures]
 
 
-def process(*command: str) -> Callable[[], float]:
-    """CPU seconds (user + system) of a fresh process, output to a pipe: less noisy than the wall clock."""
+def process(*command: str) -> Callable[[], Times]:
+    """Seconds by the clock, and of CPU (user and system), of a fresh process, output to a pipe.
 
-    def run() -> float:
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        done = subprocess.run(command, capture_output=True, cwd=ROOT, check=False)
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    Python may keep what it compiles, as it does for a user, in a folder of this run.
+    """
+
+    def run() -> Times:
+        before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+        done = subprocess.run(command, capture_output=True, cwd=ROOT, check=False, env=ENVIRONMENT)
+        wall, after = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
         assert done.returncode in (0, 1), done.stderr.decode()
-        return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        return wall, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
     return run
 
 
-def wall(command: tuple[str, ...]) -> Callable[[], float]:
-    def run() -> float:
+def clock(function: Callable[[], object]) -> Callable[[], Times]:
+    """Seconds by the clock of a call in this process."""
+
+    def run() -> Times:
         start = time.perf_counter()
-        subprocess.run(command, capture_output=True, cwd=ROOT, check=False)
-        return time.perf_counter() - start
+        function()
+        return (time.perf_counter() - start,)
 
     return run
 
 
 def cold(runs: int) -> None:
     script = str(Path(sys.executable).with_name("bisar-budget"))
-    check = (script, "check", str(MISSION))
-    yardstick = (sys.executable, "-c", "import yaml, click")
-    bare = (sys.executable, "-c", "pass")
+    check = process(script, "check", str(MISSION))
+    yardstick = process(sys.executable, "-c", "import yaml, click")
+    bare = process(sys.executable, "-c", "pass")
     print("check of one mission, cold process, output to a pipe ÷ python -c 'import yaml, click' (at most 2.5)")
-    for label, measure in (("CPU", lambda c: process(*c)), ("wall", wall)):
-        a, b, empty = in_turn(runs, measure(check), measure(yardstick), measure(bare))
+    for label, a, b, empty in zip(("clock", "CPU"), *in_turn(runs, check, yardstick, bare), strict=True):
         print(
             f"  {label:5} {a * 1e3:6.0f} ms ÷ {b * 1e3:6.0f} ms = {a / b:.2f}   "
             f"(bare interpreter {empty * 1e3:.0f} ms; without it {(a - empty) / (b - empty):.2f})"
@@ -74,7 +83,7 @@ def cold(runs: int) -> None:
 def gate(runs: int) -> None:
     examples = sorted(MISSION.parent.glob("*.yaml"))
     every_key = ROOT / "tests" / "acceptance" / "good" / "every_key.yaml"
-    print("1000 missions in one call ÷ parsing the same files with PyYAML's C loader, CPU (at most 3)")
+    print("1000 missions in one call ÷ parsing the same files with PyYAML's C loader (at most 3, by the clock)")
     fleets = {"the examples of specs/missions": examples, "missions that use every key": [every_key]}
     for label, sources in fleets.items():
         texts = [path.read_text(encoding="utf-8") for path in sources]
@@ -92,13 +101,14 @@ for name in sys.argv[1:]:
             script = str(Path(sys.executable).with_name("bisar-budget"))
             size = sum(os.path.getsize(file) for file in files) / len(files)
             print(f"  {label}, {size:.0f} bytes each")
-            for format_name in ("text", "json", "csv"):
-                a, b = in_turn(
-                    runs,
-                    process(script, "check", "--format", format_name, *files),
-                    process(sys.executable, "-c", parse, *files),
+            formats = ("text", "json", "csv")
+            checks = [process(script, "check", "--format", name, *files) for name in formats]
+            *found, parsed = in_turn(runs, *checks, process(sys.executable, "-c", parse, *files))
+            for name, (wall, cpu) in zip(formats, found, strict=True):
+                print(
+                    f"    {name:5} {wall:6.2f} s ÷ {parsed[0]:6.2f} s = {wall / parsed[0]:.2f}"
+                    f"   (CPU of all processes {cpu / parsed[1]:.2f})"
                 )
-                print(f"    {format_name:5} {a:6.2f} s ÷ {b:6.2f} s = {a / b:.2f}")
 
 
 def formats(runs: int) -> None:
@@ -112,7 +122,7 @@ def formats(runs: int) -> None:
             path.write_text(sources[index % len(sources)].read_text(encoding="utf-8"), encoding="utf-8")
             files.append(str(path))
         junit, sarif = (str(Path(folder) / name) for name in ("budget.xml", "budget.sarif"))
-        text, machine = in_turn(
+        (_, text), (_, machine) = in_turn(
             runs,
             process(script, "check", *files),
             process(script, "check", "--format", "junit", "-o", junit, "--report", sarif, *files),
@@ -132,7 +142,7 @@ def report(runs: int) -> None:
     with tempfile.TemporaryDirectory() as folder:
         page = str(Path(folder) / "report.html")
         for label, mission in (("Section V", MISSION), ("every key", every_key)):
-            a, b = in_turn(
+            (_, a), (_, b) = in_turn(
                 runs,
                 process(script, "check", "--format", "html", "-o", page, str(mission)),
                 process(*yardstick),
@@ -188,15 +198,7 @@ def evaluators(runs: int) -> None:
             *(r[3] for r in acceleration),
         )
 
-    def clock(function: Callable[[], object]) -> Callable[[], float]:
-        def run() -> float:
-            start = time.perf_counter()
-            function()
-            return time.perf_counter() - start
-
-        return run
-
-    a, b, s = in_turn(runs, clock(emitted), clock(by_hand), clock(by_hand_shared))
+    (a,), (b,), (s,) = in_turn(runs, clock(emitted), clock(by_hand), clock(by_hand_shared))
     error = max(
         float(np.max(np.abs(got - want) / np.maximum(np.abs(want), 1e-300)))
         for got, want in zip(emitted(), by_hand(), strict=True)
@@ -271,15 +273,7 @@ def montecarlo(runs: int) -> None:
 
     drawn = draw()
 
-    def clock(function: Callable[[], object]) -> Callable[[], float]:
-        def run() -> float:
-            start = time.perf_counter()
-            function()
-            return time.perf_counter() - start
-
-        return run
-
-    ours, evaluated, both = in_turn(
+    (ours,), (evaluated,), (both,) = in_turn(
         runs,
         clock(lambda: monte_carlo(mission, n, seed)),
         clock(lambda: formulas(drawn)),
@@ -310,6 +304,8 @@ if __name__ == "__main__":
     parser.add_argument("task", nargs="?", choices=[*TASKS, "all"], default="all")
     parser.add_argument("--runs", type=int, help="rounds, after one of warm-up")
     chosen = parser.parse_args()
-    for name, (task, default) in TASKS.items():
-        if chosen.task in (name, "all"):
-            task(chosen.runs or default)
+    with tempfile.TemporaryDirectory() as folder:
+        ENVIRONMENT["PYTHONPYCACHEPREFIX"] = folder
+        for name, (task, default) in TASKS.items():
+            if chosen.task in (name, "all"):
+                task(chosen.runs or default)

@@ -54,6 +54,12 @@ class ExactRanges:
         travelled = max(state.travelled(self.half) / state.slant_range for state in states.values())
         self.quadrature = _quadrature(_NODES if travelled <= _SHORT else _LONG_NODES)
         self.times = [node * self.half for node in self.quadrature.nodes]
+        # Position error at each node of a unit of an error: 1, τ or τ²/2 of (22).
+        self.powers = {
+            "m": [1.0] * len(self.times),
+            "m/s": self.times,
+            "m/s^2": [tau**2 / 2 for tau in self.times],
+        }
         self.tracks = {name: [state.at(tau)[0] for tau in self.times] for name, state in states.items()}
         self.recorded = [sum(map(norm, ends)) for ends in zip(*self.tracks.values(), strict=True)]
 
@@ -69,7 +75,7 @@ class ExactRanges:
         for source, size in errors:
             if source.is_position:
                 x, y, z = (size * part for part in source.direction)
-                powers = [source.power(tau) for tau in self.times]
+                powers = self.powers[source.unit]
                 for name, track in measured.items():
                     if source.moves(name):
                         measured[name] = [

@@ -82,12 +82,6 @@ class ErrorSource(NamedTuple):
         """Whether it is an error of a platform's position; one of the mission's own is of both."""
         return self.owner in (platform, "mission")
 
-    def power(self, tau: float) -> float:
-        """Position error of a unit of it at a slow time: 1, τ or τ²/2 of (22); 0 for what is no motion."""
-        if self.unit == "m":
-            return 1.0
-        return tau if self.unit == "m/s" else tau**2 / 2 if self.unit == "m/s^2" else 0.0
-
     def by(self, model: str) -> Effect:
         """Effect of one unit by a model; by `strictest` that of the larger quadratic phase."""
         if model == "published":
@@ -117,6 +111,11 @@ class ImagePlane(NamedTuple):
     adjugate: tuple[tuple[float, ...], ...]
     determinant: float
     degeneracy: str
+
+    @property
+    def inverse(self) -> list[list[float]]:
+        """(2, 2) [m/m, m/(m/s)], where it is not degenerate."""
+        return [[element / self.determinant for element in row] for row in self.adjugate]
 
     def displacement(self, effect: Effect, declared: float) -> GroundVector | None:
         """Displacement on the ground, (2,), by (25) with the Q of a model; None where it has no inverse. [m]"""
@@ -326,16 +325,14 @@ def _along_scene_axis(
 
 def _along(effects: list[Effect], direction: Vector) -> Effect:
     """Effect of a unit error along a direction: the projection of the three scene effects."""
-
     u, v, w = direction
-    x, y, z = effects
-    total = []
-    for a, b, c in zip(x, y, z, strict=True):
-        a, b, c = a * u, b * v, c * w
-        term = a + b + c
-        # What is left of terms that cancel exactly is rounding, and would make a limit out of nothing.
-        total.append(term if abs(term) > ROUNDING * (abs(a) + abs(b) + abs(c)) else 0.0)
-    return Effect._make(total)
+    # What is left of terms that cancel exactly is rounding, and would make a limit out of nothing.
+    return Effect._make(
+        [
+            term if abs(term := a * u + b * v + c * w) > ROUNDING * (abs(a * u) + abs(b * v) + abs(c * w)) else 0.0
+            for a, b, c in zip(*effects, strict=True)
+        ]
+    )
 
 
 def _equation(kind: str, axis: int | None) -> str:

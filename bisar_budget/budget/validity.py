@@ -1,23 +1,22 @@
 """Where the first order of the range error ends, and exact ranges beside it.
 
-Of two platforms at R_k the range error has −Σ|P⊥(r̃_k − x̂)|²/2R_k in second order, P⊥ being the part across the line
-of sight. Against exact ranges on 500 random collections every row whose second-order phase stays below 2 % or
-0.02 rad agrees with the full model within 2 % or 0.02 rad, and beyond it this phase is the difference
+Against exact ranges on 500 random collections every row whose second-order phase stays below 2 % or 0.02 rad agrees
+with the full model within 2 % or 0.02 rad, and beyond it this phase is the difference
 (`tests/simulate/test_full_model.py`); so does the displacement, within 2 % or 0.1 m. A declared error beyond that, or
 that moves the image by more than 10 m, or in a collection whose gradients are nearly parallel or whose lines of sight
-turn far, gets its phase from exact ranges. Derived here.
+turn far, gets its phase from exact ranges.
 """
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
-from operator import add, sub
 from typing import NamedTuple
 
 from bisar_budget.budget.exact_ranges import ExactPhases, ExactRanges
+from bisar_budget.budget.second_order import SecondOrder
 from bisar_budget.budget.sources import Effect, ErrorSource, FullGround
 from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
-from bisar_budget.geometry import STRAIGHT, BistaticGeometry, GroundVector, Vector, norm
+from bisar_budget.geometry import STRAIGHT, BistaticGeometry, GroundVector, norm
 from bisar_budget.mission.model import Mission
 from bisar_budget.units import format_quantity
 
@@ -30,9 +29,6 @@ _TURNING_RAD = 0.1  # the quartic term is 1 % of the quadratic there
 _NARROW_SINE = 0.2  # between range and Doppler gradient; displacements grow as its inverse
 _COARSE_CELL_RAD = 1.0  # of phase between points a range cell apart; beyond, a response spreads over cells
 _ABSORBED_RAD = 6.1  # of the same, where the image shows half; measured, uniform window, 8 to 300 MHz
-
-
-SymmetricForm = tuple[float, ...]  # xx, xy, xz, yy, yz, zz
 
 
 class Beyond(NamedTuple):
@@ -77,18 +73,16 @@ class FirstOrder:
     def __init__(self, mission: Mission, geometry: BistaticGeometry, ground: FullGround) -> None:
         self.geometry, self.ground = geometry, ground
         self.wavelength, self.T = mission.radar.wavelength, mission.collection.aperture_time
+        self.second = SecondOrder(geometry, ground, self.wavelength, self.T)
         states = (geometry.transmitter, geometry.receiver)
         nearest = max(0.0, min(state.slant_range - state.travelled(self.T / 2) for state in states))
         # Within this of platform and image the second order cannot reach the floor.
         self._harmless = math.sqrt(FLOOR_RAD * nearest * self.wavelength / (4 * math.pi))
-        (a, b), (c, d) = ground.plane.adjugate
-        determinant = abs(ground.plane.determinant)
-        self._by_constant, self._by_linear = math.hypot(a, c) / determinant, math.hypot(b, d) / determinant
+        (a, b), (c, d) = self.second.inverse
+        self._by_constant, self._by_linear = math.hypot(a, c), math.hypot(b, d)
         # By so much at most, times the square of that, the second order moves the image.
         self._farthest = (self._by_constant + self._by_linear / self.T) / nearest if nearest else math.inf
-        self._edge = {"m": 1.0, "m/s": self.T / 2, "m/s^2": self.T**2 / 8}  # of a unit of it at the aperture edge
         self._strain = _strain(geometry, self.T)
-        self._bends: dict[str, float] = {}
         self.found: dict[str, Beyond] = {}  # by row id, of the errors asked about
         self._exact_sources: dict[str, ErrorSource] = {}
 
@@ -124,7 +118,7 @@ class FirstOrder:
         """Bound of how far a unit of an error takes platform and image, over the aperture. [m/unit]"""
         full = source.full
         moves = self._by_constant * abs(full.constant) + self._by_linear * abs(full.linear)
-        return self._edge.get(source.unit, 0.0) + moves
+        return self.second.edge.get(source.unit, 0.0) + moves
 
     def _cause(self, source: ErrorSource, declared: float) -> str:
         if self._strain and (source.full.qpe or source.is_position):
@@ -135,13 +129,13 @@ class FirstOrder:
         moved = math.hypot(*(self.ground.plane.displacement(source.full, declared) or (0.0, 0.0)))
         if moved > FAR_M:
             return f"it moves the image by {moved:.3g} m"
-        first, added = source.full.qpe * declared, self._bend(source) * declared * declared
+        first, added = source.full.qpe * declared, self.second.phase(source) * declared * declared
         if abs(added) > max(FLOOR_RAD, SHARE * abs(first)):
             return f"the second order adds {added:.2g} rad"
         allowed = max(FLOOR_M, SHARE * moved)
         if self._farthest * (declared * reach) ** 2 <= allowed:
             return ""  # likewise a bound
-        farther = self._drift(source) * declared * declared
+        farther = self.second.drift(source) * declared * declared
         return f"the second order moves the image by {farther:.2g} m" if farther > allowed else ""
 
     def allowable_note(self, source: ErrorSource, gating: float | None, full: float | None, limit: float) -> str:
@@ -152,102 +146,16 @@ class FirstOrder:
         allowable, whose = (full, "the full model's") if gating is None else (gating, "the")
         if allowable is None or not source.is_motion:
             return ""
-        if allowable * self._reach(source) < FAR_M and allowable * self._edge.get(source.unit, 0.0) < self._harmless:
+        if (
+            allowable * self._reach(source) < FAR_M
+            and allowable * self.second.edge.get(source.unit, 0.0) < self._harmless
+        ):
             return ""  # the second order of what stays that near is a constant and a slope
-        bend = math.sqrt(abs(self._bend(source)) / max(FLOOR_RAD, SHARE * limit))
+        bend = math.sqrt(abs(self.second.phase(source)) / max(FLOOR_RAD, SHARE * limit))
         if allowable * bend <= 1:
             return ""
         size, held = (format_quantity(value, source.unit, 2) for value in (allowable, 1 / bend))
         return f"{whose} allowable of {size} speaks of the first order alone, which holds to about {held}"
-
-    @cached_property
-    def _across(self) -> dict[str, list[SymmetricForm]]:
-        """(I − uuᵀ)/2R at start, middle and end, of each platform and, for what moves both, their sum."""
-        states = {"transmitter": self.geometry.transmitter, "receiver": self.geometry.receiver}
-        times = (-self.T / 2, 0.0, self.T / 2)
-        forms = {name: [_across(state.at(tau)[0]) for tau in times] for name, state in states.items()}
-        both = [tuple(map(add, *pair)) for pair in zip(*forms.values(), strict=True)]
-        return {**forms, "mission": both}
-
-    def second(self, source: ErrorSource, size: float) -> Effect:
-        """What the second order adds to an error of a size: displacement and quadratic phase."""
-        k = 2 * math.pi / self.wavelength
-        of_terms = ((0.0, 1.0, 0.0), (-1 / self.T, 0.0, 1 / self.T), (k / 2, -k, k / 2))
-        constant, linear, quadratic = (
-            self._of_a_unit(SecondOrder(self._across, weights), source) * size * size for weights in of_terms
-        )
-        return self.ground.effective([(constant, linear, quadratic, 0.0)])[0]
-
-    def _bend(self, source: ErrorSource) -> float:
-        """Quadratic phase that the second order adds, what it moves the image by included. [rad/unit²]"""
-        if source.id not in self._bends:
-            self._bends[source.id] = self._of_a_unit(self._phase, source)
-        return self._bends[source.id]
-
-    def _drift(self, source: ErrorSource) -> float:
-        """How far the second order moves the image. [m/unit²]"""
-        return math.hypot(*(self._of_a_unit(along, source) for along in self._displacement))
-
-    def _of_a_unit(self, second: "SecondOrder", source: ErrorSource) -> float:
-        moved = self.ground.plane.displacement(source.full, 1.0) or (0.0, 0.0)
-        return second.of(source, self._edge.get(source.unit, 0.0), moved)
-
-    @cached_property
-    def _phase(self) -> "SecondOrder":
-        k = math.pi / self.wavelength
-        by_constant, by_linear = self.ground.quadratic
-        by_slope = by_linear / self.T
-        return SecondOrder(self._across, (k - by_slope, by_constant - 2 * k, k + by_slope))
-
-    @cached_property
-    def _displacement(self) -> tuple["SecondOrder", ...]:
-        """East and north."""
-        scale = 1 / self.ground.plane.determinant
-        return tuple(
-            SecondOrder(self._across, (-b * scale / self.T, a * scale, b * scale / self.T))
-            for a, b in self.ground.plane.adjugate
-        )
-
-
-class SecondOrder:
-    """A weighted sum of the second order of the range error at start, middle and end of the aperture.
-
-    The second order at one time is −Σwᵀ(I − uuᵀ)w/2R over both platforms, w being the platform's error, of power p
-    along d, less the displacement x̂ on the ground. Multiplied out, and summed with its weight, it is a form of x̂, one
-    of d and x̂, and one of d; in `ends` and `slope` the weights are those of errors that vanish in the middle.
-    """
-
-    def __init__(self, across: Mapping[str, Sequence[SymmetricForm]], weights: tuple[float, float, float]) -> None:
-        start, middle, end = weights
-        self._forms: dict[str, dict[str, tuple[Sequence[float], Sequence[float]]]] = {}
-        for owner, (first, second, third) in across.items():
-            before, after = [start * x for x in first], [end * x for x in third]
-            ends, slope = list(map(add, before, after)), list(map(sub, after, before))
-            whole = [x + middle * y for x, y in zip(ends, second, strict=True)]
-            self._forms[owner] = {"m": (whole, whole), "m/s": (ends, slope), "m/s^2": (ends, ends)}
-        self._of_displacement = self._forms["mission"]["m"][0]
-
-    def of(self, source: ErrorSource, edge: float, displacement: GroundVector) -> float:
-        """Of a unit error that is `edge` at the aperture edge and moves the image by `displacement`."""
-        east, north = displacement
-        xx, xy, _, yy, _, _ = self._of_displacement
-        total = east * (xx * east + 2 * xy * north) + yy * north * north
-        if source.is_position:
-            x, y, z = source.direction
-            squared, mixed = self._forms[source.owner][source.unit]
-            xx, xy, xz, yy, yz, zz = mixed
-            moved = east * (xx * x + xy * y + xz * z) + north * (xy * x + yy * y + yz * z)
-            xx, xy, xz, yy, yz, zz = squared
-            own = x * (xx * x + 2 * (xy * y + xz * z)) + y * (yy * y + 2 * yz * z) + zz * z * z
-            total += edge * (edge * own - 2 * moved)
-        return -total
-
-
-def _across(position: Vector) -> SymmetricForm:
-    x, y, z = position
-    R = norm(position)
-    u, v, w, h = x / R, y / R, z / R, 0.5 / R
-    return (h - h * u * u, -h * u * v, -h * u * w, h - h * v * v, -h * v * w, h - h * w * w)
 
 
 def of_members(

@@ -67,7 +67,7 @@ def test_shift_and_phase_of_every_row_inside_first_order_are_those_of_exact_rang
             moves = math.hypot(*per_unit)
             sizes = [math.pi / 8 / abs(source.full.qpe)] if source.full.qpe else []
             size = min([*sizes, *([0.99 * NEAR_M / moves] if moves else [])], default=0.0)
-            second = first_order.second(source, size)
+            second = first_order.second.effect(source, size)
             first = source.full.qpe * size
             goes_beyond = abs(second.qpe) > max(FLOOR_RAD, SHARE * abs(first)) or (
                 math.hypot(*ground.plane.displacement(second, 1.0)) > max(FLOOR_M, SHARE * moves * size)
@@ -97,7 +97,7 @@ def test_the_second_order_is_what_is_missing_beyond_the_first() -> None:
         first_order = FirstOrder(mission, geometry, ground)
         for source in study.sources:
             size = math.pi / 8 / abs(source.full.qpe) if source.full.qpe else 0.0
-            second = first_order.second(source, size).qpe
+            second = first_order.second.effect(source, size).qpe
             if not 0.1 < abs(second) < 0.5 or math.hypot(*ground.plane.displacement(source.full, size)) > 100:
                 continue
             effect = study.collection.effect(study.errors(source, size))
@@ -183,7 +183,7 @@ def test_curved_and_climbing_paths(seed: int) -> None:
     seen = 0
     for source in study.sources:
         size = math.pi / 8 / abs(source.full.qpe) if source.full.qpe else 0.0
-        if not size or abs(first_order.second(source, size).qpe) > FLOOR_RAD:
+        if not size or abs(first_order.second.effect(source, size).qpe) > FLOOR_RAD:
             continue
         effect = study.collection.effect(study.errors(source, size))
         assert effect.quadratic == pytest.approx(source.full.qpe * size, rel=0.02, abs=0.02), source.id

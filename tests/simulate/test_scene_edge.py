@@ -52,7 +52,7 @@ def test_phases_at_the_edge_are_those_of_exact_ranges(squint: float, radius: flo
     largest, seen = 0.0, 0
     for source in study.sources:
         size = math.pi / 8 / abs(source.full.qpe) if source.full.qpe else 0.0
-        if not size or abs(first_order.second(source, size).qpe) > 0.002:
+        if not size or abs(first_order.second.effect(source, size).qpe) > 0.002:
             continue
         edge = ScenePhases(mission, mission.geometry, [source._replace(declared=size)])
         centre = exact_at(mission, source, size, (0.0, 0.0)).quadratic
