@@ -239,26 +239,28 @@ def montecarlo(runs: int) -> None:
 
     s = np.array(ground.looks).sum(axis=0)[:, :2]
     inverse = np.linalg.inv(-s[:2])
-    phase = 2 * np.pi / wavelength * (T / 2) ** np.arange(4)
+    phase = 2 * np.pi / wavelength * (T / 2) ** np.arange(5)
 
     def left(b: list) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
         """Quadratic and cubic phase at the displaced point, and where that is."""
         x, y = (row[0] * b[0] + row[1] * b[1] for row in inverse)
         quadratic = phase[2] * (b[2] + (s[2, 0] * x + s[2, 1] * y) / 2)
+        quadratic += 6 / 7 * phase[4] * (b[4] + (s[4, 0] * x + s[4, 1] * y) / 24)
         cubic = phase[3] * (b[3] + (s[3, 0] * x + s[3, 1] * y) / 6)
         return quadratic, cubic, [x, y]
 
     def formulas(e: list[np.ndarray]) -> list[float]:
         """The full model as docs/full-model.md has it, over whole arrays, and the probabilities."""
-        clock = [SPEED_OF_LIGHT * t for t in e[18:]]
+        clock = [*(SPEED_OF_LIGHT * t for t in e[18:]), 0.0]
         parts = []
-        for k, (u, u1, u2, u3) in enumerate(ground.looks):
+        for k, (u, u1, u2, u3, u4) in enumerate(ground.looks):
             p, v, a = e[9 * k : 9 * k + 3], e[9 * k + 3 : 9 * k + 6], e[9 * k + 6 : 9 * k + 9]
             b = [
                 -sum(u[i] * p[i] for i in range(3)),
                 -sum(u1[i] * p[i] + u[i] * v[i] for i in range(3)),
                 -sum(u2[i] / 2 * p[i] + u1[i] * v[i] + u[i] / 2 * a[i] for i in range(3)),
                 -sum(u3[i] / 6 * p[i] + u2[i] / 2 * v[i] + u1[i] / 2 * a[i] for i in range(3)),
+                -sum(u4[i] / 24 * p[i] + u3[i] / 6 * v[i] + u2[i] / 4 * a[i] for i in range(3)),
             ]
             parts.append(left([x + c for x, c in zip(b, clock, strict=True)] if k else b))
         (qt, ct, mt), (qr, cr, mr) = parts

@@ -200,7 +200,7 @@ def check(
     [tool.bisar-budget] in the nearest pyproject.toml, and over it the variables BISAR_BUDGET_FORMAT and so on.
     """
     from bisar_budget.budget.findings import exit_code
-    from bisar_budget.report import ILLUSTRATED, Style, render
+    from bisar_budget.report import ILLUSTRATED, PIECEWISE, Style, joined, piece, render
 
     written = [(name, _format_of(name)) for name in reports]
     files = expand(missions)
@@ -219,15 +219,14 @@ def check(
     use_color = color == "always" or (color == "auto" and output is None and wants_color())
     style = Style(color=use_color, verbosity=-1 if quiet else 1 if verbose else 0, root=_repository())
     says_faults = format_name != "text" or output is not None or quiet or not is_terminal()
-    if format_name == "text" and not (written or verifying or drawn):
+    if format_name in PIECEWISE and not (written or verifying or drawn):
         from bisar_budget.budget.fleet import check_files
-        from bisar_budget.report.text_table import block, joined
 
-        blocks = check_files(files, day, model, partial(block, style=style))
+        pieces = check_files(files, day, model, partial(piece, format_name=format_name, style=style))
         if says_faults:
-            _say_faults(block.unusable for block in blocks)
-        deliver(joined(blocks, style), output)
-        statuses = {block.status for block in blocks}
+            _say_faults(piece.unusable for piece in pieces)
+        deliver(joined(format_name, pieces, __version__, style), output)
+        statuses = {piece.status for piece in pieces}
     else:
         report = check_all(files, day, model, verifying, illustrated, drawn)
         report = report._replace(options=tuple(_options()), day=_given_day(today))

@@ -1,13 +1,15 @@
-"""Findings as text: one pure function `render(report, style) -> str` per format, found here by name.
+"""Findings as text: a module per format, found here by name, with one pure function `render(report, style) -> str`.
 
-A format that has pictures beside its text has a function `pictures(report, style)` too.
+A format that says one mission after the other has two in its stead, `piece(mission, style) -> str` and
+`joined(pieces, version, style) -> str`: a thousand missions can be written where each is checked, and their findings
+forgotten. One that has pictures beside its text has a function `pictures(report, style)` too.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from typing import NamedTuple
 
-from bisar_budget.budget.findings import Report
+from bisar_budget.budget.findings import MissionFindings, Report, UnusableMission
 
 # Format name to its module; imported when asked for, so that none costs the others anything.
 FORMATS = {
@@ -39,6 +41,7 @@ SUFFIXES = {
 # Formats that show a mission itself, and images of verified limits; for the others neither is kept.
 ILLUSTRATED = frozenset({"html", "markdown"})
 WITH_PICTURES = ("markdown",)
+PIECEWISE = ("text", "json", "csv")
 
 
 def format_of(name: str) -> str | None:
@@ -64,7 +67,30 @@ class Style(NamedTuple):
 
 def render(format_name: str, report: Report, style: Style) -> str:
     """Write a report in a format of `FORMATS`; the text ends with a newline."""
+    if format_name in PIECEWISE:
+        pieces = [piece(mission, format_name, style) for mission in report.missions]
+        return joined(format_name, pieces, report.version, style)
     text: str = import_module(FORMATS[format_name]).render(report, style)
+    return text
+
+
+class Piece(NamedTuple):
+    """What a format says of one mission; `unusable` is the file if it cannot be used."""
+
+    status: str
+    text: str
+    unusable: UnusableMission | None
+
+
+def piece(mission: MissionFindings | UnusableMission, format_name: str, style: Style) -> Piece:
+    """Write the part of one mission, in a format of `PIECEWISE`."""
+    text: str = import_module(FORMATS[format_name]).piece(mission, style)
+    return Piece(mission.status, text, mission if isinstance(mission, UnusableMission) else None)
+
+
+def joined(format_name: str, pieces: Sequence[Piece], version: str, style: Style) -> str:
+    """Write a report from its pieces: what `render` would."""
+    text: str = import_module(FORMATS[format_name]).joined(pieces, version, style)
     return text
 
 

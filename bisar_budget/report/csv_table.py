@@ -2,11 +2,11 @@
 
 import csv
 import io
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
-from bisar_budget.budget.findings import MissionFindings, Report, UnusableMission
+from bisar_budget.budget.findings import MissionFindings, UnusableMission
 from bisar_budget.errors import printable
-from bisar_budget.report import Style
+from bisar_budget.report import Piece, Style
 
 COLUMNS = (
     "file",
@@ -37,13 +37,19 @@ COLUMNS = (
 )
 
 
-def render(report: Report, style: Style) -> str:
-    """Write every row of every mission; an unusable file gives one line per fault with the status `error`."""
+def piece(mission: MissionFindings | UnusableMission, style: Style) -> str:
+    """Write every row of a mission; an unusable file gives one line per fault with the status `error`."""
+    return _written(_faults(mission) if isinstance(mission, UnusableMission) else _rows(mission))
+
+
+def joined(pieces: Sequence[Piece], version: str, style: Style) -> str:
+    """Write them below their header."""
+    return _written([COLUMNS]) + "".join(piece.text for piece in pieces)
+
+
+def _written(rows: Iterable[Sequence[object]]) -> str:
     output = io.StringIO()
-    writer = csv.writer(output, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    for mission in report.missions:
-        writer.writerows(_faults(mission) if isinstance(mission, UnusableMission) else _rows(mission))
+    csv.writer(output, lineterminator="\n").writerows(rows)
     return output.getvalue()
 
 

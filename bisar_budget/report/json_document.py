@@ -1,14 +1,14 @@
 """The report as JSON, `bisar-budget/check/1`. Keys may be added, never changed or removed."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from bisar_budget.budget.allocation import Split
-from bisar_budget.budget.findings import MissionFindings, Report, UnusableMission
+from bisar_budget.budget.findings import MissionFindings, UnusableMission, worst
 from bisar_budget.geometry import PlatformState
-from bisar_budget.report import Style
+from bisar_budget.report import Piece, Style
 
 if TYPE_CHECKING:
     from bisar_budget.budget.monte_carlo import MonteCarlo
@@ -16,12 +16,21 @@ if TYPE_CHECKING:
 FORMAT = "bisar-budget/check/1"
 
 
-def render(report: Report, style: Style) -> str:
-    """Write the report as one JSON document, a row to a line; a number that is not finite is never written."""
-    return _indented(document(report), _LEVELS) + "\n"
+def piece(mission: MissionFindings | UnusableMission, style: Style) -> str:
+    """Write the part of one mission, a row to a line; a number that is not finite is never written."""
+    found = _unusable(mission) if isinstance(mission, UnusableMission) else _mission(mission)
+    return _indented(found, _LEVELS, _MARGIN)
 
 
-_LEVELS = 4  # document, missions, mission, rows: what is inside a row stays on its line
+def joined(pieces: Sequence[Piece], version: str, style: Style) -> str:
+    """Write the one JSON document."""
+    document = {"format": FORMAT, "version": version, "status": worst(piece.status for piece in pieces)}
+    head = _indented(document, 1).removesuffix("\n}")
+    missions = f",\n{_MARGIN}".join(piece.text for piece in pieces)
+    return f'{head},\n  "missions": [\n{_MARGIN}{missions}\n  ]\n}}\n'
+
+
+_LEVELS, _MARGIN = 2, "    "  # of a mission: itself and its rows; what is inside a row stays on its line
 
 
 @cache
@@ -50,19 +59,6 @@ def _indented(value: Any, levels: int, margin: str = "") -> str:
         else:
             content = between.join([_indented(item, levels - 1, inner) for item in value])
     return f"{opening}\n{inner}{content}\n{margin}{closing}"
-
-
-def document(report: Report) -> dict[str, Any]:
-    """Return the report as plain dicts and lists."""
-    return {
-        "format": FORMAT,
-        "version": report.version,
-        "status": report.status,
-        "missions": [
-            _unusable(mission) if isinstance(mission, UnusableMission) else _mission(mission)
-            for mission in report.missions
-        ],
-    }
 
 
 def _unusable(mission: UnusableMission) -> dict[str, Any]:

@@ -4,12 +4,11 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 from functools import cache
-from typing import NamedTuple
 
-from bisar_budget.budget.findings import MissionFindings, Report, Row, UnusableMission, worst, worst_first
+from bisar_budget.budget.findings import MissionFindings, Row, UnusableMission, worst, worst_first
 from bisar_budget.errors import printable
 from bisar_budget.geometry import PlatformState
-from bisar_budget.report import Style
+from bisar_budget.report import Piece, Style
 from bisar_budget.report.layout import WIDTH, wrapped, wrapped_counts
 from bisar_budget.units import format_quantity
 
@@ -43,31 +42,16 @@ _MODELS = {
 _EXPLAINED = ("fail", "not_evaluated", "warn", "waived", "pass_with_autofocus")
 
 
-class Block(NamedTuple):
-    """What the report for a terminal says of one mission; `unusable` is a file that cannot be used."""
-
-    status: str
-    text: str
-    unusable: UnusableMission | None = None
+def piece(mission: MissionFindings | UnusableMission, style: Style) -> str:
+    """Write the part of one mission, at most 80 columns where the file's own names allow it."""
+    return "\n".join(_unusable(mission, style) if isinstance(mission, UnusableMission) else _mission(mission, style))
 
 
-def render(report: Report, style: Style) -> str:
-    """Write the report for reading, at most 80 columns where the file's own names allow it."""
-    return joined([block(mission, style) for mission in report.missions], style)
-
-
-def block(mission: MissionFindings | UnusableMission, style: Style) -> Block:
-    """Write the part of one mission."""
-    if isinstance(mission, UnusableMission):
-        return Block(mission.status, "\n".join(_unusable(mission, style)), mission)
-    return Block(mission.status, "\n".join(_mission(mission, style)))
-
-
-def joined(blocks: Sequence[Block], style: Style) -> str:
-    """Write the report from its parts."""
-    text = ("\n" if style.verbosity < 0 else "\n\n").join(block.text for block in blocks)
-    if len(blocks) > 1:
-        text += "\n\n" + _overall([block.status for block in blocks], style)
+def joined(pieces: Sequence[Piece], version: str, style: Style) -> str:
+    """Write the report for reading."""
+    text = ("\n" if style.verbosity < 0 else "\n\n").join(piece.text for piece in pieces)
+    if len(pieces) > 1:
+        text += "\n\n" + _overall([piece.status for piece in pieces], style)
     return text + "\n"
 
 

@@ -13,7 +13,7 @@ from bisar_budget.budget.image_evidence import FLOOR_DB, ImageEvidence, rows_wor
 from bisar_budget.budget.verdicts import Verdict
 from bisar_budget.cli.check import check_all
 from bisar_budget.mission.load import load_mission, parse_mission
-from bisar_budget.report import Style, json_document
+from bisar_budget.report import Style, render
 from bisar_budget.simulate.collection import RANGE_CELLS, Chip, Errors
 from bisar_budget.simulate.image_evidence import _point_image, form_image_evidence
 from bisar_budget.simulate.verify import Study, verify_mission
@@ -232,5 +232,5 @@ def test_only_a_report_that_shows_images_keeps_them(illustrated: bool, monkeypat
     (mission,) = report.missions
     assert [one.verdict.id for one in mission.image_evidence] == ["transmitter.acceleration.x"] * illustrated
     # Images are no part of the JSON contract.
-    document = json.loads(json_document.render(Report(version="", missions=(mission,)), Style()))
+    document = json.loads(render("json", Report(version="", missions=(mission,)), Style()))
     assert "image_evidence" not in document["missions"][0]
