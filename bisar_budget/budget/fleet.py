@@ -1,7 +1,7 @@
 """Check many mission files: the gate of a fleet is one call, and takes every core.
 
 What is found about a mission is some hundred objects. A caller who only wants what a format makes of it says so, and
-nothing else is kept, or sent from one process to another: that is a third of the time of a thousand missions.
+nothing else is kept, or sent from one process to another: that is a quarter of the time of a thousand missions.
 """
 
 import gc

@@ -11,7 +11,8 @@ and with a correction that has its own bound, an edge whose phase itself exceeds
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import chain
 from typing import NamedTuple
 
@@ -20,15 +21,21 @@ from bisar_budget.budget.allocation import Allocation
 from bisar_budget.budget.combine import combine_phases
 from bisar_budget.budget.correlation import correlated_errors, phase_parts
 from bisar_budget.budget.sources import MOTION_UNITS, PLATFORMS, ErrorSource, full_ground
-from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
+from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT, SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
 from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState
 from bisar_budget.mission.model import Mission
 from bisar_budget.units import format_quantity
 
-RIM_POINTS = 8
+RIM_POINTS = 16
+_LIKE_A_COSINE = 1e-4  # as near to the crest of a cosine; its azimuth is then right to a degree
+_ROUGH = 0.1  # by so much, of itself, a crest through points of the rim may be off
+_CLIMBS = 5  # until then, each in a quarter of the arc before
+_NARROW = 10.0  # of a place's clearance; below, it is looked at whatever its difference
+_MIN_SINE = math.sin(math.radians(MIN_GRADIENT_ANGLE_DEG))
+_NEAREST_M = 1.0  # of a platform to a place; nearer, no image
 _FARTHEST = 0.5  # of the nearest slant range: the search for a radius ends there
 _PRECISION = 1e-3  # of the radius
-_TURNS = 3  # of the azimuth along which it is searched
+_TURNS = 2  # of the azimuth along which it is searched; then it is the whole circle's
 _PER_PLATFORM = 9  # unit errors: position, velocity, acceleration along each axis
 _CLOCK_TERMS = ("constant", "linear", "quadratic", "cubic")
 
@@ -80,6 +87,7 @@ class ScenePhases:
             SPEED_OF_LIGHT, mission.radar.wavelength, mission.collection.aperture_time
         )
         self.terms = [self._terms(source) for source in members]
+        self.turn = math.copysign(1.0, full_ground(mission, geometry).gradient_sine)
 
     def geometry_at(self, point: GroundVector) -> BistaticGeometry:
         """Both platforms as a point of the ground has them."""
@@ -94,18 +102,23 @@ class ScenePhases:
         )
         return BistaticGeometry(transmitter=transmitter, receiver=receiver)
 
-    def phases(self, point: GroundVector) -> list[float]:
-        """Quadratic phase of each error there, signed. [rad]"""
+    def place(self, radius: float, azimuth: float) -> "Place":
+        """What there is at a point of the ground."""
+        there = self.geometry_at(at(radius, azimuth))
+        if min(there.transmitter.slant_range, there.receiver.slant_range) < _NEAREST_M:
+            return Place(self.centre, 0.0, 0.0)
         wavelength, T = self.mission.radar.wavelength, self.mission.collection.aperture_time
-        ground = full_ground(self.mission, self.geometry_at(point))
+        ground = full_ground(self.mission, there)
         transmitter, receiver = (
             evaluators.full_motion(*(*chain.from_iterable(looks), wavelength, T)) for looks in ground.looks
         )
         of_a_unit = ground.quadratic_phases((*transmitter, *receiver, *self.clock))
-        return [
+        phases = [
             centre if terms is None else sum([of_a_unit[unit] * size for unit, size in terms])
             for terms, centre in zip(self.terms, self.centre, strict=True)
         ]
+        clearance = min(self.turn * ground.gradient_sine / _MIN_SINE, ground.range_gradient / MIN_GROUND_GRADIENT)
+        return Place(phases, self.combined(phases), clearance)
 
     def _terms(self, source: ErrorSource) -> list[tuple[int, float]] | None:
         """An error as unit errors, by their place among those of both platforms and the clock, and how much of each.
@@ -126,9 +139,9 @@ class ScenePhases:
             if part
         ]
 
-    def differences(self, point: GroundVector) -> list[float]:
+    def differences(self, radius: float, azimuth: float) -> list[float]:
         """Of each error, its phase there less that at the centre. [rad]"""
-        return [there - centre for there, centre in zip(self.phases(point), self.centre, strict=True)]
+        return [there - centre for there, centre in zip(self.place(radius, azimuth).phases, self.centre, strict=True)]
 
     def combined(self, phases: Sequence[float]) -> float:
         """Differences of phases to the centre's, combined: the largest, their sum or root-sum-square. [rad]"""
@@ -150,40 +163,103 @@ class ScenePhases:
             members.append(source._replace(full=source.full._replace(qpe=per_unit)))
         return phase_parts(members, "qpe", "full", self.combine, self.groups)
 
-    def difference(self, radius: float, azimuth: float) -> float:
-        """The same at one point. [rad]"""
-        return self.combined(self.phases(at(radius, azimuth)))
-
     def rim(self, radius: float) -> "Rim":
-        """Evaluate a circle evenly, and around the worst point at the vertex of the parabola through it, twice.
+        """Evaluate a circle evenly, and around its worst point.
 
-        Linear in the radius, a difference is a cosine of the azimuth, whose vertex that is to a few degrees.
+        That is where the difference is largest; and where the clearance is least, if it comes near to 1: a difference
+        grows there as its inverse, in an arc that points of a circle may miss.
         """
-        step = 2 * math.pi / RIM_POINTS
-        phases = [self.phases(at(radius, step * k)) for k in range(RIM_POINTS)]
-        sizes = [self.combined(there) for there in phases]
-        top = max(range(RIM_POINTS), key=sizes.__getitem__)
-        best = (sizes[top], step * top)
-        before, size, after = sizes[top - 1], sizes[top], sizes[(top + 1) % RIM_POINTS]
-        vertex = step * top
-        for _ in range(2):
-            bend = before - 2 * size + after
-            if bend >= 0:
-                break
-            vertex += step * (before - after) / (2 * bend)
-            step /= 4
-            before, size, after = (self.difference(radius, vertex + side * step) for side in (-1, 0, 1))
-            best = max(best, (before, vertex - step), (size, vertex), (after, vertex + step))
-        size, azimuth = best
+        places = [self.place(radius, 2 * math.pi * k / RIM_POINTS) for k in range(RIM_POINTS)]
+        phases = [place.phases for place in places]
+
+        def size_at(azimuth: float) -> float:
+            return self.place(radius, azimuth).size
+
+        nearness, azimuth = _highest(
+            [-place.clearance for place in places], lambda azimuth: -self.place(radius, azimuth).clearance, -_NARROW
+        )
+        if nearness >= -1:
+            return Rim(azimuth % (2 * math.pi), math.inf, phases)
+        largest = _highest([place.size for place in places], size_at)
+        if nearness > -_NARROW:
+            arc = math.pi / RIM_POINTS / 8
+            sides = (size_at(azimuth - arc), size_at(azimuth + arc))
+            largest = max(largest, _climbed(size_at, sides, size_at(azimuth), azimuth, arc))
+        size, azimuth = largest
         return Rim(azimuth % (2 * math.pi), size, phases)
 
 
+class Place(NamedTuple):
+    """A place of the scene: quadratic phase of each error there, signed; how far they are from the centre's. [rad]
+
+    There is an image where `clearance` is above 1: of the range gradient, and of the sine between it and the Doppler
+    gradient, over the least of both. The sine has the centre's sign: below zero, they are parallel on the way.
+    """
+
+    phases: list[float]
+    size: float
+    clearance: float
+
+
 class Rim(NamedTuple):
-    """A circle about the centre: where the largest difference is, that difference, and all phases around it. [rad]"""
+    """A circle about the centre: where the largest difference is, that difference, and phases around it. [rad]
+
+    Where a part of it has no image the difference is infinite.
+    """
 
     azimuth: float
     difference: float
     phases: list[list[float]]
+
+
+def _highest(
+    heights: Sequence[float], height_at: Callable[[float], float], floor: float = -math.inf
+) -> tuple[float, float]:
+    """Climb from each of the even points of a circle that is above its neighbours and may lead highest.
+
+    Height and azimuth of the highest place, of those that seem to rise above a floor.
+    """
+    count = len(heights)
+    arc = 2 * math.pi / count
+    tops = []
+    for k, height in enumerate(heights):
+        sides = (heights[k - 1], heights[(k + 1) % count])
+        if height >= max(sides):
+            tops.append((_crest(*sides, height, arc)[1], sides, height, arc * k))
+    highest = (-math.inf, 0.0)
+    for crest, sides, height, azimuth in sorted(tops, reverse=True):
+        if crest > floor and crest + _ROUGH * abs(crest) >= highest[0]:
+            highest = max(highest, _climbed(height_at, sides, height, azimuth, arc))
+    return highest
+
+
+def _climbed(
+    height_at: Callable[[float], float], sides: tuple[float, float], height: float, azimuth: float, arc: float
+) -> tuple[float, float]:
+    """Climb to the highest near a place of a circle whose sides, an arc away, are no higher: height and azimuth.
+
+    Linear in the radius, a height is a constant and a cosine of the azimuth. Where its crest does not tell what is
+    found there, that is looked for again in a quarter of the arc.
+    """
+    found = [(height, azimuth)]
+    for _ in range(_CLIMBS):
+        offset, crest = _crest(*sides, height, arc)
+        there = (height_at(azimuth + offset), azimuth + offset)
+        found.append(there)
+        if abs(there[0] - crest) <= _LIKE_A_COSINE * abs(crest):
+            break
+        height, azimuth = max(there, (height, azimuth))
+        arc /= 4
+        sides = (height_at(azimuth - arc), height_at(azimuth + arc))
+        found += [(sides[0], azimuth - arc), (sides[1], azimuth + arc)]
+    return max(found)
+
+
+def _crest(before: float, after: float, middle: float, arc: float) -> tuple[float, float]:
+    """Offset from the middle of three points an arc apart to the crest of the cosine through them, and its height."""
+    sine = (after - before) / (2 * math.sin(arc))
+    cosine = (middle - (after + before) / 2) / (1 - math.cos(arc))
+    return max(-arc, min(arc, math.atan2(sine, cosine))), middle - cosine + math.hypot(sine, cosine)
 
 
 _KINDS = {unit: index for index, unit in enumerate(MOTION_UNITS.values())}
@@ -216,26 +292,21 @@ def scene_edge(
         return None
     edge = ScenePhases(mission, geometry, members)
     searched = _FARTHEST * min(geometry.transmitter.slant_range, geometry.receiver.slant_range)
-    if reason := _no_image(edge, radius):
-        return SceneEdge(radius, math.nan, 0.0, None, searched, reason, "")
     rim = edge.rim(radius)
+    if math.isinf(rim.difference):
+        reason = f"no image at the scene's edge, azimuth {math.degrees(rim.azimuth):.0f} deg: "
+        reason += _degeneracy(edge.geometry_at(at(radius, rim.azimuth)))
+        return SceneEdge(radius, math.nan, 0.0, None, searched, reason, "")
     searched = max(searched, radius)
     reach = _autofocus_radius(edge, radius, rim, allocation.qpe_total, searched)
     doubt = _over_at_the_edge(edge, allocation, rim)
     return SceneEdge(radius, rim.difference, rim.azimuth, reach, searched, "", doubt)
 
 
-def _no_image(edge: ScenePhases, radius: float) -> str:
-    """Say where on the rim no image can be formed; else nothing."""
-    for k in range(RIM_POINTS):
-        azimuth = 2 * math.pi * k / RIM_POINTS
-        there = edge.geometry_at(at(radius, azimuth))
-        where = f"no image at the scene's edge, azimuth {math.degrees(azimuth):.0f} deg"
-        if min(there.transmitter.slant_range, there.receiver.slant_range) < 1:
-            return f"{where}: a platform is within 1 m of it"
-        if degeneracy := there.degeneracy():
-            return f"{where}: {degeneracy}"
-    return ""
+def _degeneracy(there: BistaticGeometry) -> str:
+    if min(there.transmitter.slant_range, there.receiver.slant_range) < _NEAREST_M:
+        return f"a platform is within {_NEAREST_M:g} m of it"
+    return there.degeneracy() or "on the way there range and Doppler gradients become parallel"
 
 
 def _autofocus_radius(edge: ScenePhases, radius: float, rim: Rim, total: float, searched: float) -> float | None:
@@ -243,31 +314,53 @@ def _autofocus_radius(edge: ScenePhases, radius: float, rim: Rim, total: float, 
 
     Along the worst azimuth, and again where the rim at the radius found has a worse one.
     """
-    azimuth, size, low, high = rim.azimuth, rim.difference, 0.0, radius
+    azimuth, size, high = rim.azimuth, rim.difference, radius
     if not size:
         return None
     for _ in range(_TURNS):
-        while size <= total:
-            if high >= searched:
-                break
-            low, high = high, min(searched, high * max(1.05, min(4.0, 1.05 * total / size)))
-            size = edge.difference(high, azimuth)
-        while size > total and high - low > _PRECISION * high:
-            # About linear in the radius: just below where a line from the centre reaches the total, else half way.
-            guess = high * total / size * (1 - _PRECISION / 2)
-            middle = guess if low < guess < high else (low + high) / 2
-            there = edge.difference(middle, azimuth)
-            if there > total:
-                high, size = middle, there
-            elif there > total * (1 - _PRECISION):
-                low = high = middle
-            else:
-                low = middle
+        size_at = partial(_size_or_beyond, edge, azimuth)
+        low = inside = 0.0
+        while size <= total and high < searched:
+            low, inside = high, size
+            high = min(searched, high * max(1.05, min(4.0, 1.05 * total / size)))
+            size = size_at(high)
+        if size > total:
+            low, high = _where(size_at, total, (low, inside), (high, size))
         found = edge.rim(low if size > total else high)
         if found.difference <= total * (1 + _PRECISION):
             return None if size <= total else low
-        azimuth, size, low, high = found.azimuth, found.difference, 0.0, low if size > total else high
-    return low
+        azimuth, size, high = found.azimuth, found.difference, low if size > total else high
+    return _where(lambda radius: edge.rim(radius).difference, total, (0.0, 0.0), (high, size))[0]
+
+
+def _size_or_beyond(edge: ScenePhases, azimuth: float, radius: float) -> float:
+    place = edge.place(radius, azimuth)
+    return place.size if place.clearance > 1 else math.inf
+
+
+def _where(
+    size_at: Callable[[float], float], total: float, inside: tuple[float, float], outside: tuple[float, float]
+) -> tuple[float, float]:
+    """Radii, to a thousandth, between which a size passes a total: the secant between both, drawn near (Illinois)."""
+    (low, below), (high, above) = inside, outside
+    goal = total * (1 - _PRECISION / 2)
+    below, above = below - goal, above - goal
+    was_inside = None
+    while high - low > _PRECISION * high:
+        share = 0.5 if math.isinf(above) else below / (below - above)
+        middle = low + share * (high - low)
+        over = size_at(middle) - goal
+        is_inside = over <= total - goal
+        if is_inside and over > -(total - goal):
+            return middle, middle
+        if is_inside:
+            low, below = middle, over
+            above = above / 2 if was_inside else above  # twice on one side: draw the other nearer
+        else:
+            high, above = middle, over
+            below = below / 2 if was_inside is False else below
+        was_inside = is_inside
+    return low, high
 
 
 def _over_at_the_edge(edge: ScenePhases, allocation: Allocation, rim: Rim) -> str:
@@ -293,7 +386,9 @@ def _over_at_the_edge(edge: ScenePhases, allocation: Allocation, rim: Rim) -> st
     for name, indices, limit in groups:
         if edge.together(edge.centre, indices) > limit * (1 + UTILIZATION_TOLERANCE):
             continue  # its own row says so
-        phase = max(edge.together(there, indices) for there in rim.phases)
+        around = [edge.together(there, indices) for there in rim.phases]
+        top = max(range(RIM_POINTS), key=around.__getitem__)
+        _, phase = _crest(around[top - 1], around[(top + 1) % RIM_POINTS], around[top], 2 * math.pi / RIM_POINTS)
         if phase > limit * (1 + UTILIZATION_TOLERANCE) and phase > worst[1]:
             worst = (name, phase, limit)
     name, phase, limit = worst

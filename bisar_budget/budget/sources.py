@@ -160,6 +160,18 @@ class FullGround(NamedTuple):
             effects.append(Effect._make((constant, linear, qpe, cubic)))
         return effects
 
+    @property
+    def range_gradient(self) -> float:
+        """Length of the range gradient on the ground. [m/m]"""
+        (_, b), (_, d) = self.plane.adjugate
+        return math.hypot(b, d)
+
+    @property
+    def gradient_sine(self) -> float:
+        """Sine of the angle from range to Doppler gradient on the ground, signed. [-]"""
+        (a, _), (c, _) = self.plane.adjugate
+        return self.plane.determinant / (self.range_gradient * math.hypot(a, c))
+
     def quadratic_phases(self, rows: Iterable[tuple[float, ...]]) -> list[float]:
         """Those of `effective` alone, for a point of the scene among many. [rad/unit]"""
         by_constant, by_linear = self.quadratic

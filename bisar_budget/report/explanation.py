@@ -281,7 +281,7 @@ def _spatial_variance(
     ]
     edge = ScenePhases(mission, found.geometry, members)
     east, north = at(scene.radius, scene.azimuth)
-    sizes = [(name, abs(phase)) for name, phase in edge.parts(edge.differences((east, north)))]
+    sizes = [(name, abs(phase)) for name, phase in edge.parts(edge.differences(scene.radius, scene.azimuth))]
     yield from step(
         f"Full model at the scene’s edge, {east:.6g} m east, {north:.6g} m north of the centre, less at the centre"
     )

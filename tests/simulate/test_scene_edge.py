@@ -8,6 +8,7 @@ import pytest
 from bisar_budget.budget.check import check_mission
 from bisar_budget.budget.scene import ScenePhases, at
 from bisar_budget.budget.validity import FirstOrder
+from bisar_budget.errors import MissionError
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.simulate.collection import Errors
@@ -58,7 +59,7 @@ def test_phases_at_the_edge_are_those_of_exact_ranges(squint: float, radius: flo
         centre = exact_at(mission, source, size, (0.0, 0.0)).quadratic
         for azimuth in np.arange(8) * math.pi / 4:
             point = at(radius, azimuth)
-            (difference,) = edge.differences(point)
+            (difference,) = edge.differences(radius, azimuth)
             exact = exact_at(mission, source, size, point).quadratic - centre
             assert difference == pytest.approx(exact, abs=tolerance, rel=0.02), (source.id, azimuth)
             largest, seen = max(largest, abs(exact)), seen + 1
@@ -83,7 +84,7 @@ def test_images_at_the_edge_show_them(row_id: str, radius: float, azimuth: float
         reference = study.collection.chip(there, Errors(), scatterer=there)
         history = study.collection.spatial_frequency(reference)
         measured.append(quadratic_phase_error(chip.cut, reference.cut, study.collection.spacing[1], *history)[0])
-    (difference,) = edge.differences(at(radius, azimuth))
+    (difference,) = edge.differences(radius, azimuth)
     assert measured[1] - measured[0] == pytest.approx(difference, abs=0.01)
 
 
@@ -123,7 +124,7 @@ class TestRow:
         found = check_mission(mission, TODAY)
         source = next(s for s in Study(mission).sources if s.id == "receiver.velocity.y")
         edge = ScenePhases(mission, mission.geometry, [source])
-        worst = max(edge.difference(500, math.radians(degrees / 2)) for degrees in range(720))
+        worst = max(edge.place(500, math.radians(degrees / 2)).size for degrees in range(720))
         assert row(found, "mission.spatial_variance").declared == pytest.approx(worst, rel=1e-3)
 
     @pytest.mark.parametrize("rule", ["each", "sum", "rss"])
@@ -134,7 +135,7 @@ class TestRow:
         members = [s for s in Study(mission).sources if s.declared]
         edge = ScenePhases(mission, mission.geometry, members)
         join = {"each": lambda d: np.abs(d).max(), "sum": lambda d: np.abs(d).sum(), "rss": np.linalg.norm}[rule]
-        worst = max(join(edge.differences(at(300, math.radians(degrees)))) for degrees in range(360))
+        worst = max(join(edge.differences(300, math.radians(degrees))) for degrees in range(360))
         variance = row(found, "mission.spatial_variance")
         assert variance.declared == pytest.approx(worst, rel=1e-3)
         assert variance.status != "info"
@@ -152,7 +153,7 @@ class TestRow:
         names = [f"receiver.{kind}.{axis}" for kind in ("position", "velocity") for axis in "xyz"]
         members = [sources[name]._replace(declared=size) for name, size in zip(names, sigmas, strict=True)]
         edge = ScenePhases(mission, mission.geometry, members)
-        differences = np.array([edge.differences(at(500, math.radians(degrees))) for degrees in range(360)])
+        differences = np.array([edge.differences(500, math.radians(degrees)) for degrees in range(360)])
         worst = math.sqrt(max(np.einsum("ki,ij,kj->k", differences, correlation, differences)))
         assert variance.declared == pytest.approx(worst, rel=1e-3)
         assert worst < np.linalg.norm(differences, axis=1).max()
@@ -183,6 +184,27 @@ class TestRow:
             assert (variance.status != "not_evaluated") == is_there
         assert "a platform is within 1 m of it" in variance.reason
 
+    def test_an_edge_beyond_parallel_gradients_has_no_image(self) -> None:
+        """At eight even places of the edge they are far from it; between the centre and three of them they are."""
+        platforms = {
+            "transmitter": {"position": [12e3, 7e3, 3e3], "velocity": [120, 40, 0]},
+            "receiver": {"position": [2e3, 8e3, 3e3], "velocity": [-10, 10, 0], "motion_error": {"velocity": 0.01}},
+        }
+        inner, outer = (
+            row(findings(platforms=platforms, scene={"radius": radius}), "mission.spatial_variance")
+            for radius in (500, 2000)
+        )
+        assert inner.status != "not_evaluated"
+        assert outer.status == "not_evaluated"
+        assert "on the way there range and Doppler gradients become parallel" in outer.reason
+        found = findings(platforms=platforms, scene={"radius": 500})
+        mission = parse_mission(mission_text(platforms=platforms))
+        members = [s for s in Study(mission).sources if s.declared]
+        edge = ScenePhases(mission, mission.geometry, members)
+        assert found.scene.autofocus_radius is not None
+        circle = [edge.place(found.scene.autofocus_radius, math.radians(degrees)) for degrees in range(360)]
+        assert min(place.clearance for place in circle) > 1
+
     def test_clock_and_terrain_vary_over_the_scene(self) -> None:
         """A constant clock error moves the image, and so bends it differently at the edge: exact ranges agree."""
         mission = parse_mission(mission_text(timing_error={"constant": "20 ns"}, scene={"radius": 1000}))
@@ -196,3 +218,63 @@ class TestRow:
         assert variance.qpe_full_rad == pytest.approx(worst, rel=0.02, abs=1e-3)
         raised = row(findings(scene={"radius": 1000, "height_error": 5}), "mission.spatial_variance")
         assert raised.qpe_full_rad > 0.001
+
+
+def random_scenes(count: int, seed: int):
+    """Missions with errors of every kind and rule, and a radius of 0.5, 2 or 10 % of the nearest slant range."""
+    rng = np.random.default_rng(seed)
+    while count:
+        platforms = {}
+        for name in ("transmitter", "receiver"):
+            errors = {
+                kind: [float(part) for part in rng.uniform(-size, size, 3)]
+                for kind, size in (("position", 3.0), ("velocity", 0.05), ("acceleration", 0.005))
+                if rng.random() < 0.6
+            }
+            platforms[name] = {
+                "slant_range": float(10 ** rng.uniform(3, 5)),
+                "azimuth": float(rng.uniform(-3.1, 3.1)),
+                "elevation": float(rng.uniform(0.1, 1.2)),
+                "speed": float(rng.uniform(20, 300)),
+                "motion_azimuth": float(rng.uniform(-3.1, 3.1)),
+                "climb": 0.0,
+                "motion_error": errors or {"velocity": 0.01},
+            }
+        radius = float(rng.choice([0.005, 0.02, 0.1])) * min(p["slant_range"] for p in platforms.values())
+        allocation = {"combine": str(rng.choice(["each", "sum", "rss"])), "model": "full"}
+        changes = {"platforms": platforms, "collection": {"aperture_time": 3}, "allocation": allocation}
+        try:
+            mission = parse_mission(
+                mission_text(**changes, scene={"radius": radius}, timing_error={"constant": 5e-9})
+            )
+        except MissionError:  # degenerate
+            continue
+        count -= 1
+        yield mission
+
+
+def test_edge_and_radius_are_those_of_a_circle_of_720_places() -> None:
+    """To 0.2 %: the largest difference, the radius that one correction serves, and whether there is an image."""
+    seen = {"image": 0, "none": 0, "served": 0}
+    for mission in random_scenes(60, seed=1):
+        members = [s for s in Study(mission).sources if s.declared]
+        if mission.allocation.combine != "each":
+            members = [s for s in members if s.is_independent]
+        edge = ScenePhases(mission, mission.geometry, members)
+
+        def circle(radius: float, edge=edge):
+            return [edge.place(radius, math.pi * k / 360) for k in range(720)]
+
+        scene = check_mission(mission, TODAY).scene
+        has_image = min(place.clearance for place in circle(scene.radius)) > 1
+        assert has_image == (not scene.degeneracy), mission
+        seen["image" if has_image else "none"] += 1
+        if not has_image:
+            continue
+        assert scene.difference == pytest.approx(max(p.size for p in circle(scene.radius)), rel=2e-3, abs=1e-9)
+        served = scene.autofocus_radius or scene.searched
+        assert all(place.clearance > 1 and place.size <= math.pi / 4 for place in circle(0.998 * served))
+        if scene.autofocus_radius is not None:
+            assert any(place.clearance <= 1 or place.size > math.pi / 4 for place in circle(1.01 * served))
+            seen["served"] += 1
+    assert min(seen.values()) >= 3, seen
