@@ -214,8 +214,9 @@ def montecarlo(runs: int) -> None:
     import numpy as np
 
     from bisar_budget.budget.draws import _stream
+    from bisar_budget.budget.effects import full_ground
     from bisar_budget.budget.monte_carlo import _variables, monte_carlo
-    from bisar_budget.budget.sources import error_sources, full_ground
+    from bisar_budget.budget.sources import error_sources
     from bisar_budget.constants import SPEED_OF_LIGHT
     from bisar_budget.mission.load import parse_mission
 

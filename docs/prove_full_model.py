@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bisar_budget.budget.sources import full_ground
+from bisar_budget.budget.effects import full_ground
 from bisar_budget.budget.validity import FLOOR_M, FLOOR_RAD, SHARE, FirstOrder
 from bisar_budget.errors import MissionError
 from bisar_budget.geometry import norm

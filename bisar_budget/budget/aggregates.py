@@ -14,9 +14,9 @@ from bisar_budget.budget.correlation import (
     displacement_parts,
     phase_parts,
 )
+from bisar_budget.budget.effects import ErrorSource, ImagePlane, image_plane
 from bisar_budget.budget.findings import Row
 from bisar_budget.budget.judgement import judged
-from bisar_budget.budget.sources import ErrorSource, ImagePlane, image_plane
 from bisar_budget.budget.validity import Beyond, FirstOrder, of_members
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.geometry import GroundVector

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from bisar_budget.budget.correlation import combined_phase, correlated_errors
-from bisar_budget.budget.sources import ErrorSource
+from bisar_budget.budget.effects import ErrorSource
 from bisar_budget.mission.model import MetricSplits, Mission, Shares
 
 BALANCED_RANGE = (0.05, 0.95)  # neither platform is left without a budget

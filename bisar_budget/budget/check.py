@@ -8,17 +8,11 @@ from bisar_budget.budget import vibration
 from bisar_budget.budget.aggregates import aggregate_rows
 from bisar_budget.budget.allocation import Allocation, allocate
 from bisar_budget.budget.correlation import unused_correlations
+from bisar_budget.budget.effects import ErrorSource, FullGround, ImagePlane, full_ground, image_plane
 from bisar_budget.budget.findings import FileWarning, MissionFindings, Resolution, Row
 from bisar_budget.budget.judgement import judged, judgement, quotient
 from bisar_budget.budget.pull_in import pull_in_caps
-from bisar_budget.budget.sources import (
-    ErrorSource,
-    FullGround,
-    ImagePlane,
-    error_sources,
-    full_ground,
-    image_plane,
-)
+from bisar_budget.budget.sources import error_sources
 from bisar_budget.budget.validity import FirstOrder, collection_notes
 from bisar_budget.budget.waivers import apply_waivers
 from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE

@@ -6,7 +6,7 @@ full model, is linear in the errors, so the common effect is the sum of the two 
 
 from collections.abc import Iterator, Sequence
 
-from bisar_budget.budget.sources import MOTION_UNITS, Effect, ErrorSource
+from bisar_budget.budget.effects import MOTION_UNITS, Effect, ErrorSource
 from bisar_budget.constants import ROUNDING
 from bisar_budget.mission.model import Mission
 

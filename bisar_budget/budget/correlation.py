@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from bisar_budget.budget.combine import combine_displacements, combine_phases
-from bisar_budget.budget.sources import PLATFORMS, ErrorSource
+from bisar_budget.budget.effects import PLATFORMS, ErrorSource
 from bisar_budget.errors import Place
 from bisar_budget.geometry import FRAME_AXES, GroundVector
 from bisar_budget.mission.model import Mission, MotionError

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.budget.sources import PLATFORMS, ErrorSource, FullGround
+from bisar_budget.budget.effects import PLATFORMS, ErrorSource, FullGround
 from bisar_budget.budget.validity import FLOOR_RAD, SHARE
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.geometry import BistaticGeometry

@@ -13,7 +13,7 @@ from math import sqrt
 from operator import mul
 from typing import NamedTuple
 
-from bisar_budget.budget.sources import ErrorSource
+from bisar_budget.budget.effects import ErrorSource
 from bisar_budget.geometry import BistaticGeometry, GroundVector, Vector, norm
 
 _NODES = 10  # more change nothing (below 1e-6) where platforms travel, in half an aperture, at most

@@ -10,10 +10,9 @@ from bisar_budget.geometry import BistaticGeometry, GroundVector
 from bisar_budget.mission.model import Mission
 
 if TYPE_CHECKING:
-    from bisar_budget.budget.image_evidence import ImageEvidence
+    from bisar_budget.budget.images import ImageEvidence, Verdict
     from bisar_budget.budget.monte_carlo import MonteCarlo
     from bisar_budget.budget.scene import SceneEdge
-    from bisar_budget.budget.verdicts import Verdict
 
 # Worst first. The status of a mission or a run is the worst one found; the last three gate nothing.
 GATING = ("error", "fail", "not_evaluated", "warn", "pass_with_autofocus", "pass")

@@ -15,7 +15,8 @@ from typing import NamedTuple
 from bisar_budget.budget.allocation import Allocation, allocate
 from bisar_budget.budget.correlation import Correlated, combined_displacement, combined_phase, correlated_errors
 from bisar_budget.budget.draws import BLOCK, Counted, Judged, Variable, count
-from bisar_budget.budget.sources import PLATFORMS, ErrorSource, FullGround, error_sources, full_ground
+from bisar_budget.budget.effects import PLATFORMS, ErrorSource, FullGround, full_ground
+from bisar_budget.budget.sources import error_sources
 from bisar_budget.constants import MAX_DRAWS
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.mission.symmetric import eigensystem

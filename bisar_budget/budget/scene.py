@@ -20,7 +20,7 @@ from bisar_budget import evaluators
 from bisar_budget.budget.allocation import Allocation
 from bisar_budget.budget.combine import combine_phases
 from bisar_budget.budget.correlation import correlated_errors, phase_parts
-from bisar_budget.budget.sources import MOTION_UNITS, PLATFORMS, ErrorSource, full_ground
+from bisar_budget.budget.effects import MOTION_UNITS, PLATFORMS, ErrorSource, full_ground
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT, SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
 from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState
 from bisar_budget.mission.model import Mission

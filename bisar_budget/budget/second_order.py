@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from operator import add, sub
 
-from bisar_budget.budget.sources import Effect, ErrorSource, FullGround
+from bisar_budget.budget.effects import Effect, ErrorSource, FullGround
 from bisar_budget.geometry import BistaticGeometry, Vector, norm
 
 Form = Sequence[float]  # xx, xy, xz, yy, yz, zz

@@ -12,9 +12,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import NamedTuple
 
+from bisar_budget.budget.effects import Effect, ErrorSource, FullGround
 from bisar_budget.budget.exact_ranges import ExactPhases, ExactRanges
 from bisar_budget.budget.second_order import SecondOrder
-from bisar_budget.budget.sources import Effect, ErrorSource, FullGround
 from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
 from bisar_budget.geometry import STRAIGHT, BistaticGeometry, GroundVector, norm
 from bisar_budget.mission.model import Mission

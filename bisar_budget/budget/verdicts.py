@@ -1,84 +1,11 @@
-"""What images say of the limits, and what follows for the rows. Field names are the JSON contract's of `verify`."""
+"""What follows from images for the rows of a check, and which of the images are worth showing."""
 
-from typing import NamedTuple
-
-from bisar_budget.budget.findings import FileWarning, MissionFindings, Row
+from bisar_budget.budget.findings import STATUSES, FileWarning, MissionFindings, Row
+from bisar_budget.budget.images import Verdict, VerifiedMission
 from bisar_budget.constants import UTILIZATION_TOLERANCE
-from bisar_budget.geometry import GroundVector
 
-
-class Verdict(NamedTuple):
-    """What the image says of one limit. None where a value does not exist; `reason` says why.
-
-    Phases are magnitudes at the aperture edge [rad]: by Table II, by the full model's closed form, predicted from
-    exact ranges, and measured, `…_inside` and `…_beyond` at 0.9 and 1.1 times the limit. Displacements are on the
-    ground (east, north) [m]: `displacement_m` by exact ranges, `…_published_m` by (25), `…_full_m` by the full
-    model. The smear azimuth is that of a line, from 0 to π; `…_published_rad` by (31). For vibration
-    `measured_db` stands against `requirement_db`. With autofocus the row is formed again at
-    `boundary_autofocus` and refocused.
-    """
-
-    id: str
-    model: str
-    boundary_error: float
-    unit: str
-    budget_rad: float | None = None
-    published_qpe_rad: float | None = None
-    full_qpe_rad: float | None = None
-    predicted_qpe_rad: float | None = None
-    measured_qpe_rad: float | None = None
-    measured_inside_rad: float | None = None
-    measured_beyond_rad: float | None = None
-    predicted_cubic_rad: float | None = None
-    measured_cubic_rad: float | None = None
-    irw_ratio: float | None = None
-    peak_loss_db: float | None = None
-    pslr_db: float | None = None
-    islr_db: float | None = None
-    requirement_db: float | None = None
-    measured_db: float | None = None
-    measured_db_error: float | None = None
-    displacement_m: GroundVector | None = None
-    displacement_published_m: GroundVector | None = None
-    displacement_full_m: GroundVector | None = None
-    measured_displacement_m: GroundVector | None = None
-    smear_azimuth_published_rad: float | None = None
-    measured_smear_azimuth_rad: float | None = None
-    boundary_autofocus: float | None = None
-    measured_residual_qpe_rad: float | None = None
-    refocused_loss_db: float | None = None
-    verdict: str = "not_evaluated"
-    verdict_autofocus: str | None = None
-    reason: str | None = None
-    reason_autofocus: str | None = None
-
-
-class VerifiedMission(NamedTuple):
-    """The verdicts on one mission's limits; `conditions` says of what images they are."""
-
-    file: str
-    name: str
-    rows: tuple[Verdict, ...]
-    conditions: str = ""
-
-    @property
-    def status(self) -> str:
-        """`fail` if a limit of the gating model is optimistic, with or without autofocus.
-
-        `not_evaluated` if no limit got a verdict: nothing was verified, which is no pass. Else `pass`.
-        """
-        verdicts = {row.verdict for row in self.rows} | {row.verdict_autofocus for row in self.rows}
-        if "optimistic" in verdicts:
-            return "fail"
-        return "not_evaluated" if self.doubt else "pass"
-
-    @property
-    def doubt(self) -> str:
-        """Say that no limit got a verdict; empty if one did."""
-        if any({row.verdict, row.verdict_autofocus} - {"not_evaluated", None} for row in self.rows):
-            return ""
-        rows = f"{len(self.rows)} row{'s' if len(self.rows) != 1 else ''}"
-        return f"nothing was verified: {rows} with a limit, and no image gave a verdict on any"
+_SHOWN = 4  # rows of a mission
+_RANK = {status: index for index, status in enumerate(STATUSES)}
 
 
 def with_verdicts(findings: MissionFindings, verified: VerifiedMission) -> MissionFindings:
@@ -145,3 +72,24 @@ def _shown(verdict: Verdict) -> str:
     if verdict.measured_qpe_rad is not None and verdict.budget_rad is not None:
         return f"the image shows {verdict.measured_qpe_rad:.3g} rad at it, the budget is {verdict.budget_rad:.3g} rad"
     return verdict.reason or "the image shows more than it promises"
+
+
+def rows_worth_showing(findings: MissionFindings, count: int = _SHOWN) -> tuple[Verdict, ...]:
+    """Verdicts with a measured quadratic phase whose rows decide most: worst status, limits that images refute.
+
+    A row that nobody declared is shown only if its limit is refuted, or if there is nothing else.
+    """
+    rows = {row.id: row for row in findings.rows}
+    known = [v for v in findings.verdicts or () if v.measured_qpe_rad is not None and v.id in rows]
+    ordered = sorted(known, key=lambda verdict: _urgency(rows[verdict.id], verdict))
+    wanted = [v for v in ordered if rows[v.id].status != "not_declared" or _is_refuted(v)]
+    return tuple((wanted or ordered[:1])[:count])
+
+
+def _urgency(row: Row, verdict: Verdict) -> tuple[int, bool, bool, float]:
+    # Shown again along the scene's axes, an error has the same image as in its own frame.
+    return (_RANK[row.status], not _is_refuted(verdict), not row.is_independent, -(row.utilization or 0.0))
+
+
+def _is_refuted(verdict: Verdict) -> bool:
+    return "optimistic" in (verdict.verdict, verdict.verdict_autofocus)

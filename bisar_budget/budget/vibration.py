@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 from bisar_budget import evaluators
 from bisar_budget.budget.allocation import Allocation, Split
-from bisar_budget.budget.sources import PLATFORMS
+from bisar_budget.budget.effects import PLATFORMS
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.errors import KeyPath
 from bisar_budget.geometry import FRAME_AXES, PlatformState, Vector, dot, without_rounding

@@ -24,7 +24,7 @@ from bisar_budget.errors import printable
 if TYPE_CHECKING:
     from click._termui_impl import ProgressBar
 
-    from bisar_budget.budget.verdicts import VerifiedMission
+    from bisar_budget.budget.images import VerifiedMission
     from bisar_budget.mission.model import Mission
 
 

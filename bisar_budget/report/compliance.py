@@ -11,9 +11,10 @@ from hashlib import sha256
 from typing import TYPE_CHECKING, NamedTuple
 
 from bisar_budget.budget.allocation import Allocation
+from bisar_budget.budget.effects import MOTION_UNITS, ErrorSource
 from bisar_budget.budget.findings import MissionFindings, Option, Report, Row, UnusableMission, worst_first
-from bisar_budget.budget.image_evidence import PointImage
-from bisar_budget.budget.sources import MOTION_UNITS, ErrorSource, error_sources
+from bisar_budget.budget.images import PointImage
+from bisar_budget.budget.sources import error_sources
 from bisar_budget.budget.waivers import waiver_notes
 from bisar_budget.catalogue import EQUATIONS
 from bisar_budget.constants import SPEED_OF_LIGHT

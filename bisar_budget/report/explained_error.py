@@ -3,8 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
-from bisar_budget.budget.findings import MissionFindings
-from bisar_budget.budget.sources import (
+from bisar_budget.budget.effects import (
     MOTION_UNITS,
     Effect,
     ErrorSource,
@@ -13,6 +12,7 @@ from bisar_budget.budget.sources import (
     full_ground,
     image_plane,
 )
+from bisar_budget.budget.findings import MissionFindings
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.errors import KeyPath, printable
 from bisar_budget.geometry import FRAME_AXES, PlatformState

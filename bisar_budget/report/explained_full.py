@@ -8,8 +8,8 @@ import math
 from collections.abc import Iterator
 from unicodedata import normalize
 
+from bisar_budget.budget.effects import PLATFORMS, ErrorSource, full_ground
 from bisar_budget.budget.findings import MissionFindings
-from bisar_budget.budget.sources import PLATFORMS, ErrorSource, full_ground
 from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import formulas

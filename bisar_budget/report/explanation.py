@@ -5,9 +5,10 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from bisar_budget.budget.allocation import Allocation
 from bisar_budget.budget.correlation import correlated_errors, displacement_parts, phase_parts
+from bisar_budget.budget.effects import ErrorSource, image_plane
 from bisar_budget.budget.findings import MissionFindings, Row
 from bisar_budget.budget.scene import ScenePhases, at
-from bisar_budget.budget.sources import ErrorSource, error_sources, image_plane
+from bisar_budget.budget.sources import error_sources
 from bisar_budget.budget.vibration import amplitude_share, echo_phase, lines_of, quadratic_part, shared_frequencies
 from bisar_budget.constants import ROUNDING
 from bisar_budget.errors import KeyPath, printable

@@ -5,8 +5,7 @@ import zlib
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from bisar_budget.budget.image_evidence import FLOOR_DB, ImageEvidence, PointImage
-from bisar_budget.budget.verdicts import Verdict
+from bisar_budget.budget.images import FLOOR_DB, ImageEvidence, PointImage, Verdict
 from bisar_budget.report.svg import Box, Canvas, Point, axis_number, round_step, ticks
 from bisar_budget.units import format_quantity
 

@@ -5,8 +5,8 @@ import math
 import numpy as np
 
 from bisar_budget.budget.findings import MissionFindings
-from bisar_budget.budget.image_evidence import FLOOR_DB, ImageEvidence, PointImage, rows_worth_showing
-from bisar_budget.budget.verdicts import Verdict
+from bisar_budget.budget.images import FLOOR_DB, ImageEvidence, PointImage, Verdict
+from bisar_budget.budget.verdicts import rows_worth_showing
 from bisar_budget.mission.model import Mission
 from bisar_budget.simulate.collection import OVERSAMPLING, Chip
 from bisar_budget.simulate.impulse_response import upsampled

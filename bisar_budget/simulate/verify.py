@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from bisar_budget.budget.allocation import allocate
-from bisar_budget.budget.sources import ErrorSource, error_sources, full_ground, image_plane
-from bisar_budget.budget.verdicts import Verdict, VerifiedMission
+from bisar_budget.budget.effects import ErrorSource, full_ground, image_plane
+from bisar_budget.budget.images import Verdict, VerifiedMission
+from bisar_budget.budget.sources import error_sources
 from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.simulate import vibration

@@ -12,8 +12,8 @@ from functools import partial
 import numpy as np
 
 from bisar_budget.budget.allocation import Allocation
-from bisar_budget.budget.sources import PLATFORMS
-from bisar_budget.budget.verdicts import Verdict
+from bisar_budget.budget.effects import PLATFORMS
+from bisar_budget.budget.images import Verdict
 from bisar_budget.budget.vibration import lines_of, shared_frequencies, vibration_limits
 from bisar_budget.mission.model import Mission
 from bisar_budget.simulate.collection import CELLS, Errors, PointCollection

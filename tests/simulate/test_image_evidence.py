@@ -9,8 +9,8 @@ import pytest
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.budget.findings import Report
-from bisar_budget.budget.image_evidence import FLOOR_DB, ImageEvidence, rows_worth_showing
-from bisar_budget.budget.verdicts import Verdict
+from bisar_budget.budget.images import FLOOR_DB, ImageEvidence, Verdict
+from bisar_budget.budget.verdicts import rows_worth_showing
 from bisar_budget.cli.check import check_all
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.report import Style, render

@@ -16,9 +16,8 @@ from markdown_it import MarkdownIt
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.budget.findings import MissionFindings, Option, Report, UnusableMission
-from bisar_budget.budget.image_evidence import ImageEvidence, PointImage
+from bisar_budget.budget.images import ImageEvidence, PointImage, Verdict
 from bisar_budget.budget.monte_carlo import monte_carlo
-from bisar_budget.budget.verdicts import Verdict
 from bisar_budget.errors import Fault, printable
 from bisar_budget.mission.load import load_mission
 from bisar_budget.report import Style, pictures, render

@@ -3,7 +3,7 @@
 import pytest
 
 from bisar_budget.budget.findings import Report
-from bisar_budget.budget.verdicts import Verdict, VerifiedMission
+from bisar_budget.budget.images import Verdict, VerifiedMission
 from bisar_budget.mission.load import load_mission
 from bisar_budget.report import Style, render
 from bisar_budget.report.layout import WIDTH, table

@@ -1,0 +1,120 @@
+"""What images say, as frozen data: verdicts on limits, and the pictures behind them.
+
+Field names of verdicts are the JSON contract's of `verify`. Axes of pictures are those of the rotated image: x′ along
+the bistatic look direction φ_b, y′ across it, counter-clockwise.
+"""
+
+from typing import NamedTuple
+
+from bisar_budget.geometry import GroundVector
+
+FLOOR_DB = -40.0  # of the error-free peak: black in a chip
+
+
+class Verdict(NamedTuple):
+    """What the image says of one limit. None where a value does not exist; `reason` says why.
+
+    Phases are magnitudes at the aperture edge [rad]: by Table II, by the full model's closed form, predicted from
+    exact ranges, and measured, `…_inside` and `…_beyond` at 0.9 and 1.1 times the limit. Displacements are on the
+    ground (east, north) [m]: `displacement_m` by exact ranges, `…_published_m` by (25), `…_full_m` by the full
+    model. The smear azimuth is that of a line, from 0 to π; `…_published_rad` by (31). For vibration
+    `measured_db` stands against `requirement_db`. With autofocus the row is formed again at
+    `boundary_autofocus` and refocused.
+    """
+
+    id: str
+    model: str
+    boundary_error: float
+    unit: str
+    budget_rad: float | None = None
+    published_qpe_rad: float | None = None
+    full_qpe_rad: float | None = None
+    predicted_qpe_rad: float | None = None
+    measured_qpe_rad: float | None = None
+    measured_inside_rad: float | None = None
+    measured_beyond_rad: float | None = None
+    predicted_cubic_rad: float | None = None
+    measured_cubic_rad: float | None = None
+    irw_ratio: float | None = None
+    peak_loss_db: float | None = None
+    pslr_db: float | None = None
+    islr_db: float | None = None
+    requirement_db: float | None = None
+    measured_db: float | None = None
+    measured_db_error: float | None = None
+    displacement_m: GroundVector | None = None
+    displacement_published_m: GroundVector | None = None
+    displacement_full_m: GroundVector | None = None
+    measured_displacement_m: GroundVector | None = None
+    smear_azimuth_published_rad: float | None = None
+    measured_smear_azimuth_rad: float | None = None
+    boundary_autofocus: float | None = None
+    measured_residual_qpe_rad: float | None = None
+    refocused_loss_db: float | None = None
+    verdict: str = "not_evaluated"
+    verdict_autofocus: str | None = None
+    reason: str | None = None
+    reason_autofocus: str | None = None
+
+
+class VerifiedMission(NamedTuple):
+    """The verdicts on one mission's limits; `conditions` says of what images they are."""
+
+    file: str
+    name: str
+    rows: tuple[Verdict, ...]
+    conditions: str = ""
+
+    @property
+    def status(self) -> str:
+        """`fail` if a limit of the gating model is optimistic, with or without autofocus.
+
+        `not_evaluated` if no limit got a verdict: nothing was verified, which is no pass. Else `pass`.
+        """
+        verdicts = {row.verdict for row in self.rows} | {row.verdict_autofocus for row in self.rows}
+        if "optimistic" in verdicts:
+            return "fail"
+        return "not_evaluated" if self.doubt else "pass"
+
+    @property
+    def doubt(self) -> str:
+        """Say that no limit got a verdict; empty if one did."""
+        if any({row.verdict, row.verdict_autofocus} - {"not_evaluated", None} for row in self.rows):
+            return ""
+        rows = f"{len(self.rows)} row{'s' if len(self.rows) != 1 else ''}"
+        return f"nothing was verified: {rows} with a limit, and no image gave a verdict on any"
+
+
+class PointImage(NamedTuple):
+    """Image of the point with an error, its cut along y′, and the cut without error at the same place.
+
+    `chip` holds `columns` × `rows` bytes, row by row from the largest y′ to the smallest, in each from the smallest
+    x′ to the largest: 0 is `FLOOR_DB` or less, 255 the peak without error. `pixel_m` are its steps along x′ and y′;
+    along y′ a pixel stands for `thinned` samples, of which a resolution cell has as many as along x′. The cuts are
+    powers over the error-free peak [dB], `step_m` apart, with y′ = 0 at index `len // 2`.
+    """
+
+    columns: int
+    rows: int
+    chip: bytes
+    pixel_m: tuple[float, float]
+    thinned: int
+    step_m: float
+    cut_db: tuple[float, ...]
+    error_free_db: tuple[float, ...]
+
+    @property
+    def extent_m(self) -> tuple[float, float]:
+        """Size of the chip along x′ and y′. [m]"""
+        return (self.columns * self.pixel_m[0], self.rows * self.pixel_m[1])
+
+
+class ImageEvidence(NamedTuple):
+    """The images behind one verdict: at the limit, and with autofocus at its limit, before and after."""
+
+    file: str
+    verdict: Verdict
+    look_azimuth_rad: float
+    at_limit: PointImage
+    before_autofocus: PointImage | None = None
+    after_autofocus: PointImage | None = None
