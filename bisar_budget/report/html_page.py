@@ -9,7 +9,8 @@ from markupsafe import Markup, escape
 from bisar_budget.budget.findings import Report
 from bisar_budget.errors import printable
 from bisar_budget.report import Style, typeset
-from bisar_budget.report.compliance import STATUS_WORDS, compliance
+from bisar_budget.report.compliance import compliance
+from bisar_budget.report.compliance_view import STATUS_WORDS
 from bisar_budget.report.formulas import Equation, Sum
 from bisar_budget.resources import resource
 
