@@ -5,7 +5,6 @@ nothing else is kept, or sent from one process to another: that is a quarter of 
 """
 
 import gc
-import os
 from collections.abc import Callable, Sequence
 from datetime import date
 from typing import TypeVar
@@ -14,6 +13,7 @@ from bisar_budget.budget.check import check_mission
 from bisar_budget.budget.findings import MissionFindings, UnusableMission
 from bisar_budget.errors import MissionError
 from bisar_budget.mission.load import load_mission
+from bisar_budget.resources import cores
 
 Found = MissionFindings | UnusableMission
 Kept = TypeVar("Kept")
@@ -45,12 +45,12 @@ def check_files(files: Sequence[str], today: date, model: str | None, keep: Call
     list
         What `keep` made of each.
     """
-    cores = _cores()
-    if len(files) < MANY or cores == 1 or "-" in files:
+    count = cores()
+    if len(files) < MANY or count == 1 or "-" in files:
         return _checked(files, today, model, keep)
     from concurrent.futures import ProcessPoolExecutor
 
-    size = -(-len(files) // cores)
+    size = -(-len(files) // count)
     own, *others = (files[start : start + size] for start in range(0, len(files), size))
     with ProcessPoolExecutor(len(others)) as pool:
         waiting = [pool.submit(_checked, part, today, model, keep) for part in others]
@@ -58,10 +58,6 @@ def check_files(files: Sequence[str], today: date, model: str | None, keep: Call
         for part in waiting:
             kept += part.result()
     return kept
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _checked(files: Sequence[str], today: date, model: str | None, keep: Callable[[Found], Kept]) -> list[Kept]:

@@ -1,6 +1,5 @@
 """`bisar-budget verify`: images at the limits."""
 
-import os
 import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -20,6 +19,7 @@ from bisar_budget.cli.streams import (
     wants_color,
 )
 from bisar_budget.errors import printable
+from bisar_budget.resources import cores
 
 if TYPE_CHECKING:
     from click._termui_impl import ProgressBar
@@ -80,8 +80,7 @@ def verify_all(missions: "Sequence[Mission]", only: str, jobs: int | None) -> "l
     total = sum(len(rows_to_verify(mission, only)) for mission in missions)
     if not total and only != "*":
         raise click.UsageError(f"--only {printable(only)}: no row with a limit has such an id, nothing was verified.")
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    jobs = jobs or (1 if is_compiled() else cores)
+    jobs = jobs or (1 if is_compiled() else cores())
     with progress_bar(total) as bar:
         return [verify_mission(mission, only, jobs, lambda row_id: bar.update(1)) for mission in missions]
 

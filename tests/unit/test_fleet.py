@@ -29,7 +29,7 @@ def files(tmp_path):
 def test_every_format_says_the_same_for_any_number_of_processes(files, monkeypatch, cores: int) -> None:
     one = fleet.check_files(files, DAY, None, fleet.without_mission)
     monkeypatch.setattr(fleet, "MANY", 2)
-    monkeypatch.setattr(fleet, "_cores", lambda: cores)
+    monkeypatch.setattr(fleet, "cores", lambda: cores)
     several = fleet.check_files(files, DAY, None, fleet.without_mission)
     assert [found.file for found in several] == files
     assert [found.status for found in several].count("error") == 2
@@ -47,7 +47,7 @@ def test_standard_input_is_read_once_by_one_process(monkeypatch) -> None:
 def test_the_command_checks_a_fleet(run, files, monkeypatch) -> None:
     serial = run("check", "-q", *files)
     monkeypatch.setattr(fleet, "MANY", 2)
-    monkeypatch.setattr(fleet, "_cores", lambda: 2)
+    monkeypatch.setattr(fleet, "cores", lambda: 2)
     parallel = run("check", "-q", *files)
     assert parallel.exit_code == serial.exit_code == 2
     assert parallel.stdout == serial.stdout
