@@ -21,6 +21,7 @@ from bisar_budget.budget.validity import Beyond, FirstOrder, of_members
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.model import Mission
+from bisar_budget.units import format_quantity
 
 NO_REQUIREMENT = "no requirement in the file: computed, not judged"
 
@@ -72,7 +73,7 @@ def aggregate_rows(
         info="" if mission.requirements.cubic_phase_error is not None else NO_REQUIREMENT,
         over=f"{over}; autofocus gain does not apply",
         doubt=cubic_doubt,
-        notes=(*notes, *cubic_notes),
+        notes=(*notes, *_strictest(combine, model), *cubic_notes),
     )
     counted = {source.id for source in motion}
     known = [(row.id, row.displacement_m) for row in errors if row.displacement_m is not None and row.id in counted]
@@ -141,7 +142,7 @@ def aggregate_rows(
             over=_exceeded("QPE", total, pull_in, "rad", lambda: [(s.id, abs(s.qpe(model))) for s in declared])
             + "; autofocus corrects one total, not each error its own",
             doubt=pull_in_doubt,
-            notes=pull_in_notes,
+            notes=(*_strictest("sum", model), *pull_in_notes),
         )
 
 
@@ -160,7 +161,7 @@ def _location_doubt(
     moved = combined_displacement(known, mission.allocation.combine, groups)
     if moved <= limit * (1 + UTILIZATION_TOLERANCE):
         return ""
-    return f"the {other} model says fail: {moved:.3g} m, {limit:.3g} m allowed"
+    return f"the {other} model says fail: {_said(moved, 'm')}, {_said(limit, 'm', 'down')} allowed"
 
 
 def _qpe_aggregates(
@@ -216,9 +217,16 @@ def _qpe_aggregates(
             qpe_full=full,
             notes=(
                 *correlation_notes(combine, [g for g in groups if owner in (g.platform, "mission")]),
+                *_strictest(combine, model),
                 *exact_notes,
             ),
         )
+
+
+def _strictest(combine: str, model: str) -> tuple[str, ...]:
+    if model != "strictest" or combine == "each":
+        return ()
+    return ("each error counts by the model that gives it more: together they can be more than by either alone",)
 
 
 def _exceeded(
@@ -228,7 +236,13 @@ def _exceeded(
     if size is None or limit is None or size <= limit:
         return ""
     row_id, largest = max(members(), key=lambda member: abs(member[1]))
-    return f"{what} {size:.3g} {unit}, {limit:.3g} {unit} allowed; largest: {row_id}, {abs(largest):.3g} {unit}"
+    allowed = f"{_said(size, unit)}, {_said(limit, unit, 'down')} allowed"
+    return f"{what} {allowed}; largest: {row_id}, {_said(abs(largest), unit)}"
+
+
+def _said(size: float, unit: str, rounding: str = "nearest") -> str:
+    """Metres with a prefix, as everywhere; phases in radians, to be compared with π/4."""
+    return format_quantity(size, unit, 3, rounding) if unit == "m" else f"{size:.3g} {unit}"
 
 
 def _moved_exactly(source: ErrorSource, found: Mapping[str, Beyond], plane: ImagePlane) -> GroundVector:

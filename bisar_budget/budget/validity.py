@@ -128,7 +128,7 @@ class FirstOrder:
             return ""  # a bound on what follows
         moved = math.hypot(*(self.ground.plane.displacement(source.full, declared) or (0.0, 0.0)))
         if moved > FAR_M:
-            return f"it moves the image by {moved:.3g} m"
+            return f"it moves the image by {format_quantity(moved, 'm')}"
         first, added = source.full.qpe * declared, self.second.phase(source) * declared * declared
         if abs(added) > max(FLOOR_RAD, SHARE * abs(first)):
             return f"the second order adds {added:.2g} rad"
@@ -136,7 +136,7 @@ class FirstOrder:
         if self._farthest * (declared * reach) ** 2 <= allowed:
             return ""  # likewise a bound
         farther = self.second.drift(source) * declared * declared
-        return f"the second order moves the image by {farther:.2g} m" if farther > allowed else ""
+        return f"the second order moves the image by {format_quantity(farther, 'm', 2)}" if farther > allowed else ""
 
     def allowable_note(self, source: ErrorSource, gating: float | None, full: float | None, limit: float) -> str:
         """Say that an allowable, which has a phase of `limit`, lies beyond first order; else nothing.

@@ -696,3 +696,14 @@ class TestAggregatesThatFail:
 def test_a_row_names_the_model_that_gates_it(model: str, row_id: str, equation: str) -> None:
     other = [{"name": "troposphere", "quadratic_phase_error": 0.1}]
     assert row(findings(allocation__model=model, other_errors=other), row_id).equation == equation
+
+
+@pytest.mark.parametrize("rule", ["each", "sum", "rss"])
+@pytest.mark.parametrize("model", ["published", "full", "strictest"])
+def test_a_sum_of_the_larger_of_two_models_says_so(rule: str, model: str) -> None:
+    error = {"velocity": "5 mm/s", "acceleration": "20 ug"}
+    found = findings(allocation={"combine": rule, "model": model}, platforms__transmitter__motion_error=error)
+    said = [r.id for r in found.rows if any("the model that gives it more" in note for note in r.notes)]
+    owners = [f"{owner}.quadratic_phase_error" for owner in ("transmitter", "receiver", "mission")]
+    is_larger = model == "strictest" and rule != "each"
+    assert said == ([*owners, "mission.cubic_phase_error"] if is_larger else [])
