@@ -13,6 +13,7 @@ import numpy as np
 from bisar_budget.budget.allocation import allocate
 from bisar_budget.budget.effects import ErrorSource, full_ground, image_plane
 from bisar_budget.budget.images import Verdict, VerifiedMission
+from bisar_budget.budget.pull_in import ROOM
 from bisar_budget.budget.sources import error_sources
 from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.model import Mission, Simulation
@@ -256,10 +257,9 @@ class Study:
 
     def _chips(self, errors: Errors, effect: ExactEffect) -> tuple[Chip, Chip]:
         """Image of the errors and of no error at the place they move the point to, large enough for the smear."""
-        reach = (
-            2 * abs(effect.quadratic) + 3 * abs(effect.cubic)
-        ) / math.pi  # cells, from slope at the aperture edge
-        cells = CELLS + 2 * math.ceil(min(reach, 1e6))
+        slope = 2 * abs(effect.quadratic) + 3 * abs(effect.cubic)  # at the aperture edge
+        smear = 2 * math.ceil(min(slope / math.pi, 1e6))  # cells
+        cells = max(CELLS + smear, math.ceil(max(ROOM.values()) * smear))  # with less, autofocus gives out
         form = partial(self.collection.chip, effect.displacement, cells=cells, range_cells=RANGE_CELLS)
         return form(errors), form(Errors(), scatterer=effect.displacement)
 

@@ -358,6 +358,13 @@ class TestAutofocus:
         assert row.verdict_autofocus == "not_evaluated"
         assert "beyond first order" in row.reason_autofocus
 
+    def test_a_smear_of_80_cells_has_the_room_that_autofocus_needs(self) -> None:
+        """In a patch of 1.6 smears phase gradient autofocus left 3.7 rad, and the limit was called optimistic."""
+        verdict = verdicts("mission.autofocus_pull_in", autofocus={"n_pull": 20})["mission.autofocus_pull_in"]
+        assert verdict.verdict_autofocus == "confirmed"
+        assert verdict.measured_residual_qpe_rad < 0.1
+        assert verdict.refocused_loss_db < 0.3
+
     @pytest.mark.parametrize(("n_pull", "verdict"), [(8, "confirmed"), (14, "optimistic")])
     def test_range_walk_bounds_the_pull_in(self, n_pull: float, verdict: str) -> None:
         """1 GHz at 10 GHz: half a cell of walk at n_pull 10."""
