@@ -36,3 +36,8 @@ def test_largest_signed_sum_is_the_brute_force_one(vectors) -> None:
         for signs in itertools.product((1, -1), repeat=len(vectors))
     )
     assert largest_signed_sum(vectors) == pytest.approx(best)
+
+
+def test_the_tiniest_displacement_keeps_its_length() -> None:
+    """Squares of it are zero."""
+    assert largest_signed_sum([(3e-200, 4e-200)]) == pytest.approx(5e-200)
