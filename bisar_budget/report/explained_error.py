@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from bisar_budget.budget.effects import (
     MOTION_UNITS,
+    PLATFORMS,
     Effect,
     ErrorSource,
     FullGround,
@@ -104,7 +105,7 @@ def effect(
     if not source.is_motion:
         yield from step("Quadratic phase error, as declared", f"QPE = {size:.6g} rad")
     elif platform == "common":
-        yield from _common_effect(source, sources, signed, each)
+        yield from _common_effect(mission, found, source, sources, signed, each)
     elif source.owner == "mission":
         yield from step("Published model: a height error moves the image, no quadratic term")
     elif source.owner == "clock":
@@ -112,13 +113,10 @@ def effect(
     elif axis in formulas.AXES:
         state = getattr(found.geometry, platform)
         values = _motion_values(mission, state, platform, kind, axis, signed)
-        coefficients = (source.effect.constant, source.effect.linear)
         for order, formula in formulas.motion_coefficients(kind, axis, platform).items():
-            result = signed * (coefficients[order] if order < 2 else _coefficient(mission, source, order))
-            yield from step(
-                f"Table I row {2 + 3 * formulas.AXES.index(axis) + list(MOTION_UNITS).index(kind)}{each}",
-                *equation(f"β̃_{order}", formula, values, result, RATES[order]),
-            )
+            result = signed * _coefficient(mission, source, order)
+            title = f"{_table_i(kind, axis)}{each}"
+            yield from step(title, *equation(f"β̃_{order}", formula, values, result, RATES[order]))
         phase = formulas.motion_phase(kind, axis, platform)
         if phase is not None:
             yield from step(f"{source.equation}{each}", *equation("QPE", phase, values, qpe, "rad"))
@@ -134,7 +132,9 @@ def effect(
 
 
 def _coefficient(mission: Mission, source: ErrorSource, order: int) -> float:
-    """β̃₂ or β̃₃ of one unit, from its phase at the aperture edge (2π/λ)·β·(T/2)ⁿ."""
+    """β̃ of one unit; β̃₂ and β̃₃ from their phases at the aperture edge, (2π/λ)·β·(T/2)ⁿ."""
+    if order < 2:
+        return source.effect[order]
     phase = source.effect.qpe if order == 2 else source.effect.cubic
     return phase * mission.radar.wavelength / (2 * math.pi * (mission.collection.aperture_time / 2) ** order)
 
@@ -169,10 +169,35 @@ def _clock_effect(mission: Mission, source: ErrorSource, size: float, each: str)
         yield from step(f"{source.equation}{each}", *equation("QPE", formulas.CLOCK_PHASE, values, qpe, "rad"))
 
 
-def _common_effect(source: ErrorSource, sources: Mapping[str, ErrorSource], size: float, each: str) -> Iterator[Step]:
+def _table_i(kind: str, axis: str) -> str:
+    return f"Table I row {2 + 3 * formulas.AXES.index(axis) + list(MOTION_UNITS).index(kind)}"
+
+
+def _common_effect(
+    mission: Mission,
+    found: MissionFindings,
+    source: ErrorSource,
+    sources: Mapping[str, ErrorSource],
+    size: float,
+    each: str,
+) -> Iterator[Step]:
     """The effects of both platforms, added with their signs."""
-    legs = [sources[source.id.replace("common", platform)] for platform in ("transmitter", "receiver")]
-    values = {"φ_t": legs[0].effect.qpe * size, "φ_r": legs[1].effect.qpe * size}
+    _, kind, axis = source.id.split(".")
+    values = {}
+    for platform in PLATFORMS:
+        leg, phase = sources[source.id.replace("common", platform)], f"φ_{platform[0]}"
+        values[phase] = leg.effect.qpe * size
+        known = _motion_values(mission, getattr(found.geometry, platform), platform, kind, axis, size)
+        for order, formula in formulas.motion_coefficients(kind, axis, platform).items():
+            known[f"β̃_{order}"] = result = size * _coefficient(mission, leg, order)
+            title = f"{_table_i(kind, axis)}, {platform}{each}"
+            yield from step(title, *equation(f"β̃_{order}", formula, known, result, RATES[order]))
+        if kind != "position":
+            title = f"Its phase at the aperture edge, {platform}"
+            yield from step(title, *equation(phase, formulas.EDGE_PHASE, known, values[phase], "rad"))
+    if kind == "position":
+        yield from step(f"Table I: a position error moves the image, no quadratic term{each}")
+        return
     qpe = abs(source.effect.qpe * size)
     yield from step(f"{source.equation}{each}, signed", *equation("QPE", "|φ_t + φ_r|", values, qpe, "rad"))
 

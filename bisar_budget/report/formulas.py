@@ -22,6 +22,7 @@ _PHASES = {
     "acceleration": "π*T^2*|ã_{a}{s}*{a}_{s}|/(4*R_{s}*λ)",
 }
 _LETTERS = {"position": "p\u0303", "velocity": "ṽ", "acceleration": "ã"}
+EDGE_PHASE = "π*T^2*β̃_2/(2*λ)"
 CLOCK_PHASE = "π*T^2*f_0*|t̃_2|/2"
 VIBRATION = {"pslr": "sqrt(PSLR)*λ*sqrt(s)/(2*π)", "islr": "sqrt(ISLR)*λ*sqrt(s)/(2*π)"}
 # From first principles; of a sinusoid φ is the phase of the echoes that both platforms may make.
