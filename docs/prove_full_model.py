@@ -82,7 +82,7 @@ def against_exact_ranges() -> Iterator[str]:
             size = min([*sizes, *([9.9 / moves] if moves else [])], default=0.0)
             if not size:
                 continue
-            first, second = source.full.qpe * size, first_order.second(source, size)
+            first, second = source.full.qpe * size, first_order.second.effect(source, size)
             is_outside = (
                 turn > 0.3
                 or math.sin(geometry.gradient_angle) < 0.2
@@ -126,7 +126,7 @@ def over_long_apertures() -> Iterator[str]:
                 math.pi / 8 / abs(source.full.qpe) if source.full.qpe else 0.0, 3 / moves if moves else math.inf
             )
             full = source.full.qpe * size
-            if abs(full) < 0.1 or abs(first_order.second(source, size).qpe) > 0.002:
+            if abs(full) < 0.1 or abs(first_order.second.effect(source, size).qpe) > 0.002:
                 continue
             exact = study.collection.effect(study.errors(source, size)).quadratic
             # a·T² + b·T⁴ at T and at T/2 gives a·T².

@@ -17,7 +17,9 @@ if TYPE_CHECKING:
 # Worst first. The status of a mission or a run is the worst one found; the last three gate nothing.
 GATING = ("error", "fail", "not_evaluated", "warn", "pass_with_autofocus", "pass")
 STATUSES = (*GATING, "waived", "info", "not_declared")
-_RANK = {status: index for index, status in enumerate(STATUSES)}
+# For reading. What is waived breaks its requirement: it stands before all that meets one.
+READING = ("error", "fail", "not_evaluated", "warn", "waived", "pass_with_autofocus", "pass", "info", "not_declared")
+_RANK = {status: index for index, status in enumerate(READING)}
 
 
 class Row(NamedTuple):
@@ -129,7 +131,7 @@ class Option(NamedTuple):
 class Report(NamedTuple):
     """The findings about every mission file of a run.
 
-    `day` is the date that somebody gave it; None where it is the day of the run.
+    `day` is the date that somebody gave it, or on which its waivers were judged; None where it decides nothing.
     """
 
     version: str

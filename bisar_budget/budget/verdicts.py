@@ -1,11 +1,11 @@
 """What follows from images for the rows of a check, and which of the images are worth showing."""
 
-from bisar_budget.budget.findings import STATUSES, FileWarning, MissionFindings, Row
+from bisar_budget.budget.findings import READING, FileWarning, MissionFindings, Row
 from bisar_budget.budget.images import Verdict, VerifiedMission
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 
 _SHOWN = 4  # rows of a mission
-_RANK = {status: index for index, status in enumerate(STATUSES)}
+_RANK = {status: index for index, status in enumerate(READING)}
 
 
 def with_verdicts(findings: MissionFindings, verified: VerifiedMission) -> MissionFindings:

@@ -229,7 +229,8 @@ def check(
         statuses = {piece.status for piece in pieces}
     else:
         report = check_all(files, day, model, verifying, illustrated, drawn)
-        report = report._replace(options=tuple(_options()), day=_given_day(today))
+        judged_on = _given_day(today) or (day if _has_waivers(report.missions) else None)
+        report = report._replace(options=tuple(_options(judged_on)), day=judged_on)
         if says_faults:
             _say_faults(report.missions)
         for path, its_format in written:
@@ -245,7 +246,16 @@ def check(
     sys.exit(0 if exit_zero and code == EXIT_BROKEN else code)
 
 
-def _options() -> "Iterator[Option]":
+def _has_waivers(missions: "Iterable[MissionFindings | UnusableMission]") -> bool:
+    """Whether the day decides anything."""
+    from bisar_budget.budget.findings import MissionFindings
+    from bisar_budget.budget.waivers import waiver_notes
+
+    usable = [mission for mission in missions if isinstance(mission, MissionFindings)]
+    return any(waiver_notes(row) for mission in usable for row in mission.rows)
+
+
+def _options(judged_on: date | None) -> "Iterator[Option]":
     """Say what the options that bear on the result are, and where each came from."""
     from bisar_budget.budget.findings import Option
 
@@ -262,10 +272,11 @@ def _options() -> "Iterator[Option]":
         if name == "model":
             yield Option("--model", value or "as each file says", origin)
         elif name == "today":
-            day = _given_day(value)
-            if value is None and day is not None:
-                origin = "environment, SOURCE_DATE_EPOCH"
-            yield Option("--date", day.isoformat() if day else "the day of the run, which is not recorded", origin)
+            if value is None and judged_on is not None:
+                by_environment = os.environ.get("SOURCE_DATE_EPOCH")
+                origin = "environment, SOURCE_DATE_EPOCH" if by_environment else "the day of the run"
+            unrecorded = "the day of the run, which decides nothing and is not recorded"
+            yield Option("--date", judged_on.isoformat() if judged_on else unrecorded, origin)
         elif name == "draws":
             yield Option("--monte-carlo", "no" if value is None else f"{value:,} draws", origin)
         elif name == "seed" and context.params["draws"] is not None:

@@ -68,7 +68,8 @@ _VERDICTS = {
 _NOTHING = "Nothing was judged"
 _OWNERS = ("transmitter", "receiver", "clock", "reserve")
 _DRIVERS = 3
-_JUDGED = ("fail", "not_evaluated", "warn", "pass_with_autofocus", "pass", "waived")
+_JUDGED = ("fail", "not_evaluated", "warn", "waived", "pass_with_autofocus", "pass")
+_MET = ("pass_with_autofocus", "pass")
 _DISTRIBUTIONS = {
     "normal": "one-sigma values",
     "uniform": "uniform within the values given",
@@ -120,8 +121,8 @@ def compliance(report: Report, style: Style) -> Compliance:
 
 def _verdict(status: str, waived: int) -> str:
     """Verdict on rows, with what it owes to waivers."""
-    rows = f"; {waived} row{'s' if waived != 1 else ''} waived" if waived else ""
-    return f"{_VERDICTS[status]}{rows}"
+    rows = f"{waived} rows over their limits are" if waived > 1 else "1 row over its limit is"
+    return f"{_VERDICTS[status]}; {rows} waived" if waived else _VERDICTS[status]
 
 
 def _overall(report: Report, pages: Sequence[MissionPage]) -> str:
@@ -189,9 +190,8 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
         worst=judged[0].id if judged else "",
         worst_use=_use(judged[0]) if judged else "",
         head=tuple(head(found)),
-        drivers=tuple(
-            _driver(row) for row in judged[:_DRIVERS] if row.status not in ("pass", "waived") or row.utilization
-        ),
+        tone="warn" if found.status in _MET and found.summary.get("waived") else found.status,
+        drivers=tuple(_drivers(judged, found.status)),
         matrix=matrix,
         remarks=tuple(_grouped(matrix)),
         pictures=drawings(found),
@@ -338,6 +338,14 @@ def _margin(margin: float | None) -> str:
     down = math.floor(value * 10.0**step * (1 + math.copysign(1e-12, value))) / 10.0**step if step < 300 else value
     text = f"{down:+.0f}" if size >= 100 else f"{down:+.3g}"
     return ("0" if down == 0 else text).replace("-", "−") + " %"
+
+
+def _drivers(judged: Sequence[Row], status: str) -> Iterator[Driver]:
+    """Rows that a verdict rests on: what breaks, is in doubt or is waived; of a pass also what comes nearest."""
+    is_met = status in _MET
+    for row in judged[:_DRIVERS]:
+        if row.status not in _MET or (is_met and row.utilization):
+            yield _driver(row)
 
 
 def _driver(row: Row) -> Driver:

@@ -192,6 +192,7 @@ class MissionPage(NamedTuple):
     status: str
     verdict: str
     name: str
+    tone: str = ""  # of the verdict: a pass that rests on waivers looks like a warning
     counts: str = ""
     worst: str = ""
     worst_use: str = ""

@@ -1,5 +1,6 @@
 """The full model against exact ranges on random collections, and against images at squints."""
 
+import importlib.util
 import math
 
 import numpy as np
@@ -16,7 +17,7 @@ from bisar_budget.mission.load import parse_mission
 from bisar_budget.simulate.exact import exact_effect
 from bisar_budget.simulate.phase_history import cell_centres, path
 from bisar_budget.simulate.verify import Study, verify_mission
-from tests.conftest import TODAY, findings, mission_text
+from tests.conftest import ROOT, TODAY, findings, mission_text
 from tests.conftest import row as row_of
 from tests.simulate.conftest import collection, platform
 
@@ -252,3 +253,12 @@ def test_a_flat_monostatic_image_only_shifts_on_a_wrong_height() -> None:
     platforms = {name: {"position": [20e3, 0, 6e3], "velocity": [0, 120, 0]} for name in ("transmitter", "receiver")}
     found = findings(platforms=platforms, scene={"height_error": 20})
     assert abs(row_of(found, "mission.terrain").qpe_full_rad) < 1e-9
+
+
+def test_the_proof_in_the_documentation_runs(monkeypatch) -> None:
+    """On three collections; whole, it takes half a minute and writes the tables of docs/full-model.md."""
+    spec = importlib.util.spec_from_file_location("prove_full_model", ROOT / "docs" / "prove_full_model.py")
+    proof = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(proof)
+    monkeypatch.setattr(proof, "COUNT", 3)
+    assert any("rad" in line for line in proof.against_exact_ranges())

@@ -197,8 +197,20 @@ class TestBothLanguages:
         found = found_in(ROOT / "tests" / "acceptance" / "good" / "waived.yaml")
         rows = table_with(page_of(language, found), "id", "waiver")
         waived = next(row for row in rows if "waived" in row)
-        assert "Complies; 1 row waived" in squeezed(page_of(language, found).text)
+        assert "Complies; 1 row over its limit is waived" in squeezed(page_of(language, found).text)
         assert any("until 2026-11-21: last day" in cell for cell in waived)
+
+    def test_what_is_waived_stands_before_what_passes(self, language: str) -> None:
+        """In the matrix, and among the rows that the verdict rests on."""
+        found = found_in(ROOT / "tests" / "acceptance" / "good" / "waived.yaml")
+        shown = compliance(Report("1", (found,)), Style()).missions[0]
+        assert next(row.status for row in shown.matrix if row.status != "info") == "waived"
+        assert shown.drivers[0].status == "waived"
+        assert (shown.status, shown.tone) == ("pass", "warn")
+
+    def test_no_row_that_passes_drives_a_failure(self, language: str) -> None:
+        shown = compliance(Report("1", (found_in(SECTION_V),)), Style()).missions[0]
+        assert {driver.status for driver in shown.drivers} <= {"fail", "not_evaluated", "warn", "waived"}
 
     def test_requirement_id_and_source(self, language: str) -> None:
         text = squeezed(page_of(language, found_in(EVERY_KEY)).text)
@@ -527,6 +539,17 @@ class TestCommand:
         assert self.options(run, "--date", "2026-11-21")["--date"] == ("2026-11-21", "command line")
         epoch = self.options(run, env={"SOURCE_DATE_EPOCH": "1795219200"})["--date"]
         assert epoch == ("2026-11-21", "environment, SOURCE_DATE_EPOCH")
+
+    def test_a_waiver_is_judged_on_a_day_that_the_report_names(self, run, mission) -> None:
+        """The same input gives the same report for ever, unless a waiver ends in between."""
+        from datetime import UTC, datetime
+
+        text = SECTION_V.read_text(encoding="utf-8")
+        waiver = "waivers: [{id: transmitter.acceleration.x, until: 2999-01-01, reason: flight test}]\n"
+        Path("m.yaml").write_text(text + waiver, encoding="utf-8")
+        day, origin = self.options(run)["--date"]
+        assert (day, origin) == (datetime.now(UTC).date().isoformat(), "the day of the run")
+        assert day in squeezed(read_page(run("check", "m.yaml", "--format", "html").stdout).text)
 
 
 def test_a_limit_has_one_size_on_a_page() -> None:
