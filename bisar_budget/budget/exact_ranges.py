@@ -7,8 +7,8 @@ has it; quadratic and cubic phase are those of the cubic fitted to what remains,
 """
 
 import math
-from collections.abc import Iterable
-from functools import cache, cached_property
+from collections.abc import Callable, Iterable
+from functools import cache, cached_property, partial
 from math import sqrt
 from operator import mul
 from typing import NamedTuple
@@ -18,13 +18,14 @@ from bisar_budget.geometry import BistaticGeometry, GroundVector, Vector, norm
 
 _NODES = 10  # more change nothing (below 1e-6) where platforms travel, in half an aperture, at most
 _SHORT = 0.5  # of their slant range
-_LONG_NODES = 16  # and beyond; more change less than 1e-3 where they travel 1.25 of it
+_LONG_NODES = 16  # and beyond; more change about 1e-3 where they travel 1.25 of it
 _ORDER = 6  # of the projection, of which value and slope at the midpoint are taken
 _ITERATIONS = 60
 _SETTLED_M = 1e-3  # of the last step, whose effect on the phases is counted to first order
 
 Weights = tuple[float, ...]
 Track = list[Vector]  # positions at the nodes
+Slopes = tuple[tuple[float, ...], tuple[float, ...]]  # by east and by north, of each term of the history
 
 
 class Quadrature(NamedTuple):
@@ -87,27 +88,38 @@ class ExactRanges:
                     edge = term.qpe * node**2 + term.cubic * node**3
                     metres = term.constant + term.linear * tau + self.wavelength / (2 * math.pi) * edge
                     recorded[index] += size * metres
-        return self._settled(recorded, measured, near)
+        # Slopes turn little on the way to most points; where those of the centre lead nowhere, each place's own do.
+        found = self._settled(recorded, measured, near, lambda place: self._centre_slopes)
+        return found or self._settled(recorded, measured, near, partial(self._slopes, measured.values()))
 
     @cached_property
-    def _slopes(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """What a step of a metre east, and north, of the scene centre does to each term of the history."""
-        tracks = self.tracks.values()
+    def _centre_slopes(self) -> Slopes:
+        return self._slopes(self.tracks.values(), (0.0, 0.0))
+
+    def _slopes(self, tracks: Iterable[Track], place: GroundVector) -> Slopes:
+        """What a step of a metre east, and north, does to each term of the history."""
+        rays = [[(x - place[0], y - place[1], z) for x, y, z in track] for track in tracks]
         east, north = (  # the slope of a track's range is minus its direction
-            [-sum(end[axis] / norm(end) for end in ends) for ends in zip(*tracks, strict=True)] for axis in (0, 1)
+            [-sum(ray[axis] / norm(ray) for ray in pair) for pair in zip(*rays, strict=True)] for axis in (0, 1)
         )
         _, *terms = self.quadrature
         return tuple(_sum(term, east) for term in terms), tuple(_sum(term, north) for term in terms)
 
-    def _settled(self, recorded: list[float], measured: dict[str, Track], near: GroundVector) -> ExactPhases | None:
-        """Newton's method for the point, with the slopes at the scene centre, which turn little on the way there."""
+    def _settled(
+        self,
+        recorded: list[float],
+        measured: dict[str, Track],
+        near: GroundVector,
+        slopes_at: Callable[[GroundVector], Slopes],
+    ) -> ExactPhases | None:
+        """Newton's method for the point."""
         _, at_midpoint, per_half, quadratic, cubic = self.quadrature
-        (a, c, *by_east), (b, d, *by_north) = self._slopes
-        determinant = a * d - b * c
-        if not determinant:
-            return None
         east, north = near
         for _ in range(_ITERATIONS):
+            (a, c, *by_east), (b, d, *by_north) = slopes_at((east, north))
+            determinant = a * d - b * c
+            if not determinant:
+                return None
             left = []
             for whole, (x, y, z), (u, v, w) in zip(recorded, *measured.values(), strict=True):
                 x, y, u, v = x - east, y - north, u - east, v - north

@@ -27,10 +27,11 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.units import format_quantity
 
 RIM_POINTS = 16
+_WIDE = 0.1  # of the nearest slant range; beyond, twice as many
 _LIKE_A_COSINE = 1e-4  # as near to the crest of a cosine; its azimuth is then right to a degree
 _ROUGH = 0.1  # by so much, of itself, a crest through points of the rim may be off
 _CLIMBS = 5  # until then, each in a quarter of the arc before
-_NARROW = 10.0  # of a place's clearance; below, it is looked at whatever its difference
+_NARROW = 10.0  # of a place's clearances; below, it is looked at whatever its difference
 _MIN_SINE = math.sin(math.radians(MIN_GRADIENT_ANGLE_DEG))
 _NEAREST_M = 1.0  # of a platform to a place; nearer, no image
 _FARTHEST = 0.5  # of the nearest slant range: the search for a radius ends there
@@ -87,6 +88,8 @@ class ScenePhases:
             SPEED_OF_LIGHT, mission.radar.wavelength, mission.collection.aperture_time
         )
         self.terms = [self._terms(source) for source in members]
+        self.nearest = min(geometry.transmitter.slant_range, geometry.receiver.slant_range)
+        self.nowhere = Place(self.centre, 0.0, (0.0, 0.0))  # without an image
         self.turn = math.copysign(1.0, full_ground(mission, geometry).gradient_sine)
 
     def geometry_at(self, point: GroundVector) -> BistaticGeometry:
@@ -106,9 +109,13 @@ class ScenePhases:
         """What there is at a point of the ground."""
         there = self.geometry_at(at(radius, azimuth))
         if min(there.transmitter.slant_range, there.receiver.slant_range) < _NEAREST_M:
-            return Place(self.centre, 0.0, 0.0)
+            return self.nowhere
         wavelength, T = self.mission.radar.wavelength, self.mission.collection.aperture_time
-        ground = full_ground(self.mission, there)
+        try:
+            ground = full_ground(self.mission, there)
+            sine = ground.gradient_sine
+        except ZeroDivisionError:  # a gradient vanishes, or both are parallel to the last digit
+            return self.nowhere
         transmitter, receiver = (
             evaluators.full_motion(*(*chain.from_iterable(looks), wavelength, T)) for looks in ground.looks
         )
@@ -117,8 +124,8 @@ class ScenePhases:
             centre if terms is None else sum([of_a_unit[unit] * size for unit, size in terms])
             for terms, centre in zip(self.terms, self.centre, strict=True)
         ]
-        clearance = min(self.turn * ground.gradient_sine / _MIN_SINE, ground.range_gradient / MIN_GROUND_GRADIENT)
-        return Place(phases, self.combined(phases), clearance)
+        clearances = (self.turn * sine / _MIN_SINE, ground.range_gradient / MIN_GROUND_GRADIENT)
+        return Place(phases, self.combined(phases), clearances)
 
     def _terms(self, source: ErrorSource) -> list[tuple[int, float]] | None:
         """An error as unit errors, by their place among those of both platforms and the clock, and how much of each.
@@ -166,43 +173,55 @@ class ScenePhases:
     def rim(self, radius: float) -> "Rim":
         """Evaluate a circle evenly, and around its worst point.
 
-        That is where the difference is largest; and where the clearance is least, if it comes near to 1: a difference
+        That is where the difference is largest; and where a clearance is least, if it comes near to 1: a difference
         grows there as its inverse, in an arc that points of a circle may miss.
         """
-        places = [self.place(radius, 2 * math.pi * k / RIM_POINTS) for k in range(RIM_POINTS)]
+        count = RIM_POINTS if radius <= _WIDE * self.nearest else 2 * RIM_POINTS
+        places = [self.place(radius, 2 * math.pi * k / count) for k in range(count)]
         phases = [place.phases for place in places]
 
         def size_at(azimuth: float) -> float:
             return self.place(radius, azimuth).size
 
-        nearness, azimuth = _highest(
-            [-place.clearance for place in places], lambda azimuth: -self.place(radius, azimuth).clearance, -_NARROW
-        )
+        narrow = []
+        for which in (0, 1):
+
+            def nearness_at(azimuth: float, which: int = which) -> float:
+                return -self.place(radius, azimuth).clearances[which]
+
+            # None is left out: a valley that is milder at the points may be the deeper one between them.
+            narrow += _tops([-place.clearances[which] for place in places], nearness_at, -_NARROW)
+        nearness, azimuth = max(narrow, default=(-math.inf, 0.0))
         if nearness >= -1:
-            return Rim(azimuth % (2 * math.pi), math.inf, phases)
-        largest = _highest([place.size for place in places], size_at)
-        if nearness > -_NARROW:
-            arc = math.pi / RIM_POINTS / 8
+            return Rim(azimuth % (2 * math.pi), math.inf, phases, self.centre)
+        tops = _tops([place.size for place in places], size_at, rough=_ROUGH)
+        arc = math.pi / count / 8
+        for _, azimuth in narrow:
             sides = (size_at(azimuth - arc), size_at(azimuth + arc))
-            largest = max(largest, _climbed(size_at, sides, size_at(azimuth), azimuth, arc))
-        size, azimuth = largest
-        return Rim(azimuth % (2 * math.pi), size, phases)
+            tops.append(_climbed(size_at, sides, size_at(azimuth), azimuth, arc))
+        size, azimuth = max(tops)
+        return Rim(azimuth % (2 * math.pi), size, phases, self.place(radius, azimuth).phases)
 
 
 class Place(NamedTuple):
     """A place of the scene: quadratic phase of each error there, signed; how far they are from the centre's. [rad]
 
-    There is an image where `clearance` is above 1: of the range gradient, and of the sine between it and the Doppler
-    gradient, over the least of both. The sine has the centre's sign: below zero, they are parallel on the way.
+    There is an image where both `clearances` are above 1: the sine between range and Doppler gradient, and the range
+    gradient, over the least of each. The sine has the centre's sign: below zero, they are parallel on the way.
     """
 
     phases: list[float]
     size: float
-    clearance: float
+    clearances: tuple[float, float]
+
+    @property
+    def has_image(self) -> bool:
+        """Whether an image can be formed there."""
+        return min(self.clearances) > 1
 
 
 class Rim(NamedTuple):
-    """A circle about the centre: where the largest difference is, that difference, and phases around it. [rad]
+    """A circle about the centre: where the largest difference is, that difference, phases around it and there. [rad]
 
     Where a part of it has no image the difference is infinite.
     """
@@ -210,27 +229,31 @@ class Rim(NamedTuple):
     azimuth: float
     difference: float
     phases: list[list[float]]
+    worst: list[float]
 
 
-def _highest(
-    heights: Sequence[float], height_at: Callable[[float], float], floor: float = -math.inf
-) -> tuple[float, float]:
-    """Climb from each of the even points of a circle that is above its neighbours and may lead highest.
+def _tops(
+    heights: Sequence[float],
+    height_at: Callable[[float], float],
+    floor: float = -math.inf,
+    rough: float = math.inf,
+) -> list[tuple[float, float]]:
+    """Climb from each of the even points of a circle that is above its neighbours: heights and azimuths of the tops.
 
-    Height and azimuth of the highest place, of those that seem to rise above a floor.
+    Left out are those that do not seem to rise above a floor, or by more than a rough part not to the highest.
     """
     count = len(heights)
     arc = 2 * math.pi / count
-    tops = []
+    starts = []
     for k, height in enumerate(heights):
         sides = (heights[k - 1], heights[(k + 1) % count])
         if height >= max(sides):
-            tops.append((_crest(*sides, height, arc)[1], sides, height, arc * k))
-    highest = (-math.inf, 0.0)
-    for crest, sides, height, azimuth in sorted(tops, reverse=True):
-        if crest > floor and crest + _ROUGH * abs(crest) >= highest[0]:
-            highest = max(highest, _climbed(height_at, sides, height, azimuth, arc))
-    return highest
+            starts.append((_crest(*sides, height, arc)[1], sides, height, arc * k))
+    tops: list[tuple[float, float]] = []
+    for crest, sides, height, azimuth in sorted(starts, reverse=True):
+        if crest > floor and (not tops or crest + rough * abs(crest) >= max(tops)[0]):
+            tops.append(_climbed(height_at, sides, height, azimuth, arc))
+    return tops
 
 
 def _climbed(
@@ -291,7 +314,7 @@ def scene_edge(
     if radius is None or not members:
         return None
     edge = ScenePhases(mission, geometry, members)
-    searched = _FARTHEST * min(geometry.transmitter.slant_range, geometry.receiver.slant_range)
+    searched = _FARTHEST * edge.nearest
     rim = edge.rim(radius)
     if math.isinf(rim.difference):
         reason = f"no image at the scene's edge, azimuth {math.degrees(rim.azimuth):.0f} deg: "
@@ -335,7 +358,7 @@ def _autofocus_radius(edge: ScenePhases, radius: float, rim: Rim, total: float, 
 
 def _size_or_beyond(edge: ScenePhases, azimuth: float, radius: float) -> float:
     place = edge.place(radius, azimuth)
-    return place.size if place.clearance > 1 else math.inf
+    return place.size if place.has_image else math.inf
 
 
 def _where(
@@ -345,6 +368,8 @@ def _where(
     (low, below), (high, above) = inside, outside
     goal = total * (1 - _PRECISION / 2)
     below, above = below - goal, above - goal
+    if below > 0:  # as near as asked for
+        return low, low
     was_inside = None
     while high - low > _PRECISION * high:
         share = 0.5 if math.isinf(above) else below / (below - above)
@@ -387,8 +412,9 @@ def _over_at_the_edge(edge: ScenePhases, allocation: Allocation, rim: Rim) -> st
         if edge.together(edge.centre, indices) > limit * (1 + UTILIZATION_TOLERANCE):
             continue  # its own row says so
         around = [edge.together(there, indices) for there in rim.phases]
-        top = max(range(RIM_POINTS), key=around.__getitem__)
-        _, phase = _crest(around[top - 1], around[(top + 1) % RIM_POINTS], around[top], 2 * math.pi / RIM_POINTS)
+        top, count = max(range(len(around)), key=around.__getitem__), len(around)
+        _, crest = _crest(around[top - 1], around[(top + 1) % count], around[top], 2 * math.pi / count)
+        phase = max(crest, edge.together(rim.worst, indices))
         if phase > limit * (1 + UTILIZATION_TOLERANCE) and phase > worst[1]:
             worst = (name, phase, limit)
     name, phase, limit = worst

@@ -203,7 +203,38 @@ class TestRow:
         edge = ScenePhases(mission, mission.geometry, members)
         assert found.scene.autofocus_radius is not None
         circle = [edge.place(found.scene.autofocus_radius, math.radians(degrees)) for degrees in range(360)]
-        assert min(place.clearance for place in circle) > 1
+        assert all(place.has_image for place in circle)
+
+    @pytest.mark.parametrize(
+        ("transmitter", "receiver"),
+        [
+            # At (2, 0) km the lines of sight cancel on the ground, to the last digit.
+            ([[12e3, 0, 5e3], [0, 150, 0]], [[-8e3, 0, 5e3], [0, 60, 0]]),
+            # A receiver that climbs straight above it: neither line of sight turns there.
+            ([[0, -20e3, 5e3], [0, 0, 0]], [[2e3, 0, 3e3], [0, 0, 10]]),
+        ],
+    )
+    def test_a_place_of_the_edge_without_any_gradient_is_not_evaluated(self, transmitter, receiver) -> None:
+        platforms = {
+            name: {"position": position, "velocity": velocity, "motion_error": {"velocity": 0.005}}
+            for name, (position, velocity) in (("transmitter", transmitter), ("receiver", receiver))
+        }
+        platforms["transmitter"].pop("motion_error")
+        found = row(findings(platforms=platforms, scene={"radius": 2000}), "mission.spatial_variance")
+        assert found.status == "not_evaluated"
+        assert "no image at the scene's edge" in found.reason
+
+    def test_a_narrow_arc_without_an_image_is_not_hidden_by_a_short_range_gradient(self) -> None:
+        """14° around azimuth 125° with gradients parallel to 1°; beside it the range gradient is nearer to 0.02."""
+        velocities = ([223.48, 165.06, 8.766], [40.53, 24.197, 1.0026])
+        positions = ([-903.7, 453.007, 4911.339], [-96.108, -46.558, 4249.289])
+        platforms = {
+            name: {"position": position, "velocity": velocity, "motion_error": {"velocity": 0.0006}}
+            for name, position, velocity in zip(("transmitter", "receiver"), positions, velocities, strict=True)
+        }
+        found = row(findings(platforms=platforms, scene={"radius": 422.9}), "mission.spatial_variance")
+        assert found.status == "not_evaluated"
+        assert "azimuth 125 deg" in found.reason
 
     def test_clock_and_terrain_vary_over_the_scene(self) -> None:
         """A constant clock error moves the image, and so bends it differently at the edge: exact ranges agree."""
@@ -266,15 +297,15 @@ def test_edge_and_radius_are_those_of_a_circle_of_720_places() -> None:
             return [edge.place(radius, math.pi * k / 360) for k in range(720)]
 
         scene = check_mission(mission, TODAY).scene
-        has_image = min(place.clearance for place in circle(scene.radius)) > 1
+        has_image = all(place.has_image for place in circle(scene.radius))
         assert has_image == (not scene.degeneracy), mission
         seen["image" if has_image else "none"] += 1
         if not has_image:
             continue
         assert scene.difference == pytest.approx(max(p.size for p in circle(scene.radius)), rel=2e-3, abs=1e-9)
         served = scene.autofocus_radius or scene.searched
-        assert all(place.clearance > 1 and place.size <= math.pi / 4 for place in circle(0.998 * served))
+        assert all(place.has_image and place.size <= math.pi / 4 for place in circle(0.998 * served))
         if scene.autofocus_radius is not None:
-            assert any(place.clearance <= 1 or place.size > math.pi / 4 for place in circle(1.01 * served))
+            assert any(not place.has_image or place.size > math.pi / 4 for place in circle(1.01 * served))
             seen["served"] += 1
     assert min(seen.values()) >= 3, seen
