@@ -173,6 +173,11 @@ def format_quantity(value: float, unit: str, digits: int = 3, rounding: str = "n
     return text + suffix
 
 
+def format_limit(limit: float, unit: str) -> str:
+    """Write a limit, rounded down; radians without a prefix, for the eye that knows π/4."""
+    return f"{_rounded(limit, 3, 'down')} rad" if unit == "rad" else format_quantity(limit, unit, 3, "down")
+
+
 _SMALL = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 # Nobody says kilometre per second squared, or megametre.
 _STEPS = {

@@ -21,7 +21,7 @@ from bisar_budget.budget.validity import Beyond, FirstOrder, of_members
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.model import Mission
-from bisar_budget.units import format_quantity
+from bisar_budget.units import format_limit, format_quantity
 
 NO_REQUIREMENT = "no requirement in the file: computed, not judged"
 
@@ -49,7 +49,7 @@ def aggregate_rows(
     if cubic_limit is not None and other is not None and motion:
         cubic = combined_phase(motion, "cubic", other, combine, groups)
         if cubic > cubic_limit * (1 + UTILIZATION_TOLERANCE):
-            cubic_doubt = f"the {other} model says fail: {cubic:.3g} rad, {cubic_limit:.3g} rad allowed"
+            cubic_doubt = f"the {other} model says fail: {cubic:.3g} rad, {format_limit(cubic_limit, 'rad')} allowed"
     found = first_order.found
     cubic_notes: tuple[str, ...] = ()
     if found and motion:
@@ -128,7 +128,9 @@ def aggregate_rows(
             pull_in_notes, pull_in_doubt = of_members(found, declared, by_exact, pull_in, "rad")
         by_other = math.fsum(abs(s.qpe(other)) for s in declared) if other is not None else 0.0
         if by_other > pull_in * (1 + UTILIZATION_TOLERANCE):
-            pull_in_doubt = f"the {other} model says beyond it: QPE {by_other:.3g} rad, {pull_in:.3g} rad allowed"
+            pull_in_doubt = (
+                f"the {other} model says beyond it: QPE {by_other:.3g} rad, {format_limit(pull_in, 'rad')} allowed"
+            )
         yield judged(
             mission,
             id="mission.autofocus_pull_in",
@@ -161,7 +163,7 @@ def _location_doubt(
     moved = combined_displacement(known, mission.allocation.combine, groups)
     if moved <= limit * (1 + UTILIZATION_TOLERANCE):
         return ""
-    return f"the {other} model says fail: {_said(moved, 'm')}, {_said(limit, 'm', 'down')} allowed"
+    return f"the {other} model says fail: {_said(moved, 'm')}, {format_limit(limit, 'm')} allowed"
 
 
 def _qpe_aggregates(
@@ -192,7 +194,7 @@ def _qpe_aggregates(
         other = {"published": ("full", full), "full": ("published", published)}.get(model)
         doubt = ""
         if other is not None and other[1] is not None and other[1] > limit * (1 + UTILIZATION_TOLERANCE):
-            doubt = f"the {other[0]} model says fail: {other[1]:.3g} rad, {limit:.3g} rad allowed"
+            doubt = f"the {other[0]} model says fail: {other[1]:.3g} rad, {format_limit(limit, 'rad')} allowed"
         exact_notes: tuple[str, ...] = ()
         exact_doubt = ""
         if first_order.found:
@@ -236,13 +238,13 @@ def _exceeded(
     if size is None or limit is None or size <= limit:
         return ""
     row_id, largest = max(members(), key=lambda member: abs(member[1]))
-    allowed = f"{_said(size, unit)}, {_said(limit, unit, 'down')} allowed"
+    allowed = f"{_said(size, unit)}, {format_limit(limit, unit)} allowed"
     return f"{what} {allowed}; largest: {row_id}, {_said(abs(largest), unit)}"
 
 
-def _said(size: float, unit: str, rounding: str = "nearest") -> str:
+def _said(size: float, unit: str) -> str:
     """Metres with a prefix, as everywhere; phases in radians, to be compared with π/4."""
-    return format_quantity(size, unit, 3, rounding) if unit == "m" else f"{size:.3g} {unit}"
+    return format_quantity(size, unit) if unit == "m" else f"{size:.3g} {unit}"
 
 
 def _moved_exactly(source: ErrorSource, found: Mapping[str, Beyond], plane: ImagePlane) -> GroundVector:

@@ -17,6 +17,7 @@ from bisar_budget.budget.validity import FirstOrder, collection_notes
 from bisar_budget.budget.waivers import apply_waivers
 from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
 from bisar_budget.mission.model import Mission
+from bisar_budget.units import format_limit
 
 if TYPE_CHECKING:
     from bisar_budget.budget.scene import SceneEdge
@@ -126,7 +127,7 @@ def _error_rows(
             needed = allocation.n_pull_needed(qpe, source.owner)
             of_model = source.equation_by(model)
             over = (
-                f"QPE {qpe:.3g} rad, {limit:.3g} rad allowed ({of_model}); "
+                f"QPE {qpe:.3g} rad, {format_limit(limit, 'rad')} allowed ({of_model}); "
                 f"passes with autofocus from n_pull {needed:g}"
             )
         utilization, margin, status, reason, notes = judgement(
@@ -189,10 +190,11 @@ def _doubt(source: ErrorSource, model: str, limit: float, ground: FullGround) ->
             cause = "the displaced response has a quadratic phase of its own"
         else:
             cause = "at a squint the range is not constant"
-        return f"the full model says fail: QPE {qpe:.3g} rad, {limit:.3g} rad allowed; {cause}"
+        return f"the full model says fail: QPE {qpe:.3g} rad, {format_limit(limit, 'rad')} allowed; {cause}"
     qpe = abs(source.qpe("published"))
     if model == "full" and qpe > limit * (1 + UTILIZATION_TOLERANCE):
-        return f"the published model says fail: QPE {qpe:.3g} rad, {limit:.3g} rad allowed ({source.equation})"
+        allowed = f"{format_limit(limit, 'rad')} allowed ({source.equation})"
+        return f"the published model says fail: QPE {qpe:.3g} rad, {allowed}"
     return ""
 
 
@@ -278,7 +280,7 @@ def _scene_row(
     if edge is not None and not edge.degeneracy:
         difference, doubt, notes = edge.difference, edge.doubt, edge.notes(total)
         if is_published and difference > total * (1 + UTILIZATION_TOLERANCE):
-            doubt = f"the full model says fail: {difference:.3g} rad, {total:.3g} rad allowed"
+            doubt = f"the full model says fail: {difference:.3g} rad, {format_limit(total, 'rad')} allowed"
     row = judged(
         mission,
         id="mission.spatial_variance",

@@ -24,7 +24,7 @@ from bisar_budget.budget.effects import MOTION_UNITS, PLATFORMS, ErrorSource, fu
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT, SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
 from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState
 from bisar_budget.mission.model import Mission
-from bisar_budget.units import format_quantity
+from bisar_budget.units import format_limit, format_quantity
 
 RIM_POINTS = 16
 _WIDE = 0.1  # of the nearest slant range; beyond, twice as many
@@ -65,7 +65,7 @@ class SceneEdge(NamedTuple):
         return (
             f"largest between the centre and azimuth {math.degrees(self.azimuth):.0f} deg, "
             f"{format_quantity(self.radius, 'm')} away",
-            f"one autofocus correction serves {self.served}, by the total of {total:.3g} rad",
+            f"one autofocus correction serves {self.served}, by the total of {format_limit(total, 'rad')}",
         )
 
     @property
@@ -418,4 +418,4 @@ def _over_at_the_edge(edge: ScenePhases, allocation: Allocation, rim: Rim) -> st
         if phase > limit * (1 + UTILIZATION_TOLERANCE) and phase > worst[1]:
             worst = (name, phase, limit)
     name, phase, limit = worst
-    return f"{name} is {phase:.3g} rad at the scene's edge, {limit:.3g} rad allowed" if name else ""
+    return f"{name} is {phase:.3g} rad at the scene's edge, {format_limit(limit, 'rad')} allowed" if name else ""

@@ -18,7 +18,7 @@ from bisar_budget.budget.second_order import SecondOrder
 from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
 from bisar_budget.geometry import STRAIGHT, BistaticGeometry, GroundVector, norm
 from bisar_budget.mission.model import Mission
-from bisar_budget.units import format_quantity
+from bisar_budget.units import format_limit, format_quantity
 
 FLOOR_RAD = 0.02
 FLOOR_M = 0.1  # of displacement, a fifth of a resolution cell
@@ -64,7 +64,7 @@ class Beyond(NamedTuple):
         if self.exact is None:
             return self.against(qpe_full)
         is_over = abs(self.qpe) > limit * (1 + UTILIZATION_TOLERANCE)
-        return f"{self.against(qpe_full)}, {limit:.3g} rad allowed" if is_over else ""
+        return f"{self.against(qpe_full)}, {format_limit(limit, 'rad')} allowed" if is_over else ""
 
 
 class FirstOrder:

@@ -3,6 +3,7 @@
 from bisar_budget.budget.findings import READING, FileWarning, MissionFindings, Row
 from bisar_budget.budget.images import Verdict, VerifiedMission
 from bisar_budget.constants import UTILIZATION_TOLERANCE
+from bisar_budget.units import format_limit
 
 _SHOWN = 4  # rows of a mission
 _RANK = {status: index for index, status in enumerate(READING)}
@@ -70,7 +71,8 @@ def _shown(verdict: Verdict) -> str:
     if verdict.measured_db is not None:
         return f"the image shows {verdict.measured_db:.1f} dB at it"
     if verdict.measured_qpe_rad is not None and verdict.budget_rad is not None:
-        return f"the image shows {verdict.measured_qpe_rad:.3g} rad at it, the budget is {verdict.budget_rad:.3g} rad"
+        budget = format_limit(verdict.budget_rad, "rad")
+        return f"the image shows {verdict.measured_qpe_rad:.3g} rad at it, the budget is {budget}"
     return verdict.reason or "the image shows more than it promises"
 
 

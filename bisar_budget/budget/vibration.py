@@ -23,7 +23,7 @@ from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.errors import KeyPath
 from bisar_budget.geometry import FRAME_AXES, PlatformState, Vector, dot, without_rounding
 from bisar_budget.mission.model import Mission, MotionError, Sinusoid
-from bisar_budget.units import format_quantity
+from bisar_budget.units import format_limit, format_quantity
 
 ECHO_CYCLES = 3.0  # per aperture; below, echoes lie beside the mainlobe and the motion is a quadratic phase as well
 
@@ -267,7 +267,7 @@ def _line(
         return case._replace(notes=(*notes, *together.notes), doubt=case.doubt or together.doubt)
     qpe, cubic = phase * quadratic_part(cycles), phase * cubic_part(cycles)
     limit = allocation.qpe_limit(name) * allocation.autofocus_gain
-    worst = f"in the worst phase a quadratic phase error of {qpe:.3g} rad, {limit:.3g} rad allowed"
+    worst = f"in the worst phase a quadratic phase error of {qpe:.3g} rad, {format_limit(limit, 'rad')} allowed"
     if cycles < 1:
         slow = (
             f"{cycles:.2g} cycles per aperture: slower than one it makes no echoes, but {worst}, or a cubic of "
@@ -277,7 +277,7 @@ def _line(
     or_cubic = f"or a cubic of {cubic:.3g} rad"
     allowed_cubic = mission.requirements.cubic_phase_error
     if allowed_cubic is not None:
-        or_cubic += f", {allowed_cubic:.3g} rad allowed"
+        or_cubic += f", {format_limit(allowed_cubic, 'rad')} allowed"
     notes.append(
         f"{cycles:.3g} cycles per aperture: below three it also is {worst}, {or_cubic}; the same motion, in no sum"
     )

@@ -234,7 +234,7 @@ def check(
         if says_faults:
             _say_faults(report.missions)
         for path, its_format in written:
-            _write_report(path, its_format, report, style._replace(color=False))
+            _write_report(path, its_format, report, style._replace(color=False, verbosity=max(style.verbosity, 0)))
         if output is None:
             print_text(render(format_name, report, style))
         else:

@@ -42,6 +42,8 @@ def expand(patterns: Iterable[str]) -> list[str]:
     """Expand the glob patterns that the shell left; a pattern without a match stays and fails to load."""
     files: list[str] = []
     for pattern in patterns:
+        if not pattern:
+            raise click.UsageError("the name of a file is empty.")
         if pattern != "-" and any(char in pattern for char in "*?[") and not os.path.exists(pattern):
             from glob import glob
 

@@ -41,7 +41,9 @@ def load_mission(path: str, model: str | None = None) -> Mission:
                 data = _bounded(file)
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         reason = getattr(error, "strerror", None) or str(error)
-        raise MissionError(path, (_file_fault(f"cannot be read: {reason}"),)) from None
+        is_pattern = isinstance(error, FileNotFoundError) and any(char in path for char in "*?[")
+        problem = "is no file, and as a pattern matches none" if is_pattern else f"cannot be read: {reason}"
+        raise MissionError(path, (_file_fault(problem),)) from None
     try:
         return parse_mission(data, path, model)
     except MissionError as error:

@@ -17,6 +17,7 @@ from bisar_budget.units import Dimension, format_quantity, parse_quantity
 INVALID: Any = object()  # in place of a value that was reported
 Report = Callable[[KeyPath, Problem], None]
 
+_POINT = "A decimal is written with a point, a comma separates"
 _MAX_TEXT = 500  # characters
 _MAX_ENTRIES = 1000  # of a list
 # Controls, line separators, lone surrogates, byte order mark, and the marks that turn the reading direction.
@@ -84,7 +85,22 @@ class Quantity(Reader):
             )
             if not holds
         )
-        raise InvalidValueError(f"must be {words} {format_quantity(bound, self.dimension.si)}")
+        raise InvalidValueError(
+            f"must be {words} {format_quantity(bound, self.dimension.si)}", hint=self._meant(value)
+        )
+
+    def _meant(self, value: Any) -> str:
+        """Hint at the unit that a bare number may lack."""
+        text = str(value).strip()
+        if not text or not text[-1].isdigit():
+            return ""
+        for unit in ("deg", "%"):
+            if unit in self.dimension.units:
+                try:
+                    return f"Did you mean {text} {unit}?" if self.leaf(f"{text} {unit}") is not None else ""
+                except InvalidValueError:
+                    return ""
+        return f"A bare number is in {self.dimension.si}" if self.dimension.si not in ("", "dB") else ""
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Text with a unit, or a bare number."""
@@ -105,7 +121,8 @@ class Triple(Reader):
             return one if one is INVALID else (one, one, one)
         if not isinstance(value, list) or len(value) != 3:
             given = f", {len(value)} given" if isinstance(value, list) else ""
-            report(path, Problem(f"must be three components{given}", "accepted: [a, b, c]"))
+            hint = _POINT if isinstance(value, list) and len(value) > 3 else ""
+            report(path, Problem(f"must be three components{given}", "accepted: [a, b, c]", hint))
             return INVALID
         parts = tuple([_read(self.component, part, (*path, index), report) for index, part in enumerate(value)])
         return INVALID if INVALID in parts else parts
@@ -255,7 +272,7 @@ class Section(Reader):
             key = self.keys.get(name)
             if key is None:
                 known = f"accepted: {', '.join(self.keys)}"
-                hint = did_you_mean(name, tuple(self.keys))
+                hint = _POINT if name[:1].isdigit() else did_you_mean(name, tuple(self.keys))
                 report((*path, name), Problem("is not a known key", known, hint))
                 is_valid = False
                 continue

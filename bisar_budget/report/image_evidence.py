@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from bisar_budget.budget.images import FLOOR_DB, ImageEvidence, PointImage, Verdict
 from bisar_budget.report.svg import Box, Canvas, Point, axis_number, round_step, ticks
-from bisar_budget.units import format_quantity
+from bisar_budget.units import format_limit, format_quantity
 
 _WIDTH, _HEIGHT = 520.0, 190.0  # px, of the drawing and of one panel
 _AXIS, _EDGE = (46.0, 34.0), 8.0  # px, beside and below a panel for its axes; elsewhere
@@ -111,18 +111,18 @@ def _chunk(kind: bytes, content: bytes) -> bytes:
 
 
 def _at_limit(verdict: Verdict) -> str:
-    limit = format_quantity(verdict.boundary_error, verdict.unit)
+    limit = format_limit(verdict.boundary_error, verdict.unit)
     return (
         f"At the limit, {limit}: predicted {_phase(verdict.predicted_qpe_rad)}, measured "
-        f"{_phase(verdict.measured_qpe_rad)}, budget {_phase(verdict.budget_rad)}"
+        f"{_phase(verdict.measured_qpe_rad)}, budget {format_limit(verdict.budget_rad or 0.0, 'rad')}"
     )
 
 
 def _with_autofocus(verdict: Verdict) -> str:
-    limit = format_quantity(verdict.boundary_autofocus or 0.0, verdict.unit)
+    limit = format_limit(verdict.boundary_autofocus or 0.0, verdict.unit)
     return (
         f"At the limit with autofocus, {limit}: {_phase(verdict.measured_residual_qpe_rad)} left, "
-        f"budget {_phase(verdict.budget_rad)}"
+        f"budget {format_limit(verdict.budget_rad or 0.0, 'rad')}"
     )
 
 

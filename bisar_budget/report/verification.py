@@ -8,7 +8,7 @@ from bisar_budget.budget.images import Verdict, VerifiedMission
 from bisar_budget.errors import printable
 from bisar_budget.report import Style
 from bisar_budget.report.layout import table, wrapped, wrapped_counts
-from bisar_budget.units import format_quantity
+from bisar_budget.units import format_limit, format_quantity
 
 FORMAT = "bisar-budget/verify/1"
 WORDS = {
@@ -127,7 +127,7 @@ def _smaller(row: Verdict) -> float | None:
 
 def limit(row: Verdict) -> str:
     """The error that the image was formed with."""
-    return format_quantity(row.boundary_error, row.unit)
+    return format_limit(row.boundary_error, row.unit)
 
 
 def numbers(row: Verdict) -> tuple[str, str, str, str, str]:
@@ -140,24 +140,24 @@ def numbers(row: Verdict) -> tuple[str, str, str, str, str]:
         return limit(row), "-", "-", exact, image
     if row.measured_cubic_rad is not None:
         cubic = (_phase(row.predicted_cubic_rad), _phase(row.measured_cubic_rad))
-        return _phase(row.budget_rad), "-", "-", *cubic
+        return _budget(row), "-", "-", *cubic
     by_model = (_phase(row.published_qpe_rad), _phase(row.full_qpe_rad))
-    return _phase(row.budget_rad), *by_model, _phase(row.predicted_qpe_rad), _phase(row.measured_qpe_rad)
+    return _budget(row), *by_model, _phase(row.predicted_qpe_rad), _phase(row.measured_qpe_rad)
+
+
+def _budget(row: Verdict) -> str:
+    return "-" if row.budget_rad is None else format_limit(row.budget_rad, "rad").removesuffix(" rad")
 
 
 def refocused_cells(row: Verdict) -> tuple[str, str, str, str, str]:
     """Limit with autofocus, budget, residual phase, loss of the refocused peak, verdict."""
     return (
-        _quantity(row.boundary_autofocus, row.unit),
-        _phase(row.budget_rad),
+        "-" if row.boundary_autofocus is None else format_limit(row.boundary_autofocus, row.unit),
+        _budget(row),
         _phase(row.measured_residual_qpe_rad),
         _decibel(row.refocused_loss_db),
         WORDS[row.verdict_autofocus or "not_evaluated"],
     )
-
-
-def _quantity(value: float | None, unit: str) -> str:
-    return "-" if value is None else format_quantity(value, unit)
 
 
 def _phase(value: float | None) -> str:

@@ -24,7 +24,7 @@ from bisar_budget.simulate.exact import ExactEffect
 from bisar_budget.simulate.impulse_response import impulse_response, quadratic_phase_error
 from bisar_budget.simulate.phase_history import MotionError
 from bisar_budget.simulate.shift import measured_shift
-from bisar_budget.units import format_quantity
+from bisar_budget.units import format_limit, format_quantity
 
 TOLERANCE = 0.05  # of the budget: nearer than this a limit is confirmed
 INSIDE, BEYOND = 0.9, 1.1  # of the limit: the phase on both sides shows that the limit is the limit
@@ -329,7 +329,9 @@ class Study:
             "measured_residual_qpe_rad": residual,
             "refocused_loss_db": loss,
             "verdict_autofocus": "confirmed" if is_met else "optimistic",
-            "reason_autofocus": None if is_met else f"autofocus leaves {residual:.3g} of {budget:.3g} rad",
+            "reason_autofocus": None
+            if is_met
+            else f"autofocus leaves {residual:.3g} rad, {format_limit(budget, 'rad')} allowed",
         }
 
     def _pull_in(self, n_pull: float) -> Verdict:

@@ -665,7 +665,7 @@ class TestAggregatesThatFail:
     def test_quadratic_phase(self) -> None:
         """v_y·ṽ_y/R: 40·0.06/8718 m/s² over 3 s of half aperture, 2π/λ: 0.519 rad; ã_x/2·x/R: 0.0649 rad."""
         reason = self.reason("receiver.quadratic_phase_error", allocation__combine="sum")
-        assert reason.startswith("QPE 0.584 rad, 0.393 rad allowed; largest: receiver.velocity.y, 0.519 rad; passes")
+        assert reason.startswith("QPE 0.584 rad, 0.392 rad allowed; largest: receiver.velocity.y, 0.519 rad; passes")
 
     def test_location(self) -> None:
         reason = self.reason("mission.location_error", requirements__location_error=1)

@@ -13,6 +13,7 @@ from bisar_budget.budget.check import check_mission
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import MotionError, Sinusoid
+from bisar_budget.units import format_limit
 from tests.conftest import TODAY, findings, mission_text, row
 
 LAMBDA = 299_792_458 / 10e9
@@ -282,7 +283,7 @@ def test_a_slow_vibration_that_breaks_the_cubic_requirement_is_a_warning(allowed
     )
     assert found.status == status
     text = found.reason if status == "warn" else found.notes[-1]
-    assert f"or a cubic of {phase:.3g} rad, {allowed * phase:.3g} rad allowed" in text
+    assert f"or a cubic of {phase:.3g} rad, {format_limit(allowed * phase, 'rad')} allowed" in text
 
 
 def test_rules_that_agree_are_not_said_to_be_0_db_apart() -> None:
