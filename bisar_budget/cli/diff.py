@@ -78,8 +78,8 @@ def diff(
     Compares two mission files, or each with itself in a git revision.
 
     Rows are sorted by erosion: the part of what was left of a limit that the change uses up, (u2 - u1)/(1 - u1)
-    with the utilizations before and after. Exit code: 0, or 1 with --fail-on-erosion, 2 for wrong usage,
-    an unusable file or an unknown revision.
+    with the utilizations before and after; for a row that had nothing left, u2/u1 - 1. Exit code: 0, or 1 with
+    --fail-on-erosion, 2 for wrong usage, an unusable file or an unknown revision.
     """
     from bisar_budget.budget.check import check_mission
     from bisar_budget.errors import MissionError

@@ -19,7 +19,8 @@ from bisar_budget.cli.verify import progress_bar
 def simulate(mission: str, plot: str | None, output: str | None) -> None:
     """Form the image of a point with the declared errors.
 
-    The data come from exact ranges; the image is formed where the errors move the point, in the scene's
+    All errors of the file together, with its signs, are flown once: they may cancel, and the worst case is that
+    of `check`. The data come from exact ranges; the image is formed where the errors move the point, in the scene's
     axes and rotated so that the smear lies in cross range, before and after phase gradient autofocus.
     """
     for name, suffixes in ((plot, (".png", ".svg", ".pdf")), (output, (".npz",))):
@@ -47,4 +48,4 @@ def simulate(mission: str, plot: str | None, output: str | None) -> None:
             point_plot.draw(images, loaded.name, plot)
     except OSError as error:
         fail(f"cannot write {error.filename}: {error.strerror}")
-    print_text(point_plot.summary(images, loaded.name))
+    print_text(point_plot.summary(images, loaded))

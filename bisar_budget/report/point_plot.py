@@ -4,6 +4,9 @@ from typing import Any
 
 import numpy as np
 
+from bisar_budget.budget.effects import PLATFORMS
+from bisar_budget.mission.model import Mission
+from bisar_budget.report.layout import wrapped
 from bisar_budget.simulate.point import PointImages
 
 _FLOOR_DB = -35.0
@@ -50,13 +53,25 @@ def save(images: PointImages, path: str) -> None:
     )
 
 
-def summary(images: PointImages, title: str) -> str:
+def _flown(mission: Mission) -> str:
+    factor = mission.allocation.coverage_factor
+    times = f", {factor:g} times the file's values" if factor != 1 else ""
+    errors = (getattr(mission.platforms, name).motion_error for name in PLATFORMS)
+    likely = "; of a covariance its most probable one" if any(error.covariance for error in errors) else ""
+    return (
+        f"the declared ones together, with the signs of the file{times}{likely}. Some may cancel: the worst case is "
+        "that of check"
+    )
+
+
+def summary(images: PointImages, mission: Mission) -> str:
     """Say in a few lines what the errors do to the point and what autofocus brings back."""
     clean = images.clean_response
     east, north = (round(float(moved), 3) for moved in images.effect.displacement)
     lines = [
-        title,
+        mission.name,
         "",
+        *wrapped(f"errors         {_flown(mission)}", " " * 15),
         f"displacement   {east + 0.0:.3f} m east, {north + 0.0:.3f} m north",
         f"phase          quadratic {abs(images.effect.quadratic):.2f} rad, cubic {abs(images.effect.cubic):.2f} rad",
         "",
