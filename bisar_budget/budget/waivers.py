@@ -50,6 +50,10 @@ def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> tuple[l
                 result[position] = row._replace(status="waived", notes=(*row.notes, words))
         if not named:
             warnings.append(FileWarning(line=line, message=f"waiver {waiver.id}: matches no row"))
+        elif len(named) == len(rows):
+            warnings.append(
+                FileWarning(line=line, message=f"waiver {waiver.id}: names every row, whatever fails next")
+            )
         elif not failing:
             warnings.append(FileWarning(line=line, message=f"waiver {waiver.id}: unused, no row it names fails"))
     return result, warnings

@@ -553,7 +553,8 @@ def _sources(rows: Sequence[Row]) -> tuple[Source, ...]:
 def _evidence(found: MissionFindings) -> Iterator[Evidence]:
     for verdict in found.verdicts or ():
         limit, numbers = verification.limit(verdict), verification.numbers(verdict)
-        refocused = verification.refocused_cells(verdict) if verdict.verdict_autofocus else ()
+        by_autofocus = verdict.verdict_autofocus
+        refocused = (*verification.refocused_cells(verdict)[:4], by_autofocus) if by_autofocus else ()
         with_autofocus = verdict.reason_autofocus and f"with autofocus: {verdict.reason_autofocus}"
         reasons = tuple(reason for reason in (verdict.reason, with_autofocus) if reason)
         yield Evidence(verdict.id, limit, *numbers, verdict.verdict, refocused, reasons)

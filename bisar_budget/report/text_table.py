@@ -67,7 +67,9 @@ def _unusable(mission: UnusableMission, style: Style) -> list[str]:
 
 def _mission(mission: MissionFindings, style: Style) -> list[str]:
     if style.verbosity < 0:
-        return [_lead(_summary(mission), mission.status, style)]
+        count = len(mission.warnings)
+        warned = f"; {count} warning{'s' if count != 1 else ''} about the file" if count else ""
+        return [_lead(_summary(mission) + warned, mission.status, style)]
     lines = [*wrapped(mission.name, "  "), ""]
     lines += [line for key, text in head(mission) for line in wrapped(f"{key:<12} {text}", " " * 13)]
     rows = worst_first(mission.rows)

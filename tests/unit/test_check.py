@@ -473,9 +473,14 @@ class TestWaivers:
         assert row(self.waived("2027-01-01", glob), "transmitter.velocity.y").status == "waived"
 
     def test_a_waiver_changes_only_what_fails(self) -> None:
-        found = self.waived("2027-01-01", "*")
+        found = self.waived("2027-01-01", "transmitter.*")
         assert row(found, "transmitter.velocity.x").status == "pass"
         assert not found.warnings
+
+    @pytest.mark.parametrize("glob", ["*", "*.*", "?*"])
+    def test_a_waiver_of_everything_is_warned_of(self, glob: str) -> None:
+        (warning,) = self.waived("2027-01-01", glob).warnings
+        assert "names every row" in warning.message
 
     @pytest.mark.parametrize(
         ("glob", "says"), [("transmiter.*", "matches no row"), ("receiver.*", "unused, no row it names fails")]

@@ -370,3 +370,18 @@ def test_shells_complete_commands_options_and_files(words: str, offered: str) ->
         [sys.executable, "-c", program], capture_output=True, text=True, env=environment, check=False
     )
     assert done.stdout.split() == [offered], done.stderr
+
+
+def test_quiet_counts_the_warnings_about_a_file(run, tmp_path) -> None:
+    """They gate nothing, but a line that says pass does not hide them."""
+    file = tmp_path / "silent.yaml"
+    file.write_text(mission_text())
+    result = run("check", "-q", file)
+    assert result.exit_code == 0
+    assert result.stdout.splitlines()[0].endswith("; 1 warning about the file")
+
+
+def test_quiet_does_not_shorten_a_report_beside_it(run, failing, tmp_path) -> None:
+    report = tmp_path / "report.txt"
+    run("check", "-q", failing, "--report", report)
+    assert "allowable" in report.read_text(encoding="utf-8")
