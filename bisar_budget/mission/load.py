@@ -7,6 +7,7 @@ every scalar stays the text that stands in the file: YAML 1.1 would read `9.6e9`
 
 import sys
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any, BinaryIO, cast
 
 import yaml
@@ -177,12 +178,38 @@ class _Tree:
             value = self._mapping(next_event, path)
         else:
             value = []
+            items: list[Any] = []
             while type(item := next_event()) is not yaml.SequenceEndEvent:
+                items.append(item)
                 value.append(self._node(next_event, item, (*path, len(value))))
+            if event.flow_style:
+                self._decimal_commas(items, path)
         if event.tag is not None and event.tag != "!":
             self.fault(mark, path, "carries a YAML tag", given=_shown(event.tag), accepted="plain values")
             return INVALID
         return value
+
+    def _decimal_commas(self, items: list[Any], path: KeyPath) -> None:
+        """Refuse `[0,5 m, 1 m, 2 m]` and `[0,5 m, 1 m]`, which YAML reads as four values and as three.
+
+        Told by the blank that other commas of the list have behind them.
+        """
+        commas = []
+        for index, (before, item) in enumerate(pairwise(items), start=1):
+            if all(type(one) is ScalarEvent for one in (before, item)):
+                is_tight = item.start_mark.column - before.end_mark.column == 1
+                commas.append((index, is_tight, before, item))
+        if all(is_tight for _, is_tight, _, _ in commas):
+            return
+        for index, is_tight, before, item in commas:
+            has_unit = any(char.isalpha() and char not in "eE" for char in item.value)
+            if is_tight and has_unit and before.value.lstrip("+-").isdigit() and item.value[:1].isdigit():
+                given = _shown(f"{before.value},{item.value}")
+                problem, accepted = (
+                    "may be half of a number with a decimal comma",
+                    "a point, or a blank behind commas",
+                )
+                self.fault(item.start_mark, (*path, index), problem, given=given, accepted=accepted)
 
     def _mapping(self, next_event: Callable[[], Any], path: KeyPath) -> dict[str, Any]:
         mapping: dict[str, Any] = {}

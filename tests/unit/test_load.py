@@ -235,3 +235,30 @@ def test_any_value_anywhere(key: str, value, place) -> None:
 
 def test_recursion_limit_is_far_away() -> None:
     assert sys.getrecursionlimit() > load.MAX_DEPTH * 10
+
+
+@pytest.mark.parametrize(
+    ("value", "is_refused"),
+    [
+        ("[0,5 mm/s, 3 mm/s]", True),
+        ("[0,5 mm/s, 3 mm/s, 1 mm/s]", True),
+        ("[1 mm/s, -2,5 mm/s, 0]", True),
+        ("[0,5 mm/s,3 mm/s]", False),
+        ("[0, 5 mm/s, 3 mm/s]", False),
+        ("[0,0, 0]", False),
+        ("[0,1e-3, 0]", False),
+        ("[0.5 mm/s, 5 mm/s, 3 mm/s]", False),
+    ],
+)
+def test_a_decimal_comma_in_a_list_is_refused(value: str, is_refused: bool) -> None:
+    """Three components to YAML, the first of them 0; where no comma has a blank behind it, nobody can tell."""
+    text = mission_text().replace("platforms:", "platforms:", 1)
+    data = yaml.safe_load(text)
+    data["platforms"]["transmitter"]["motion_error"] = {"velocity": "VALUE"}
+    text = yaml.safe_dump(data).replace("VALUE", value)
+    if not is_refused:
+        assert parse_mission(text).platforms.transmitter.motion_error.velocity is not None
+        return
+    with pytest.raises(MissionError) as error:
+        parse_mission(text)
+    assert any("decimal comma" in fault.problem and "velocity" in fault.key for fault in error.value.faults)
