@@ -236,11 +236,12 @@ def _tops(
     heights: Sequence[float],
     height_at: Callable[[float], float],
     floor: float = -math.inf,
-    rough: float = math.inf,
+    rough: float | None = None,
 ) -> list[tuple[float, float]]:
     """Climb from each of the even points of a circle that is above its neighbours: heights and azimuths of the tops.
 
-    Left out are those that do not seem to rise above a floor, or by more than a rough part not to the highest.
+    Left out are those that do not seem to rise above a floor and, given a part by which that may be off, those that
+    seem to stay below the highest by more.
     """
     count = len(heights)
     arc = 2 * math.pi / count
@@ -251,7 +252,7 @@ def _tops(
             starts.append((_crest(*sides, height, arc)[1], sides, height, arc * k))
     tops: list[tuple[float, float]] = []
     for crest, sides, height, azimuth in sorted(starts, reverse=True):
-        if crest > floor and (not tops or crest + rough * abs(crest) >= max(tops)[0]):
+        if crest > floor and (rough is None or not tops or crest + rough * abs(crest) >= max(tops)[0]):
             tops.append(_climbed(height_at, sides, height, azimuth, arc))
     return tops
 

@@ -385,3 +385,9 @@ def test_quiet_does_not_shorten_a_report_beside_it(run, failing, tmp_path) -> No
     report = tmp_path / "report.txt"
     run("check", "-q", failing, "--report", report)
     assert "allowable" in report.read_text(encoding="utf-8")
+
+
+def test_a_name_that_is_empty_is_refused(run) -> None:
+    result = run("check", "")
+    assert result.exit_code == 2
+    assert "the name of a file is empty" in result.stderr

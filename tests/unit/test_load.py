@@ -262,3 +262,50 @@ def test_a_decimal_comma_in_a_list_is_refused(value: str, is_refused: bool) -> N
     with pytest.raises(MissionError) as error:
         parse_mission(text)
     assert any("decimal comma" in fault.problem and "velocity" in fault.key for fault in error.value.faults)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "hint"),
+    [
+        ("requirements__quadratic_phase_error", "360 deg", None),
+        ("requirements__quadratic_phase_error", "361 deg", ""),
+        ("requirements__quadratic_phase_error", "45", "Did you mean 45 deg?"),
+        ("requirements__cubic_phase_error", "6.28", None),
+        ("requirements__cubic_phase_error", "6.29", "Did you mean 6.29 deg?"),
+        ("allocation__warn_above", "1", None),
+        ("allocation__warn_above", "80", "Did you mean 80 %?"),
+        ("radar__center_frequency", "9.6", "A bare number is in Hz"),
+        ("radar__center_frequency", "9.6 GHz", None),
+    ],
+)
+def test_a_number_out_of_bounds_is_asked_for_its_unit(key: str, value: str, hint: str | None) -> None:
+    """A turn at the aperture edge is the most that a phase may be required to be; both sides of it."""
+    text = mission_text(**{key: value})
+    if hint is None:
+        parse_mission(text)
+        return
+    (fault,) = faults_of(text).faults
+    assert fault.hint == hint
+
+
+@pytest.mark.parametrize(("azimuth", "is_refused"), [("360 deg", False), ("-360 deg", False), ("361 deg", True)])
+def test_a_direction_is_within_a_turn(azimuth: str, is_refused: bool) -> None:
+    platform = {
+        "slant_range": "9 km",
+        "azimuth": azimuth,
+        "elevation": "15 deg",
+        "speed": "60 m/s",
+        "motion_azimuth": "90 deg",
+    }
+    text = mission_text(platforms__receiver=platform)
+    if is_refused:
+        assert [fault.key for fault in faults_of(text).faults] == ["platforms.receiver.azimuth"]
+    else:
+        parse_mission(text)
+
+
+def test_decimal_commas_are_told() -> None:
+    error = faults_of(mission_text().replace("center_frequency: 10 GHz", "center_frequency: 9,6 GHz"))
+    assert error.faults  # `9,6 GHz` is no number in a block; in a mapping it is a key
+    text = "schema_version: 1\nname: x\nradar: {center_frequency: 9,6 GHz, bandwidth: 1 MHz}\n"
+    assert any("written with a point" in fault.hint for fault in faults_of(text).faults)

@@ -91,6 +91,34 @@ def test_clock_and_terrain_in_exact_ranges() -> None:
     assert found.quadratic == pytest.approx(quadratic, abs=1e-4)
 
 
+def test_a_point_that_the_centre_s_slopes_do_not_find_is_found_with_its_own() -> None:
+    """Gradients 3.4° apart, 190 m away: with fixed slopes the search ran off, and no point was said to have it."""
+    transmitter = {
+        "position": [788.131, -4136.845, 4464.006],
+        "velocity": [-21.67, 2.61710, 1.54785],
+        "acceleration": [-1.21552, -2.93011, 2.80680],
+    }
+    receiver = {
+        "position": [6394.313, 24708.333, 29239.446],
+        "velocity": [-175.65024, 74.57597, 10.98991],
+        "motion_error": {"position": [0, -7.66, 0.063]},
+    }
+    duration = 1.77122
+    mission = parse_mission(
+        mission_text(
+            platforms={"transmitter": transmitter, "receiver": receiver}, collection={"aperture_time": duration}
+        )
+    )
+    source = next(s for s in error_sources(mission, mission.geometry) if s.id == "receiver.position.y")
+    found = ExactRanges(mission.geometry, LAMBDA, duration).phases([(source, -7.66)])
+    moved = (lambda t: 0 * t * np.ones(3), lambda t: 0 * t + np.array([0, -7.66, 0]))
+    point, quadratic, _ = brute_force(mission, moved, aperture_time=duration)
+    assert math.hypot(*point) > 100
+    assert found is not None
+    assert found.displacement == pytest.approx(point, abs=1e-2)
+    assert found.quadratic == pytest.approx(quadratic, rel=1e-3)
+
+
 def test_no_ground_point_has_the_history_of_an_absurd_error() -> None:
     found = row(findings(**{f"{TX_ERROR}__position": [0, 0, "100 km"]}), "transmitter.position.z")
     assert found.qpe_exact_rad is None
