@@ -157,6 +157,9 @@ def _error_rows(
                 source.is_independent,
                 exact,
                 None,
+                None,
+                None,
+                None,
             )
         )
 
@@ -233,6 +236,9 @@ def _undeclared(
             mission.requirement_ids.get(source.id),
             source.evidence,
             source.is_independent,
+            None,
+            None,
+            None,
             None,
             None,
         )

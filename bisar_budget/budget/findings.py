@@ -28,7 +28,8 @@ class Row(NamedTuple):
     `is_independent` marks the rows that sums run over: errors as the file states them. Along the scene's
     axes an error stated in another frame is shown again, but not counted again. `qpe_exact_rad` is the phase by exact
     ranges, of errors beyond first order; `published_margin_db` how far the published rule of a vibration stays inside
-    first principles.
+    first principles. `binding_requirement` is the requirement that sets `allowable`, `cubic_rad` the magnitude of the
+    declared error's cubic phase at the aperture edge, `islr_db` the ISLR that a declared random error adds.
     """
 
     id: str
@@ -53,6 +54,9 @@ class Row(NamedTuple):
     is_independent: bool
     qpe_exact_rad: float | None = None
     published_margin_db: float | None = None
+    binding_requirement: str | None = None
+    cubic_rad: float | None = None
+    islr_db: float | None = None
 
 
 class FileWarning(NamedTuple):

@@ -34,6 +34,9 @@ COLUMNS = (
     "verdict",
     "qpe_exact_rad",
     "published_margin_db",
+    "binding_requirement",
+    "cubic_rad",
+    "islr_db",
 )
 
 
@@ -96,6 +99,9 @@ def _rows(mission: MissionFindings) -> Iterator[list[object]]:
             verdicts.get(row.id),
             row.qpe_exact_rad,
             row.published_margin_db,
+            row.binding_requirement,
+            row.cubic_rad,
+            row.islr_db,
         ]
 
 
