@@ -143,12 +143,12 @@ def _drawn(family: _Family, name: str, random: Random) -> str:
         lines += [f"  {key}:", *(f"    {line}" for line in _geometry_lines(state, random))]
         if random.random() < 0.9:
             frame = random.choice(("scene", "track", "look")) if norm(state.velocity) else "scene"
-            error = _error(flight, state, share / factor, aperture_time, random)
+            error = _error(flight, state, share / factor, factor, aperture_time, random)
             if error:
                 lines.append(f"    motion_error: {{ frame: {frame}, {', '.join(error)} }}")
     if random.random() < 0.25:
         nearer = min(zip(states, family[2:], strict=True), key=lambda pair: pair[0].slant_range)
-        error = _error(nearer[1], nearer[0], share / factor, aperture_time, random)
+        error = _error(nearer[1], nearer[0], share / factor, factor, aperture_time, random)
         if error:
             lines.append(f"common_motion_error: {{ {', '.join(error)} }}")
     if random.random() < 0.5:
@@ -236,15 +236,19 @@ def _geometry_lines(state: PlatformState, random: Random) -> Iterator[str]:
         yield f"acceleration: {_vector(state.acceleration, 6)}"
 
 
-def _error(flight: _Flight, state: PlatformState, share: float, aperture_time: float, random: Random) -> list[str]:
+def _error(
+    flight: _Flight, state: PlatformState, share: float, factor: float, aperture_time: float, random: Random
+) -> list[str]:
     """Declared errors about what a Taylor term allows; each kind may be missing, or be one number for all axes."""
     half = aperture_time / 2
     turning = max(norm(state.look_rate), 1e-9)  # a fixed platform has none
     allowed = (share / (turning * half) ** 2, share / (turning * half**2), 2 * share / half**2)
     found = []
-    kinds = zip(("position", "velocity", "acceleration"), allowed, flight.largest_errors, (1, half, half**2 / 2))
+    kinds = zip(
+        ("position", "velocity", "acceleration"), allowed, flight.largest_errors, (1, half, half**2 / 2), strict=True
+    )
     for kind, size, largest, edge in kinds:
-        largest = min(largest, 0.03 * state.slant_range / edge)
+        largest = min(largest, 0.03 * state.slant_range / edge / factor)
         if random.random() < 0.2:
             continue
         sizes = [_signed(random, min(size * _log_uniform(random, 0.003, 5), largest)) for _ in range(3)]
