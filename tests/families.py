@@ -124,6 +124,7 @@ def _drawn(family: _Family, name: str, random: Random) -> str:
         aperture_time = min(longest, max(shortest, 2 * turn / max(norm(state.look_rate) for state in states)))
     share = total / 2 / (2 * math.pi * frequency / _SPEED_OF_LIGHT)  # of one platform, as a way [m]
     nearest = min(state.slant_range for state in states)
+    turning = max(norm(state.look_rate) for state in states)
 
     lines = [
         "schema_version: 1",
@@ -143,12 +144,12 @@ def _drawn(family: _Family, name: str, random: Random) -> str:
         lines += [f"  {key}:", *(f"    {line}" for line in _geometry_lines(state, random))]
         if random.random() < 0.9:
             frame = random.choice(("scene", "track", "look")) if norm(state.velocity) else "scene"
-            error = _error(flight, state, share / factor, factor, aperture_time, random)
+            error = _error(flight, state, share / factor, factor, turning, aperture_time, random)
             if error:
                 lines.append(f"    motion_error: {{ frame: {frame}, {', '.join(error)} }}")
     if random.random() < 0.25:
         nearer = min(zip(states, family[2:], strict=True), key=lambda pair: pair[0].slant_range)
-        error = _error(nearer[1], nearer[0], share / factor, factor, aperture_time, random)
+        error = _error(nearer[1], nearer[0], share / factor, factor, turning, aperture_time, random)
         if error:
             lines.append(f"common_motion_error: {{ {', '.join(error)} }}")
     if random.random() < 0.5:
@@ -237,11 +238,19 @@ def _geometry_lines(state: PlatformState, random: Random) -> Iterator[str]:
 
 
 def _error(
-    flight: _Flight, state: PlatformState, share: float, factor: float, aperture_time: float, random: Random
+    flight: _Flight,
+    state: PlatformState,
+    share: float,
+    factor: float,
+    turning: float,
+    aperture_time: float,
+    random: Random,
 ) -> list[str]:
-    """Declared errors about what a Taylor term allows; each kind may be missing, or be one number for all axes."""
+    """Declared errors about what a Taylor term allows; each kind may be missing, or be one number for all axes.
+
+    The faster of both lines of sight counts: it bends what the other platform's error displaces.
+    """
     half = aperture_time / 2
-    turning = max(norm(state.look_rate), 1e-9)  # a fixed platform has none
     allowed = (share / (turning * half) ** 2, share / (turning * half**2), 2 * share / half**2)
     found = []
     kinds = zip(
