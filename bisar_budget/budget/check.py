@@ -63,7 +63,7 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
         aperture_time=mission.collection.aperture_time,
         scene_radius=mission.scene.radius,
         resolution=resolution,
-        allocation=checked.allocation,
+        allocation=analysis.allocation,
         rows=tuple(rows),
         warnings=(
             *_unknown_requirement_ids(mission, rows),
@@ -81,14 +81,13 @@ class _Checked(NamedTuple):
     """One complete check by one model, before waivers."""
 
     rows: list[Row]
-    allocation: Allocation
     scene: "SceneEdge | None"
 
 
 def _checked(analysis: Analysis, gating: str) -> _Checked:
     mission = analysis.mission
     model, other = analysis.models(gating)
-    allocation = analysis.allocation(model)
+    allocation = analysis.allocation
     rows = [
         *error_rows(analysis, model, other, allocation),
         *_vibration_rows(mission, allocation, gating),
@@ -98,7 +97,7 @@ def _checked(analysis: Analysis, gating: str) -> _Checked:
     if mission.scene.radius is not None:
         scene, row = _scene_row(analysis, gating, allocation)
         rows.append(row)
-    return _Checked(rows, allocation, scene)
+    return _Checked([row._replace(model=gating) for row in rows], scene)
 
 
 def stricter(published: _Checked, full: _Checked) -> _Checked:
@@ -106,8 +105,7 @@ def stricter(published: _Checked, full: _Checked) -> _Checked:
     by_id = {row.id: row for row in published.rows}
     rows = [max((row, by_id.pop(row.id, row)), key=_strictness) for row in full.rows]
     rows += by_id.values()  # an aggregate that only one of them has
-    allocation = min(published, full, key=lambda one: min(READING.index(row.status) for row in one.rows)).allocation
-    return _Checked(rows, allocation, full.scene)
+    return _Checked(rows, full.scene)
 
 
 def _strictness(row: Row) -> tuple[int, float, float]:

@@ -106,6 +106,7 @@ def error_rows(analysis: Analysis, model: Model, other: Model, allocation: Alloc
                 allowed.binding,
                 cubic,
                 None,
+                model.name,
             )
         )
 
