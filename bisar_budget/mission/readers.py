@@ -94,16 +94,19 @@ class Quantity(Reader):
         text = str(value).strip()
         if not text or not text[-1].isdigit():
             return ""
-        for unit in ("deg", "%"):
-            if unit in self.dimension.units:
-                try:
-                    return f"Did you mean {text} {unit}?" if self.leaf(f"{text} {unit}") is not None else ""
-                except InvalidValueError:
-                    return ""
+        if self.dimension.usual:
+            return ""  # only a zero comes so far without its unit
+        if "%" in self.dimension.units:
+            try:
+                return f"Did you mean {text} %?" if self.leaf(f"{text} %") is not None else ""
+            except InvalidValueError:
+                return ""
         return f"A bare number is in {self.dimension.si}" if self.dimension.si not in ("", "dB") else ""
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Text with a unit, or a bare number."""
+        """Text with a unit, or a bare number; of an angle only zero is bare."""
+        if self.dimension.usual:
+            return {"anyOf": [{"type": "string"}, {"const": 0}]}
         return {"type": ["string", "number"]}
 
 
@@ -152,6 +155,14 @@ class Text(Reader):
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Text that is not empty."""
         return {"type": "string", "minLength": 1}
+
+
+class Label(Text):
+    """Text that may look like a number, such as the issue of a document."""
+
+    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+        """Text or a number, of which the digits are kept as they stand."""
+        return {"type": ["string", "number"], "minLength": 1}
 
 
 class Choice(Reader):
