@@ -12,11 +12,11 @@ import numpy as np
 
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import GroundVector
-from bisar_budget.simulate.collection import Chip, Errors, PointCollection
+from bisar_budget.simulate.collection import OVERSAMPLING, Chip, Errors, PointCollection
 from bisar_budget.simulate.phase_history import Complexes, Floats, cell_centres
 
-_LINES = 9  # read around the middle one: the range walk of a phase of tens of radians
-_TIMES = 129  # at least
+_LINES = 6  # read around the middle one: the range walk of a phase of tens of radians
+_TIMES = 65  # at least
 _INNER = 0.95  # of the aperture; its edges ring in a patch of finite extent
 _ORDER = 6  # of the polynomial; a turn of ±0.5 rad shows sixth powers
 _PRESENT = 0.25  # of the median strength over the aperture; less is smeared out of the patch
@@ -26,11 +26,12 @@ _BLOCK = 1 << 20  # contributions held at once
 class ApertureReading(NamedTuple):
     """Phases at the aperture edge, signed like the range error [rad].
 
-    `coverage` is the part of the aperture that the patch holds: 1 unless a smear leaves it.
+    `across_pixels` is how far the response lies from the middle along y′, by the linear part of the phase; `coverage` is the part of the aperture that the patch holds: 1 unless a smear leaves it.
     """
 
     quadratic: float
     cubic: float
+    across_pixels: float
     coverage: float
 
 
@@ -55,7 +56,7 @@ def read_aperture(
     ValueError
         The response is not in the image.
     """
-    count = max(_TIMES, 2 * chip.image.shape[1] + 1)
+    count = max(_TIMES, round(2 * chip.image.shape[1] / OVERSAMPLING) + 1)
     slow_time = cell_centres(collection.aperture_time, count)
     seen, clean = _by_pulse(collection, errors, centre, slow_time, [chip, reference])
     place = slow_time / (collection.aperture_time / 2)
@@ -74,7 +75,10 @@ def read_aperture(
     fit = np.polynomial.legendre.legfit(place[kept], phase, _ORDER, w=weights)
     covered = (place[last - 1] - place[first]) / (2 * _INNER)
     # The image's phase is −2π/λ times the range error; P₂ = (3t² - 1)/2, P₃ = (5t³ - 3t)/2.
-    return ApertureReading(float(-1.5 * fit[2]), float(-2.5 * fit[3]), min(1.0, float(covered) * 1.02))
+    # A pixel along y′ changes the range sum over the aperture by λ / OVERSAMPLING, twice its P₁ part.
+    turn = 1 if collection.flown(errors).turns_left(centre) else -1
+    across = -turn * OVERSAMPLING / math.pi * float(fit[1])
+    return ApertureReading(float(-1.5 * fit[2]), float(-2.5 * fit[3]), across, min(1.0, float(covered) * 1.02))
 
 
 def _by_pulse(

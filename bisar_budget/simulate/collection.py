@@ -24,7 +24,7 @@ from bisar_budget.simulate.range_lines import Flown
 
 OVERSAMPLING = 2.5  # samples of an image per resolution cell
 CELLS = 48  # resolution cells of a cross-range cut; fewer blur the aperture by over 1 % of a phase under a taper
-RANGE_CELLS = 12  # of a chip
+RANGE_CELLS = 8  # of a chip
 _FREQUENCIES = 64  # at least; half of them for the response itself
 MAX_CELLS = 1024
 _BYTES_PER_PIXEL = 16 * 8  # the image, its grid, and what forming it holds at once
@@ -111,6 +111,7 @@ class PointCollection:
         )
         self.spacing = (self.resolution[0] / OVERSAMPLING, self.resolution[1] / OVERSAMPLING)
         self._nodes = aperture_nodes(self.aperture_time)
+        self._kept: tuple[object, Floats, tuple[float, float]] | None = None
 
     def paths(self, errors: Errors, slow_time: Floats, rng: np.random.Generator | None = None) -> tuple[Path, Path]:
         """Fly both platforms."""
@@ -173,18 +174,13 @@ class PointCollection:
         ValueError
             The patch aliases with the mission's pulses, or is too large to be formed.
         """
-        self._require_room(cells, range_cells)
+        grid, spacing = self._grid(centre, errors, cells, range_cells)
         slow_time = cell_centres(self.aperture_time, _PULSES_PER_CELL * cells)
         transmitter, receiver = self.paths(errors, slow_time)
         clock = self.clock(errors, slow_time)
         if is_reference:
             transmitter, receiver = (Path(actual=p.measured, measured=p.measured) for p in (transmitter, receiver))
             clock = 0 * clock
-        flown = self.flown(errors)
-        cell = flown.cells(centre, self.radar.bandwidth, self.wavelength)
-        spacing = (cell[0] / OVERSAMPLING, cell[1] / OVERSAMPLING)
-        shape = (max(1, 2 * round(range_cells * OVERSAMPLING / 2)), 2 * round(cells * OVERSAMPLING / 2))
-        grid = flown.grid(centre, spacing, shape)
         frequencies = self._frequencies(grid, transmitter, receiver, scatterer)
         history = phase_history(
             np.array([[*scatterer, 0.0]]),
@@ -197,7 +193,32 @@ class PointCollection:
         )
         if self.is_tapered:
             history.samples[:] *= np.outer(taylor_window(slow_time.size), taylor_window(frequencies))
-        return Chip(backprojection(history, grid) * baseband(flown, grid, self.wavelength), grid, spacing)
+        image = backprojection(history, grid) * baseband(self.flown(errors), grid, self.wavelength)
+        return Chip(image, grid, spacing)
+
+    def pair(
+        self, errors: Errors, place: GroundVector, cells: int = CELLS, range_cells: int = RANGE_CELLS
+    ) -> tuple[Chip, Chip]:
+        """Image of errors around the place they move the point to, and of no error there: see `chip`."""
+        size = {"cells": cells, "range_cells": range_cells}
+        return (
+            self.chip(place, errors, **size),
+            self.chip(place, errors, scatterer=place, is_reference=True, **size),
+        )
+
+    def _grid(
+        self, centre: GroundVector, errors: Errors, cells: int, range_cells: int
+    ) -> tuple[Floats, tuple[float, float]]:
+        """Pixels of a chip and their spacing; the last one is kept, since images come in pairs."""
+        key = (centre, errors.smooth(), cells, range_cells)
+        if self._kept is None or self._kept[0] != key:
+            self._require_room(cells, range_cells)
+            flown = self.flown(errors)
+            cell = flown.cells(centre, self.radar.bandwidth, self.wavelength)
+            spacing = (cell[0] / OVERSAMPLING, cell[1] / OVERSAMPLING)
+            shape = (max(1, 2 * round(range_cells * OVERSAMPLING / 2)), 2 * round(cells * OVERSAMPLING / 2))
+            self._kept = (key, flown.grid(centre, spacing, shape), spacing)
+        return self._kept[1:]
 
     def _frequencies(self, grid: Floats, transmitter: Path, receiver: Path, scatterer: GroundVector) -> int:
         """How many keep a range profile from repeating within a patch: its range walk sets that."""

@@ -33,7 +33,9 @@ def location(study: Study, requirement: float) -> Verdict:
         said = _places(study, sizes, scale)
         errors = study.together(sizes, scale)
         effect = study.collection.effect(errors)
-        shift = measured_shift(*study.chips(errors, effect))
+        chips = study.chips(errors, effect)
+        reading = study.read(errors, effect.displacement, *chips)
+        shift = measured_shift(*chips, reading.across_pixels)
     except (ValueError, np.linalg.LinAlgError) as error:
         return blank._replace(reason=f"no image: {error}")
     assert said is not None

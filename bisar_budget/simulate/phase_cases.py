@@ -9,6 +9,7 @@ from bisar_budget.budget.effects import ErrorSource
 from bisar_budget.budget.images import Verdict
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import GroundVector
+from bisar_budget.simulate.aperture_reading import ApertureReading
 from bisar_budget.simulate.collection import Chip, Errors
 from bisar_budget.simulate.exact import ExactEffect
 from bisar_budget.simulate.impulse_response import impulse_response
@@ -19,7 +20,7 @@ from bisar_budget.units import format_limit, format_quantity
 TOLERANCE = 0.05  # of the budget: nearer than this a limit is confirmed
 INSIDE, BEYOND = 0.9, 1.1  # of the limit: the phase on both sides shows that the limit is the limit
 HALF_CELL = 0.5  # of range walk; beyond, one-dimensional autofocus leaves a loss (0.34 dB there, uniform)
-_READ_RANGE_CELLS = 4  # of a chip from which nothing but the phase is read
+_READ_RANGE_CELLS = 1  # of a chip from which nothing but the phase is read
 _COARSE_CELL_RAD = 1.0  # of phase between points a range cell apart; beyond, a response moves along range instead
 
 
@@ -192,7 +193,7 @@ def _judged(study: Study, blank: Verdict, sizes: Sizes, scale: float) -> Verdict
     measured = abs(reading.quadratic)
     return blank._replace(
         **predicted(effect),
-        **_of_response(chip, reference, effect),
+        **_of_response(chip, reference, effect, reading),
         full_qpe_rad=abs(effect.quadratic),
         measured_qpe_rad=measured,
         measured_cubic_rad=None,
@@ -206,11 +207,11 @@ def _judged(study: Study, blank: Verdict, sizes: Sizes, scale: float) -> Verdict
     )
 
 
-def _of_response(chip: Chip, reference: Chip, effect: ExactEffect) -> dict[str, Any]:
+def _of_response(chip: Chip, reference: Chip, effect: ExactEffect, reading: ApertureReading) -> dict[str, Any]:
     """Measures of the response; those that a long smear or a bent patch leaves without value are missing."""
     found: dict[str, Any] = {}
     try:
-        shift = measured_shift(chip, reference)
+        shift = measured_shift(chip, reference, reading.across_pixels)
         found["measured_displacement_m"] = moved(effect.displacement, shift.displacement)
         found["measured_smear_azimuth_rad"] = shift.smear_azimuth
     except (ValueError, np.linalg.LinAlgError):

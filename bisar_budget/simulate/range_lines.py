@@ -6,6 +6,7 @@ one change of the range sum over the aperture. Lines are followed from the middl
 a platform.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -28,18 +29,25 @@ class Flown(NamedTuple):
 
     def gradients(self, points: Floats) -> tuple[Floats, Floats]:
         """Of the range sum at the midpoint, and of its change over the aperture, at points (..., 2): (..., 2)."""
-        begin, middle, end = (
-            sum(_direction(points, one[index]) for one in (self.transmitter, self.receiver)) for index in range(3)
-        )
-        return np.asarray(middle), np.asarray(end - begin)
+        platforms = np.concatenate((self.transmitter, self.receiver))
+        ground = points[..., None, :] - platforms[:, :2]
+        square = ground[..., 0] ** 2 + ground[..., 1] ** 2 + platforms[:, 2] ** 2
+        directions = ground / np.sqrt(square)[..., None]
+        sums = directions[..., :3, :] + directions[..., 3:, :]
+        return sums[..., 1, :], sums[..., 2, :] - sums[..., 0, :]
 
     def range_sum(self, points: Floats) -> Floats:
         """At the midpoint, of ground points (..., 2 or 3), (...). [m]"""
         total: Floats = np.zeros(points.shape[:-1])
         for one in (self.transmitter, self.receiver):
-            ground = points[..., :2] - one[1, :2]
-            total += np.sqrt(np.sum(ground**2, axis=-1) + one[1, 2] ** 2)
+            east, north = points[..., 0] - one[1, 0], points[..., 1] - one[1, 1]
+            total += np.sqrt(east**2 + north**2 + one[1, 2] ** 2)
         return total
+
+    def turns_left(self, centre: GroundVector) -> bool:
+        """Whether the range sum grows over the aperture for points counter-clockwise of a ground point."""
+        by_range, by_doppler = self.gradients(np.asarray(centre, dtype=float))
+        return float(by_doppler @ _left(by_range)) < 0
 
     def cells(self, centre: GroundVector, bandwidth_hz: float, wavelength_m: float) -> tuple[float, float]:
         """Resolution at a ground point: peak to first null across the lines of equal range, and along them. [m]"""
@@ -77,23 +85,18 @@ class Flown(NamedTuple):
             """To the next line, along equal Doppler."""
             g, d = self.gradients(points)
             slant = _left(d)
-            slope = np.sum(g * slant, axis=-1, keepdims=True)
-            straight = g / np.sum(g**2, axis=-1, keepdims=True)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                step = slant / slope
-            longest = _SLANT**2 * np.sum(straight**2, axis=-1, keepdims=True)
-            keeps = np.sum(step**2, axis=-1, keepdims=True) <= longest
-            return range_step * np.where(keeps, step, straight)
+            square, slope = _dot(g, g), _dot(g, slant)
+            # Along equal range instead where that would lead too far: |slant/slope| against |g|/square.
+            keeps = _dot(slant, slant) * square <= _SLANT**2 * slope**2
+            return range_step * np.where(keeps, slant / np.where(keeps, slope, 1.0), g / square)
 
         def along(points: Floats) -> Floats:
-            """To the next pixel of a line, by an equal step of Doppler; as long as the centre's where it must be."""
+            """To the next pixel of a line, by an equal step of Doppler; as long as may be where there is none."""
             g, d = self.gradients(points)
-            tangent = -_left(g) / np.linalg.norm(g, axis=-1, keepdims=True)
-            slope = np.sum(d * tangent, axis=-1, keepdims=True)
-            with np.errstate(divide="ignore"):
-                length = doppler_step / slope
-            length = np.where(length > 0, np.minimum(length, _STRETCH * spacing[1]), _STRETCH * spacing[1])
-            return length * tangent
+            tangent = -_left(g) / np.sqrt(_dot(g, g))
+            slope, longest = _dot(d, tangent), _STRETCH * spacing[1]
+            keeps = slope * longest / doppler_step > 1
+            return np.where(keeps, doppler_step / np.where(keeps, slope, 1.0), longest) * tangent
 
         start = _followed(across, middle, nx)
         points = np.moveaxis(_followed(along, start, ny), 0, 1)
@@ -105,25 +108,25 @@ class Flown(NamedTuple):
         return np.concatenate((points, np.zeros((nx, ny, 1))), axis=-1)
 
 
-def _followed(step, start: Floats, count: int) -> Floats:  # type: ignore[no-untyped-def]
+def _followed(step: Callable[[Floats], Floats], start: Floats, count: int) -> Floats:
     """Follow a field of steps both ways from points (..., 2), (count, ..., 2), the start at count // 2."""
-    back, forth = count // 2, count - 1 - count // 2
-    sides = []
-    for sign, needed in ((-1, back), (1, forth)):
-        place, nodes = start, []
-        velocity = sign * step(place)
-        for _ in range(-(-needed // _STRIDE)):
-            half = place + _STRIDE / 2 * velocity
-            ahead = place + _STRIDE * sign * step(half)
-            slope = sign * step(ahead)
-            nodes.append((place, velocity, ahead, slope))
-            place, velocity = ahead, slope
-        pixels = [_between(*node, t / _STRIDE) for node in nodes for t in range(1, _STRIDE + 1)][:needed]
-        sides.append(pixels)
-    return np.stack([*sides[0][::-1], start, *sides[1]])
+    back = count // 2
+    way = np.array([-1.0, 1.0]).reshape(2, *[1] * start.ndim)
+    place = np.stack((start, start))
+    velocity = way * step(place)
+    pixels = [place[:1]]
+    within = (np.arange(1, _STRIDE + 1) / _STRIDE).reshape(-1, *[1] * place.ndim)
+    for _ in range(-(-back // _STRIDE)):
+        half = place + _STRIDE / 2 * velocity
+        ahead = place + _STRIDE * way * step(half)
+        slope = way * step(ahead)
+        pixels.append(_between(place, velocity, ahead, slope, within))
+        place, velocity = ahead, slope
+    out = np.concatenate(pixels[1:]) if back else np.empty((0, *place.shape))
+    return np.concatenate((out[:back, 0][::-1], pixels[0], out[: count - 1 - back, 1]))
 
 
-def _between(a: Floats, slope_a: Floats, b: Floats, slope_b: Floats, t: float) -> Floats:
+def _between(a: Floats, slope_a: Floats, b: Floats, slope_b: Floats, t: Floats) -> Floats:
     """Cubic through two points with their slopes per pixel."""
     slope_a, slope_b = _STRIDE * slope_a, _STRIDE * slope_b
     s = 1 - t
@@ -131,12 +134,12 @@ def _between(a: Floats, slope_a: Floats, b: Floats, slope_b: Floats, t: float) -
     return cubic
 
 
-def _direction(points: Floats, platform: Floats) -> Floats:
-    ground = points - platform[:2]
-    direction: Floats = ground / np.sqrt(np.sum(ground**2, axis=-1, keepdims=True) + platform[2] ** 2)
-    return direction
+def _dot(a: Floats, b: Floats) -> Floats:
+    """Scalar products of plane vectors, (..., 1)."""
+    return a[..., :1] * b[..., :1] + a[..., 1:] * b[..., 1:]
 
 
 def _left(vectors: Floats) -> Floats:
     """Turned by a quarter, counter-clockwise."""
-    return np.stack((-vectors[..., 1], vectors[..., 0]), axis=-1)
+    turned: Floats = vectors[..., ::-1] * np.array([-1.0, 1.0])
+    return turned

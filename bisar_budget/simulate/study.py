@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from functools import partial
 
 from bisar_budget.budget.allocation import allocate
 from bisar_budget.budget.effects import ErrorSource, full_ground, image_plane
@@ -133,10 +132,7 @@ class Study:
         slope = 2 * abs(effect.quadratic) + 3 * abs(effect.cubic)  # at the aperture edge
         smear = 2 * math.ceil(min(slope / math.pi, 1e6))  # cells
         cells = max(CELLS + smear, math.ceil(max(ROOM.values()) * smear))  # with less, autofocus gives out
-        form = partial(
-            self.collection.chip, effect.displacement, errors, cells=min(cells, MAX_CELLS), range_cells=range_cells
-        )
-        return form(), form(scatterer=effect.displacement, is_reference=True)
+        return self.collection.pair(errors, effect.displacement, min(cells, MAX_CELLS), range_cells)
 
     def read(self, errors: Errors, place: GroundVector, chip: Chip, reference: Chip) -> ApertureReading:
         """Quadratic and cubic phase of a response, measured."""
