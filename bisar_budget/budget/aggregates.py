@@ -17,6 +17,7 @@ from bisar_budget.budget.correlation import (
 from bisar_budget.budget.effects import ErrorSource, ImagePlane, image_plane
 from bisar_budget.budget.findings import Row
 from bisar_budget.budget.judgement import judged
+from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.budget.validity import Beyond, FirstOrder, of_members
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.geometry import GroundVector
@@ -190,7 +191,7 @@ def _qpe_aggregates(
         if qpe is not None:
             parts = partial(phase_parts, members, "qpe", model, combine, groups)
             exceeded = _exceeded("QPE", qpe, limit, "rad", parts)
-            over = f"{exceeded}; passes with autofocus from n_pull {allocation.n_pull_needed(qpe, owner):g}"
+            over = f"{exceeded}; {needed_sentence(allocation.n_pull_needed(qpe, owner), caps(mission))}"
         other = {"published": ("full", full), "full": ("published", published)}.get(model)
         doubt = ""
         if other is not None and other[1] is not None and other[1] > limit * (1 + UTILIZATION_TOLERANCE):

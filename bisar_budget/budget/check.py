@@ -11,7 +11,7 @@ from bisar_budget.budget.correlation import unused_correlations
 from bisar_budget.budget.effects import ErrorSource, FullGround, ImagePlane, full_ground, image_plane
 from bisar_budget.budget.findings import FileWarning, MissionFindings, Resolution, Row
 from bisar_budget.budget.judgement import judged, judgement, quotient
-from bisar_budget.budget.pull_in import pull_in_caps
+from bisar_budget.budget.pull_in import caps, needed_sentence, pull_in_caps
 from bisar_budget.budget.sources import error_sources
 from bisar_budget.budget.validity import FirstOrder, collection_notes
 from bisar_budget.budget.waivers import apply_waivers
@@ -128,7 +128,7 @@ def _error_rows(
             of_model = source.equation_by(model)
             over = (
                 f"QPE {qpe:.3g} rad, {format_limit(limit, 'rad')} allowed ({of_model}); "
-                f"passes with autofocus from n_pull {needed:g}"
+                f"{needed_sentence(needed, caps(mission))}"
             )
         utilization, margin, status, reason, notes = judgement(
             warn_above, declared, allowable, gain, over, doubt, _no_limit(source, model), "", info, True, False, notes
