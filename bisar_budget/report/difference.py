@@ -69,7 +69,8 @@ def _summary(mission: MissionChange, tolerated: float | None, all_rows: bool) ->
     newly = sum(change.is_newly_failing for change in mission.changes)
     hidden = len(mission.changes) - len(_shown(mission, tolerated, all_rows))
     small = f" ({hidden} by less than 1 %, not shown without --all)" if hidden else ""
-    text = f"{len(mission.changes)} rows changed{small}, {mission.unchanged} not, {newly} newly failing"
+    count = len(mission.changes)
+    text = f"{count} row{'s' if count != 1 else ''} changed{small}, {mission.unchanged} not, {newly} newly failing"
     if tolerated is not None:
         refused = len(mission.broken(tolerated))
         text += f"; {refused} refused (newly failing, or erosion above {percent(tolerated)})"
