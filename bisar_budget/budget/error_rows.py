@@ -10,6 +10,7 @@ from bisar_budget.budget.effects import ErrorSource
 from bisar_budget.budget.findings import Row
 from bisar_budget.budget.judgement import judgement
 from bisar_budget.budget.models import CUBIC, LOCATION, QUADRATIC, Declared
+from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.geometry import FRAME_AXES
 from bisar_budget.units import format_limit, format_quantity
@@ -65,7 +66,8 @@ def error_rows(analysis: Analysis, model: Model, other: Model, allocation: Alloc
             elif combine != "each":
                 info = f"combine is {combine}: the aggregate decides"
             else:
-                over = _over(analysis, model, source, mine, allowed, limit, allocation)
+                if allowed.smallest is not None and declared > allowed.smallest:
+                    over = _over(analysis, model, source, mine, allowed, limit, allocation)
                 doubt = _doubt(analysis, model, other, source, theirs, allowed_other, declared, limit)
         no_limit = model.no_limit(source) if allowed.smallest is None else ""
         utilization, margin, status, reason, notes = judgement(
@@ -149,7 +151,7 @@ def _over(
     text = f"QPE {_phase(qpe)}, {format_limit(limit, 'rad')} allowed ({model.equation(source)})"
     if not math.isfinite(qpe):
         return text
-    return f"{text}; passes with autofocus from n_pull {allocation.n_pull_needed(qpe, source.owner):g}"
+    return f"{text}; {needed_sentence(allocation.n_pull_needed(qpe, source.owner), caps(analysis.mission))}"
 
 
 def _phase(phase: float) -> str:
