@@ -272,5 +272,3 @@ def _said(size: float, unit: str) -> str:
     if not math.isfinite(size):
         return "without a value (no ground point has this range history)"
     return format_quantity(size, unit) if unit == "m" else f"{size:.3g} {unit}"
-
-

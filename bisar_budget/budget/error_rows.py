@@ -47,9 +47,7 @@ def error_rows(analysis: Analysis, model: Model, other: Model, allocation: Alloc
         limit = limits[source.owner]
         allowed = allowed_by(analysis, model, source, limit)
         allowed_other = allowed_by(analysis, other, source, limit)
-        published, full = (
-            (allowed, allowed_other) if model.name == "published" else (allowed_other, allowed)
-        )
+        published, full = (allowed, allowed_other) if model.name == "published" else (allowed_other, allowed)
         declared = None if source.declared is None else abs(source.declared)
         info = over = doubt = ""
         qpe_published = qpe_full = cubic = displacement = None
@@ -155,7 +153,11 @@ def _over(
 
 
 def _phase(phase: float) -> str:
-    return f"{abs(phase):.3g} rad" if math.isfinite(phase) else "without a value (no ground point has this range history)"
+    return (
+        f"{abs(phase):.3g} rad"
+        if math.isfinite(phase)
+        else "without a value (no ground point has this range history)"
+    )
 
 
 def _doubt(

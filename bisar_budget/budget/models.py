@@ -84,7 +84,10 @@ class FullModel:
         self.exact, self.plane = exact, exact.plane
         nearest = [min(exact.ranges[name]) for name in ("transmitter", "receiver")]
         self._nearest = min(nearest)
-        self._slant_ranges = {"transmitter": geometry.transmitter.slant_range, "receiver": geometry.receiver.slant_range}
+        self._slant_ranges = {
+            "transmitter": geometry.transmitter.slant_range,
+            "receiver": geometry.receiver.slant_range,
+        }
         half = exact.half
         self._edge = {"m": 1.0, "m/s": half, "m/s^2": half**2 / 2}
         (a, b), (c, d) = self.plane.inverse

@@ -4,13 +4,13 @@ Every number is one that the check found or an explanation shows; nothing is com
 """
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from hashlib import sha256
 from typing import TYPE_CHECKING
 
 from bisar_budget.budget.allocation import Allocation
-from bisar_budget.budget.effects import MOTION_UNITS, ErrorSource
 from bisar_budget.budget.analysis import Analysis
+from bisar_budget.budget.effects import MOTION_UNITS, ErrorSource
 from bisar_budget.budget.findings import MissionFindings, Report, Row, UnusableMission, worst_first
 from bisar_budget.budget.images import PointImage
 from bisar_budget.budget.waivers import waiver_notes
@@ -440,7 +440,9 @@ def _contributions(analysis: Analysis, model: str) -> tuple[Contribution, ...]:
     by = {name: analysis.declared(one) for name, one in (("published", analysis.published), ("full", analysis.full))}
     sizes = {source.id: max(abs(found[source.id].qpe) for name, found in by.items() if model in (name, "strictest"))
              for source in analysis.stated}  # fmt: skip
-    declared = sorted((source for source in analysis.stated if sizes[source.id]), key=lambda source: -sizes[source.id])
+    declared = sorted(
+        (source for source in analysis.stated if sizes[source.id]), key=lambda source: -sizes[source.id]
+    )
     total, largest = math.fsum(sizes.values()), max(sizes.values(), default=0.0)
     result = []
     for source in declared:

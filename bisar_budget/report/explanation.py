@@ -3,8 +3,8 @@
 import math
 from collections.abc import Iterator, Sequence
 
-from bisar_budget.budget.allocation import Allocation
 from bisar_budget.budget.aggregates import Together
+from bisar_budget.budget.allocation import Allocation
 from bisar_budget.budget.analysis import Analysis
 from bisar_budget.budget.correlation import displacement_parts, phase_parts
 from bisar_budget.budget.effects import ErrorSource, image_plane
@@ -137,7 +137,8 @@ def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]
         return
     text = f"min({', '.join(number(size) for size in sizes.values())})" if len(sizes) > 1 else number(row.allowable)
     yield from step(
-        f"Allowable: the smallest, by {', '.join(sizes)}", Sum(f"allowable = {text} = {with_unit(row.allowable, row.unit)}")
+        f"Allowable: the smallest, by {', '.join(sizes)}",
+        Sum(f"allowable = {text} = {with_unit(row.allowable, row.unit)}"),
     )
 
 
@@ -311,7 +312,9 @@ def _location_aggregate(mission: Mission, together: Together, found: MissionFind
         combined = [] if row.declared is None else [f"combined = {row.declared:.6g} m"]
         yield from step(f"{title}: displacements, {rule}", *(vectors or ["none"]), *combined)
     else:
-        yield from _combined(f"{title}: displacement", found.combine, [(n, math.hypot(*m)) for n, m in parts], row, "m")
+        yield from _combined(
+            f"{title}: displacement", found.combine, [(n, math.hypot(*m)) for n, m in parts], row, "m"
+        )
     if row.allowable is not None:
         where = place(mission, ("requirements", "location_error"))
         yield from step("Allowable", f"requirements.location_error = {row.allowable:.6g} m, {where}")

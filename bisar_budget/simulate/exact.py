@@ -159,9 +159,7 @@ def _displaced(
     )
 
 
-def _parts_and_step(
-    tracks: list[Floats], history: Floats, weights: Floats, point: Floats
-) -> tuple[Floats, Floats]:
+def _parts_and_step(tracks: list[Floats], history: Floats, weights: Floats, point: Floats) -> tuple[Floats, Floats]:
     """Legendre parts of what remains at points (n, 2), and Newton's step there: (n, 4) [m] and (n, 2) [m]."""
     left, slopes = history, 0.0
     for track in tracks:

@@ -7,7 +7,6 @@ import numpy as np
 
 from bisar_budget.budget.effects import ErrorSource
 from bisar_budget.budget.images import Verdict
-from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import GroundVector
 from bisar_budget.simulate.aperture_reading import ApertureReading
 from bisar_budget.simulate.collection import Chip, Errors
@@ -15,7 +14,7 @@ from bisar_budget.simulate.exact import ExactEffect
 from bisar_budget.simulate.impulse_response import impulse_response
 from bisar_budget.simulate.shift import measured_shift
 from bisar_budget.simulate.study import Sizes, Study
-from bisar_budget.units import format_limit, format_quantity
+from bisar_budget.units import format_limit
 
 TOLERANCE = 0.05  # of the budget: nearer than this a limit is confirmed
 INSIDE, BEYOND = 0.9, 1.1  # of the limit: the phase on both sides shows that the limit is the limit

@@ -104,9 +104,7 @@ class Study:
 
     def aligned(self, members: Sequence[ErrorSource]) -> list[tuple[ErrorSource, float]]:
         """Declared errors, each with the sign that makes their phases add."""
-        return [
-            (s, math.copysign(s.declared or 0.0, s.by(self.model).qpe)) for s in members if s.by(self.model).qpe
-        ]
+        return [(s, math.copysign(s.declared or 0.0, s.by(self.model).qpe)) for s in members if s.by(self.model).qpe]
 
     def at_limit(self, row_id: str, limit: float) -> Errors:
         """Return the errors that a verdict of quadratic phase was read with."""
