@@ -12,6 +12,7 @@ from bisar_budget.budget.effects import ErrorSource, FullGround, ImagePlane, ful
 from bisar_budget.budget.findings import FileWarning, MissionFindings, Resolution, Row
 from bisar_budget.budget.judgement import judged, judgement, quotient
 from bisar_budget.budget.pull_in import pull_in_caps
+from bisar_budget.budget.required import with_required
 from bisar_budget.budget.sources import error_sources
 from bisar_budget.budget.validity import FirstOrder, collection_notes
 from bisar_budget.budget.waivers import apply_waivers
@@ -54,7 +55,7 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
     if mission.scene.radius is not None:
         scene, row = _scene_row(mission, allocation, sources)
         unwaived.append(row)
-    rows, warnings = apply_waivers(unwaived, mission, today)
+    rows, warnings = apply_waivers(with_required(unwaived, mission), mission, today)
     resolution = Resolution(
         range=geometry.range_resolution(mission.radar.bandwidth, SPEED_OF_LIGHT),
         cross_range=geometry.cross_range_resolution(mission.radar.wavelength, mission.collection.aperture_time),
@@ -82,6 +83,7 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
         ),
         scene=scene,
         notes=(*collection_notes(mission, geometry, ground), *_unused_keys(mission)),
+        document=mission.document,
     )
 
 
