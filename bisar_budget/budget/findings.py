@@ -29,7 +29,8 @@ class Row(NamedTuple):
     axes an error stated in another frame is shown again, but not counted again. `qpe_exact_rad` is the phase by exact
     ranges, of errors beyond first order; `published_margin_db` how far the published rule of a vibration stays inside
     first principles. `binding_requirement` is the requirement that sets `allowable`, `cubic_rad` the magnitude of the
-    declared error's cubic phase at the aperture edge, `islr_db` the ISLR that a declared random error adds.
+    declared error's cubic phase at the aperture edge, `islr_db` the ISLR that a declared random error adds, `model` the one whose numbers
+    these are.
     """
 
     id: str
@@ -57,12 +58,13 @@ class Row(NamedTuple):
     binding_requirement: str | None = None
     cubic_rad: float | None = None
     islr_db: float | None = None
+    model: str | None = None
 
 
 class FileWarning(NamedTuple):
     """Something about the mission file that should not go unsaid.
 
-    Most change no verdict. One that `is_doubt` puts in doubt what was checked: the mission's status is `warn` at least.
+    Most change no verdict. One that `is_doubt` puts in doubt what was checked: the status is `warn` at least.
     """
 
     line: int | None
