@@ -15,6 +15,7 @@ from bisar_budget.budget.error_rows import error_rows
 from bisar_budget.budget.findings import READING, FileWarning, MissionFindings, Resolution, Row
 from bisar_budget.budget.judgement import judged
 from bisar_budget.budget.pull_in import pull_in_caps
+from bisar_budget.budget.required import with_required
 from bisar_budget.budget.waivers import apply_waivers
 from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
 from bisar_budget.mission.model import Mission
@@ -45,7 +46,7 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
         checked = stricter(_checked(analysis, "published"), _checked(analysis, "full"))
     else:
         checked = _checked(analysis, gating)
-    rows, warnings = apply_waivers(checked.rows, mission, today)
+    rows, warnings = apply_waivers(with_required(checked.rows, mission), mission, today)
     geometry = analysis.geometry
     resolution = Resolution(
         range=geometry.range_resolution(mission.radar.bandwidth, SPEED_OF_LIGHT),
@@ -74,6 +75,7 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
         ),
         scene=checked.scene,
         notes=(*collection_notes(analysis), *_unused_keys(mission)),
+        document=mission.document,
     )
 
 

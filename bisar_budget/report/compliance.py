@@ -130,9 +130,9 @@ def _overall(report: Report, pages: Sequence[MissionPage]) -> str:
     usable = [mission for mission in report.missions if isinstance(mission, MissionFindings)]
     verdict = _verdict(report.status, sum(mission.summary.get("waived", 0) for mission in usable))
     empty = sum(page.verdict == _NOTHING for page in pages)
-    if report.status != "pass" or not empty:
-        return verdict
-    return _NOTHING if empty == len(pages) else f"{verdict}; of {len(pages)} missions {empty} declare no error"
+    if empty == len(pages):
+        return _NOTHING
+    return f"{verdict}; of {len(pages)} missions {empty} declare no error" if empty else verdict
 
 
 def _unusable(found: UnusableMission, style: Style, anchor: str) -> MissionPage:
