@@ -14,6 +14,7 @@ from bisar_budget.budget.correlation import unused_correlations
 from bisar_budget.budget.error_rows import error_rows
 from bisar_budget.budget.findings import READING, FileWarning, MissionFindings, Resolution, Row
 from bisar_budget.budget.judgement import judged
+from bisar_budget.budget.orbit import straight_orbits
 from bisar_budget.budget.pull_in import pull_in_caps
 from bisar_budget.budget.required import with_required
 from bisar_budget.budget.waivers import apply_waivers
@@ -70,6 +71,7 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
             *_unknown_requirement_ids(mission, rows),
             *warnings,
             *_unused_correlations(mission),
+            *straight_orbits(mission),
             *pull_in_caps(mission, resolution),
             *_nothing_declared(rows),
         ),
