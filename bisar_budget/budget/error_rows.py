@@ -176,7 +176,8 @@ def _doubt(
     requirements = analysis.mission.requirements
     says = f"the {other.name} model says fail"
     if allowed.binding == CUBIC and requirements.cubic_phase_error is not None:
-        return f"{says}: cubic phase {_phase(theirs.cubic)}, {format_limit(requirements.cubic_phase_error, 'rad')} allowed"
+        allows = format_limit(requirements.cubic_phase_error, "rad")
+        return f"{says}: cubic phase {_phase(theirs.cubic)}, {allows} allowed"
     if allowed.binding == LOCATION and requirements.location_error is not None:
         moved = "out of sight" if theirs.farthest is None else format_quantity(math.hypot(*theirs.farthest), "m")
         return f"{says}: displacement {moved}, {format_limit(requirements.location_error, 'm')} allowed"

@@ -110,7 +110,7 @@ class ExactRanges:
 
     @cached_property
     def plane(self) -> ImagePlane:
-        """Q⁻¹: from the constant [m] and linear [m/s] part of a range error to the displacement. ZeroDivisionError if none."""
+        """Q⁻¹: from the constant [m] and the linear part [m/s] of a range error to the displacement."""
         (s_x, rate_x, *_), (s_y, rate_y, *_) = self._gradient
         rate_x, rate_y = rate_x / self.half, rate_y / self.half
         return ImagePlane(((-rate_y, s_y), (rate_x, -s_x)), s_x * rate_y - s_y * rate_x, "")
@@ -131,7 +131,7 @@ class ExactRanges:
         return tuple(_sum(weights, samples) for weights in self.fit)
 
     def motion_effects(self) -> dict[str, list[Effect]]:
-        """Effects of a small unit error of each platform: position, velocity, acceleration along x, y, z, nine each."""
+        """Effects of a small unit error of each platform, nine: position, velocity, acceleration along x, y, z."""
         found = {}
         for name in PLATFORMS:
             at_nodes = [

@@ -29,8 +29,8 @@ class Row(NamedTuple):
     axes an error stated in another frame is shown again, but not counted again. `qpe_exact_rad` is the phase by exact
     ranges, of errors beyond first order; `published_margin_db` how far the published rule of a vibration stays inside
     first principles. `binding_requirement` is the requirement that sets `allowable`, `cubic_rad` the magnitude of the
-    declared error's cubic phase at the aperture edge, `islr_db` the ISLR that a declared random error adds, `model` the one whose numbers
-    these are.
+    declared error's cubic phase at the aperture edge, `islr_db` the ISLR that a declared random error adds, `model` the one
+    whose numbers these are.
     """
 
     id: str

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
-from bisar_budget.budget.effects import Effect, ErrorSource, ImagePlane, image_plane
+from bisar_budget.budget.effects import PLATFORMS, Effect, ErrorSource, ImagePlane, image_plane
 from bisar_budget.budget.exact_ranges import ExactPhases, ExactRanges
 from bisar_budget.geometry import BistaticGeometry, GroundVector
 
@@ -82,8 +82,7 @@ class FullModel:
 
     def __init__(self, exact: ExactRanges, geometry: BistaticGeometry) -> None:
         self.exact, self.plane = exact, exact.plane
-        nearest = [min(exact.ranges[name]) for name in ("transmitter", "receiver")]
-        self._nearest = min(nearest)
+        self._nearest = min(min(exact.ranges[name]) for name in PLATFORMS)
         self._slant_ranges = {
             "transmitter": geometry.transmitter.slant_range,
             "receiver": geometry.receiver.slant_range,
@@ -233,8 +232,9 @@ class FullModel:
         low, below = 0.0, 0.0
         while value < limit:
             if size >= farthest:
-                inner = [part * size for part in _INNER if part * size > low]
-                size = next((one for one in inner if value_at(one) >= limit), 0.0)
+                size = next(
+                    (part * size for part in _INNER if part * size > low and value_at(part * size) >= limit), 0.0
+                )
                 if not size:
                     return None
                 value = value_at(size)

@@ -1,27 +1,14 @@
-"""What a motion error does, from exact ranges and a projection over the aperture: no expansion, no image.
+"""What a motion error of an image does, by exact ranges: paths sampled at pulses instead of nodes."""
 
-The response of a point lies where what remains of its range history has no constant and no linear part over the
-aperture, P₀ and P₁ of Legendre's polynomials. What remains then defocuses: 3/2 of the P₂ part is the quadratic phase
-at the aperture edge, 5/2 of the P₃ part the cubic one. `budget/exact_ranges.py` does the same without NumPy, one error
-at a time.
-"""
-
-import math
 from dataclasses import dataclass
-from functools import cache
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bisar_budget.budget.exact_arrays import displaced
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.simulate.phase_history import Floats, Path
 
-NODES = 24  # of Gauss-Legendre quadrature; more change nothing where platforms travel less than their slant range
 _ORDER = 12  # of the fit to samples anywhere else
-_ITERATIONS = 50
-_HALVINGS = 6  # of a step that leads farther away
-_SETTLED_M = 1e-6  # a satellite's range in double precision gives no more
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,56 +20,6 @@ class ExactEffect:
     cubic: float
 
 
-class ExactEffects(NamedTuple):
-    """Effects of many errors: displacement (..., 2) [m], phases (...) [rad], and whether a point was found (...)."""
-
-    displacement: Floats
-    quadratic: Floats
-    cubic: Floats
-    found: NDArray[np.bool_]
-
-
-def aperture_nodes(aperture_time_s: float, count: int = NODES) -> Floats:
-    """Slow times at which `exact_effects` takes positions, (count,). [s]"""
-    nodes: Floats = _quadrature(count)[0] * (aperture_time_s / 2)
-    return nodes
-
-
-def exact_effects(
-    transmitter: Floats,
-    receiver: Floats,
-    actual_transmitter: Floats,
-    actual_receiver: Floats,
-    clock_range: Floats | float,
-    wavelength_m: float,
-    near: Floats | None = None,
-) -> ExactEffects:
-    """Find where the responses of a scatterer at the scene centre go, and what phases are left there.
-
-    Parameters
-    ----------
-    transmitter, receiver : (..., nodes, 3) ndarray
-        Measured positions at `aperture_nodes`; leading axes are errors and broadcast. [m]
-    actual_transmitter, actual_receiver : (nodes, 3) ndarray
-        Actual positions there. [m]
-    clock_range : (..., nodes) ndarray or float
-        Clock error times the speed of light. [m]
-    wavelength_m : float
-        Of the centre frequency.
-    near : (..., 2) ndarray, optional
-        Where the search starts; the scene centre. [m]
-
-    Returns
-    -------
-    ExactEffects
-        NaN where no ground point has the recorded history.
-    """
-    weights = _quadrature(transmitter.shape[-2])[1]
-    recorded = np.linalg.norm(actual_transmitter, axis=-1) + np.linalg.norm(actual_receiver, axis=-1)
-    recorded = recorded + np.asarray(clock_range, dtype=float)
-    return _displaced(transmitter, receiver, recorded, weights, wavelength_m, near)
-
-
 def exact_effect(
     slow_time: Floats,
     transmitter: Path,
@@ -91,7 +28,7 @@ def exact_effect(
     wavelength_m: float,
     aperture_time_s: float,
 ) -> ExactEffect:
-    """Effect of one error, its paths sampled anywhere over the aperture: see `exact_effects`.
+    """Effect of one error, its paths sampled anywhere over the aperture: see `budget/exact_arrays.py`.
 
     Raises
     ------
@@ -101,86 +38,11 @@ def exact_effect(
     recorded = np.linalg.norm(transmitter.actual, axis=1) + np.linalg.norm(receiver.actual, axis=1)
     recorded = recorded + SPEED_OF_LIGHT * np.asarray(clock_error, dtype=float)
     weights = _projection(slow_time / (aperture_time_s / 2))
-    found = _displaced(transmitter.measured, receiver.measured, recorded, weights, wavelength_m, None)
+    found = displaced(transmitter.measured, receiver.measured, recorded, weights, wavelength_m, None)
     if not found.found:
         raise ValueError("no ground point has the recorded range history")
     east, north = (float(part) for part in found.displacement)
     return ExactEffect(displacement=(east, north), quadratic=float(found.quadratic), cubic=float(found.cubic))
-
-
-def _displaced(
-    transmitter: Floats,
-    receiver: Floats,
-    recorded: Floats,
-    weights: Floats,
-    wavelength_m: float,
-    near: Floats | None,
-) -> ExactEffects:
-    """Newton's method for P₀ = P₁ = 0, a step halved where it leads away.
-
-    How far away is measured by the step that would come next: that does not depend on the units of P₀ and P₁.
-    """
-    lead = np.broadcast_shapes(transmitter.shape[:-2], receiver.shape[:-2], recorded.shape[:-1])
-    count, total = weights.shape[1], math.prod(lead)
-    tracks = [np.broadcast_to(one, (*lead, count, 3)).reshape(total, count, 3) for one in (transmitter, receiver)]
-    history = np.broadcast_to(recorded, (*lead, count)).reshape(total, count)
-    point = np.zeros((total, 2))
-    if near is not None:
-        point[:] = np.broadcast_to(near, (*lead, 2)).reshape(total, 2)
-    parts, step, is_settled = np.full((total, 4), np.nan), np.zeros((total, 2)), np.zeros(total, dtype=bool)
-    alive = np.arange(total)
-    with np.errstate(all="ignore"):
-        parts[:], step[:] = _parts_and_step(tracks, history, weights, point)
-        for _ in range(_ITERATIONS):
-            length = np.hypot(*step[alive].T)
-            settled = length < _SETTLED_M + 1e-12 * np.hypot(*point[alive].T)
-            is_settled[alive[settled]] = True
-            alive = alive[~settled & np.isfinite(length)]
-            if not alive.size:
-                break
-            here = [one[alive] for one in tracks]
-            length, scale = np.hypot(*step[alive].T), np.ones(alive.size)
-            for _ in range(_HALVINGS):
-                ahead = point[alive] + scale[:, None] * step[alive]
-                new_parts, new_step = _parts_and_step(here, history[alive], weights, ahead)
-                farther = ~(np.hypot(*new_step.T) < length)
-                if not farther.any():
-                    break
-                scale[farther] /= 2
-            point[alive], parts[alive], step[alive] = ahead, new_parts, new_step
-    k = 2 * math.pi / wavelength_m
-    parts[~is_settled] = np.nan
-    point = np.where(is_settled[:, None], point, np.nan)
-    return ExactEffects(
-        point.reshape((*lead, 2)),
-        (1.5 * k * parts[:, 2]).reshape(lead),  # P₂ = (3t² - 1)/2
-        (2.5 * k * parts[:, 3]).reshape(lead),  # P₃ = (5t³ - 3t)/2
-        is_settled.reshape(lead),
-    )
-
-
-def _parts_and_step(tracks: list[Floats], history: Floats, weights: Floats, point: Floats) -> tuple[Floats, Floats]:
-    """Legendre parts of what remains at points (n, 2), and Newton's step there: (n, 4) [m] and (n, 2) [m]."""
-    left, slopes = history, 0.0
-    for track in tracks:
-        ground = track[..., :2] - point[:, None, :]
-        distance = np.sqrt(np.sum(ground**2, axis=-1) + track[..., 2] ** 2)
-        left = left - distance
-        slopes = slopes - ground / distance[..., None]
-    parts = left @ weights.T
-    (a, b), (c, d) = (np.moveaxis(weights[n] @ slopes, -1, 0) for n in (0, 1))
-    determinant = a * d - b * c
-    first, second = parts[:, 0], parts[:, 1]
-    step = np.stack((d * first - b * second, a * second - c * first), axis=-1) / determinant[:, None]
-    return parts, step
-
-
-@cache
-def _quadrature(count: int) -> tuple[Floats, Floats]:
-    """Gauss-Legendre nodes in -1 … 1, and the weights (4, count) that project on P₀ … P₃."""
-    nodes, weights = np.polynomial.legendre.leggauss(count)
-    legendre = np.polynomial.legendre.legvander(nodes, 3)
-    return nodes, np.ascontiguousarray((legendre * weights[:, None] * (np.arange(4) + 0.5)).T)
 
 
 def _projection(place: Floats) -> Floats:
