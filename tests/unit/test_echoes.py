@@ -19,8 +19,7 @@ def highest_echo(phases: list[float], cycles: list[float], rng: np.random.Genera
 
     def level(starts: np.ndarray) -> float:
         phase = sum(
-            size * np.sin(2 * np.pi * n * TIME + start)
-            for size, n, start in zip(phases, cycles, starts, strict=True)
+            size * np.sin(2 * np.pi * n * TIME + start) for size, n, start in zip(phases, cycles, starts, strict=True)
         )
         phasor = np.exp(1j * phase)
         coherent = phasor.mean()
