@@ -137,6 +137,8 @@ def _qpe_of_all(analysis: Analysis, mine: Together, allocation: Allocation) -> I
     if not warning:
         return
     largest = combined_phase(phases, "each", analysis.groups)
+    if largest > limit * (1 + UTILIZATION_TOLERANCE):
+        return  # its own row says so
     yield _judged(
         mission,
         id="mission.quadratic_phase_error",
@@ -147,7 +149,6 @@ def _qpe_of_all(analysis: Analysis, mine: Together, allocation: Allocation) -> I
         path=("platforms",),
         equation="largest of the rows",
         gain=allocation.autofocus_gain,
-        over=_exceeded("QPE", largest, limit, "rad", lambda: phases),
         doubt=warning,
         limits=(limit, limit),
     )

@@ -4,7 +4,7 @@ Every number is one that the check found or an explanation shows; nothing is com
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from hashlib import sha256
 from typing import TYPE_CHECKING
 

@@ -156,8 +156,8 @@ def evaluators() -> tuple[Evaluator, ...]:
             name="full_motion",
             summary="Range error of one unit of each motion error of one platform at one slow time. [m/unit]",
             details=(
-                "−u·r̃(τ): the line of sight is that of the position then, nothing is held constant. Position and slant "
-                "range are those at the slow time. Derived here."
+                "−u·r̃(τ): the line of sight is that of the position then, nothing is held constant. Position and "
+                "slant range are those at the slow time. Derived here."
             ),
             arguments=(*platform_arguments(TRANSMITTER)[:3], (TRANSMITTER.slant_range, "slant_range"), (tau, "tau")),
             rows=tuple(
