@@ -19,6 +19,7 @@ from bisar_budget.budget.findings import Row
 from bisar_budget.budget.judgement import judged
 from bisar_budget.budget.models import CUBIC, LOCATION, QUADRATIC, Declared
 from bisar_budget.budget.pull_in import caps, needed_sentence
+from bisar_budget.budget.vibration import slow_phases
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.model import Mission
@@ -38,6 +39,7 @@ class Together:
         self.found: Mapping[str, Declared] = analysis.declared(model)
         self.stated = analysis.stated
         self.motion = [source for source in self.stated if source.is_motion]
+        self.slow = slow_phases(analysis.mission)
 
     def members(self, allocation: Allocation, owner: str) -> list[ErrorSource]:
         """Those that count against the share of an owner; against the mission's all."""
@@ -46,6 +48,15 @@ class Together:
     def phases(self, members: Sequence[ErrorSource]) -> Phases:
         """Quadratic phase of each, signed. [rad]"""
         return [(source.id, self.found[source.id].qpe) for source in members]
+
+    def owed(self, allocation: Allocation, owner: str) -> Phases:
+        """Quadratic phases that count against the share of an owner, those of slow vibrations too. [rad]"""
+        slow = [s for s in self.slow if owner == "mission" or allocation.qpe.includes(s.owner, owner)]
+        return [*self.phases(self.members(allocation, owner)), *((s.row_id, s.qpe_rad) for s in slow)]
+
+    def all_cubics(self) -> Phases:
+        """Cubic phases of motion, the clock and slow vibrations. [rad]"""
+        return [*self.cubics(), *((s.row_id, s.cubic_rad) for s in self.slow)]
 
     def cubics(self) -> Phases:
         """Cubic phase of each error that moves something, signed. [rad]"""
@@ -88,9 +99,8 @@ def _qpe_rows(analysis: Analysis, mine: Together, theirs: Together, allocation: 
     if allocation.qpe.clock is not None:
         owners.insert(2, "clock")  # else it counts with the receiver
     for owner in owners:
-        members = mine.members(allocation, owner)
-        phases, others = mine.phases(members), theirs.phases(members)
-        qpe, by_other = (combined_phase(of, combine, groups) if members else None for of in (phases, others))
+        phases, others = mine.owed(allocation, owner), theirs.owed(allocation, owner)
+        qpe, by_other = (combined_phase(of, combine, groups) if of else None for of in (phases, others))
         published, full = (qpe, by_other) if mine.model.name == "published" else (by_other, qpe)
         limit = allocation.qpe_limit(owner) * gain
         over = ""
@@ -121,7 +131,7 @@ def _qpe_rows(analysis: Analysis, mine: Together, theirs: Together, allocation: 
 
 def _qpe_of_all(analysis: Analysis, mine: Together, allocation: Allocation) -> Iterator[Row]:
     """Where each error stands alone: a warning if all together, by root-sum-square, exceed the total."""
-    mission, phases = analysis.mission, mine.phases(mine.stated)
+    mission, phases = analysis.mission, mine.owed(allocation, "mission")
     limit = allocation.qpe_total * allocation.autofocus_gain
     warning = _of_all("QPE", combined_phase(phases, "rss", analysis.groups), limit, "rad")
     if not warning:
@@ -147,8 +157,8 @@ def _qpe_of_all(analysis: Analysis, mine: Together, allocation: Allocation) -> I
 def _cubic_row(analysis: Analysis, mine: Together, theirs: Together) -> Row:
     mission, groups = analysis.mission, analysis.groups
     combine, limit = mission.allocation.combine, mission.requirements.cubic_phase_error
-    phases = mine.cubics()
-    cubic, by_other = (combined_phase(of, combine, groups) if of else None for of in (phases, theirs.cubics()))
+    phases = mine.all_cubics()
+    cubic, by_other = (combined_phase(of, combine, groups) if of else None for of in (phases, theirs.all_cubics()))
     over = _exceeded("cubic phase", cubic, limit, "rad", lambda: phase_parts(phases, combine, groups))
     doubt = _doubt(theirs.model, by_other, limit, "rad")
     if combine == "each":
@@ -209,10 +219,8 @@ def _location_row(analysis: Analysis, mine: Together, theirs: Together) -> Row:
 
 
 def _pull_in_row(analysis: Analysis, mine: Together, theirs: Together, pull_in: float) -> Row:
-    phases = mine.phases(mine.stated)
-    total, by_other = (
-        math.fsum(abs(phase) for _, phase in of) if of else None for of in (phases, theirs.phases(theirs.stated))
-    )
+    phases, others = (one.owed(analysis.allocation, "mission") for one in (mine, theirs))
+    total, by_other = (math.fsum(abs(phase) for _, phase in of) if of else None for of in (phases, others))
     return _judged(
         analysis.mission,
         id="mission.autofocus_pull_in",
