@@ -18,6 +18,7 @@ from bisar_budget.budget.effects import ErrorSource
 from bisar_budget.budget.findings import Row
 from bisar_budget.budget.judgement import judged
 from bisar_budget.budget.models import CUBIC, LOCATION, QUADRATIC, Declared
+from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.model import Mission
@@ -95,8 +96,8 @@ def _qpe_rows(analysis: Analysis, mine: Together, theirs: Together, allocation: 
         over = ""
         if qpe is not None:
             over = _exceeded("QPE", qpe, limit, "rad", partial(phase_parts, phases, combine, groups))
-            if math.isfinite(qpe):
-                over += f"; passes with autofocus from n_pull {allocation.n_pull_needed(qpe, owner):g}"
+            if over and math.isfinite(qpe):
+                over += f"; {needed_sentence(allocation.n_pull_needed(qpe, owner), caps(mission))}"
         yield _judged(
             mission,
             id=f"{'timing' if owner == 'clock' else owner}.quadratic_phase_error",
@@ -271,5 +272,3 @@ def _said(size: float, unit: str) -> str:
     if not math.isfinite(size):
         return "without a value (no ground point has this range history)"
     return format_quantity(size, unit) if unit == "m" else f"{size:.3g} {unit}"
-
-

@@ -86,9 +86,7 @@ def _divide_power(split: object) -> Split:
     return _split(split) if isinstance(split, Shares) else EQUAL  # `balanced` weighs phase, not power
 
 
-def _divide(
-    split: object, mission: Mission, stated: Sequence[ErrorSource], phases: Mapping[str, float]
-) -> Split:
+def _divide(split: object, mission: Mission, stated: Sequence[ErrorSource], phases: Mapping[str, float]) -> Split:
     if isinstance(split, Shares):
         return _split(split)
     if split != "balanced":
@@ -98,6 +96,8 @@ def _divide(
         rule = mission.allocation.combine
         members = [(s.id, phases[s.id]) for s in stated if EQUAL.includes(s.owner, platform)]
         weight[platform] = combined_phase(members, rule, correlated_errors(mission))
+    # An error that leaves no image has no finite phase: it takes all that it may.
+    weight = {name: min(size, 1e300) for name, size in weight.items()}
     total = weight["transmitter"] + weight["receiver"]
     if total == 0:
         return EQUAL

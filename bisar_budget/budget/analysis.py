@@ -71,7 +71,14 @@ class Analysis:
     def _declared(self) -> dict[str, dict[str, Declared]]:
         return {}
 
-    def allocation(self, model: Model) -> Allocation:
-        """Budgets as divided, `balanced` by a model."""
-        found = self.declared(model)
-        return allocate(self.mission, self.stated, {source.id: found[source.id].qpe for source in self.stated})
+    @cached_property
+    def allocation(self) -> Allocation:
+        """Budgets as divided; `balanced` weighs phases by the gating model, under `strictest` the larger of both."""
+        gating = self.mission.allocation.model
+        both: tuple[Model, ...] = (self.published, self.full)
+        models = [model for model in both if gating in (model.name, "strictest")]
+        phases = {
+            source.id: max((self.declared(model)[source.id].qpe for model in models), key=abs)
+            for source in self.stated
+        }
+        return allocate(self.mission, self.stated, phases)

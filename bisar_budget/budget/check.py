@@ -15,6 +15,7 @@ from bisar_budget.budget.error_rows import error_rows
 from bisar_budget.budget.findings import READING, FileWarning, MissionFindings, Resolution, Row
 from bisar_budget.budget.judgement import judged
 from bisar_budget.budget.pull_in import pull_in_caps
+from bisar_budget.budget.required import with_required
 from bisar_budget.budget.waivers import apply_waivers
 from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
 from bisar_budget.mission.model import Mission
@@ -45,7 +46,7 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
         checked = stricter(_checked(analysis, "published"), _checked(analysis, "full"))
     else:
         checked = _checked(analysis, gating)
-    rows, warnings = apply_waivers(checked.rows, mission, today)
+    rows, warnings = apply_waivers(with_required(checked.rows, mission), mission, today)
     geometry = analysis.geometry
     resolution = Resolution(
         range=geometry.range_resolution(mission.radar.bandwidth, SPEED_OF_LIGHT),
@@ -63,7 +64,7 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
         aperture_time=mission.collection.aperture_time,
         scene_radius=mission.scene.radius,
         resolution=resolution,
-        allocation=checked.allocation,
+        allocation=analysis.allocation,
         rows=tuple(rows),
         warnings=(
             *_unknown_requirement_ids(mission, rows),
@@ -74,6 +75,7 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
         ),
         scene=checked.scene,
         notes=(*collection_notes(analysis), *_unused_keys(mission)),
+        document=mission.document,
     )
 
 
@@ -81,14 +83,13 @@ class _Checked(NamedTuple):
     """One complete check by one model, before waivers."""
 
     rows: list[Row]
-    allocation: Allocation
     scene: "SceneEdge | None"
 
 
 def _checked(analysis: Analysis, gating: str) -> _Checked:
     mission = analysis.mission
     model, other = analysis.models(gating)
-    allocation = analysis.allocation(model)
+    allocation = analysis.allocation
     rows = [
         *error_rows(analysis, model, other, allocation),
         *_vibration_rows(mission, allocation, gating),
@@ -98,7 +99,7 @@ def _checked(analysis: Analysis, gating: str) -> _Checked:
     if mission.scene.radius is not None:
         scene, row = _scene_row(analysis, gating, allocation)
         rows.append(row)
-    return _Checked(rows, allocation, scene)
+    return _Checked([row._replace(model=gating) for row in rows], scene)
 
 
 def stricter(published: _Checked, full: _Checked) -> _Checked:
@@ -106,8 +107,7 @@ def stricter(published: _Checked, full: _Checked) -> _Checked:
     by_id = {row.id: row for row in published.rows}
     rows = [max((row, by_id.pop(row.id, row)), key=_strictness) for row in full.rows]
     rows += by_id.values()  # an aggregate that only one of them has
-    allocation = min(published, full, key=lambda one: min(READING.index(row.status) for row in one.rows)).allocation
-    return _Checked(rows, allocation, full.scene)
+    return _Checked(rows, full.scene)
 
 
 def _strictness(row: Row) -> tuple[int, float, float]:

@@ -10,6 +10,7 @@ from bisar_budget.budget.effects import ErrorSource
 from bisar_budget.budget.findings import Row
 from bisar_budget.budget.judgement import judgement
 from bisar_budget.budget.models import CUBIC, LOCATION, QUADRATIC, Declared
+from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.geometry import FRAME_AXES
 from bisar_budget.units import format_limit, format_quantity
@@ -46,9 +47,7 @@ def error_rows(analysis: Analysis, model: Model, other: Model, allocation: Alloc
         limit = limits[source.owner]
         allowed = allowed_by(analysis, model, source, limit)
         allowed_other = allowed_by(analysis, other, source, limit)
-        published, full = (
-            (allowed, allowed_other) if model.name == "published" else (allowed_other, allowed)
-        )
+        published, full = (allowed, allowed_other) if model.name == "published" else (allowed_other, allowed)
         declared = None if source.declared is None else abs(source.declared)
         info = over = doubt = ""
         qpe_published = qpe_full = cubic = displacement = None
@@ -65,7 +64,8 @@ def error_rows(analysis: Analysis, model: Model, other: Model, allocation: Alloc
             elif combine != "each":
                 info = f"combine is {combine}: the aggregate decides"
             else:
-                over = _over(analysis, model, source, mine, allowed, limit, allocation)
+                if allowed.smallest is not None and declared > allowed.smallest:
+                    over = _over(analysis, model, source, mine, allowed, limit, allocation)
                 doubt = _doubt(analysis, model, other, source, theirs, allowed_other, declared, limit)
         no_limit = model.no_limit(source) if allowed.smallest is None else ""
         utilization, margin, status, reason, notes = judgement(
@@ -106,6 +106,7 @@ def error_rows(analysis: Analysis, model: Model, other: Model, allocation: Alloc
                 allowed.binding,
                 cubic,
                 None,
+                model.name,
             )
         )
 
@@ -148,11 +149,15 @@ def _over(
     text = f"QPE {_phase(qpe)}, {format_limit(limit, 'rad')} allowed ({model.equation(source)})"
     if not math.isfinite(qpe):
         return text
-    return f"{text}; passes with autofocus from n_pull {allocation.n_pull_needed(qpe, source.owner):g}"
+    return f"{text}; {needed_sentence(allocation.n_pull_needed(qpe, source.owner), caps(analysis.mission))}"
 
 
 def _phase(phase: float) -> str:
-    return f"{abs(phase):.3g} rad" if math.isfinite(phase) else "without a value (no ground point has this range history)"
+    return (
+        f"{abs(phase):.3g} rad"
+        if math.isfinite(phase)
+        else "without a value (no ground point has this range history)"
+    )
 
 
 def _doubt(
@@ -171,7 +176,8 @@ def _doubt(
     requirements = analysis.mission.requirements
     says = f"the {other.name} model says fail"
     if allowed.binding == CUBIC and requirements.cubic_phase_error is not None:
-        return f"{says}: cubic phase {_phase(theirs.cubic)}, {format_limit(requirements.cubic_phase_error, 'rad')} allowed"
+        allows = format_limit(requirements.cubic_phase_error, "rad")
+        return f"{says}: cubic phase {_phase(theirs.cubic)}, {allows} allowed"
     if allowed.binding == LOCATION and requirements.location_error is not None:
         moved = "out of sight" if theirs.farthest is None else format_quantity(math.hypot(*theirs.farthest), "m")
         return f"{says}: displacement {moved}, {format_limit(requirements.location_error, 'm')} allowed"

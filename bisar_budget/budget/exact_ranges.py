@@ -93,6 +93,11 @@ class ExactRanges:
         )
 
     @cached_property
+    def orientation(self) -> float:
+        """Sign of the turn from range to Doppler gradient at the centre."""
+        return math.copysign(1.0, self.plane.determinant)
+
+    @cached_property
     def gradient_sine(self) -> float:
         """Sine of the angle from range to Doppler gradient on the ground, signed, both fitted. [-]"""
         (s_x, rate_x, *_), (s_y, rate_y, *_) = self._gradient
@@ -105,7 +110,7 @@ class ExactRanges:
 
     @cached_property
     def plane(self) -> ImagePlane:
-        """Q⁻¹: from the constant [m] and linear [m/s] part of a range error to the displacement. ZeroDivisionError if none."""
+        """Q⁻¹: from the constant [m] and the linear part [m/s] of a range error to the displacement."""
         (s_x, rate_x, *_), (s_y, rate_y, *_) = self._gradient
         rate_x, rate_y = rate_x / self.half, rate_y / self.half
         return ImagePlane(((-rate_y, s_y), (rate_x, -s_x)), s_x * rate_y - s_y * rate_x, "")
@@ -126,7 +131,7 @@ class ExactRanges:
         return tuple(_sum(weights, samples) for weights in self.fit)
 
     def motion_effects(self) -> dict[str, list[Effect]]:
-        """Effects of a small unit error of each platform: position, velocity, acceleration along x, y, z, nine each."""
+        """Effects of a small unit error of each platform, nine: position, velocity, acceleration along x, y, z."""
         found = {}
         for name in PLATFORMS:
             at_nodes = [
@@ -143,8 +148,12 @@ class ExactRanges:
 
     def effect_of(self, source: ErrorSource) -> Effect:
         """Effect of a small unit of any error."""
+        return self.effect(self.range_error(source))
+
+    def range_error(self, source: ErrorSource) -> list[float]:
+        """Range error at the nodes of a small unit of any error, before it displaces anything. [m/unit]"""
         if not source.is_position:
-            return self.effect(self.shape(source))
+            return self.shape(source)
         x, y, z = source.direction
         total = [0.0] * len(self.times)
         for name in PLATFORMS:
@@ -155,7 +164,7 @@ class ExactRanges:
                         total, self.tracks[name], self.ranges[name], self.powers[source.unit], strict=True
                     )
                 ]
-        return self.effect(total)
+        return total
 
     def effect(self, range_error: Samples) -> Effect:
         """Effect of a range error sampled at the nodes [m/unit], that of the displacement included."""
@@ -181,7 +190,8 @@ class ExactRanges:
     ) -> ExactPhases | None:
         """Find where errors of given sizes move a point at the centre, and what defocuses there.
 
-        The search starts `near` [m]. None where it finds no ground point with the recorded history.
+        The search starts `near` [m]. None where it finds no ground point with the recorded history, or one beyond a
+        line on which range and Doppler gradients are parallel: no error leads there from nothing.
         """
         measured = dict(self.tracks)
         recorded = self.recorded
@@ -199,6 +209,39 @@ class ExactRanges:
                 shape = self.shape(source)
                 recorded = [whole + size * metres for whole, metres in zip(recorded, shape, strict=True)]
         return self._settled(recorded, measured["transmitter"], measured["receiver"], near)
+
+    def left_over(self, source: ErrorSource, size: float, place: GroundVector) -> list[float]:
+        """Range error at the nodes that an error leaves at a ground point. [m]"""
+        recorded = self.recorded
+        measured = dict(self.tracks)
+        if source.is_position:
+            x, y, z = (size * part for part in source.direction)
+            for name in PLATFORMS:
+                if source.moves(name):
+                    measured[name] = [
+                        (a + p * x, b + p * y, c + p * z)
+                        for (a, b, c), p in zip(measured[name], self.powers[source.unit], strict=True)
+                    ]
+        else:
+            recorded = [whole + size * metres for whole, metres in zip(recorded, self.shape(source), strict=True)]
+        east, north = place
+        return [
+            whole
+            - sqrt((x - east) ** 2 + (y - north) ** 2 + z * z)
+            - sqrt((u - east) ** 2 + (v - north) ** 2 + w * w)
+            for whole, (x, y, z), (u, v, w) in zip(recorded, *measured.values(), strict=True)
+        ]
+
+    def left_over_small(self, source: ErrorSource, size: float) -> list[float]:
+        """The same at the displaced point, of an error so small that its effects are proportional to it. [m]"""
+        east, north = self.plane.displacement(source.full, size) or (0.0, 0.0)
+        rays = zip(self.tracks["transmitter"], self.ranges["transmitter"], self.tracks["receiver"],
+                   self.ranges["receiver"], strict=True)  # fmt: skip
+        gradient = [(p[0] / R + q[0] / S, p[1] / R + q[1] / S) for p, R, q, S in rays]
+        return [
+            size * metres + east * x + north * y
+            for metres, (x, y) in zip(self.range_error(source), gradient, strict=True)
+        ]
 
     @cached_property
     def powers(self) -> dict[str, list[float]]:
@@ -244,12 +287,22 @@ class ExactRanges:
             east, north = east + step_east, north + step_north
             step = step_east * step_east + step_north * step_north
             if self.k * step < _UNSEEN_RAD * nearest:
+                if determinant * self.orientation <= 0:
+                    return None
                 return ExactPhases(
                     (east, north),
-                    self.k * (sum(map(mul, quadratic, left)) + sum(map(mul, quadratic, by_east)) * step_east
-                              + sum(map(mul, quadratic, by_north)) * step_north),
-                    self.k * (sum(map(mul, cubic, left)) + sum(map(mul, cubic, by_east)) * step_east
-                              + sum(map(mul, cubic, by_north)) * step_north),
+                    self.k
+                    * (
+                        sum(map(mul, quadratic, left))
+                        + sum(map(mul, quadratic, by_east)) * step_east
+                        + sum(map(mul, quadratic, by_north)) * step_north
+                    ),
+                    self.k
+                    * (
+                        sum(map(mul, cubic, left))
+                        + sum(map(mul, cubic, by_east)) * step_east
+                        + sum(map(mul, cubic, by_north)) * step_north
+                    ),
                 )
             if not step < 1e30:
                 return None
@@ -259,9 +312,7 @@ class ExactRanges:
 def _track(state: PlatformState, times: Samples, east: float, north: float) -> Track:
     (x, y, z), (u, v, w), (a, b, c) = state.position, state.velocity, state.acceleration
     x, y = x - east, y - north
-    return [
-        (x + tau * (u + tau * a / 2), y + tau * (v + tau * b / 2), z + tau * (w + tau * c / 2)) for tau in times
-    ]
+    return [(x + tau * (u + tau * a / 2), y + tau * (v + tau * b / 2), z + tau * (w + tau * c / 2)) for tau in times]
 
 
 def _sum(weights: Samples, samples: Samples) -> float:

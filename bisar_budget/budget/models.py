@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
-from bisar_budget.budget.effects import Effect, ErrorSource, ImagePlane, image_plane
+from bisar_budget.budget.effects import PLATFORMS, Effect, ErrorSource, ImagePlane, image_plane
 from bisar_budget.budget.exact_ranges import ExactPhases, ExactRanges
 from bisar_budget.geometry import BistaticGeometry, GroundVector
 
@@ -21,6 +21,7 @@ _SHARE = 0.002  # what the second order may add, of a phase, a displacement or a
 _FLOOR_RAD, _FLOOR_M = 5e-4, 1e-3  # and whatever the size
 _CLOSE = 2e-4  # of a limit: near enough to go on in a straight line
 _STEPS = 60
+_FOLLOWED = 8  # steps from no error on, where a point is not found at once
 _INNER = (0.5, 0.25)  # of a size, where a phase that bends back may have been larger
 
 
@@ -81,9 +82,11 @@ class FullModel:
 
     def __init__(self, exact: ExactRanges, geometry: BistaticGeometry) -> None:
         self.exact, self.plane = exact, exact.plane
-        nearest = [min(exact.ranges[name]) for name in ("transmitter", "receiver")]
-        self._nearest = min(nearest)
-        self._slant_ranges = {"transmitter": geometry.transmitter.slant_range, "receiver": geometry.receiver.slant_range}
+        self._nearest = min(min(exact.ranges[name]) for name in PLATFORMS)
+        self._slant_ranges = {
+            "transmitter": geometry.transmitter.slant_range,
+            "receiver": geometry.receiver.slant_range,
+        }
         half = exact.half
         self._edge = {"m": 1.0, "m/s": half, "m/s^2": half**2 / 2}
         (a, b), (c, d) = self.plane.inverse
@@ -140,10 +143,16 @@ class FullModel:
         if not source.is_motion:
             return linear
         farthest = self.farthest(source)
-        first = farthest if linear is None else min(linear, farthest)
-        if self._adds(source, first, requirement) <= _SHARE * limit:
+        if self.is_linear_at(source, requirement, limit):
             return None if linear is None or linear > farthest else linear
+        first = farthest if linear is None else min(linear, farthest)
         return self._smallest(source, requirement, limit, per_unit, first, farthest)
+
+    def is_linear_at(self, source: ErrorSource, requirement: str, limit: float) -> bool:
+        """Whether effects of an error are proportional to its size up to a limit."""
+        linear, farthest = quotient(limit, _per_unit(source.full, self.plane, requirement)), self.farthest(source)
+        first = farthest if linear is None else min(linear, farthest)
+        return self._adds(source, first, requirement) <= _SHARE * limit
 
     def farthest(self, source: ErrorSource) -> float:
         """Size beyond which an error is none of navigation. [unit]"""
@@ -174,8 +183,21 @@ class FullModel:
         key = (source.id, size)
         if key not in self._known:
             near = self.plane.displacement(source.full, size) or (0.0, 0.0)
-            self._known[key] = self.exact.phases([(source, size)], near)
+            self._known[key] = self.exact.phases([(source, size)], near) or self._followed(source, size)
         return self._known[key]
+
+    def _followed(self, source: ErrorSource, size: float) -> ExactPhases | None:
+        """Follow the point from no error on, where it is not found at once."""
+        near: GroundVector = (0.0, 0.0)
+        found = None
+        for step in range(1, _FOLLOWED + 1):
+            part = size * step / _FOLLOWED
+            stretch = step / (step - 1) if step > 1 else 1.0
+            found = self.exact.phases([(source, part)], (near[0] * stretch, near[1] * stretch))
+            if found is None:
+                return None
+            near = found.displacement
+        return found
 
     def worst(self, source: ErrorSource, size: float, requirement: str) -> float:
         """Phase [rad] or displacement [m] of the worse sign; infinite without a ground point."""
@@ -210,8 +232,9 @@ class FullModel:
         low, below = 0.0, 0.0
         while value < limit:
             if size >= farthest:
-                inner = [part * size for part in _INNER if part * size > low]
-                size = next((one for one in inner if value_at(one) >= limit), 0.0)
+                size = next(
+                    (part * size for part in _INNER if part * size > low and value_at(part * size) >= limit), 0.0
+                )
                 if not size:
                     return None
                 value = value_at(size)

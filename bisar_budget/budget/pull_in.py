@@ -7,7 +7,9 @@ out is the patch, whatever walk and bandwidth: phase gradient needs three times 
 with less they leave the image smeared at a hundredth of a cell of walk as at a third of one.
 """
 
+import math
 from collections.abc import Iterator
+from typing import NamedTuple
 
 from bisar_budget.budget.findings import FileWarning, Resolution
 from bisar_budget.mission.model import Mission
@@ -17,30 +19,80 @@ WALK_CELLS = 0.5
 ROOM = {"pga": 3.0, "map_drift": 1.5}  # patch over smear
 
 
+class Caps(NamedTuple):
+    """Largest N_pull by range walk, f₀/B, and by the scene's size; None where the file gives none."""
+
+    walk: float
+    scene: float | None = None
+
+
+def caps(mission: Mission) -> Caps:
+    """What no autofocus of a mission goes beyond."""
+    walk = 2 * WALK_CELLS * mission.radar.center_frequency / mission.radar.bandwidth
+    if mission.scene.radius is None:
+        return Caps(walk)
+    cell = mission.geometry.cross_range_resolution(mission.radar.wavelength, mission.collection.aperture_time)
+    return Caps(walk, 2 * mission.scene.radius / (4 * cell * ROOM[mission.autofocus.algorithm]))
+
+
+def needed_sentence(n_pull: float, caps: Caps) -> str:
+    """Say from which N_pull an error would pass, or that none can correct it.
+
+    Parameters
+    ----------
+    n_pull : float
+        N_pull that the error needs.
+    caps : Caps
+        What `caps` says of the mission.
+    """
+    if caps.scene is not None and caps.scene < min(n_pull, caps.walk):
+        allowed = f"the scene's size allows {_down(caps.scene)}"
+    elif n_pull > caps.walk:
+        allowed = f"range walk allows {_down(caps.walk)}"
+    else:
+        return f"passes with autofocus from n_pull {n_pull:g}"
+    return f"no autofocus corrects this: N_pull would have to be {_up(n_pull)}, {allowed}"
+
+
+def _up(number: float) -> str:
+    """Three digits, rounded up; whole from a hundred on, with a space between thousands."""
+    if number >= 100:
+        return f"{math.ceil(number * (1 - 1e-12)):,}".replace(",", " ")
+    step = 10.0 ** (math.floor(math.log10(number)) - 2)
+    return f"{math.ceil(number / step * (1 - 1e-12)) * step:.3g}"
+
+
+def _down(number: float) -> str:
+    """Three digits, rounded down; whole from a hundred on, with a space between thousands."""
+    if number >= 100:
+        return f"{math.floor(number * (1 + 1e-12)):,}".replace(",", " ")
+    return format_quantity(number, "", 3, "down")
+
+
 def pull_in_caps(mission: Mission, resolution: Resolution) -> Iterator[FileWarning]:
     """Warn where `autofocus.n_pull` asks for more than range walk or the scene's size leaves."""
     n_pull, algorithm = mission.autofocus.n_pull, mission.autofocus.algorithm
     if n_pull is None:
         return
     line = mission.line(("autofocus", "n_pull"))
-    ratio = mission.radar.center_frequency / mission.radar.bandwidth
-    if n_pull > ratio * 2 * WALK_CELLS:
+    limit = caps(mission)
+    ratio = limit.walk / (2 * WALK_CELLS)
+    if n_pull > limit.walk:
         yield FileWarning(
             line=line,
             message=(
-                f"autofocus.n_pull: an error of {n_pull:g}π rad walks over {n_pull / ratio / 2:.3g} range cells, and "
-                f"correction along one dimension costs over 0.6 dB; half a cell is n_pull {ratio:.4g}, f0/B"
+                f"autofocus.n_pull: an error of {n_pull:g}π rad walks over {n_pull / ratio / 2:.3g} range cells; "
+                f"correction along one dimension then costs over 0.6 dB; half a cell is n_pull {ratio:.4g}, f0/B"
             ),
         )
     radius = mission.scene.radius
     smear = 4 * n_pull * resolution.cross_range
-    if radius is not None and ROOM[algorithm] * smear > 2 * radius:
-        largest = 2 * radius / (4 * resolution.cross_range * ROOM[algorithm])
+    if radius is not None and limit.scene is not None and n_pull > limit.scene:
         yield FileWarning(
             line=line,
             message=(
-                f"autofocus.n_pull: an error of {n_pull:g}π rad smears a point over {format_quantity(smear, 'm')}, "
-                f"and {algorithm} needs {ROOM[algorithm]:g} times that; a scene of "
-                f"{format_quantity(2 * radius, 'm')} across holds n_pull {largest:.3g}"
+                f"autofocus.n_pull: an error of {n_pull:g}π rad smears a point over {format_quantity(smear, 'm')}; "
+                f"{algorithm} needs {ROOM[algorithm]:g} times that. A scene of "
+                f"{format_quantity(2 * radius, 'm')} across holds n_pull {_down(limit.scene)}"
             ),
         )

@@ -135,8 +135,10 @@ class ScenePhases:
         """Of each error, its phase there less that at the centre, by the worse sign where it is large. [rad]"""
         phases = self.place(radius, azimuth).phases
         found = [there - centre for there, centre in zip(phases, self.centre, strict=True)]
-        there = self.ranges_at(radius, azimuth) if self.large else None
-        for i in self.large if there is not None else ():
+        if not self.large:
+            return found
+        there = self.ranges_at(radius, azimuth)
+        for i in self.large:
             source, of_both = self.members[i], []
             for size in (self.sizes[i], -self.sizes[i]):
                 near = there.plane.displacement(there.effect_of(source), size) or (0.0, 0.0)

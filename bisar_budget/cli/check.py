@@ -120,6 +120,13 @@ class _Draws(click.ParamType[int]):
     ".sarif or .needs.json. Repeatable.",
 )
 @click.option(
+    "--detail",
+    type=click.Choice(["summary", "full"]),
+    default="summary",
+    show_default=True,
+    help="Of html and markdown: the summary alone, or with an annex of formulas, remarks and undeclared rows.",
+)
+@click.option(
     "--strict/--no-strict",
     envvar="BISAR_BUDGET_STRICT",
     help="Fail on warnings and on rows that could not be evaluated.",
@@ -159,7 +166,13 @@ class _Draws(click.ParamType[int]):
     help="Seed of --monte-carlo (default: simulation.seed of the mission file, else 1).",
 )
 @click.option("-q", "--quiet", is_flag=True, help="One line per mission.")
-@click.option("-v", "--verbose", is_flag=True, help="Reason, equation, displacement and evidence of every row.")
+@click.option("--all", "all_rows", is_flag=True, help="Show every row, also those that are not declared.")
+@click.option(
+    "-v",
+    "--verbose",
+    is_flag=True,
+    help="Show every row with its reason, notes, equation, displacement and evidence.",
+)
 @click.option(
     "--explain",
     metavar="ID",
@@ -179,6 +192,7 @@ def check(
     format_name: str,
     output: str | None,
     reports: Sequence[str],
+    detail: str,
     strict: bool,
     exit_zero: bool,
     model: str | None,
@@ -187,6 +201,7 @@ def check(
     draws: int | None,
     seed: int | None,
     quiet: bool,
+    all_rows: bool,
     verbose: bool,
     explain: str | None,
     color: str,
@@ -217,7 +232,8 @@ def check(
     drawn = None if draws is None else (draws, seed)
     day = today.date() if today else day_of_run()
     use_color = color == "always" or (color == "auto" and output is None and wants_color())
-    style = Style(color=use_color, verbosity=-1 if quiet else 1 if verbose else 0, root=_repository())
+    verbosity = -1 if quiet else 1 if verbose else 0
+    style = Style(color=use_color, verbosity=verbosity, root=_repository(), all_rows=all_rows, detail=detail)
     says_faults = format_name != "text" or output is not None or quiet or not is_terminal()
     if format_name in PIECEWISE and not (written or verifying or drawn):
         from bisar_budget.budget.fleet import check_files

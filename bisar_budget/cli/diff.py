@@ -58,6 +58,7 @@ class _Part(click.ParamType[float]):
     show_default=True,
     help="Format of the comparison.",
 )
+@click.option("--all", "all_rows", is_flag=True, help="Show rows that moved by less than 1 % too.")
 @click.option("-o", "--output", type=FILE, metavar="FILE", help="Write to FILE instead of standard output.")
 @click.option(
     "--date",
@@ -70,16 +71,18 @@ def diff(
     base: str | None,
     tolerated: float | None,
     format_name: str,
+    all_rows: bool,
     output: str | None,
     today: datetime | None,
 ) -> None:
     """Show what a change to a mission does to every margin.
 
-    Compares two mission files, or each with itself in a git revision.
+    Compares two mission files, or each with itself in a git revision. What changed in the file and in the geometry
+    stands first, then the rows.
 
-    Rows are sorted by erosion: the part of what was left of a limit that the change uses up, (u2 - u1)/(1 - u1)
-    with the utilizations before and after; for a row that had nothing left, u2/u1 - 1. Exit code: 0, or 1 with
-    --fail-on-erosion, 2 for wrong usage, an unusable file or an unknown revision.
+    Rows are sorted by erosion. Erosion is the part of what was left of a limit that the change uses up:
+    (u2 - u1)/(1 - u1), u1 and u2 being declared over allowable before and after. A row that had nothing left has
+    u2/u1 - 1. Exit code: 0; 1 with --fail-on-erosion; 2 for wrong usage, an unusable file or an unknown revision.
     """
     from bisar_budget.budget.check import check_mission
     from bisar_budget.errors import MissionError
@@ -108,7 +111,8 @@ def diff(
     if format_name == "json":
         text = difference.as_json(__version__, changes, tolerated)
     else:
-        text = (difference.as_text if format_name == "text" else difference.as_markdown)(changes, tolerated)
+        write = difference.as_text if format_name == "text" else difference.as_markdown
+        text = write(changes, tolerated, all_rows)
     deliver(text, output)
     is_refused = tolerated is not None and any(change.broken(tolerated) for change in changes)
     sys.exit(EXIT_BROKEN if is_refused else 0)

@@ -63,6 +63,8 @@ class Style(NamedTuple):
     verbosity: int = 0  # -1: verdicts only; 0: the table; 1: every row's reason, source and displacement
     root: str = ""  # absolute path of the repository; empty: files are named as given
     assets: str = ""
+    all_rows: bool = False  # of the text: what is neither declared nor limits anything too
+    detail: str = "summary"  # of a compliance report; full: formulas and undeclared rows too
 
 
 def render(format_name: str, report: Report, style: Style) -> str:

@@ -1,4 +1,4 @@
-"""The report for a terminal: the geometry, the table with the worst row first, the reasons, one summary line."""
+"""The report for a terminal: verdict, geometry, the rows that matter with the worst first, what decides them."""
 
 import math
 import re
@@ -6,8 +6,10 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 
 from bisar_budget.budget.findings import MissionFindings, Row, UnusableMission, worst, worst_first
+from bisar_budget.budget.verdicts import image_notes
+from bisar_budget.budget.waivers import waiver_notes
 from bisar_budget.errors import printable
-from bisar_budget.geometry import PlatformState
+from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.report import Piece, Style
 from bisar_budget.report.layout import WIDTH, wrapped, wrapped_counts
 from bisar_budget.units import format_quantity
@@ -23,6 +25,12 @@ WORDS = {
     "info": "info",
     "not_declared": "not decl",
 }
+# A requirement that can set an allowable, in words; the terminal has room for the first.
+BINDING_WORDS = {
+    "quadratic_phase_error": "quadratic phase error",
+    "cubic_phase_error": "cubic phase error",
+    "location_error": "location error",
+}
 _ANSI = {
     "error": "1;31",
     "fail": "1;31",
@@ -36,10 +44,12 @@ _ANSI = {
 }
 _MODELS = {
     "published": "published (Rigling & Moses, Tables I and II)",
-    "full": "full (every first-order term, displacement included)",
+    "full": "full (exact ranges, displacement included)",
     "strictest": "strictest (the stricter of published and full for each row)",
 }
-_EXPLAINED = ("fail", "not_evaluated", "warn", "waived", "pass_with_autofocus")
+RULES = {"each": "each error alone", "sum": "worst-case sum", "rss": "root-sum-square"}
+EXPLAINED = ("fail", "not_evaluated", "warn", "waived")  # the rows whose reason decides something
+_NARROW_DEG = 30.0  # between range and Doppler gradients; below it the verdict says what that does
 
 
 def piece(mission: MissionFindings | UnusableMission, style: Style) -> str:
@@ -62,7 +72,7 @@ def _unusable(mission: UnusableMission, style: Style) -> list[str]:
         return [_lead(summary, "error", style)]
     places = [f"  {fault.line or '-'}:{fault.column or '-'}  {fault}" for fault in mission.faults]
     first, *rest = wrapped_counts(summary)
-    return [*(line for place in places for line in wrapped(place, "       ")), _lead(first, "error", style), *rest]
+    return [_lead(first, "error", style), *rest, *(line for place in places for line in wrapped(place, "       "))]
 
 
 def _mission(mission: MissionFindings, style: Style) -> list[str]:
@@ -70,13 +80,14 @@ def _mission(mission: MissionFindings, style: Style) -> list[str]:
         count = len(mission.warnings)
         warned = f"; {count} warning{'s' if count != 1 else ''} about the file" if count else ""
         return [_lead(_summary(mission) + warned, mission.status, style)]
-    lines = [*wrapped(mission.name, "  "), ""]
-    lines += [line for key, text in head(mission) for line in wrapped(f"{key:<12} {text}", " " * 13)]
-    rows = worst_first(mission.rows)
-    lines += ["", _cells("status", "row", "declared", "allowable", "use", "from")]
-    lines += [line for row in rows for line in _row(row, style)]
-    explained = [row for row in rows if row.status in _EXPLAINED or style.verbosity > 0]
-    details = [line for row in explained for line in _details(row, mission, style)]
+    alone = "; each error alone" if mission.combine == "each" else ""
+    first, *rest = wrapped_counts(_summary(mission) + alone)
+    lines = [_lead(first, mission.status, style), *rest, *wrapped(mission.name, "  ")]
+    if sentence := narrow_gradients(mission.geometry):
+        lines += wrapped(sentence, "  ")
+    lines += ["", *(line for key, text in head(mission) for line in wrapped(f"{key:<12} {text}", " " * 13))]
+    lines += ["", *_table(mission, style)]
+    details = list(_details(mission, style))
     lines += ["", *details] if details else []
     lines += [line for text in _asides(mission, style) for line in wrapped(text, "  ")]
     if mission.monte_carlo is not None:
@@ -87,18 +98,31 @@ def _mission(mission: MissionFindings, style: Style) -> list[str]:
         from bisar_budget.report.verification import evidence
 
         lines += ["", "Images with each error at its limit", "", *evidence(mission.verdicts, style)]
-    first, *rest = wrapped_counts(_summary(mission))
-    return [*lines, "", _lead(first, mission.status, style), *rest]
+    return lines
+
+
+def narrow_gradients(geometry: BistaticGeometry) -> str:
+    """Say what range and Doppler gradients close to parallel do to displacements; nothing from 30 degrees on."""
+    angle = geometry.gradient_angle
+    if math.degrees(angle) >= _NARROW_DEG:
+        return ""
+    return (
+        f"Range and Doppler gradients are only {_degrees(angle)} apart: displacements are {1 / math.sin(angle):.2g} "
+        "times those at right angles."
+    )
 
 
 def head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
     """Say in a few lines what was checked: geometry, resolution, budget, model."""
     geometry, allocation = mission.geometry, mission.allocation
-    yield "Transmitter", _platform(geometry.transmitter)
-    yield "Receiver", _platform(geometry.receiver)
+    is_first = True  # the first squint says what one is
+    for name, state in (("Transmitter", geometry.transmitter), ("Receiver", geometry.receiver)):
+        yield name, _platform(state, is_first)
+        is_first = is_first and state.squint is None
     yield (
         "Geometry",
         f"bistatic angle {_degrees(geometry.bistatic_angle)}, look azimuth {_degrees(geometry.look_azimuth)}, "
+        f"range and Doppler gradients {_degrees(geometry.gradient_angle)} apart, "
         f"wavelength {format_quantity(mission.wavelength, 'm', 4)}",
     )
     yield (
@@ -110,10 +134,14 @@ def head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
     shares = f"transmitter {split.transmitter:.3g}, receiver {split.receiver:.3g}"
     shares += f", clock {split.clock:.3g}" if split.clock is not None else ""
     shares += f", reserve {split.reserve:.3g}" if split.reserve else ""
-    gain = f"; autofocus allows {allocation.autofocus_gain:.3g} times that" if allocation.n_pull else ""
-    yield "QPE budget", f"{format_quantity(allocation.qpe_total, 'rad')}: {shares}{gain}"
-    rule = {"each": "each error alone", "sum": "worst-case sum", "rss": "root-sum-square"}[mission.combine]
-    yield "Model", f"{_MODELS[mission.model]}, {rule}"
+    gain = ""
+    if allocation.n_pull is not None:
+        gain = (
+            f"; autofocus pulls in (corrects) up to {multiple_of_pi(allocation.n_pull)} rad: limits times "
+            f"{allocation.autofocus_gain:.3g}"
+        )
+    yield "Budget", f"quadratic phase error (QPE) {format_quantity(allocation.qpe_total, 'rad')}: {shares}{gain}"
+    yield "Model", f"{_MODELS[mission.model]}, {RULES[mission.combine]}"
     if mission.scene is not None and not mission.scene.degeneracy:
         radius = format_quantity(mission.scene.radius, "m")
         yield (
@@ -124,8 +152,15 @@ def head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
         yield "Coverage", f"navigation and clock: declared is {mission.coverage_factor:g} times the file's value"
 
 
-def _platform(state: PlatformState) -> str:
-    squint = "still" if state.squint is None else f"squint {_degrees(state.squint)}"
+def multiple_of_pi(factor: float) -> str:
+    """Write 2 as 2π, 1 as π."""
+    return "π" if factor == 1 else f"{factor:g}π"
+
+
+def _platform(state: PlatformState, explains_squint: bool) -> str:
+    squint = "still"
+    if state.squint is not None:
+        squint = f"squint {_degrees(state.squint)}" + (" off broadside" if explains_squint else "")
     return (
         f"{format_quantity(state.slant_range, 'm', 4)} away, azimuth {_degrees(state.azimuth)}, "
         f"elevation {_degrees(state.elevation)}, {squint}"
@@ -136,8 +171,63 @@ def _degrees(angle: float) -> str:
     return f"{math.degrees(angle):.1f}°".replace("-0.0°", "0.0°")
 
 
-def _row(row: Row, style: Style) -> list[str]:
-    row_id, status, limit, unit, declared = row.id, row.status, row.allowable, row.unit, row.declared
+_HEADER = ("status", "row", "declared", "allowable", "use", "by")
+
+
+def _table(mission: MissionFindings, style: Style) -> Iterator[str]:
+    """Rows that are declared or limit something, the worst first, and how many others there are."""
+    rows, hidden = worst_first(mission.rows), list[Row]()
+    # Where nothing is declared the allowables are the answer.
+    if not style.all_rows and style.verbosity <= 0 and any(row.status != "not_declared" for row in rows):
+        hidden = [row for row in rows if not matters(row)]
+        rows = [row for row in rows if matters(row)]
+    cells = [_row(row) for row in rows]
+    widths = [max(len(line[column]) for line in (_HEADER, *cells)) for column in range(len(_HEADER))]
+    widths[0] = 8  # the same in every table: the eye and scripts look there
+    names = [len(line[1]) for line in (_HEADER, *cells)]
+    room = WIDTH - sum(widths) + widths[1] - len(_HEADER) + 1
+    widths[1] = max(name for name in names if name <= max(room, len("row")))
+    yield _line(_HEADER, widths)
+    for row, line in zip(rows, cells, strict=True):
+        if len(line[1]) > widths[1]:  # an id that would take its line beyond 80 columns stands above its numbers
+            yield f"{_word(row.status, style, widths[0])} {line[1]}"
+            yield _line(("", "", *line[2:]), widths)
+        else:
+            yield _word(row.status, style, widths[0]) + _line(line, widths)[widths[0] :]
+        if row.requirement_id and (row.status not in EXPLAINED and style.verbosity < 1):
+            yield f"{'':<{widths[0]}} [{row.requirement_id}]"  # the others have it with their reason
+    yield from wrapped(_table_key(rows, hidden), "  ")
+
+
+def matters(row: Row) -> bool:
+    """Whether a row is declared or limits something; along other axes than the file's, only if it does not pass."""
+    if row.status in ("info", "pass"):
+        return row.is_independent and (row.status == "pass" or bool(row.declared))
+    return row.status != "not_declared"
+
+
+def _table_key(rows: Sequence[Row], hidden: Sequence[Row]) -> str:
+    """Say what the columns are, and what is not in the table."""
+    key = "use: declared / allowable"
+    if any(row.binding_requirement not in (None, "quadratic_phase_error") for row in rows):
+        key += "; by: what limits, QPE where it names a table, equation or model"
+    counts = [
+        (sum(row.status == "not_declared" for row in hidden), "not declared"),
+        (sum(row.status != "not_declared" for row in hidden), "that limit nothing"),
+    ]
+    others = ", ".join(f"{count} {what}" for count, what in counts if count)
+    return f"{key}. Not shown (--all): {others}." if others else f"{key}."
+
+
+def _line(cells: Sequence[str], widths: Sequence[int]) -> str:
+    """One line of the table: names to the left, numbers to the right, the last column to the left."""
+    status, name, *numbers, last = cells
+    right = " ".join(cell.rjust(width) for cell, width in zip(numbers, widths[2:-1], strict=True))
+    return f"{status:<{widths[0]}} {name:<{widths[1]}} {right} {last}".rstrip()
+
+
+def _row(row: Row) -> tuple[str, ...]:
+    status, limit, unit, declared = row.status, row.allowable, row.unit, row.declared
     size = "-" if declared is None else format_quantity(declared, unit)
     use = "-"
     if limit is None:
@@ -148,16 +238,18 @@ def _row(row: Row, style: Style) -> list[str]:
         allowable = format_quantity(limit, unit, 3, "down")
         if row.utilization is not None and status != "not_evaluated":
             use = percent(row.utilization)
-    reference = _short_reference(row.equation)
-    lines = [_cells(WORDS[status], row_id, size, allowable, use, reference)]
-    if len(row_id) > 34 or len(lines[0]) > WIDTH:
-        numbers = _cells("", "", size, allowable, use, reference)
-        lines = [f"{WORDS[status]:<8} {row_id}", numbers if len(numbers) <= WIDTH else numbers.lstrip().rjust(WIDTH)]
-    if style.color:
-        lines[0] = _word(status, style, 8) + lines[0][8:]
-    if row.requirement_id and status not in _EXPLAINED and style.verbosity < 1:
-        lines.append(f"{'':<8} [{row.requirement_id}]")  # the others have it with their reason
-    return lines
+    return WORDS[status], row.id, size, allowable, use, _limited_by(row)
+
+
+def binding_words(row: Row) -> str:
+    """Say which other requirement than the one the row is about sets its allowable; nothing if it is that one."""
+    return "" if row.binding_requirement == row.metric else BINDING_WORDS.get(row.binding_requirement or "", "")
+
+
+def _limited_by(row: Row) -> str:
+    """What sets the allowable: another requirement than the row's own, else the place of its equation."""
+    binding = binding_words(row)
+    return binding.split()[0] if binding else _short_reference(row.equation)
 
 
 @cache
@@ -194,42 +286,52 @@ def percent(ratio: float) -> str:
     return f"{value} %"
 
 
-def _cells(status: str, row: str, declared: str, allowable: str, use: str, reference: str) -> str:
-    # A blank of its own between cells: a wide one shifts the rest, it does not touch its neighbour.
-    return f"{status:<8} {row:<34} {declared:>11} {allowable:>11} {use:>7} {reference}".rstrip()
+def _details(mission: MissionFindings, style: Style) -> Iterator[str]:
+    """What decides the rows that do not simply pass, once for all that share it; with -v all about every row."""
+    groups: dict[tuple[str, tuple[str, ...]], list[Row]] = {}
+    for row in worst_first(mission.rows):
+        if style.verbosity > 0:
+            yield from _detail([row], [*filter(None, [row.reason]), *row.notes, *_more(row)], mission, style)
+        elif row.status in EXPLAINED:
+            groups.setdefault((row.status, reasons(row)), []).append(row)
+    for (_, texts), rows in groups.items():
+        yield from _detail(rows, texts, mission, style)
 
 
-def _details(row: Row, mission: MissionFindings, style: Style) -> list[str]:
+def _detail(rows: Sequence[Row], texts: Sequence[str], mission: MissionFindings, style: Style) -> Iterator[str]:
     file = printable(mission.file)
-    place = f"{file}:{row.line}" if row.line is not None else file
-    own_id = f" [{row.requirement_id}]" if row.requirement_id else ""
-    head = f"{WORDS[row.status]} {row.id}{own_id} ({place})"
-    texts = [row.reason] if row.reason else []
-    texts += row.notes
-    if style.verbosity > 0:
-        texts.append(f"from {row.equation}")
-        if row.displacement_m is not None:
-            x, y = row.displacement_m
-            texts.append(f"moves the image by {format_quantity(x, 'm')} east, {format_quantity(y, 'm')} north")
-        if row.evidence:
-            texts.append(f"evidence: {row.evidence}")
-    lines = [*wrapped(head, "  "), *(line for text in texts for line in wrapped(f"  {text}", "  "))]
-    return [_lead(lines[0], row.status, style), *lines[1:]]
+    names = []
+    for row in rows:
+        own_id = f" [{row.requirement_id}]" if row.requirement_id else ""
+        place = f"{file}:{row.line}" if row.line is not None else file
+        names.append(f"{row.id}{own_id} ({place})")
+    first, *rest = wrapped(f"{WORDS[rows[0].status]} {', '.join(names)}", "  ")
+    yield _lead(first, rows[0].status, style)
+    yield from rest
+    for text in texts:
+        yield from wrapped(f"  {text}", "  ")
+
+
+def reasons(row: Row) -> tuple[str, ...]:
+    """What decides the status of a row: its reason, and of its notes those on waivers and images."""
+    return tuple(text for text in (row.reason, *waiver_notes(row), *image_notes(row)) if text)
+
+
+def _more(row: Row) -> Iterator[str]:
+    yield f"from {row.equation}"
+    if row.displacement_m is not None:
+        x, y = row.displacement_m
+        yield f"moves the image by {format_quantity(x, 'm')} east, {format_quantity(y, 'm')} north"
+    if row.evidence:
+        yield f"evidence: {row.evidence}"
 
 
 def _asides(mission: MissionFindings, style: Style) -> Iterator[str]:
     for warning in mission.warnings:
         place = f"{printable(mission.file)}:{warning.line}: " if warning.line is not None else ""
         yield f"warning: {place}{printable(warning.message)}"
-    yield from (f"note: {note}" for note in mission.notes)
     if style.verbosity > 0:
-        return  # each row has its notes
-    qualified: dict[str, list[str]] = {}
-    for row in mission.rows:
-        if row.declared and row.status not in _EXPLAINED:
-            for note in row.notes:
-                qualified.setdefault(note, []).append(row.id)
-    yield from (f"note: {', '.join(ids)}: {note}" for note, ids in qualified.items())
+        yield from (f"note: {note}" for note in mission.notes)
 
 
 def _summary(mission: MissionFindings) -> str:

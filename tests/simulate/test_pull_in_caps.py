@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from bisar_budget.budget.pull_in import ROOM
+from bisar_budget.budget.pull_in import ROOM, Caps, caps, needed_sentence
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.simulate.autofocus import ALGORITHMS
 from bisar_budget.simulate.collection import Errors
 from bisar_budget.simulate.verify import Study
-from tests.conftest import findings, mission_text
+from tests.conftest import findings, mission_text, row
 
 F0_MHZ = 10_000
 
@@ -69,3 +69,43 @@ class TestWarnings:
 
     def test_no_autofocus_no_warning(self) -> None:
         assert not warnings(scene={"radius": 1})
+
+
+class TestNeeded:
+    """What a row over its limit says: the N_pull from which it passes, or that none can."""
+
+    def test_within_range_walk_it_passes(self) -> None:
+        assert needed_sentence(2.95, Caps(walk=33.3)) == "passes with autofocus from n_pull 2.95"
+
+    def test_beyond_range_walk_no_autofocus_corrects_it(self) -> None:
+        sentence = needed_sentence(59952.1, Caps(walk=23.4))
+        assert sentence == "no autofocus corrects this: N_pull would have to be 59 953, range walk allows 23.4"
+
+    def test_the_smaller_cap_is_named(self) -> None:
+        assert needed_sentence(10, Caps(walk=33.3, scene=3.6)).endswith(
+            "would have to be 10, the scene's size allows 3.6"
+        )
+        assert needed_sentence(100, Caps(walk=33.3, scene=50)).endswith("range walk allows 33.3")
+        assert needed_sentence(10, Caps(walk=33.3, scene=50)).startswith("passes")
+
+    def test_digits_never_contradict_it(self) -> None:
+        """What is needed is rounded up, what is allowed down: else 33.31 of 33.29 would read 33.3 of 33.3."""
+        assert needed_sentence(33.31, Caps(walk=33.29)).endswith("would have to be 33.4, range walk allows 33.2")
+
+    def test_caps_are_those_of_the_warnings(self) -> None:
+        """f₀/B; and a scene that holds the smear times the room of the algorithm."""
+        mission = parse_mission(mission_text(scene={"radius": 100}, autofocus={"algorithm": "map_drift"}), "m.yaml")
+        cell = findings().resolution.cross_range
+        assert caps(mission) == pytest.approx((100 / 3, 2 * 100 / (1.5 * 4 * cell)))
+        assert caps(parse_mission(mission_text(), "m.yaml")).scene is None
+
+    def test_rows_say_it(self) -> None:
+        """An error that smears over kilometres was said to pass with enough autofocus."""
+        found = findings(platforms__receiver__motion_error__acceleration=["10 m/s^2", 0, 0])
+        reason = row(found, "receiver.acceleration.x").reason
+        assert "no autofocus corrects this: N_pull would have to be" in reason
+        assert reason.endswith("range walk allows 33.3")
+        found = findings(
+            platforms__receiver__motion_error__acceleration=["10 m/s^2", 0, 0], allocation={"combine": "rss"}
+        )
+        assert "range walk allows 33.3" in row(found, "receiver.quadratic_phase_error").reason

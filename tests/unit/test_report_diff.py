@@ -106,6 +106,72 @@ class TestCompare:
         assert second == pytest.approx(2 * first)
 
 
+class TestInputs:
+    @staticmethod
+    def moved(before: dict, after: dict) -> dict[str, tuple[str | None, str | None]]:
+        change = compare(findings(**before), findings(**after))
+        return {move.name: (move.before, move.after) for move in change.inputs}
+
+    def test_keys_that_changed_came_and_went(self) -> None:
+        before = {**BASE, "radar__bandwidth": "300 MHz"}
+        after = {"radar__bandwidth": "600 MHz", "timing_error__quadratic": 3e-13, "scene__radius": "250 m"}
+        assert self.moved(before, after) == {
+            "radar.bandwidth": ("300 MHz", "600 MHz"),
+            "other_errors[0].name": ("a", None),
+            "other_errors[0].quadratic_phase_error": ("0.1", None),
+            "scene.radius": (None, "250 m"),
+        }
+
+    def test_the_same_value_in_other_words_is_no_change(self) -> None:
+        assert self.moved({"radar__bandwidth": "300 MHz"}, {"radar__bandwidth": "0.3 GHz"}) == {}
+
+    def test_a_vector_is_one_value(self) -> None:
+        error = "platforms__receiver__motion_error__velocity"
+        moved = self.moved({error: "5 mm/s"}, {error: ["5 mm/s", 0, "1 mm/s"]})
+        assert moved == {error.replace("__", "."): ("5 mm/s", "[5 mm/s, 0, 1 mm/s]")}
+
+
+class TestGeometry:
+    def test_resolution_and_angles(self) -> None:
+        """Twice the bandwidth halves the range cell; no angle moves."""
+        (move,) = compare(findings(), findings(radar__bandwidth="600 MHz")).geometry
+        assert (move.name, move.unit) == ("range resolution", "m")
+        assert move.after == pytest.approx(move.before / 2)
+        turned = compare(findings(), findings(platforms__receiver__velocity=[-40, 0, 0])).geometry
+        names = [move.name for move in turned]
+        assert names == ["receiver squint", "angle between range and Doppler gradients", "cross-range resolution"]
+
+
+class TestSmallMoves:
+    @pytest.mark.parametrize(
+        ("before", "after", "is_small"),
+        [(0.5, 0.504, True), (0.5, 0.506, False), (0.99, 0.995, False), (0.5, None, False), (0.0, 0.001, False)],
+    )
+    def test_below_one_percent_of_value_and_of_what_was_left(self, before, after, is_small) -> None:
+        assert change(before, after).is_small == is_small
+
+    def test_are_hidden_and_counted_unless_all_are_asked_for(self, run, tmp_path) -> None:
+        old, new = tmp_path / "old.yaml", tmp_path / "new.yaml"
+        old.write_text(mission_text(**BASE))
+        new.write_text(mission_text(**{**BASE, "timing_error__quadratic": 3.01e-13}))
+        for name in ("text", "markdown"):
+            short, long = (run("diff", old, new, "--format", name, *more).stdout for more in ((), ("--all",)))
+            assert "1 row changed (1 by less than 1 %, not shown without --all)" in " ".join(short.split())
+            assert ("timing.quadratic" in short, "timing.quadratic" in long) == (False, True)
+            assert "by less than" not in long
+        refused = run("diff", old, new, "--fail-on-erosion", "0").stdout
+        assert "timing.quadratic" in refused
+
+    def test_json_has_every_row(self, run, tmp_path) -> None:
+        old, new = tmp_path / "old.yaml", tmp_path / "new.yaml"
+        old.write_text(mission_text(**BASE))
+        new.write_text(mission_text(**{**BASE, "timing_error__quadratic": 3.01e-13}))
+        (mission,) = json.loads(run("diff", old, new, "--format", "json").stdout)["missions"]
+        assert [row["id"] for row in mission["rows"]] == ["timing.quadratic"]
+        assert mission["inputs"] == [{"key": "timing_error.quadratic", "before": "3.0e-13", "after": "3.01e-13"}]
+        assert mission["geometry"] == []
+
+
 @pytest.fixture
 def repository(tmp_path):
     """A repository with a mission that has since become worse."""
@@ -167,6 +233,7 @@ class TestCommand:
             text = mission_text(other_errors=[{"name": name, "quadratic_phase_error": size}])
             (tmp_path / file).write_text(text)
         text = run("diff", tmp_path / "old.yaml", tmp_path / "new.yaml", "--format", "markdown").stdout
+        assert r"- input other_errors\[0\].quadratic_phase_error: 0.1 → 0.2" in text.splitlines()
         rows = [line for line in text.splitlines() if line.startswith("|")]
         assert len(rows) == 3
         assert {line.count("|") for line in rows} == {8}

@@ -12,7 +12,7 @@ from bisar_budget.budget.findings import Report, UnusableMission, worst_first
 from bisar_budget.errors import Fault
 from bisar_budget.report import FORMATS, Style, render
 from bisar_budget.report.text_table import percent
-from tests.conftest import findings
+from tests.conftest import ROOT, findings
 
 ROW_KEYS = [
     "id", "metric", "unit", "declared", "allowable", "allowable_published", "allowable_full", "qpe_published_rad",
@@ -151,16 +151,23 @@ class TestText:
 
     def test_says_what_breaks_by_how_much_and_from_which_row(self) -> None:
         text = render("text", report(), Style())
-        assert text.splitlines()[0] == "base"
+        assert text.splitlines()[2] == "base"
         (line,) = [line for line in text.splitlines() if line.startswith("FAIL     receiver.velocity.x")]
         assert "500 mm/s" in line
         assert line.endswith("II.1")
         assert "(Table II row 1)" in text
         assert "Resolution" in text
 
-    def test_one_summary_line_is_the_last(self) -> None:
-        last = render("text", report(), Style()).splitlines()[-1]
-        assert last.startswith("FAIL mission.yaml: 3 FAIL, 1 WARN, 1 pass AF, ")
+    def test_verdict_is_the_first_line_and_says_how_errors_are_combined(self) -> None:
+        verdict = " ".join(render("text", report(), Style()).split()).partition(" base ")[0]
+        assert verdict.startswith("FAIL mission.yaml: 3 FAIL, 1 WARN, 1 pass AF, ")
+        assert verdict.endswith("; each error alone")
+        together = render("text", report(findings(**FULL, allocation={"combine": "rss"})), Style())
+        assert "each error alone" not in together
+
+    def test_verdict_of_an_unusable_file_is_the_first_line(self) -> None:
+        text = render("text", report(UnusableMission(file="b.yaml", faults=(FAULT,))), Style())
+        assert text.splitlines()[0] == "ERROR b.yaml: cannot be used, 1 fault"
 
     def test_quiet_is_one_line_per_mission(self) -> None:
         assert len(render("text", report(), Style(verbosity=-1)).splitlines()) == 1
@@ -197,24 +204,83 @@ def test_every_format_ends_with_one_newline() -> None:
         assert not text.endswith("\n\n")
 
 
-def test_text_shows_what_qualifies_a_pass_without_being_asked() -> None:
-    """Notes on the collection, and of rows that pass; each once, with the rows it is about."""
+def test_notes_that_decide_nothing_stand_in_the_verbose_text_only() -> None:
+    """A pass needs no footnote: what qualifies it is in -v, --explain and the JSON."""
     found = findings(**FULL, collection={"aperture_time": 60, "pulses": 900})
+    noted = found._replace(rows=tuple(row._replace(notes=("holds by a hair",)) for row in found.rows))
+    short, long = (render("text", Report("1", (noted,)), Style(verbosity=verbosity)) for verbosity in (0, 1))
+    assert "note: " not in short
+    assert "by a hair" not in short
+    assert "note: collection.pulses: no part in" in " ".join(long.split())
+    assert long.count("holds by a hair") == len(noted.rows)
+
+
+def test_a_reason_that_rows_share_stands_once() -> None:
+    found = findings(**FULL)
     rows = tuple(
-        row._replace(status="pass", notes=("holds by a hair",)) if row.declared else row for row in found.rows
+        row._replace(status="warn", reason="a reason of them all") if row.declared else row for row in found.rows
     )
-    declared = [row.id for row in rows if row.declared]
-    text = " ".join(render("text", Report("1", (found._replace(rows=rows),)), Style()).split())
-    assert "note: the receiver's line of sight turns by" in text
-    assert "note: collection.pulses: no part in" in text
-    assert f"note: {', '.join(declared)}: holds by a hair" in text
-    silent = [row._replace(status="not_declared", declared=None) for row in rows]
-    assert "by a hair" not in render("text", Report("1", (found._replace(rows=tuple(silent)),)), Style())
+    text = render("text", Report("1", (found._replace(rows=rows),)), Style())
+    assert text.count("a reason of them all") == 1
+    (paragraph,) = re.findall(r"(?ms)^WARN [^\n]* \(.*?\n  a reason", text)
+    assert all(row.id in paragraph for row in rows if row.declared)
+
+
+def test_rows_that_limit_nothing_are_a_count_and_all_shows_them(run) -> None:
+    mission = "specs/missions/drones_same_gnss.yaml"
+    short, long = run("check", mission).stdout, run("check", mission, "--all").stdout
+    hidden = ["timing.linear", "receiver.acceleration.x", "receiver.velocity.x"]  # the last restates along other axes
+    assert "Not shown (--all): 17 not declared, 6 that limit nothing" in " ".join(short.split())
+    assert "Not shown" not in long
+    assert [row_id in short for row_id in hidden] == [False] * 3
+    assert [row_id in long for row_id in hidden] == [True] * 3
+
+
+def test_a_file_that_declares_nothing_shows_its_allowables() -> None:
+    text = render("text", Report("1", (findings(),)), Style())
+    assert "not decl receiver.acceleration.x" in text
+    assert "Not shown" not in text
+
+
+def test_no_example_prints_more_than_45_lines(run) -> None:
+    examples = sorted((ROOT / "specs" / "missions").glob("*.yaml"))
+    assert len(examples) > 5
+    lengths = {path.name: len(run("check", path).stdout.splitlines()) for path in examples}
+    assert {name: length for name, length in lengths.items() if length > 45} == {}
+
+
+def test_a_row_says_which_requirement_binds_it() -> None:
+    found = findings(**FULL)
+    bound = dict(
+        zip(("receiver.velocity.x", "receiver.velocity.y"), ("location_error", "cubic_phase_error"), strict=True)
+    )
+    rows = tuple(row._replace(binding_requirement=bound.get(row.id, "quadratic_phase_error")) for row in found.rows)
+    text = render("text", Report("1", (found._replace(rows=rows),)), Style(all_rows=True))
+    lines = [line.split() for line in text.splitlines() if re.match(r"\w.* receiver\.velocity\.[xy]  ", line)]
+    ends = {next(word for word in line if word.startswith("receiver.")): line[-1] for line in lines}
+    assert (ends["receiver.velocity.x"], ends["receiver.velocity.y"]) == ("location", "cubic")
+    assert "by: what limits" in text
+
+
+def test_gradients_below_30_degrees_are_said_in_the_verdict() -> None:
+    """Displacements grow as the inverse sine of the angle between range and Doppler gradients."""
+    wide, narrow = (
+        findings(),
+        findings(platforms__receiver__velocity=[-40, -40, 0], platforms__transmitter__velocity=[-150, 5, 0]),
+    )
+    for found in (wide, narrow):
+        degrees = math.degrees(found.geometry.gradient_angle)
+        text = render("text", Report("1", (found,)), Style())
+        assert f"gradients {degrees:.1f}° apart" in " ".join(text.split())
+        verdict = " ".join(text.split("\n\n")[0].split())
+        sentence = f"displacements are {1 / math.sin(math.radians(degrees)):.2g} times those at right angles"
+        assert (sentence in verdict) == (degrees < 30)
+    assert math.degrees(wide.geometry.gradient_angle) > 30 > math.degrees(narrow.geometry.gradient_angle)
 
 
 def test_cells_of_the_table_do_not_touch(run) -> None:
     """An allowable of twelve characters beside a dash read as a negative number; one of percent ran into metres."""
-    text = run("check", "specs/missions/drones_same_gnss.yaml").stdout
+    text = run("check", "specs/missions/drones_same_gnss.yaml", "--all").stdout
     assert " - 3.05e-08 s/s " in text
     assert not re.search(
         r" -\d|m\d+\.\d+ %", text[text.index("status") : text.index("FAIL mission.location_error (")]
