@@ -130,7 +130,8 @@ def _displaced(
     parts, step, is_settled = np.full((total, 4), np.nan), np.zeros((total, 2)), np.zeros(total, dtype=bool)
     alive = np.arange(total)
     with np.errstate(all="ignore"):
-        parts[:], step[:] = _parts_and_step(tracks, history, weights, point)
+        parts[:], step[:], turn = _parts_and_step(tracks, history, weights, point)
+        orientation = np.sign(_parts_and_step(tracks, history, weights, np.zeros((total, 2)))[2])
         for _ in range(_ITERATIONS):
             length = np.hypot(*step[alive].T)
             settled = length < _SETTLED_M + 1e-12 * np.hypot(*point[alive].T)
@@ -142,12 +143,14 @@ def _displaced(
             length, scale = np.hypot(*step[alive].T), np.ones(alive.size)
             for _ in range(_HALVINGS):
                 ahead = point[alive] + scale[:, None] * step[alive]
-                new_parts, new_step = _parts_and_step(here, history[alive], weights, ahead)
+                new_parts, new_step, new_turn = _parts_and_step(here, history[alive], weights, ahead)
                 farther = ~(np.hypot(*new_step.T) < length)
                 if not farther.any():
                     break
                 scale[farther] /= 2
-            point[alive], parts[alive], step[alive] = ahead, new_parts, new_step
+            point[alive], parts[alive], step[alive], turn[alive] = ahead, new_parts, new_step, new_turn
+    # Beyond a line on which range and Doppler gradients are parallel no error leads from nothing.
+    is_settled &= turn * orientation > 0
     k = 2 * math.pi / wavelength_m
     parts[~is_settled] = np.nan
     point = np.where(is_settled[:, None], point, np.nan)
@@ -161,8 +164,8 @@ def _displaced(
 
 def _parts_and_step(
     tracks: list[Floats], history: Floats, weights: Floats, point: Floats
-) -> tuple[Floats, Floats]:
-    """Legendre parts of what remains at points (n, 2), and Newton's step there: (n, 4) [m] and (n, 2) [m]."""
+) -> tuple[Floats, Floats, Floats]:
+    """Legendre parts of what remains at points (n, 2), Newton's step there and its determinant, (n, 4), (n, 2), (n,)."""
     left, slopes = history, 0.0
     for track in tracks:
         ground = track[..., :2] - point[:, None, :]
@@ -174,7 +177,7 @@ def _parts_and_step(
     determinant = a * d - b * c
     first, second = parts[:, 0], parts[:, 1]
     step = np.stack((d * first - b * second, a * second - c * first), axis=-1) / determinant[:, None]
-    return parts, step
+    return parts, step, determinant
 
 
 @cache
