@@ -12,7 +12,7 @@ import numpy as np
 
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import GroundVector
-from bisar_budget.simulate.collection import OVERSAMPLING, Chip, Errors, PointCollection
+from bisar_budget.simulate.collection import CELLS, OVERSAMPLING, Chip, Errors, PointCollection
 from bisar_budget.simulate.phase_history import Complexes, Floats, cell_centres
 
 READ_CELLS = 2  # of range that are read at most, beside what a response walks
@@ -26,12 +26,15 @@ _BLOCK = 1 << 20  # contributions held at once
 class ApertureReading(NamedTuple):
     """Phases at the aperture edge, signed like the range error [rad].
 
-    `across_pixels` is how far the response lies from the middle along y′, by the linear part of the phase; `coverage` is the part of the aperture that the patch holds: 1 unless a smear leaves it.
+    `across_pixels` is how far the response lies from the middle along y′, by the linear part of the phase.
+    `walked_pixels` is what the other parts put the centre of gravity nearer along x′: at a frequency of y′ it is where
+    the range error less its slope times slow time puts it. `coverage` is the part of the aperture that the patch holds: 1 unless a smear leaves it.
     """
 
     quadratic: float
     cubic: float
     across_pixels: float
+    walked_pixels: float
     coverage: float
 
 
@@ -85,7 +88,12 @@ def read_aperture(
     # A pixel along y′ changes the range sum over the aperture by λ / OVERSAMPLING, twice its P₁ part.
     turn = 1 if collection.flown(errors).turns_left(centre) else -1
     across = -turn * OVERSAMPLING / math.pi * float(fit[1])
-    return ApertureReading(float(-1.5 * fit[2]), float(-2.5 * fit[3]), across, min(1.0, float(covered) * 1.02))
+    slope = np.polynomial.legendre.legder([0.0, 0.0, *fit[2:]])
+    mean = float(np.mean(place[inner] * np.polynomial.legendre.legval(place[inner], slope)))
+    walked = mean / (2 * math.pi) * collection.relative_bandwidth * OVERSAMPLING
+    return ApertureReading(
+        float(-1.5 * fit[2]), float(-2.5 * fit[3]), across, -walked, min(1.0, float(covered) * 1.02)
+    )
 
 
 def _by_pulse(
@@ -103,7 +111,10 @@ def _by_pulse(
     half = min(middle, lines - 1 - middle, round(range_cells * OVERSAMPLING / 2))
     rows = slice(middle - half, middle + half + 1)
     pixels = grid[rows].reshape(-1, 3)
-    taper = np.cos(math.pi * (np.arange(columns) - columns // 2) / columns) ** 2
+    # The ends of the patch are half the cells of a response without smear; what is smeared stays as it is.
+    ramp = round(CELLS * OVERSAMPLING / 2)
+    inside = np.minimum(np.arange(columns) + 0.5, columns - np.arange(columns) - 0.5) / ramp
+    taper = np.sin(math.pi / 2 * np.clip(inside, 0, 1)) ** 2
     images = np.stack([(one.image[rows] * taper).reshape(-1) for one in chips])
     flown = collection.flown(errors)
     k = 2 * math.pi / collection.wavelength

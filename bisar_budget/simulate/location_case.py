@@ -35,7 +35,7 @@ def location(study: Study, requirement: float) -> Verdict:
         effect = study.collection.effect(errors)
         chips = study.chips(errors, effect)
         reading = study.read(errors, effect, *chips)
-        shift = measured_shift(*chips, reading.across_pixels)
+        shift = measured_shift(*chips, reading)
     except (ValueError, np.linalg.LinAlgError) as error:
         return blank._replace(reason=f"no image: {error}")
     assert said is not None
@@ -50,6 +50,10 @@ def location(study: Study, requirement: float) -> Verdict:
                 seen.append((f"{source.id} alone", alone, exact))
     verdict, farthest = _judged(study, seen)
     along, across = _pixels_apart(study, said, measured)
+    if study.is_full:
+        # What exact ranges predict is the middle of the chip, whose lines and columns are those of range and Doppler.
+        along, across = abs(shift.pixels[0]), abs(shift.pixels[1])
+        verdict = "confirmed" if max(along, across) <= HALF_PIXEL else "optimistic"
     reason = f"{rule} and the image differ by {along:.2g} and {across:.2g} pixels along x' and y'"
     if verdict != "confirmed":
         who, by_rule, is_at = farthest

@@ -13,7 +13,7 @@ from bisar_budget.geometry import GroundVector
 from bisar_budget.simulate.aperture_reading import READ_CELLS, ApertureReading
 from bisar_budget.simulate.collection import MAX_CELLS, Chip, Errors
 from bisar_budget.simulate.exact import ExactEffect
-from bisar_budget.simulate.impulse_response import impulse_response
+from bisar_budget.simulate.impulse_response import impulse_response, impulse_response_2d
 from bisar_budget.simulate.shift import measured_shift
 from bisar_budget.simulate.study import Sizes, Study
 from bisar_budget.units import format_limit, format_quantity
@@ -60,7 +60,7 @@ def _bound_elsewhere(study: Study, source: ErrorSource) -> Verdict:
             verdict=compare(abs(reading.cubic) / requirements.cubic_phase_error - 1, TOLERANCE),
             reason="bound by the cubic phase",
         )
-    shift = measured_shift(*chips, reading.across_pixels)
+    shift = measured_shift(*chips, reading)
     measured = moved(effect.displacement, shift.displacement)
     required = requirements.location_error or 0.0
     pixel = min(chips[0].spacing)
@@ -168,7 +168,7 @@ def refocused(study: Study, sizes: Sizes, budget: float) -> dict[str, Any]:
         chip, reference = study.chips(errors, effect, room=room)
         focused = study.focused(chip)
         residual = abs(study.read(errors, effect, focused, reference).quadratic)
-        peaks = [impulse_response(one.cut, one.spacing[1]).peak for one in (reference, focused)]
+        peaks = [impulse_response_2d(one.image, one.spacing).peak for one in (reference, focused)]
         loss = 20 * math.log10(peaks[0] / peaks[1])
     except (ValueError, np.linalg.LinAlgError) as error:
         return {"verdict_autofocus": "not_evaluated", "reason_autofocus": f"no image: {error}"}
@@ -248,7 +248,7 @@ def _of_response(chip: Chip, reference: Chip, effect: ExactEffect, reading: Aper
     """Measures of the response; those that a long smear or a bent patch leaves without value are missing."""
     found: dict[str, Any] = {}
     try:
-        shift = measured_shift(chip, reference, reading.across_pixels)
+        shift = measured_shift(chip, reference, reading)
         found["measured_displacement_m"] = moved(effect.displacement, shift.displacement)
         found["measured_smear_azimuth_rad"] = shift.smear_azimuth
     except (ValueError, np.linalg.LinAlgError):
