@@ -99,135 +99,26 @@ def published_ground_inverse(
     )
 
 
-def look_series(
+def full_motion(
     x: float,
     y: float,
     z: float,
-    v_x: float,
-    v_y: float,
-    v_z: float,
-    a_x: float,
-    a_y: float,
-    a_z: float,
     slant_range: float,
+    tau: float,
 ) -> tuple[tuple[float, ...], ...]:
-    """Line of sight to a platform and its first four derivatives at the aperture midpoint.
+    """Range error of one unit of each motion error of one platform at one slow time. [m/unit]
 
-    Rows are orders 0 to 4 [1/sⁿ], columns x, y, z, on a path of constant acceleration. Derived here.
+    −u·r̃(τ): the line of sight is that of the position then, nothing is held constant. Position and
+    slant range are those at the slow time. Derived here.
     """
-    shared_0 = 1/slant_range
-    shared_1 = 2*x
-    shared_2 = 2*y
-    shared_3 = 2*z
-    shared_4 = shared_1*v_x + shared_2*v_y + shared_3*v_z
-    shared_5 = slant_range**(-2)
-    shared_6 = 0.5*shared_5
-    shared_7 = shared_4*shared_6
-    shared_8 = shared_4*shared_5
-    shared_9 = slant_range**(-4)
-    shared_10 = shared_4**2
-    shared_11 = a_x*x + a_y*y + a_z*z + v_x**2 + v_y**2 + v_z**2
-    shared_12 = 0.375*shared_10*shared_9 - shared_11*shared_6
-    shared_13 = 1.5*shared_8
-    shared_14 = 6*shared_12
-    shared_15 = a_x*v_x + a_y*v_y + a_z*v_z
-    shared_16 = slant_range**(-6)
-    shared_17 = 0.75*shared_11*shared_4*shared_9 - shared_15*shared_6 - 0.3125*shared_16*shared_4**3
-    shared_18 = 6*shared_17
-    shared_19 = 12*shared_12
-    shared_20 = 24*shared_17
-    shared_21 = -22.5*shared_10*shared_11*shared_16 + 9*shared_11**2*shared_9 + 18*shared_15*shared_4*shared_9 + 6.5625*shared_4**4/slant_range**8 - 24*shared_6*(0.25*a_x**2 + 0.25*a_y**2 + 0.25*a_z**2)
+    along_x = -x/slant_range
+    along_y = -y/slant_range
+    along_z = -z/slant_range
+    shared_0 = 0.5*tau**2
     return (
-        (shared_0*x, shared_0*y, shared_0*z),  # u
-        (shared_0*(-shared_7*x + v_x), shared_0*(-shared_7*y + v_y), shared_0*(-shared_7*z + v_z)),  # first derivative
-        (shared_0*(a_x + shared_1*shared_12 - shared_8*v_x), shared_0*(a_y + shared_12*shared_2 - shared_8*v_y), shared_0*(a_z + shared_12*shared_3 - shared_8*v_z)),  # second derivative
-        (shared_0*(-a_x*shared_13 + shared_14*v_x + shared_18*x), shared_0*(-a_y*shared_13 + shared_14*v_y + shared_18*y), shared_0*(-a_z*shared_13 + shared_14*v_z + shared_18*z)),  # third derivative
-        (shared_0*(a_x*shared_19 + shared_20*v_x + shared_21*x), shared_0*(a_y*shared_19 + shared_20*v_y + shared_21*y), shared_0*(a_z*shared_19 + shared_20*v_z + shared_21*z)),  # fourth derivative
-    )
-
-
-def full_motion(
-    u_x: float,
-    u_y: float,
-    u_z: float,
-    u_dot_x: float,
-    u_dot_y: float,
-    u_dot_z: float,
-    u_ddot_x: float,
-    u_ddot_y: float,
-    u_ddot_z: float,
-    u_dddot_x: float,
-    u_dddot_y: float,
-    u_dddot_z: float,
-    u_ddddot_x: float,
-    u_ddddot_y: float,
-    u_ddddot_z: float,
-    wavelength: float,
-    aperture_time: float,
-) -> tuple[tuple[float, ...], ...]:
-    """Effects of one unit of each motion error of one platform, every first-order term kept.
-
-    Columns as in published_motion, before what the displacement of the image adds; the quadratic phase
-    is that of the quadratic fitted over the aperture, in which the quartic term has a part. u and its
-    derivatives as look_series gives them. Derived here.
-    """
-    shared_0 = -u_x
-    shared_1 = 3.1415926535897932/wavelength
-    shared_2 = aperture_time**2*shared_1
-    shared_3 = 0.25*shared_2
-    shared_4 = aperture_time**4*shared_1
-    shared_5 = (1/224)*shared_4
-    shared_6 = aperture_time**3*shared_1
-    shared_7 = (1/24)*shared_6
-    shared_8 = -u_y
-    shared_9 = -u_z
-    shared_10 = 0.5*shared_2
-    shared_11 = (1/56)*shared_4
-    shared_12 = 0.125*shared_6
-    shared_13 = (3/112)*shared_4
-    return (
-        (shared_0, -u_dot_x, -shared_3*u_ddot_x - shared_5*u_ddddot_x, -shared_7*u_dddot_x),  # position x
-        (shared_8, -u_dot_y, -shared_3*u_ddot_y - shared_5*u_ddddot_y, -shared_7*u_dddot_y),  # position y
-        (shared_9, -u_dot_z, -shared_3*u_ddot_z - shared_5*u_ddddot_z, -shared_7*u_dddot_z),  # position z
-        (0.0, shared_0, -shared_10*u_dot_x - shared_11*u_dddot_x, -shared_12*u_ddot_x),  # velocity x
-        (0.0, shared_8, -shared_10*u_dot_y - shared_11*u_dddot_y, -shared_12*u_ddot_y),  # velocity y
-        (0.0, shared_9, -shared_10*u_dot_z - shared_11*u_dddot_z, -shared_12*u_ddot_z),  # velocity z
-        (0.0, 0.0, -shared_13*u_ddot_x - shared_3*u_x, -shared_12*u_dot_x),  # acceleration x
-        (0.0, 0.0, -shared_13*u_ddot_y - shared_3*u_y, -shared_12*u_dot_y),  # acceleration y
-        (0.0, 0.0, -shared_13*u_ddot_z - shared_3*u_z, -shared_12*u_dot_z),  # acceleration z
-    )
-
-
-def full_ground(
-    s_x: float,
-    s_y: float,
-    s_dot_x: float,
-    s_dot_y: float,
-    s_ddot_x: float,
-    s_ddot_y: float,
-    s_dddot_x: float,
-    s_dddot_y: float,
-    s_ddddot_x: float,
-    s_ddddot_y: float,
-    wavelength: float,
-    aperture_time: float,
-) -> tuple[tuple[float, ...], ...]:
-    """Adjugate and determinant of Q, and the phases that a displacement of one metre adds.
-
-    s is the sum of both platforms' look_series on the ground. Displacement of the image [m] = adjugate
-    · (constant term, linear term) / determinant; quadratic and cubic phase at the aperture edge per
-    metre of displacement east and north [rad/m]. Derived here.
-    """
-    shared_0 = 3.1415926535897932/wavelength
-    shared_1 = 0.25*aperture_time**2*shared_0
-    shared_2 = (1/224)*aperture_time**4*shared_0
-    shared_3 = (1/24)*aperture_time**3*shared_0
-    return (
-        (-s_dot_y, s_y),  # adjugate, first row
-        (s_dot_x, -s_x),  # adjugate, second row
-        (-s_dot_x*s_y + s_dot_y*s_x,),  # determinant
-        (s_ddddot_x*shared_2 + s_ddot_x*shared_1, s_ddddot_y*shared_2 + s_ddot_y*shared_1),  # quadratic phase
-        (s_dddot_x*shared_3, s_dddot_y*shared_3),  # cubic phase
+        (along_x, along_y, along_z),  # position x, y, z
+        (along_x*tau, along_y*tau, along_z*tau),  # velocity x, y, z
+        (along_x*shared_0, along_y*shared_0, along_z*shared_0),  # acceleration x, y, z
     )
 
 
@@ -241,3 +132,30 @@ def vibration_limit(
     Source: Rigling & Moses, Section V.
     """
     return 0.5*root_power*wavelength/3.1415926535897932
+
+
+# Nodes over -1 … 1, in half apertures, and the weights that fit a history sampled there: value P₀,
+# slope P₁, quadratic at the edge (3/2 of P₂), cubic at the edge (5/2 of P₃); by the number of nodes.
+LEGENDRE_FITS: dict[int, tuple[tuple[float, ...], ...]] = {
+    6: (
+        (-0.932469514203152, -0.6612093864662645, -0.2386191860831969, 0.2386191860831969, 0.6612093864662645, 0.932469514203152),
+        (0.08566224618958518, 0.1803807865240693, 0.23395696728634552, 0.23395696728634552, 0.1803807865240693, 0.08566224618958518),
+        (-0.23963229926985988, -0.3578084075636463, -0.16747986333708267, 0.16747986333708267, 0.3578084075636463, 0.23963229926985988),
+        (0.5167033781173703, 0.21077059167585144, -0.7274739697932218, -0.7274739697932218, 0.21077059167585144, 0.5167033781173703),
+        (-0.94180274498478, 0.8495079987198195, 1.3263798718560966, -1.3263798718560966, -0.8495079987198195, 0.94180274498478),
+    ),
+    10: (
+        (-0.9739065285171717, -0.8650633666889845, -0.6794095682990244, -0.4333953941292472, -0.14887433898163122, 0.14887433898163122, 0.4333953941292472, 0.6794095682990244, 0.8650633666889845, 0.9739065285171717),
+        (0.03333567215434407, 0.0747256745752903, 0.10954318125799102, 0.13463335965499817, 0.14776211235737644, 0.14776211235737644, 0.13463335965499817, 0.10954318125799102, 0.0747256745752903, 0.03333567215434407),
+        (-0.09739748623087134, -0.19392733087861824, -0.22327405646578039, -0.17504843391186786, -0.06599396041120181, 0.06599396041120181, 0.17504843391186786, 0.22327405646578039, 0.19392733087861824, 0.09739748623087134),
+        (0.23070140830148575, 0.3488765818784095, 0.1580675589667381, -0.22038065493021272, -0.5172648942164206, -0.5172648942164206, -0.22038065493021272, 0.1580675589667381, 0.3488765818784095, 0.23070140830148575),
+        (-0.49499380564686607, -0.4195061873335815, 0.4506500618126433, 1.052179312775924, 0.5561166707291799, -0.5561166707291799, -1.052179312775924, -0.4506500618126433, 0.4195061873335815, 0.49499380564686607),
+    ),
+    16: (
+        (-0.9894009349916499, -0.9445750230732326, -0.8656312023878318, -0.755404408355003, -0.6178762444026438, -0.45801677765722737, -0.2816035507792589, -0.09501250983763744, 0.09501250983763744, 0.2816035507792589, 0.45801677765722737, 0.6178762444026438, 0.755404408355003, 0.8656312023878318, 0.9445750230732326, 0.9894009349916499),
+        (0.013576229705877048, 0.031126761969323947, 0.04757925584124639, 0.06231448562776694, 0.07479799440828837, 0.08457825969750127, 0.09130170752246179, 0.09472530522753425, 0.09472530522753425, 0.09130170752246179, 0.08457825969750127, 0.07479799440828837, 0.06231448562776694, 0.04757925584124639, 0.031126761969323947, 0.013576229705877048),
+        (-0.04029700309396849, -0.08820468571610755, -0.12355826532772915, -0.14121791144276888, -0.1386477116215295, -0.11621478589951703, -0.07713265509160384, -0.02700026698441292, 0.02700026698441292, 0.07713265509160384, 0.11621478589951703, 0.1386477116215295, 0.14121791144276888, 0.12355826532772915, 0.08820468571610755, 0.04029700309396849),
+        (0.09860123562246295, 0.19570942903550842, 0.2226623772725645, 0.1663580520554516, 0.04075924853791147, -0.11756226728879961, -0.2609282923786285, -0.3455997828564708, -0.3455997828564708, -0.2609282923786285, -0.11756226728879961, 0.04075924853791147, 0.1663580520554516, 0.2226623772725645, 0.19570942903550842, 0.09860123562246295),
+        (-0.22267447853088795, -0.3758904828418327, -0.2690536957004317, 0.06047341049061533, 0.441247100817642, 0.6613455206447082, 0.5857094005940888, 0.23269777126146723, -0.23269777126146723, -0.5857094005940888, -0.6613455206447082, -0.441247100817642, -0.06047341049061533, 0.2690536957004317, 0.3758904828418327, 0.22267447853088795),
+    ),
+}

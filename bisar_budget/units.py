@@ -22,17 +22,20 @@ class Dimension:
     """A kind of quantity: its name with article, the unit of a bare number, every unit with its factor.
 
     `scales` maps what can stand behind a number to a factor and a divisor, of which one is 1: dividing by a whole
-    number keeps decimals exact, 5 mm is 0.005 m to the bit.
+    number keeps decimals exact, 5 mm is 0.005 m to the bit. `usual` names the units of which one has to stand there;
+    empty where a bare number is in SI.
     """
 
-    def __init__(self, name: str, si: str, units: dict[str, float]) -> None:
-        self.name, self.si, self.units = name, si, units
-        self.scales = {unit: _scale(factor) for unit, factor in units.items()} | {"": (1.0, 1.0)}
+    def __init__(self, name: str, si: str, units: dict[str, float], usual: tuple[str, ...] = ()) -> None:
+        self.name, self.si, self.units, self.usual = name, si, units, usual
+        self.scales = {unit: _scale(factor) for unit, factor in units.items()} | ({} if usual else {"": (1.0, 1.0)})
 
     @property
     def accepted(self) -> str:
         """Say which units may stand behind the number."""
         units = ", ".join(unit for unit in self.units if unit)
+        if self.usual:
+            return f"accepted: {self.name} in {units}; only zero needs no unit"
         return f"accepted: {self.name} in {units}; a bare number is {'in ' + self.si if self.si else 'a ratio'}"
 
 
@@ -62,21 +65,25 @@ _G = STANDARD_GRAVITY
 
 FREQUENCY = Dimension("a frequency", "Hz", _scaled("Hz", "kMGT"))
 TIME = Dimension("a time", "s", _scaled("s", "munp") | {"min": 60.0})
-LENGTH = Dimension("a length", "m", _LENGTHS)
+LENGTH = Dimension("a length", "m", _LENGTHS | {"NM": 1852.0})
 SPEED = Dimension(
     "a speed",
     "m/s",
-    {f"{unit}/s": factor for unit, factor in _LENGTHS.items()} | {"km/h": 1 / 3.6, "kt": 1852 / 3600},
+    {f"{unit}/s": factor for unit, factor in _LENGTHS.items()}
+    | {"km/h": 1 / 3.6, "kt": 1852 / 3600, "kn": 1852 / 3600},
 )
 ACCELERATION = Dimension(
     "an acceleration",
     "m/s^2",
     {f"{unit}/s^2": factor for unit, factor in _LENGTHS.items()} | {"g": _G, "mg": 1e-3 * _G, "ug": 1e-6 * _G},
 )
-ANGLE = Dimension("an angle", "rad", _scaled("rad", "mun") | {"deg": math.pi / 180, "°": math.pi / 180})
+# Readers think in degrees, formulas in radians: 45 without its unit is one in one file and the other in the next.
+ANGLE = Dimension(
+    "an angle", "rad", _scaled("rad", "mun") | {"deg": math.pi / 180, "°": math.pi / 180}, usual=("deg", "rad")
+)
 RATIO = Dimension("a number", "", {"": 1.0, "%": 1e-2, "ppm": 1e-6, "ppb": 1e-9, "s/s": 1.0})
-RATE = Dimension("a rate", "1/s", {"1/s": 1.0, "s^-1": 1.0, "Hz": 1.0, "s/s^2": 1.0})
-RATE_SQUARED = Dimension("a rate per second", "1/s^2", {"1/s^2": 1.0, "s^-2": 1.0, "s/s^3": 1.0})
+RATE = Dimension("a rate", "1/s", {"1/s": 1.0, "/s": 1.0, "s^-1": 1.0, "Hz": 1.0, "s/s^2": 1.0})
+RATE_SQUARED = Dimension("a rate per second", "1/s^2", {"1/s^2": 1.0, "/s^2": 1.0, "s^-2": 1.0, "s/s^3": 1.0})
 POWER_RATIO = Dimension("a power ratio in decibel", "dB", {"dB": 1.0})
 POSITION_VARIANCE = Dimension("a position variance", "m^2", _scaled("m^2", "kcmu", 2))
 POSITION_VELOCITY = Dimension("a covariance of position and velocity", "m^2/s", _scaled("m^2/s", "kcmu", 2))
@@ -104,6 +111,8 @@ DIMENSIONS = (
 def parse_quantity(value: object, dimension: Dimension) -> float:
     """Read `31 km`, `9.6GHz`, `2 µrad`, `1e-12`; a bare number is SI, in decibels where the dimension is.
 
+    A bare angle is refused, except zero.
+
     Parameters
     ----------
     value : str, int or float
@@ -119,7 +128,7 @@ def parse_quantity(value: object, dimension: Dimension) -> float:
     Raises
     ------
     InvalidValueError
-        Not a number, not finite, an unknown unit, or a unit of another dimension.
+        Not a number, not finite, an unknown unit, a unit of another dimension, or none where one is needed.
     """
     plain = _plain_quantity(value) if type(value) is str else None
     if plain is not None:
@@ -137,7 +146,7 @@ def _parse_closely(value: object, dimension: Dimension) -> float:
     if isinstance(value, bool) or not isinstance(value, str | int | float):
         raise _invalid(f"must be {dimension.name}", dimension)
     if not isinstance(value, str):
-        return _finite(float(value), dimension)
+        return _bare(_finite(float(value), dimension), str(value), dimension)
     text = value.strip()
     match = _NUMBER.match(text) if len(text) <= _MAX_TEXT else None
     if match is None:
@@ -148,6 +157,8 @@ def _parse_closely(value: object, dimension: Dimension) -> float:
         raise InvalidValueError("has a leading zero, which some YAML readers take for octal", "write it without")
     number, unit = float(match[0]), text[match.end() :].lstrip()
     scale = dimension.scales.get(unit)
+    if not unit:
+        return _bare(_finite(number, dimension), text, dimension)
     if scale is None:
         unit = _normal(unit)
         scale = dimension.scales.get(unit)
@@ -210,6 +221,13 @@ def _rounded(value: float, digits: int, rounding: str) -> str:
         value = math.copysign(mantissa / 10.0**step if step <= 300 else abs(value), value)
         text = f"{value:.{digits}g}"
     return f"{value:.0f}" if "e+0" in text and abs(value) < 1e6 else text
+
+
+def _bare(number: float, text: str, dimension: Dimension) -> float:
+    if number and dimension.usual:
+        choices = " or ".join(f"'{text} {unit}'" for unit in dimension.usual)
+        raise _invalid("has no unit", dimension, f"Did you mean {choices}?")
+    return number
 
 
 def _finite(number: float, dimension: Dimension) -> float:

@@ -12,9 +12,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from bisar_budget.budget.validity import FLOOR_M, FLOOR_RAD, SHARE, FirstOrder
 
 from bisar_budget.budget.effects import full_ground
-from bisar_budget.budget.validity import FLOOR_M, FLOOR_RAD, SHARE, FirstOrder
 from bisar_budget.errors import MissionError
 from bisar_budget.geometry import norm
 from bisar_budget.mission.load import parse_mission

@@ -36,6 +36,18 @@ BASE: dict[str, Any] = {
 }
 
 
+ANGLES = ("azimuth", "elevation", "motion_azimuth", "quadratic_phase_error", "cubic_phase_error")
+
+
+def with_radians(value: Any, key: str = "") -> Any:
+    """Write the unit behind angles that a test gives as numbers; what it gives as text stays as it is."""
+    if isinstance(value, dict):
+        return {name: with_radians(item, name) for name, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [with_radians(item) for item in value]
+    return f"{value} rad" if key in ANGLES and isinstance(value, int | float) else value
+
+
 def mission_text(**changes: Any) -> str:
     """Return the base mission as YAML with `a__b=value` putting a value at the path a.b."""
     tree = copy.deepcopy(BASE)
@@ -45,7 +57,7 @@ def mission_text(**changes: Any) -> str:
         for key in parents:
             node = node.setdefault(key, {})
         node[last] = value
-    return yaml.safe_dump(tree, sort_keys=False, allow_unicode=True)
+    return yaml.safe_dump(with_radians(tree), sort_keys=False, allow_unicode=True)
 
 
 def findings(**changes: Any) -> MissionFindings:

@@ -1,7 +1,7 @@
 """Division of the budgets between transmitter, receiver and clock, and the gain of autofocus."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from bisar_budget.budget.correlation import combined_phase, correlated_errors
@@ -59,13 +59,23 @@ class Allocation(NamedTuple):
         return math.ceil(exact * 100 * (1 - 1e-12)) / 100
 
 
-def allocate(mission: Mission, sources: Sequence[ErrorSource]) -> Allocation:
-    """Divide the budgets of a mission as its `allocation.split` says."""
+def allocate(mission: Mission, stated: Sequence[ErrorSource], phases: Mapping[str, float]) -> Allocation:
+    """Divide the budgets of a mission as its `allocation.split` says.
+
+    Parameters
+    ----------
+    mission : Mission
+        As loaded.
+    stated : sequence of ErrorSource
+        Declared errors, along the axes that the file states them in.
+    phases : mapping of str to float
+        Quadratic phase of each by the gating model, by row id: `balanced` weighs them. [rad]
+    """
     split = mission.allocation.split
     metrics = split if isinstance(split, MetricSplits) else None
     return Allocation(
         qpe_total=mission.requirements.quadratic_phase_error,
-        qpe=_divide(metrics.quadratic_phase_error if metrics else split, mission, sources),
+        qpe=_divide(metrics.quadratic_phase_error if metrics else split, mission, stated, phases),
         pslr=_divide_power(metrics.pslr if metrics else split),
         islr=_divide_power(metrics.islr if metrics else split),
         n_pull=mission.autofocus.n_pull,
@@ -76,7 +86,7 @@ def _divide_power(split: object) -> Split:
     return _split(split) if isinstance(split, Shares) else EQUAL  # `balanced` weighs phase, not power
 
 
-def _divide(split: object, mission: Mission, sources: Sequence[ErrorSource]) -> Split:
+def _divide(split: object, mission: Mission, stated: Sequence[ErrorSource], phases: Mapping[str, float]) -> Split:
     if isinstance(split, Shares):
         return _split(split)
     if split != "balanced":
@@ -84,14 +94,10 @@ def _divide(split: object, mission: Mission, sources: Sequence[ErrorSource]) -> 
     weight = {}
     for platform in ("transmitter", "receiver"):
         rule = mission.allocation.combine
-        members = [
-            source
-            for source in sources
-            if source.declared is not None
-            and EQUAL.includes(source.owner, platform)
-            and (rule == "each" or source.is_independent)
-        ]
-        weight[platform] = combined_phase(members, "qpe", mission.allocation.model, rule, correlated_errors(mission))
+        members = [(s.id, phases[s.id]) for s in stated if EQUAL.includes(s.owner, platform)]
+        weight[platform] = combined_phase(members, rule, correlated_errors(mission))
+    # An error that leaves no image has no finite phase: it takes all that it may.
+    weight = {name: min(size, 1e300) for name, size in weight.items()}
     total = weight["transmitter"] + weight["receiver"]
     if total == 0:
         return EQUAL

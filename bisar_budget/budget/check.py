@@ -1,19 +1,21 @@
 """Hold a mission's declared errors to its allocated budget: one row for each, and what the rows add up to."""
 
+import math
 from collections.abc import Iterator, Sequence
 from datetime import date
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from bisar_budget.budget import vibration
 from bisar_budget.budget.aggregates import aggregate_rows
-from bisar_budget.budget.allocation import Allocation, allocate
+from bisar_budget.budget.allocation import Allocation
+from bisar_budget.budget.analysis import Analysis
+from bisar_budget.budget.collection_notes import collection_notes
 from bisar_budget.budget.correlation import unused_correlations
-from bisar_budget.budget.effects import ErrorSource, FullGround, ImagePlane, full_ground, image_plane
-from bisar_budget.budget.findings import FileWarning, MissionFindings, Resolution, Row
-from bisar_budget.budget.judgement import judged, judgement, quotient
-from bisar_budget.budget.pull_in import caps, needed_sentence, pull_in_caps
-from bisar_budget.budget.sources import error_sources
-from bisar_budget.budget.validity import FirstOrder, collection_notes
+from bisar_budget.budget.error_rows import error_rows
+from bisar_budget.budget.findings import READING, FileWarning, MissionFindings, Resolution, Row
+from bisar_budget.budget.judgement import judged
+from bisar_budget.budget.pull_in import pull_in_caps
+from bisar_budget.budget.required import with_required
 from bisar_budget.budget.waivers import apply_waivers
 from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
 from bisar_budget.mission.model import Mission
@@ -38,23 +40,14 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
     MissionFindings
         Rows in the order of the contract, declared or not.
     """
-    geometry = mission.geometry
-    ground = full_ground(mission, geometry)
-    plane = image_plane(geometry) if mission.allocation.model == "published" else ground.plane
-    sources = error_sources(mission, geometry, ground)
-    allocation = allocate(mission, sources)
-    first_order = FirstOrder(mission, geometry, ground)
-    errors = list(_error_rows(mission, allocation, sources, plane, first_order))
-    unwaived = [
-        *errors,
-        *_vibration_rows(mission, allocation),
-        *aggregate_rows(mission, allocation, sources, errors, plane, first_order),
-    ]
-    scene = None
-    if mission.scene.radius is not None:
-        scene, row = _scene_row(mission, allocation, sources)
-        unwaived.append(row)
-    rows, warnings = apply_waivers(unwaived, mission, today)
+    analysis = Analysis(mission)
+    gating = mission.allocation.model
+    if gating == "strictest":
+        checked = stricter(_checked(analysis, "published"), _checked(analysis, "full"))
+    else:
+        checked = _checked(analysis, gating)
+    rows, warnings = apply_waivers(with_required(checked.rows, mission), mission, today)
+    geometry = analysis.geometry
     resolution = Resolution(
         range=geometry.range_resolution(mission.radar.bandwidth, SPEED_OF_LIGHT),
         cross_range=geometry.cross_range_resolution(mission.radar.wavelength, mission.collection.aperture_time),
@@ -63,7 +56,7 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
         mission=mission,
         file=mission.file,
         name=mission.name,
-        model=mission.allocation.model,
+        model=gating,
         combine=mission.allocation.combine,
         coverage_factor=mission.allocation.coverage_factor,
         wavelength=mission.radar.wavelength,
@@ -71,7 +64,7 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
         aperture_time=mission.collection.aperture_time,
         scene_radius=mission.scene.radius,
         resolution=resolution,
-        allocation=allocation,
+        allocation=analysis.allocation,
         rows=tuple(rows),
         warnings=(
             *_unknown_requirement_ids(mission, rows),
@@ -80,173 +73,50 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
             *pull_in_caps(mission, resolution),
             *_nothing_declared(rows),
         ),
-        scene=scene,
-        notes=(*collection_notes(mission, geometry, ground), *_unused_keys(mission)),
+        scene=checked.scene,
+        notes=(*collection_notes(analysis), *_unused_keys(mission)),
+        document=mission.document,
     )
 
 
-def _error_rows(
-    mission: Mission,
-    allocation: Allocation,
-    sources: Sequence[ErrorSource],
-    plane: ImagePlane,
-    first_order: FirstOrder,
-) -> Iterator[Row]:
-    combine = mission.allocation.combine
-    info = f"combine is {combine}: the aggregate decides" if combine != "each" else ""
-    gain = allocation.autofocus_gain
-    owners = ("transmitter", "receiver", "clock", "mission")
-    limits = {owner: allocation.qpe_limit(owner) * gain for owner in owners}
-    model, warn_above = mission.allocation.model, mission.allocation.warn_above
-    for source in sources:
-        limit, signed = limits[source.owner], source.declared
-        by_table, by_full = abs(source.effect.qpe), source.full.qpe
-        published, full = quotient(limit, by_table), quotient(limit, abs(by_full))
-        if signed is None:
-            yield _undeclared(mission, source, published, full, first_order, limit)
-            continue
-        declared = abs(signed)
-        qpe_published, qpe_full = by_table * declared, by_full * signed
-        notes, displacement, exact = source.notes, None, None
-        over = doubt = ""
-        if source.is_motion:
-            displacement = plane.displacement(source.effect if model == "published" else source.full, signed)
-            if displacement is None:
-                notes = (*notes, plane.degeneracy)
-            beyond = first_order.beyond(source)
-            if beyond is not None:
-                exact = beyond.exact and beyond.qpe
-                notes = (*notes, beyond.against(qpe_full))
-                doubt = beyond.doubt(qpe_full, limit)
-        allowable = _gating(model, published, full)
-        if of_allowable := first_order.allowable_note(source, allowable, full, limit):
-            notes = (*notes, of_allowable)
-        if qpe_published > limit or abs(qpe_full) > limit:
-            qpe = abs(source.qpe(model))
-            doubt = _doubt(source, model, limit, first_order.ground) or doubt
-            needed = allocation.n_pull_needed(qpe, source.owner)
-            of_model = source.equation_by(model)
-            over = (
-                f"QPE {qpe:.3g} rad, {format_limit(limit, 'rad')} allowed ({of_model}); "
-                f"{needed_sentence(needed, caps(mission))}"
-            )
-        utilization, margin, status, reason, notes = judgement(
-            warn_above, declared, allowable, gain, over, doubt, _no_limit(source, model), "", info, True, False, notes
-        )
-        yield Row._make(  # twice as quick as by keyword, and there are a dozen in every mission
-            (
-                source.id,
-                "quadratic_phase_error",
-                source.unit,
-                declared,
-                allowable,
-                published,
-                full,
-                qpe_published,
-                qpe_full,
-                displacement,
-                utilization,
-                margin,
-                status,
-                mission.line(source.path),
-                reason or None,
-                notes,
-                source.equation_by(model),
-                mission.requirement_ids.get(source.id),
-                source.evidence,
-                source.is_independent,
-                exact,
-                None,
-                None,
-                None,
-                None,
-            )
-        )
+class _Checked(NamedTuple):
+    """One complete check by one model, before waivers."""
+
+    rows: list[Row]
+    scene: "SceneEdge | None"
 
 
-def _no_limit(source: ErrorSource, model: str) -> str:
-    return source.no_limit if model == "published" else "no quadratic phase to first order"
+def _checked(analysis: Analysis, gating: str) -> _Checked:
+    mission = analysis.mission
+    model, other = analysis.models(gating)
+    allocation = analysis.allocation
+    rows = [
+        *error_rows(analysis, model, other, allocation),
+        *_vibration_rows(mission, allocation, gating),
+        *aggregate_rows(analysis, model, other, allocation),
+    ]
+    scene = None
+    if mission.scene.radius is not None:
+        scene, row = _scene_row(analysis, gating, allocation)
+        rows.append(row)
+    return _Checked([row._replace(model=gating) for row in rows], scene)
 
 
-def _gating(model: str, published: float | None, full: float | None) -> float | None:
-    """Allowable by the model that gates; the strictest takes the smaller, no limit being infinite."""
-    if model == "published":
-        return published
-    if model == "full" or published is None:
-        return full
-    return published if full is None else min(published, full)
+def stricter(published: _Checked, full: _Checked) -> _Checked:
+    """Of two complete checks each row of the stricter verdict, then of the higher utilization."""
+    by_id = {row.id: row for row in published.rows}
+    rows = [max((row, by_id.pop(row.id, row)), key=_strictness) for row in full.rows]
+    rows += by_id.values()  # an aggregate that only one of them has
+    return _Checked(rows, full.scene)
 
 
-def _doubt(source: ErrorSource, model: str, limit: float, ground: FullGround) -> str:
-    """Say that the model that does not gate fails the error, and why it thinks otherwise; else nothing."""
-    if model == "published":
-        qpe = abs(source.qpe("full"))
-        if qpe <= limit * (1 + UTILIZATION_TOLERANCE):
-            return ""
-        moved = ground.moved(source.full)
-        turned = source.full.qpe - moved - source.effect.qpe
-        if source.id == "mission.terrain":
-            cause = "a bistatic image defocuses on a wrong height"
-        elif ".position." in source.id:
-            cause = "the line of sight turns over a position error, and its displacement defocuses"
-        elif abs(moved) >= abs(turned):
-            cause = "the displaced response has a quadratic phase of its own"
-        else:
-            cause = "at a squint the range is not constant"
-        return f"the full model says fail: QPE {qpe:.3g} rad, {format_limit(limit, 'rad')} allowed; {cause}"
-    qpe = abs(source.qpe("published"))
-    if model == "full" and qpe > limit * (1 + UTILIZATION_TOLERANCE):
-        allowed = f"{format_limit(limit, 'rad')} allowed ({source.equation})"
-        return f"the published model says fail: QPE {qpe:.3g} rad, {allowed}"
-    return ""
+def _strictness(row: Row) -> tuple[int, float, float]:
+    allowable = math.inf if row.allowable is None else row.allowable
+    return (-READING.index(row.status), row.utilization or 0.0, -allowable)
 
 
-def _undeclared(
-    mission: Mission,
-    source: ErrorSource,
-    published: float | None,
-    full: float | None,
-    first_order: FirstOrder,
-    limit: float,
-) -> Row:
-    """Row of an error that the file does not declare, as `judged` would make it: half of all rows are such."""
-    allowable = _gating(mission.allocation.model, published, full)
-    notes = source.notes
-    if of_allowable := first_order.allowable_note(source, allowable, full, limit):
-        notes = (*notes, of_allowable)
-    return Row._make(
-        (
-            source.id,
-            "quadratic_phase_error",
-            source.unit,
-            None,
-            allowable,
-            published,
-            full,
-            None,
-            None,
-            None,
-            None,
-            None,
-            "not_declared",
-            mission.line(source.path),
-            _no_limit(source, mission.allocation.model) if allowable is None else None,
-            notes,
-            source.equation_by(mission.allocation.model),
-            mission.requirement_ids.get(source.id),
-            source.evidence,
-            source.is_independent,
-            None,
-            None,
-            None,
-            None,
-            None,
-        )
-    )
-
-
-def _vibration_rows(mission: Mission, allocation: Allocation) -> Iterator[Row]:
-    model = mission.allocation.model
+def _vibration_rows(mission: Mission, allocation: Allocation, model: str) -> Iterator[Row]:
+    mission = mission._replace(allocation=mission.allocation._replace(model=model))
     for case in vibration.cases(mission, allocation):
         allowed = case.limits
         yield judged(
@@ -271,16 +141,13 @@ def _vibration_rows(mission: Mission, allocation: Allocation) -> Iterator[Row]:
         )
 
 
-def _scene_row(
-    mission: Mission, allocation: Allocation, sources: Sequence[ErrorSource]
-) -> tuple["SceneEdge | None", Row]:
+def _scene_row(analysis: Analysis, model: str, allocation: Allocation) -> tuple["SceneEdge | None", Row]:
     """Row of the scene's edge; to the published model an error is the same all over the scene."""
     from bisar_budget.budget.scene import scene_edge
 
-    combine, total = mission.allocation.combine, allocation.qpe_total
-    single = [s for s in sources if combine == "each" or s.is_independent]
-    edge = scene_edge(mission, mission.geometry, allocation, single)
-    is_published = mission.allocation.model == "published"
+    mission, total = analysis.mission, allocation.qpe_total
+    edge = scene_edge(analysis, allocation)
+    is_published = model == "published"
     difference: float | None = None
     doubt, notes = "", tuple[str, ...]()
     if edge is not None and not edge.degeneracy:

@@ -28,12 +28,9 @@ class Correlated(NamedTuple):
         """Name of the six together."""
         return f"{self.platform}.covariance"
 
-    def phase(self, members: Sequence[ErrorSource], term: str, model: str) -> float:
-        """√(gᵀCg) of the quadratic (`qpe`) or `cubic` phase; by `strictest` the largest there is. [rad]"""
-        # The strictest takes the larger phase of each row, and with signs that is not yet the larger of the whole.
-        models = ("published", "full", model) if model == "strictest" else (model,)
-        squares = [quadratic_form(self.correlation, [getattr(s, term)(of) for s in members]) for of in models]
-        return math.sqrt(max(squares))
+    def phase(self, phases: Sequence[float]) -> float:
+        """√(gᵀCg) of the six phases gᵢσᵢ, signed. [rad]"""
+        return math.sqrt(quadratic_form(self.correlation, phases))
 
     def displacement(self, moves: Sequence[GroundVector]) -> float:
         """Root of the trace of the displacement's covariance on the ground: its rms length. [m]"""
@@ -54,30 +51,25 @@ def correlated_errors(mission: Mission) -> tuple[Correlated, ...]:
 
 
 def phase_parts(
-    sources: Sequence[ErrorSource], term: str, model: str, rule: str, groups: Sequence[Correlated]
+    phases: Sequence[tuple[str, float]], rule: str, groups: Sequence[Correlated]
 ) -> list[tuple[str, float]]:
-    """List what combines to a quadratic (`qpe`) or `cubic` phase: id and phase. [rad]
+    """List what combines of phases by row id, signed: id and phase. [rad]
 
     Of a covariance the six errors are one part under `rss`, else six.
     """
+    if rule != "rss" or not groups:  # few missions have any
+        return list(phases)
+    left = dict(phases)
     parts = []
-    if rule == "rss" and groups:  # few missions have any
-        left = {source.id: source for source in sources}
-        for group in groups:
-            if left.keys() >= set(group.ids):
-                members = [left.pop(row_id) for row_id in group.ids]
-                parts.append((group.id, group.phase(members, term, model)))
-        sources = list(left.values())
-    return [*parts, *((source.id, getattr(source, term)(model)) for source in sources)]
+    for group in groups:
+        if left.keys() >= set(group.ids):
+            parts.append((group.id, group.phase([left.pop(row_id) for row_id in group.ids])))
+    return [*parts, *left.items()]
 
 
-def combined_phase(
-    sources: Sequence[ErrorSource], term: str, model: str, rule: str, groups: Sequence[Correlated]
-) -> float:
+def combined_phase(phases: Sequence[tuple[str, float]], rule: str, groups: Sequence[Correlated]) -> float:
     """Combine the phases of errors by a rule, those of a covariance with their correlations. [rad]"""
-    if not groups:
-        return combine_phases([getattr(source, term)(model) for source in sources], rule)
-    return combine_phases([phase for _, phase in phase_parts(sources, term, model, rule, groups)], rule)
+    return combine_phases([phase for _, phase in phase_parts(phases, rule, groups)], rule)
 
 
 def displacement_parts(
@@ -134,7 +126,7 @@ def likely_error(group: Correlated, members: Sequence[ErrorSource]) -> tuple[flo
     """
     sizes = [source.declared or 0.0 for source in members]
     phases = [source.full.qpe * size for source, size in zip(members, sizes, strict=True)]
-    total = math.sqrt(quadratic_form(group.correlation, phases))
+    total = group.phase(phases)
     if not total:
         return tuple(sizes)
     shares = [math.fsum(rho * phase for rho, phase in zip(row, phases, strict=True)) for row in group.correlation]

@@ -1,41 +1,34 @@
-"""What declared errors do by exact ranges: no expansion, and no array library, so that a check can ask for it.
+"""What errors do by exact ranges: no expansion, and no array library, so that a check can ask for it.
 
-The range history is sampled at the nodes of Gauss-Legendre quadrature, where its projection on Legendre polynomials
-is a sum. The displaced point has the recorded constant and linear term at the aperture midpoint, as the full model
-has it; quadratic and cubic phase are those of the cubic fitted to what remains, over the whole aperture.
-`simulate/exact.py` does the same on arrays.
+The data hold the ranges of the true path; the processor subtracts those of the measured one. What is left is fitted
+over the whole aperture by Legendre polynomials Pₙ, at the nodes of Gauss-Legendre quadrature (`LEGENDRE_FITS`). The
+response sits at the ground point for which nothing is left of P₀ and P₁; what then is left of P₂ and P₃ defocuses.
+`Linear` is the same for errors so small that their effects are proportional to them. `exact_arrays.py` does both on
+arrays. Derived here.
 """
 
 import math
-from collections.abc import Callable, Iterable
-from functools import cache, cached_property, partial
+from collections.abc import Iterable, Sequence
+from functools import cached_property
 from math import sqrt
 from operator import mul
 from typing import NamedTuple
 
-from bisar_budget.budget.effects import ErrorSource
-from bisar_budget.geometry import BistaticGeometry, GroundVector, Vector, norm
+from bisar_budget.budget.effects import CLOCK_UNITS, PLATFORMS, Effect, ErrorSource, ImagePlane
+from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
+from bisar_budget.evaluators import LEGENDRE_FITS, full_motion
+from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState
 
-_NODES = 10  # more change nothing (below 1e-6) where platforms travel, in half an aperture, at most
-_SHORT = 0.5  # of their slant range
-_LONG_NODES = 16  # and beyond; more change about 1e-3 where they travel 1.25 of it
-_ORDER = 6  # of the projection, of which value and slope at the midpoint are taken
-_ITERATIONS = 60
-_SETTLED_M = 1e-3  # of the last step, whose effect on the phases is counted to first order
+# Way of a platform in half an aperture, over its slant range, up to which so many nodes change phases by less than
+# 1e-6 of themselves; beyond the last, 16 nodes are right to 1e-3 at 1.25.
+_NODES = ((0.1, 6), (0.5, 10), (math.inf, 16))
+_ITERATIONS = 40
+_UNSEEN_RAD = 1e-5  # what the last step of the search may change a phase by beyond the part counted linearly
 
-Weights = tuple[float, ...]
-Track = list[Vector]  # positions at the nodes
-Slopes = tuple[tuple[float, ...], tuple[float, ...]]  # by east and by north, of each term of the history
+_CLOCK_POWERS = {unit: power for power, unit in enumerate(CLOCK_UNITS.values())}
 
-
-class Quadrature(NamedTuple):
-    """Nodes in -1 to 1, and the weights that give, of samples there, what the fit has."""
-
-    nodes: Weights
-    constant: Weights  # value at the midpoint
-    linear: Weights  # slope there, over the half aperture
-    quadratic: Weights  # at the edge, of the cubic fitted to the samples
-    cubic: Weights
+Samples = Sequence[float]
+Track = list[tuple[float, float, float]]  # positions at the nodes
 
 
 class ExactPhases(NamedTuple):
@@ -46,135 +39,282 @@ class ExactPhases(NamedTuple):
     cubic: float
 
 
+def nodes_for(geometry: BistaticGeometry, aperture_time_s: float) -> int:
+    """Number of nodes that a collection needs."""
+    half = aperture_time_s / 2
+    way = max(state.travelled(half) / state.slant_range for state in (geometry.transmitter, geometry.receiver))
+    return next(count for limit, count in _NODES if way <= limit)
+
+
 class ExactRanges:
-    """The exact paths of one collection, sampled over the aperture."""
+    """The exact paths of one collection, sampled over the aperture.
 
-    def __init__(self, geometry: BistaticGeometry, wavelength_m: float, aperture_time_s: float) -> None:
+    `centre` (2,) is the ground point [m] that stands for the scene centre: what errors do is asked there.
+    """
+
+    def __init__(
+        self,
+        geometry: BistaticGeometry,
+        wavelength_m: float,
+        aperture_time_s: float,
+        centre: GroundVector = (0.0, 0.0),
+        count: int | None = None,
+    ) -> None:
         self.wavelength, self.half = wavelength_m, aperture_time_s / 2
-        states = {"transmitter": geometry.transmitter, "receiver": geometry.receiver}
-        travelled = max(state.travelled(self.half) / state.slant_range for state in states.values())
-        self.quadrature = _quadrature(_NODES if travelled <= _SHORT else _LONG_NODES)
-        self.times = [node * self.half for node in self.quadrature.nodes]
-        # Position error at each node of a unit of an error: 1, τ or τ²/2 of (22).
-        self.powers = {
-            "m": [1.0] * len(self.times),
-            "m/s": self.times,
-            "m/s^2": [tau**2 / 2 for tau in self.times],
-        }
-        self.tracks = {name: [state.at(tau)[0] for tau in self.times] for name, state in states.items()}
-        self.recorded = [sum(map(norm, ends)) for ends in zip(*self.tracks.values(), strict=True)]
+        self.k = 2 * math.pi / wavelength_m
+        self.nodes, *self.fit = LEGENDRE_FITS[count or nodes_for(geometry, aperture_time_s)]
+        self.times = [node * self.half for node in self.nodes]
+        east, north = centre
+        self.tracks: dict[str, Track] = {}
+        self.ranges: dict[str, list[float]] = {}
+        for name, state in zip(PLATFORMS, (geometry.transmitter, geometry.receiver), strict=True):
+            self.tracks[name] = track = _track(state, self.times, east, north)
+            self.ranges[name] = [sqrt(x * x + y * y + z * z) for x, y, z in track]
+        self.recorded = [t + r for t, r in zip(*self.ranges.values(), strict=True)]
 
+    # ------------------------------------------------------------------ small errors
+    @cached_property
+    def _gradient(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """What a metre east, and north, takes from the range: s = u_t + u_r on the ground, fitted, (2, 4)."""
+        return tuple(  # type: ignore[return-value]
+            self._fitted(
+                [
+                    p[axis] / R + q[axis] / S
+                    for p, R, q, S in zip(
+                        self.tracks["transmitter"],
+                        self.ranges["transmitter"],
+                        self.tracks["receiver"],
+                        self.ranges["receiver"],
+                        strict=True,
+                    )
+                ]
+            )
+            for axis in (0, 1)
+        )
+
+    @cached_property
+    def orientation(self) -> float:
+        """Sign of the turn from range to Doppler gradient at the centre."""
+        return math.copysign(1.0, self.plane.determinant)
+
+    @cached_property
+    def gradient_sine(self) -> float:
+        """Sine of the angle from range to Doppler gradient on the ground, signed, both fitted. [-]"""
+        (s_x, rate_x, *_), (s_y, rate_y, *_) = self._gradient
+        return (s_x * rate_y - s_y * rate_x) / (math.hypot(s_x, s_y) * math.hypot(rate_x, rate_y))
+
+    @property
+    def range_gradient(self) -> float:
+        """Length of the range gradient on the ground, fitted. [m/m]"""
+        return math.hypot(self._gradient[0][0], self._gradient[1][0])
+
+    @cached_property
+    def plane(self) -> ImagePlane:
+        """Q⁻¹: from the constant [m] and the linear part [m/s] of a range error to the displacement."""
+        (s_x, rate_x, *_), (s_y, rate_y, *_) = self._gradient
+        rate_x, rate_y = rate_x / self.half, rate_y / self.half
+        return ImagePlane(((-rate_y, s_y), (rate_x, -s_x)), s_x * rate_y - s_y * rate_x, "")
+
+    @cached_property
+    def phases_per_term(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Quadratic phase, and cubic, that the displacement by a unit of the constant and of the linear part adds."""
+        (_, _, q_x, c_x), (_, _, q_y, c_y) = self._gradient
+        (a, b), (c, d) = self.plane.adjugate
+        scale = self.k / self.plane.determinant
+        return (
+            ((q_x * a + q_y * c) * scale, (q_x * b + q_y * d) * scale),
+            ((c_x * a + c_y * c) * scale, (c_x * b + c_y * d) * scale),
+        )
+
+    def _fitted(self, samples: Samples) -> tuple[float, ...]:
+        """Value, slope over the half aperture, quadratic and cubic at its edge."""
+        return tuple(_sum(weights, samples) for weights in self.fit)
+
+    def motion_effects(self) -> dict[str, list[Effect]]:
+        """Effects of a small unit error of each platform, nine: position, velocity, acceleration along x, y, z."""
+        found = {}
+        for name in PLATFORMS:
+            at_nodes = [
+                full_motion(*place, R, tau)
+                for place, R, tau in zip(self.tracks[name], self.ranges[name], self.times, strict=True)
+            ]
+            kinds = zip(*at_nodes, strict=True)
+            found[name] = [self.effect(along) for of_kind in kinds for along in zip(*of_kind, strict=True)]
+        return found
+
+    def clock_effects(self) -> list[Effect]:
+        """Effects of a small unit of each power of the clock error, 1 to τ³."""
+        return [self.effect([SPEED_OF_LIGHT * tau**n for tau in self.times]) for n in range(4)]
+
+    def effect_of(self, source: ErrorSource) -> Effect:
+        """Effect of a small unit of any error."""
+        return self.effect(self.range_error(source))
+
+    def range_error(self, source: ErrorSource) -> list[float]:
+        """Range error at the nodes of a small unit of any error, before it displaces anything. [m/unit]"""
+        if not source.is_position:
+            return self.shape(source)
+        x, y, z = source.direction
+        total = [0.0] * len(self.times)
+        for name in PLATFORMS:
+            if source.moves(name):
+                total = [
+                    whole - (a * x + b * y + c * z) / R * p
+                    for whole, (a, b, c), R, p in zip(
+                        total, self.tracks[name], self.ranges[name], self.powers[source.unit], strict=True
+                    )
+                ]
+        return total
+
+    def effect(self, range_error: Samples) -> Effect:
+        """Effect of a range error sampled at the nodes [m/unit], that of the displacement included."""
+        constant, linear, own, own_cubic = self._fitted(range_error)
+        linear /= self.half
+        own, own_cubic = own * self.k, own_cubic * self.k
+        size = max(map(abs, range_error)) * self.k
+        (q_0, q_1), (c_0, c_1) = self.phases_per_term
+        moved, moved_cubic = (q_0 * constant, q_1 * linear), (c_0 * constant, c_1 * linear)
+        qpe, cubic = own + sum(moved), own_cubic + sum(moved_cubic)
+        # What is left of terms that cancel exactly is rounding, and would make a limit out of nothing.
+        if abs(qpe) <= ROUNDING * (size + abs(moved[0]) + abs(moved[1])):
+            qpe = 0.0
+        if abs(cubic) <= ROUNDING * (size + abs(moved_cubic[0]) + abs(moved_cubic[1])):
+            cubic = 0.0
+        if abs(linear) * self.half <= ROUNDING * size / self.k:
+            linear = 0.0
+        return Effect._make((constant, linear, qpe, cubic))
+
+    # ------------------------------------------------------------------ errors of any size
     def phases(
         self, errors: Iterable[tuple[ErrorSource, float]], near: GroundVector = (0.0, 0.0)
     ) -> ExactPhases | None:
-        """Find where errors of given sizes move a point at the scene centre, and what defocuses there.
+        """Find where errors of given sizes move a point at the centre, and what defocuses there.
 
-        The search starts `near`. None where it finds no ground point with the recorded history.
+        The search starts `near` [m]. None where it finds no ground point with the recorded history, or one beyond a
+        line on which range and Doppler gradients are parallel: no error leads there from nothing.
         """
         measured = dict(self.tracks)
-        recorded = list(self.recorded)
+        recorded = self.recorded
         for source, size in errors:
             if source.is_position:
                 x, y, z = (size * part for part in source.direction)
                 powers = self.powers[source.unit]
-                for name, track in measured.items():
+                for name in PLATFORMS:
                     if source.moves(name):
                         measured[name] = [
-                            (a + p * x, b + p * y, c + p * z) for (a, b, c), p in zip(track, powers, strict=True)
+                            (a + p * x, b + p * y, c + p * z)
+                            for (a, b, c), p in zip(measured[name], powers, strict=True)
                         ]
-            else:  # a clock, or a phase as such: its polynomial is exact
-                for index, (tau, node) in enumerate(zip(self.times, self.quadrature.nodes, strict=True)):
-                    term = source.effect
-                    edge = term.qpe * node**2 + term.cubic * node**3
-                    metres = term.constant + term.linear * tau + self.wavelength / (2 * math.pi) * edge
-                    recorded[index] += size * metres
-        # Slopes turn little on the way to most points; where those of the centre lead nowhere, each place's own do.
-        found = self._settled(recorded, measured, near, lambda place: self._centre_slopes)
-        return found or self._settled(recorded, measured, near, partial(self._slopes, measured.values()))
+            else:  # a clock, or a phase as such
+                shape = self.shape(source)
+                recorded = [whole + size * metres for whole, metres in zip(recorded, shape, strict=True)]
+        return self._settled(recorded, measured["transmitter"], measured["receiver"], near)
+
+    def left_over(self, source: ErrorSource, size: float, place: GroundVector) -> list[float]:
+        """Range error at the nodes that an error leaves at a ground point. [m]"""
+        recorded = self.recorded
+        measured = dict(self.tracks)
+        if source.is_position:
+            x, y, z = (size * part for part in source.direction)
+            for name in PLATFORMS:
+                if source.moves(name):
+                    measured[name] = [
+                        (a + p * x, b + p * y, c + p * z)
+                        for (a, b, c), p in zip(measured[name], self.powers[source.unit], strict=True)
+                    ]
+        else:
+            recorded = [whole + size * metres for whole, metres in zip(recorded, self.shape(source), strict=True)]
+        east, north = place
+        return [
+            whole
+            - sqrt((x - east) ** 2 + (y - north) ** 2 + z * z)
+            - sqrt((u - east) ** 2 + (v - north) ** 2 + w * w)
+            for whole, (x, y, z), (u, v, w) in zip(recorded, *measured.values(), strict=True)
+        ]
+
+    def left_over_small(self, source: ErrorSource, size: float) -> list[float]:
+        """The same at the displaced point, of an error so small that its effects are proportional to it. [m]"""
+        east, north = self.plane.displacement(source.full, size) or (0.0, 0.0)
+        rays = zip(self.tracks["transmitter"], self.ranges["transmitter"], self.tracks["receiver"],
+                   self.ranges["receiver"], strict=True)  # fmt: skip
+        gradient = [(p[0] / R + q[0] / S, p[1] / R + q[1] / S) for p, R, q, S in rays]
+        return [
+            size * metres + east * x + north * y
+            for metres, (x, y) in zip(self.range_error(source), gradient, strict=True)
+        ]
 
     @cached_property
-    def _centre_slopes(self) -> Slopes:
-        return self._slopes(self.tracks.values(), (0.0, 0.0))
+    def powers(self) -> dict[str, list[float]]:
+        """Position error at each node of a unit of an error: 1, τ or τ²/2 of (22)."""
+        return {"m": [1.0] * len(self.times), "m/s": self.times, "m/s^2": [tau**2 / 2 for tau in self.times]}
 
-    def _slopes(self, tracks: Iterable[Track], place: GroundVector) -> Slopes:
-        """What a step of a metre east, and north, does to each term of the history."""
-        rays = [[(x - place[0], y - place[1], z) for x, y, z in track] for track in tracks]
-        east, north = (  # the slope of a track's range is minus its direction
-            [-sum(ray[axis] / norm(ray) for ray in pair) for pair in zip(*rays, strict=True)] for axis in (0, 1)
-        )
-        _, *terms = self.quadrature
-        return tuple(_sum(term, east) for term in terms), tuple(_sum(term, north) for term in terms)
+    def shape(self, source: ErrorSource) -> list[float]:
+        """Range error at the nodes of a unit of a clock error, or of a phase as such. [m/unit]"""
+        if source.owner == "clock":
+            power = _CLOCK_POWERS[source.unit]
+            return [SPEED_OF_LIGHT * tau**power for tau in self.times]
+        return [(node * node - 1 / 3) / self.k for node in self.nodes]  # a quadratic that displaces nothing
 
     def _settled(
-        self,
-        recorded: list[float],
-        measured: dict[str, Track],
-        near: GroundVector,
-        slopes_at: Callable[[GroundVector], Slopes],
+        self, recorded: Samples, transmitter: Track, receiver: Track, near: GroundVector
     ) -> ExactPhases | None:
         """Newton's method for the point."""
-        _, at_midpoint, per_half, quadratic, cubic = self.quadrature
         east, north = near
+        value, slope, quadratic, cubic = self.fit
         for _ in range(_ITERATIONS):
-            (a, c, *by_east), (b, d, *by_north) = slopes_at((east, north))
+            left, by_east, by_north, nearest = [], [], [], math.inf
+            for whole, (x, y, z), (u, v, w) in zip(recorded, transmitter, receiver, strict=True):
+                x, y, u, v = x - east, y - north, u - east, v - north
+                p, q = sqrt(x * x + y * y + z * z), sqrt(u * u + v * v + w * w)
+                if p < nearest:
+                    nearest = p
+                if q < nearest:
+                    nearest = q
+                if not nearest:
+                    return None
+                left.append(whole - p - q)
+                by_east.append(x / p + u / q)
+                by_north.append(y / p + v / q)
+            # A step of a metre adds by_east, by_north to what is left.
+            a, b = sum(map(mul, value, by_east)), sum(map(mul, value, by_north))
+            c, d = sum(map(mul, slope, by_east)), sum(map(mul, slope, by_north))
+            constant, linear = sum(map(mul, value, left)), sum(map(mul, slope, left))
             determinant = a * d - b * c
             if not determinant:
                 return None
-            left = []
-            for whole, (x, y, z), (u, v, w) in zip(recorded, *measured.values(), strict=True):
-                x, y, u, v = x - east, y - north, u - east, v - north
-                left.append(whole - sqrt(x * x + y * y + z * z) - sqrt(u * u + v * v + w * w))
-            constant, linear = _sum(at_midpoint, left), _sum(per_half, left)
-            step_east, step_north = (
-                (d * constant - b * linear) / determinant,
-                (a * linear - c * constant) / determinant,
-            )
+            step_east = (b * linear - d * constant) / determinant
+            step_north = (c * constant - a * linear) / determinant
             east, north = east + step_east, north + step_north
-            if abs(step_east) + abs(step_north) < _SETTLED_M:
-                scale = 2 * math.pi / self.wavelength
-                phases = [
-                    scale * (_sum(term, left) - by_e * step_east - by_n * step_north)
-                    for term, by_e, by_n in zip((quadratic, cubic), by_east, by_north, strict=True)
-                ]
-                return ExactPhases((east, north), *phases)
-            if not math.isfinite(east + north):
+            step = step_east * step_east + step_north * step_north
+            if self.k * step < _UNSEEN_RAD * nearest:
+                if determinant * self.orientation <= 0:
+                    return None
+                return ExactPhases(
+                    (east, north),
+                    self.k
+                    * (
+                        sum(map(mul, quadratic, left))
+                        + sum(map(mul, quadratic, by_east)) * step_east
+                        + sum(map(mul, quadratic, by_north)) * step_north
+                    ),
+                    self.k
+                    * (
+                        sum(map(mul, cubic, left))
+                        + sum(map(mul, cubic, by_east)) * step_east
+                        + sum(map(mul, cubic, by_north)) * step_north
+                    ),
+                )
+            if not step < 1e30:
                 return None
         return None
 
 
-def _sum(weights: Weights, samples: list[float]) -> float:
+def _track(state: PlatformState, times: Samples, east: float, north: float) -> Track:
+    (x, y, z), (u, v, w), (a, b, c) = state.position, state.velocity, state.acceleration
+    x, y = x - east, y - north
+    return [(x + tau * (u + tau * a / 2), y + tau * (v + tau * b / 2), z + tau * (w + tau * c / 2)) for tau in times]
+
+
+def _sum(weights: Samples, samples: Samples) -> float:
     total: float = sum(map(mul, weights, samples))
     return total
-
-
-@cache
-def _quadrature(count: int) -> Quadrature:
-    nodes: list[float] = []
-    weights: list[float] = []
-    for k in range(count):
-        x = math.cos(math.pi * (k + 0.75) / (count + 0.5))  # close enough for Newton's method
-        for _ in range(8):
-            before, at = 1.0, x
-            for n in range(2, count + 1):
-                before, at = at, ((2 * n - 1) * x * at - (n - 1) * before) / n
-            slope = count * (x * at - before) / (x * x - 1)
-            x -= at / slope
-        nodes.append(x)
-        weights.append(2 / ((1 - x * x) * slope * slope))
-    legendre: list[Weights] = []  # the weights that project on each polynomial
-    last, this = [0.0] * count, [1.0] * count
-    for n in range(_ORDER + 1):
-        legendre.append(tuple((2 * n + 1) / 2 * w * p for w, p in zip(weights, this, strict=True)))
-        recurred = [((2 * n + 1) * x * p - n * q) / (n + 1) for x, p, q in zip(nodes, this, last, strict=True)]
-        last, this = this, recurred
-
-    def combined(*factors: float) -> Weights:
-        return tuple(sum(f * w for f, w in zip(factors, row, strict=True)) for row in zip(*legendre, strict=True))
-
-    return Quadrature(
-        tuple(nodes),
-        combined(1, 0, -1 / 2, 0, 3 / 8, 0, -5 / 16),  # Pₙ(0)
-        combined(0, 1, 0, -3 / 2, 0, 15 / 8, 0),  # P′ₙ(0)
-        combined(0, 0, 3 / 2, 0, 0, 0, 0),  # P₂ = (3x² - 1)/2
-        combined(0, 0, 0, 5 / 2, 0, 0, 0),  # P₃ = (5x³ - 3x)/2
-    )

@@ -1,8 +1,7 @@
 """How a row is judged: what is declared against what is allowed, and everything that may stand between them."""
 
-import math
-
 from bisar_budget.budget.findings import Row
+from bisar_budget.budget.models import quotient
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.errors import KeyPath
 from bisar_budget.geometry import GroundVector
@@ -119,9 +118,3 @@ def judgement(
     else:
         status = "pass"
     return utilization, margin, status, reason, notes
-
-
-def quotient(numerator: float, denominator: float) -> float | None:
-    """Divide; None where there is no finite quotient: a zero coefficient or a vanishing error."""
-    quotient = numerator / denominator if denominator else math.inf
-    return quotient if math.isfinite(quotient) else None

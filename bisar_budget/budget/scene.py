@@ -1,7 +1,7 @@
 """The scene's edge: how far a quadratic phase error there differs from the one at the centre.
 
 The paper's errors are spatially invariant; in the full model they are not. At a point p of the scene both platforms
-have other lines of sight: the whole model (u and its derivatives, s, Q, x̂) is evaluated there, with p in place of the
+have other lines of sight: exact ranges are taken there, with p in place of the
 centre. One autofocus correction is one phase for the whole image, so that it leaves the difference behind. Against
 exact ranges and against images at 250 m and 1 km: `tests/simulate/test_scene_edge.py`. Derived here.
 
@@ -13,17 +13,15 @@ and with a correction that has its own bound, an edge whose phase itself exceeds
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
-from itertools import chain
 from typing import NamedTuple
 
-from bisar_budget import evaluators
 from bisar_budget.budget.allocation import Allocation
+from bisar_budget.budget.analysis import Analysis
 from bisar_budget.budget.combine import combine_phases
-from bisar_budget.budget.correlation import correlated_errors, phase_parts
-from bisar_budget.budget.effects import MOTION_UNITS, PLATFORMS, ErrorSource, full_ground
-from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT, SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
+from bisar_budget.budget.correlation import phase_parts
+from bisar_budget.budget.exact_ranges import ExactRanges, nodes_for
+from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT, UTILIZATION_TOLERANCE
 from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState
-from bisar_budget.mission.model import Mission
 from bisar_budget.units import format_limit, format_quantity
 
 RIM_POINTS = 16
@@ -37,8 +35,7 @@ _NEAREST_M = 1.0  # of a platform to a place; nearer, no image
 _FARTHEST = 0.5  # of the nearest slant range: the search for a radius ends there
 _PRECISION = 1e-3  # of the radius
 _TURNS = 2  # of the azimuth along which it is searched; then it is the whole circle's
-_PER_PLATFORM = 9  # unit errors: position, velocity, acceleration along each axis
-_CLOCK_TERMS = ("constant", "linear", "quadratic", "cubic")
+_FINEST = 1e-3  # rad, of the azimuth of a largest difference: a cosine loses half its square
 
 
 class SceneEdge(NamedTuple):
@@ -77,20 +74,29 @@ class SceneEdge(NamedTuple):
 
 
 class ScenePhases:
-    """Quadratic phases of the declared errors at any point of the scene."""
+    """Quadratic phases of the declared errors at any point of the scene.
 
-    def __init__(self, mission: Mission, geometry: BistaticGeometry, members: Sequence[ErrorSource]) -> None:
-        self.mission, self.geometry, self.members = mission, geometry, members
-        self.combine = mission.allocation.combine
-        self.centre = [source.qpe("full") for source in members]
-        self.groups = correlated_errors(mission) if self.combine == "rss" else ()
-        self.clock = evaluators.published_clock(
-            SPEED_OF_LIGHT, mission.radar.wavelength, mission.collection.aperture_time
-        )
-        self.terms = [self._terms(source) for source in members]
-        self.nearest = min(geometry.transmitter.slant_range, geometry.receiver.slant_range)
+    Of errors so small that their effects are proportional to them; `large` are the others, by their place among
+    the members.
+    """
+
+    def __init__(self, analysis: Analysis) -> None:
+        mission = analysis.mission
+        self.geometry, self.full = analysis.geometry, analysis.full
+        self.wavelength, self.T = mission.radar.wavelength, mission.collection.aperture_time
+        self.combine, self.groups = mission.allocation.combine, analysis.groups
+        self.members = [source for source in analysis.stated if source.is_motion]
+        self.sizes = [source.declared or 0.0 for source in self.members]
+        self.centre = [source.full.qpe * size for source, size in zip(self.members, self.sizes, strict=True)]
+        self.large = [
+            i
+            for i, (source, size) in enumerate(zip(self.members, self.sizes, strict=True))
+            if size and not self.full.is_small(source, abs(size))
+        ]
+        self.nearest = min(self.geometry.transmitter.slant_range, self.geometry.receiver.slant_range)
+        self.count = nodes_for(self.geometry, self.T)
         self.nowhere = Place(self.centre, 0.0, (0.0, 0.0))  # without an image
-        self.turn = math.copysign(1.0, full_ground(mission, geometry).gradient_sine)
+        self.turn = math.copysign(1.0, analysis.exact.gradient_sine)
 
     def geometry_at(self, point: GroundVector) -> BistaticGeometry:
         """Both platforms as a point of the ground has them."""
@@ -105,50 +111,62 @@ class ScenePhases:
         )
         return BistaticGeometry(transmitter=transmitter, receiver=receiver)
 
+    def ranges_at(self, radius: float, azimuth: float) -> ExactRanges:
+        """Exact ranges of a point of the ground."""
+        return ExactRanges(self.geometry, self.wavelength, self.T, at(radius, azimuth), self.count)
+
     def place(self, radius: float, azimuth: float) -> "Place":
         """What there is at a point of the ground."""
-        there = self.geometry_at(at(radius, azimuth))
-        if min(there.transmitter.slant_range, there.receiver.slant_range) < _NEAREST_M:
+        there = self.ranges_at(radius, azimuth)
+        if min(min(ranges) for ranges in there.ranges.values()) < _NEAREST_M:
             return self.nowhere
-        wavelength, T = self.mission.radar.wavelength, self.mission.collection.aperture_time
         try:
-            ground = full_ground(self.mission, there)
-            sine = ground.gradient_sine
+            sine = there.gradient_sine
+            phases = [
+                there.effect_of(source).qpe * size if size else 0.0
+                for source, size in zip(self.members, self.sizes, strict=True)
+            ]
         except ZeroDivisionError:  # a gradient vanishes, or both are parallel to the last digit
             return self.nowhere
-        transmitter, receiver = (
-            evaluators.full_motion(*(*chain.from_iterable(looks), wavelength, T)) for looks in ground.looks
-        )
-        of_a_unit = ground.quadratic_phases((*transmitter, *receiver, *self.clock))
-        phases = [
-            centre if terms is None else sum([of_a_unit[unit] * size for unit, size in terms])
-            for terms, centre in zip(self.terms, self.centre, strict=True)
-        ]
-        clearances = (self.turn * sine / _MIN_SINE, ground.range_gradient / MIN_GROUND_GRADIENT)
+        clearances = (self.turn * sine / _MIN_SINE, there.range_gradient / MIN_GROUND_GRADIENT)
         return Place(phases, self.combined(phases), clearances)
 
-    def _terms(self, source: ErrorSource) -> list[tuple[int, float]] | None:
-        """An error as unit errors, by their place among those of both platforms and the clock, and how much of each.
-
-        None for a phase as such, which is the same everywhere.
-        """
-        size = source.declared or 0.0
-        if source.owner == "clock":
-            return [(2 * _PER_PLATFORM + _CLOCK_TERMS.index(source.id.rpartition(".")[2]), size)]
-        if not source.is_position:
-            return None
-        first = 3 * _KINDS[source.unit]
-        return [
-            (_PER_PLATFORM * platform + first + axis, part * size)
-            for platform, name in enumerate(PLATFORMS)
-            if source.moves(name)
-            for axis, part in enumerate(source.direction)
-            if part
-        ]
-
     def differences(self, radius: float, azimuth: float) -> list[float]:
-        """Of each error, its phase there less that at the centre. [rad]"""
-        return [there - centre for there, centre in zip(self.place(radius, azimuth).phases, self.centre, strict=True)]
+        """Of each error, its phase there less that at the centre, by the worse sign where it is large. [rad]"""
+        phases = self.place(radius, azimuth).phases
+        found = [there - centre for there, centre in zip(phases, self.centre, strict=True)]
+        if not self.large:
+            return found
+        there = self.ranges_at(radius, azimuth)
+        for i in self.large:
+            source, of_both = self.members[i], []
+            for size in (self.sizes[i], -self.sizes[i]):
+                near = there.plane.displacement(there.effect_of(source), size) or (0.0, 0.0)
+                here, away = self.full.at(source, size), there.phases([(source, size)], near)
+                of_both.append(math.inf if here is None or away is None else away.quadratic - here.quadratic)
+            found[i] = math.copysign(max(map(abs, of_both)), found[i])
+        return found
+
+    def largest(self, rim: "Rim", radius: float) -> tuple[float, float]:
+        """Largest difference on a circle, errors of any size counted, and its azimuth. [rad], [rad]
+
+        It is climbed from where it is largest of small errors.
+        """
+        if not self.large:
+            return rim.difference, rim.azimuth
+
+        def size_at(azimuth: float) -> float:
+            return self.together(self.differences(radius, azimuth))
+
+        arc = math.pi / RIM_POINTS
+        size, azimuth = size_at(rim.azimuth), rim.azimuth
+        while arc > _FINEST:
+            sides = [(size_at(azimuth + step), azimuth + step) for step in (-arc, arc)]
+            if max(sides)[0] > size:
+                size, azimuth = max(sides)
+            else:
+                arc /= 4
+        return size, azimuth % (2 * math.pi)
 
     def combined(self, phases: Sequence[float]) -> float:
         """Differences of phases to the centre's, combined: the largest, their sum or root-sum-square. [rad]"""
@@ -156,19 +174,14 @@ class ScenePhases:
 
     def together(self, phases: Sequence[float], indices: Sequence[int] | None = None) -> float:
         """Phases of the errors, or of some of them, combined; those of a covariance with their correlations. [rad]"""
-        if not self.groups:
+        if not self.groups or self.combine != "rss":
             return combine_phases(phases if indices is None else [phases[i] for i in indices], self.combine)
         return combine_phases([phase for _, phase in self.parts(phases, indices)], self.combine)
 
     def parts(self, phases: Sequence[float], indices: Sequence[int] | None = None) -> list[tuple[str, float]]:
         """What they combine from: ids and phases, of a covariance one under `rss`. [rad]"""
         chosen = range(len(self.members)) if indices is None else indices
-        members = []
-        for i in chosen:
-            source = self.members[i]
-            per_unit = phases[i] / (source.declared or 1.0)
-            members.append(source._replace(full=source.full._replace(qpe=per_unit)))
-        return phase_parts(members, "qpe", "full", self.combine, self.groups)
+        return phase_parts([(self.members[i].id, phases[i]) for i in chosen], self.combine, self.groups)
 
     def rim(self, radius: float) -> "Rim":
         """Evaluate a circle evenly, and around its worst point.
@@ -286,35 +299,25 @@ def _crest(before: float, after: float, middle: float, arc: float) -> tuple[floa
     return max(-arc, min(arc, math.atan2(sine, cosine))), middle - cosine + math.hypot(sine, cosine)
 
 
-_KINDS = {unit: index for index, unit in enumerate(MOTION_UNITS.values())}
-
-
 def at(radius: float, azimuth: float) -> GroundVector:
     """Point of the ground, east and north. [m]"""
     return (radius * math.cos(azimuth), radius * math.sin(azimuth))
 
 
-def scene_edge(
-    mission: Mission, geometry: BistaticGeometry, allocation: Allocation, sources: Sequence[ErrorSource]
-) -> SceneEdge | None:
+def scene_edge(analysis: Analysis, allocation: Allocation) -> SceneEdge | None:
     """Evaluate the errors of a mission at the edge of its scene; None without a radius or a declared error.
 
     Parameters
     ----------
-    mission : Mission
-        With `scene.radius`.
-    geometry : BistaticGeometry
-        Seen from the centre.
+    analysis : Analysis
+        Of a mission with `scene.radius`.
     allocation : Allocation
         Total budget, and limits of the owners.
-    sources : sequence of ErrorSource
-        Those that the combination runs over.
     """
-    radius = mission.scene.radius
-    members = [source for source in sources if source.declared is not None and source.is_motion]
-    if radius is None or not members:
+    radius = analysis.mission.scene.radius
+    edge = ScenePhases(analysis)
+    if radius is None or not edge.members:
         return None
-    edge = ScenePhases(mission, geometry, members)
     searched = _FARTHEST * edge.nearest
     rim = edge.rim(radius)
     if math.isinf(rim.difference):
@@ -322,9 +325,13 @@ def scene_edge(
         reason += _degeneracy(edge.geometry_at(at(radius, rim.azimuth)))
         return SceneEdge(radius, math.nan, 0.0, None, searched, reason, "")
     searched = max(searched, radius)
+    difference, azimuth = edge.largest(rim, radius)
+    if math.isinf(difference):
+        reason = "a declared error leaves no ground point with its range history: there is no image"
+        return SceneEdge(radius, math.nan, 0.0, None, searched, reason, "")
     reach = _autofocus_radius(edge, radius, rim, allocation.qpe_total, searched)
     doubt = _over_at_the_edge(edge, allocation, rim)
-    return SceneEdge(radius, rim.difference, rim.azimuth, reach, searched, "", doubt)
+    return SceneEdge(radius, difference, azimuth, reach, searched, "", doubt)
 
 
 def _degeneracy(there: BistaticGeometry) -> str:

@@ -7,7 +7,6 @@ allowable.
 import math
 from collections.abc import Iterator
 from functools import cache
-from itertools import chain
 
 from bisar_budget import evaluators
 from bisar_budget.budget.common import common_sources
@@ -18,9 +17,8 @@ from bisar_budget.budget.effects import (
     PLATFORMS,
     Effect,
     ErrorSource,
-    FullGround,
-    full_ground,
 )
+from bisar_budget.budget.exact_ranges import ExactRanges
 from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
 from bisar_budget.errors import KeyPath
 from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, PlatformState, Vector
@@ -30,27 +28,25 @@ _AXES: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 def error_sources(
-    mission: Mission, geometry: BistaticGeometry, ground: FullGround | None = None
+    mission: Mission, geometry: BistaticGeometry, exact: ExactRanges | None = None
 ) -> list[ErrorSource]:
     """List every position, velocity, acceleration, clock and other error, declared or not, in a fixed order."""
     sources: list[ErrorSource] = []
-    ground = ground or full_ground(mission, geometry)
+    exact = exact or ExactRanges(geometry, mission.radar.wavelength, mission.collection.aperture_time)
+    full = exact.motion_effects()
     states = (geometry.transmitter, geometry.receiver)
-    for name, state, look in zip(PLATFORMS, states, ground.looks, strict=True):
-        sources += _motion(mission, name, state, look, ground)
-    sources += _clock(mission, ground)
+    for name, state in zip(PLATFORMS, states, strict=True):
+        sources += _motion(mission, name, state, full[name])
+    sources += _clock(mission, exact.clock_effects())
     sources += common_sources(mission, sources)
     sources += _terrain(mission, sources)
     sources += _other(mission)
     return sources
 
 
-def _motion(
-    mission: Mission, name: str, state: PlatformState, look: tuple[tuple[float, ...], ...], ground: FullGround
-) -> Iterator[ErrorSource]:
+def _motion(mission: Mission, name: str, state: PlatformState, full_effects: list[Effect]) -> Iterator[ErrorSource]:
     wavelength, T = mission.radar.wavelength, mission.collection.aperture_time
     rows = evaluators.published_motion(*state.position, *state.velocity, state.slant_range, wavelength, T)
-    full_effects = ground.effective(evaluators.full_motion(*(*chain.from_iterable(look), wavelength, T)))
     error: MotionError = getattr(mission.platforms, name).motion_error
     factor = mission.allocation.coverage_factor
     in_scene = error.frame == "scene"
@@ -162,9 +158,9 @@ def _no_limit(kind: str, axis: str) -> str:
     return f"no quadratic term: the platform's {cause} has no component along {axis}"
 
 
-def _clock(mission: Mission, ground: FullGround) -> Iterator[ErrorSource]:
+def _clock(mission: Mission, full_effects: list[Effect]) -> Iterator[ErrorSource]:
     rows = evaluators.published_clock(SPEED_OF_LIGHT, mission.radar.wavelength, mission.collection.aperture_time)
-    for (term, unit), row, full in zip(CLOCK_UNITS.items(), rows, ground.effective(rows), strict=True):
+    for (term, unit), row, full in zip(CLOCK_UNITS.items(), rows, full_effects, strict=True):
         value: float | None = getattr(mission.timing_error, term)
         yield ErrorSource(
             id=f"timing.{term}",

@@ -94,16 +94,19 @@ class Quantity(Reader):
         text = str(value).strip()
         if not text or not text[-1].isdigit():
             return ""
-        for unit in ("deg", "%"):
-            if unit in self.dimension.units:
-                try:
-                    return f"Did you mean {text} {unit}?" if self.leaf(f"{text} {unit}") is not None else ""
-                except InvalidValueError:
-                    return ""
+        if self.dimension.usual:
+            return ""  # only a zero comes so far without its unit
+        if "%" in self.dimension.units:
+            try:
+                return f"Did you mean {text} %?" if self.leaf(f"{text} %") is not None else ""
+            except InvalidValueError:
+                return ""
         return f"A bare number is in {self.dimension.si}" if self.dimension.si not in ("", "dB") else ""
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Text with a unit, or a bare number."""
+        """Text with a unit, or a bare number; of an angle only zero is bare."""
+        if self.dimension.usual:
+            return {"anyOf": [{"type": "string"}, {"const": 0}]}
         return {"type": ["string", "number"]}
 
 
@@ -154,6 +157,14 @@ class Text(Reader):
         return {"type": "string", "minLength": 1}
 
 
+class Label(Text):
+    """Text that may look like a number, such as the issue of a document."""
+
+    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+        """Text or a number, of which the digits are kept as they stand."""
+        return {"type": ["string", "number"], "minLength": 1}
+
+
 class Choice(Reader):
     """One of a few words; `refused` maps words that mean something elsewhere to why not here."""
 
@@ -173,6 +184,29 @@ class Choice(Reader):
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Enumeration."""
         return {"enum": list(self.names)}
+
+
+class Words(Reader):
+    """A list of some of a few words, each once."""
+
+    def __init__(self, *names: str) -> None:
+        self.word = Choice(*names)
+
+    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
+        """Read each word at its own place."""
+        if not isinstance(value, list):
+            report(path, Problem("must be a list", f"accepted: some of {', '.join(self.word.names)}"))
+            return INVALID
+        words = tuple([_read(self.word, word, (*path, index), report) for index, word in enumerate(value)])
+        for index, word in enumerate(words):
+            if word is not INVALID and word in words[:index]:
+                report((*path, index), Problem("stands in the list twice"))
+                return INVALID
+        return INVALID if INVALID in words else words
+
+    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+        """Array of the words."""
+        return {"type": "array", "items": self.word.schema(definitions), "uniqueItems": True}
 
 
 class Whole(Reader):

@@ -9,10 +9,10 @@ from hashlib import sha256
 from typing import TYPE_CHECKING
 
 from bisar_budget.budget.allocation import Allocation
+from bisar_budget.budget.analysis import Analysis
 from bisar_budget.budget.effects import MOTION_UNITS, ErrorSource
 from bisar_budget.budget.findings import MissionFindings, Report, Row, UnusableMission, worst_first
 from bisar_budget.budget.images import PointImage
-from bisar_budget.budget.sources import error_sources
 from bisar_budget.budget.waivers import waiver_notes
 from bisar_budget.catalogue import EQUATIONS
 from bisar_budget.constants import SPEED_OF_LIGHT
@@ -143,8 +143,10 @@ def _overall(report: Report, pages: Sequence[MissionPage]) -> str:
     usable = [mission for mission in report.missions if isinstance(mission, MissionFindings)]
     verdict = _verdict(report.status, sum(mission.summary.get("waived", 0) for mission in usable))
     empty = sum(page.verdict == _NOTHING for page in pages)
-    if report.status == "pass" and empty:
-        verdict = _NOTHING if empty == len(pages) else f"{verdict}; of {len(pages)} missions {empty} declare no error"
+    if empty == len(pages):
+        return _NOTHING
+    if empty:
+        verdict = f"{verdict}; of {len(pages)} missions {empty} declare no error"
     alone = sum(bool(page.alone) for page in pages)
     if not alone:
         return verdict
@@ -169,7 +171,8 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
     mission = found.mission
     if mission is None:
         raise ValueError("a compliance report needs findings that carry their mission")
-    sources = {source.id: source for source in error_sources(mission, found.geometry)}
+    analysis = Analysis(mission)
+    sources = {source.id: source for source in analysis.sources}
     rows = worst_first(found.rows)
     judged = [row for row in rows if row.status in _JUDGED]
     evidence = {verdict.id: verdict for verdict in found.verdicts or ()}
@@ -229,8 +232,8 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
         gain_text=_gain(allocation),
         shares=tuple(_shares(allocation)),
         power_shares=tuple(_power_shares(mission, allocation)),
-        contributions=_contributions(found, sources.values()),
-        moves=_moves(found, sources.values()),
+        contributions=_contributions(analysis, found.model),
+        moves=_moves(found, analysis.stated),
         validity=tuple(_validity(mission, found)),
         inputs=tuple(_inputs(mission, found, file)),
         undeclared=tuple(
@@ -464,28 +467,31 @@ def _power_shares(mission: Mission, allocation: Allocation) -> Iterator[PowerSha
             yield PowerShare(name, f"{value:g} dB", f"{split.transmitter:.3g}", f"{split.receiver:.3g}")
 
 
-def _contributions(found: MissionFindings, sources: Iterable[ErrorSource]) -> tuple[Contribution, ...]:
+def _contributions(analysis: Analysis, model: str) -> tuple[Contribution, ...]:
     """Errors as the file states them, the largest quadratic phase error first."""
-    declared = [source for source in sources if source.declared is not None and source.is_independent]
-    sizes = {source.id: abs(source.qpe(found.model)) for source in declared}
-    declared = sorted((source for source in declared if sizes[source.id]), key=lambda source: -sizes[source.id])
+    by = {name: analysis.declared(one) for name, one in (("published", analysis.published), ("full", analysis.full))}
+    sizes = {source.id: max(abs(found[source.id].qpe) for name, found in by.items() if model in (name, "strictest"))
+             for source in analysis.stated}  # fmt: skip
+    declared = sorted(
+        (source for source in analysis.stated if sizes[source.id]), key=lambda source: -sizes[source.id]
+    )
     total, largest = math.fsum(sizes.values()), max(sizes.values(), default=0.0)
     result = []
     for source in declared:
         owner, kind, axis = _kind(source)
-        published, full = (_phase(abs(source.qpe(model))) for model in ("published", "full"))
+        published, full = (_phase(abs(by[name][source.id].qpe)) for name in ("published", "full"))
         qpe = sizes[source.id]
         part, of_sum = qpe / largest, percent(qpe / total)
         result.append(Contribution(source.id, owner, kind, axis, _phase(qpe), published, full, part, of_sum))
     return tuple(result)
 
 
-def _moves(found: MissionFindings, sources: Iterable[ErrorSource]) -> tuple[Move, ...]:
+def _moves(found: MissionFindings, stated: Iterable[ErrorSource]) -> tuple[Move, ...]:
     """Errors as the file states them, the largest displacement of the image first."""
     rows = {row.id: row.displacement_m for row in found.rows}
-    known = [(source, rows.get(source.id)) for source in sources if source.declared is not None]
-    sizes = [(source, math.hypot(*by)) for source, by in known if by is not None and source.is_independent]
-    moving = sorted(((source, size) for source, size in sizes if size), key=lambda one: -one[1])
+    known = [(source, rows.get(source.id)) for source in stated]
+    moving = [(source, math.hypot(*by)) for source, by in known if by is not None and any(by)]
+    moving.sort(key=lambda one: -one[1])
     largest = max((size for _, size in moving), default=1.0)
     return tuple(
         Move(source.id, *_kind(source), format_quantity(size, "m"), size / largest) for source, size in moving

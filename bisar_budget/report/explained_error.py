@@ -3,23 +3,15 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
-from bisar_budget.budget.effects import (
-    MOTION_UNITS,
-    PLATFORMS,
-    Effect,
-    ErrorSource,
-    FullGround,
-    ImagePlane,
-    full_ground,
-    image_plane,
-)
+from bisar_budget.budget.analysis import Analysis
+from bisar_budget.budget.effects import MOTION_UNITS, PLATFORMS, ErrorSource
 from bisar_budget.budget.findings import MissionFindings
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.errors import KeyPath, printable
 from bisar_budget.geometry import FRAME_AXES, PlatformState
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import formulas
-from bisar_budget.report.explained_full import RATES, full_chain
+from bisar_budget.report.explained_full import RATES, for_comparison, full_chain
 from bisar_budget.report.formulas import Equation, Step, Sum, equation, number, step, with_unit
 
 
@@ -90,16 +82,16 @@ def _quadratic_form(parts: Sequence[str], correlation: Sequence[Sequence[float]]
     return "sqrt(" + " + ".join(terms) + ")"
 
 
-def effect(
-    mission: Mission, found: MissionFindings, source: ErrorSource, sources: Mapping[str, ErrorSource]
-) -> Iterator[Step]:
+def effect(analysis: Analysis, found: MissionFindings, source: ErrorSource, model: str | None) -> Iterator[Step]:
     """From `declared` to the quadratic phase error; for one unit where nothing is declared."""
+    mission = analysis.mission
+    sources = {one.id: one for one in analysis.sources}
     size = 1.0 if source.declared is None else abs(source.declared)
     each = " of one unit" if source.declared is None else ""
     signed = math.copysign(size, source.declared or 1.0)
     qpe = abs(source.effect.qpe) * size
     platform, kind, axis = (*source.id.split(".", 2), "")[:3]
-    gates_by_full = mission.allocation.model != "published" and source.by(mission.allocation.model) is source.full
+    gates_by_full = model == "full"
     if gates_by_full and source.is_motion and source.owner != "mission":
         yield from step("The published model, for comparison; what gates, the full model, comes after it")
     if not source.is_motion:
@@ -125,10 +117,10 @@ def effect(
     if not source.is_motion:
         return
     if gates_by_full:
-        yield from full_chain(mission, found, source, signed, each)
+        yield from full_chain(analysis, source, signed, each)
     else:
-        yield from _full(full_ground(mission, found.geometry), source, signed, each)
-        yield from _displacement(mission, found, source)
+        yield from for_comparison(analysis, source, signed, each)
+        yield from _displacement(analysis, source)
 
 
 def _coefficient(mission: Mission, source: ErrorSource, order: int) -> float:
@@ -227,41 +219,24 @@ def _projected_effect(
     yield from step(f"Quadratic phase error{each}", *equation("QPE", "QPE/unit*declared", values, qpe, "rad"))
 
 
-def _full(ground: FullGround, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
-    """What the full model makes of it, signed as declared."""
-    moved = ground.moved(source.full) * size
-    values = {"φ_turning": source.full.qpe * size - moved, "φ_displaced": moved}
-    title = (
-        f"Full model{each}, for comparison: phase as the line of sight turns, and what the displaced response adds "
-        "(--model full shows how)"
-    )
-    yield from step(title, *equation("QPE_full", "φ_turning + φ_displaced", values, source.full.qpe * size, "rad"))
-
-
-def plane_and_effect(mission: Mission, found: MissionFindings, source: ErrorSource) -> tuple[ImagePlane, Effect, str]:
-    """Image plane and effect of the model that says where the image goes, and its name."""
-    if mission.allocation.model == "published":
-        return image_plane(found.geometry), source.effect, "(25), (30)"
-    return full_ground(mission, found.geometry).plane, source.full, "Full model"
-
-
-def _displacement(mission: Mission, found: MissionFindings, source: ErrorSource) -> Iterator[Step]:
-    plane, by_model, title = plane_and_effect(mission, found, source)
+def _displacement(analysis: Analysis, source: ErrorSource) -> Iterator[Step]:
+    """Where (25) puts the image."""
+    plane, by_table = analysis.published.plane, source.effect
     if plane.degeneracy or source.declared is None:
         return
-    moved = plane.displacement(by_model, source.declared)
+    moved = plane.displacement(by_table, source.declared)
     if moved is None or moved == (0.0, 0.0):
         return
     values = {
-        "β̃_0": by_model.constant * source.declared,
-        "β̃_1": by_model.linear * source.declared,
+        "β̃_0": by_table.constant * source.declared,
+        "β̃_1": by_table.linear * source.declared,
         "det Q": plane.determinant,
     }
     lines: list[Equation] = []
     for symbol, (first, second), result in zip(("x̃", "ỹ"), plane.adjugate, moved, strict=True):
         entries = {"adj_0": first, "adj_1": second}
         lines += equation(symbol, "(adj_0*β̃_0 + adj_1*β̃_1)/(det Q)", values | entries, result, "m")
-    yield from step(f"{title}: the image moves east, north by", *lines)
+    yield from step("(25), (30): the image moves east, north by", *lines)
 
 
 def place(mission: Mission, path: KeyPath) -> str:

@@ -1,21 +1,24 @@
 """How a row comes to its status: from the line of the mission file through the equations to the verdict."""
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
+from bisar_budget.budget.aggregates import Together
 from bisar_budget.budget.allocation import Allocation
-from bisar_budget.budget.correlation import correlated_errors, displacement_parts, phase_parts
+from bisar_budget.budget.analysis import Analysis
+from bisar_budget.budget.correlation import displacement_parts, phase_parts
 from bisar_budget.budget.effects import ErrorSource, image_plane
 from bisar_budget.budget.findings import MissionFindings, Row
+from bisar_budget.budget.models import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.budget.scene import ScenePhases, at
-from bisar_budget.budget.sources import error_sources
 from bisar_budget.budget.vibration import amplitude_share, echo_phase, lines_of, quadratic_part, shared_frequencies
 from bisar_budget.constants import ROUNDING
 from bisar_budget.errors import KeyPath, printable
 from bisar_budget.geometry import dot, without_rounding
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import formulas
-from bisar_budget.report.explained_error import as_written, declaration, effect, missing, place, plane_and_effect
+from bisar_budget.report.explained_error import as_written, declaration, effect, missing, place
+from bisar_budget.report.explained_full import at_the_allowable
 from bisar_budget.report.formulas import Equation, Step, Sum, equation, number, step, with_unit
 from bisar_budget.report.layout import wrapped
 from bisar_budget.report.text_table import WORDS, percent
@@ -60,22 +63,23 @@ def _fitted(line: str) -> list[str]:
 
 def chain(mission: Mission, found: MissionFindings, row: Row) -> Iterator[Step]:
     """Steps from the line of the mission file to how much of the allowable a row uses."""
-    sources = {source.id: source for source in error_sources(mission, found.geometry)}
-    source = sources.get(row.id)
+    analysis = Analysis(mission)
+    together = Together(analysis, analysis.full if row.model == "full" else analysis.published)
+    source = next((source for source in analysis.sources if source.id == row.id), None)
     if source is not None:
         yield from declaration(mission, source)
-        yield from effect(mission, found, source, sources)
-        yield from _budget(found.allocation, source.owner, source.by(mission.allocation.model).qpe, row)
+        yield from effect(analysis, found, source, row.model)
+        yield from _budget(analysis, source, row)
     elif ".vibration." in row.id:
         yield from _vibration(mission, found.allocation, row)
     elif row.id.endswith(".quadratic_phase_error") or row.id == "mission.autofocus_pull_in":
-        yield from _phase_aggregate(mission, found, row, sources.values())
+        yield from _phase_aggregate(together, found, row)
     elif row.id == "mission.cubic_phase_error":
-        yield from _cubic_aggregate(mission, found, row, sources.values())
+        yield from _cubic_aggregate(together, found, row)
     elif row.id == "mission.spatial_variance":
-        yield from _spatial_variance(mission, found, row, sources.values())
+        yield from _spatial_variance(analysis, found, row)
     elif row.id == "mission.location_error":
-        yield from _location_aggregate(mission, found, row, sources.values())
+        yield from _location_aggregate(mission, together, found, row)
     if row.declared is not None and row.allowable is not None and row.utilization is not None:
         values = {"declared": row.declared, "allowable": row.allowable}
         yield from step("Utilization", *equation("utilization", "declared/allowable", values, row.utilization, ""))
@@ -100,14 +104,42 @@ def collection_chain(found: MissionFindings) -> Iterator[Step]:
     yield from step("(30), range held constant", *equation("det Q", formulas.DETERMINANT, values, determinant, "1/s"))
 
 
-def _budget(allocation: Allocation, owner: str, qpe_per_unit: float, row: Row) -> Iterator[Step]:
-    limit = allocation.qpe_limit(owner) * allocation.autofocus_gain
-    yield from _limit(allocation, owner, limit)
+def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]:
+    """From the requirements to the smallest size that one of them allows."""
+    allocation, requirements = analysis.allocation, analysis.mission.requirements
+    limit = allocation.qpe_limit(source.owner) * allocation.autofocus_gain
+    yield from _limit(allocation, source.owner, limit)
+    model = analysis.full if row.model == "full" else analysis.published
+    by_quadratic = row.allowable_full if row.model == "full" else row.allowable_published
+    sizes: dict[str, float] = {}
+    if by_quadratic is not None:
+        sizes["by_QPE"] = by_quadratic
+        if row.model == "full" and source.is_motion and not analysis.full.is_linear_at(source, QUADRATIC, limit):
+            yield from at_the_allowable(analysis, source, by_quadratic)
+        else:
+            values = {"limit": limit, "QPE/unit": abs(model.effect(source).qpe)}
+            yield from step(
+                "Allowable by the quadratic phase",
+                *equation("by_QPE", "limit/(QPE/unit)", values, by_quadratic, row.unit),
+            )
+    others = ((CUBIC, requirements.cubic_phase_error, "rad"), (LOCATION, requirements.location_error, "m"))
+    for name, required, unit in others if source.is_motion else ():
+        size = None if required is None else model.allowable(source, name, required)
+        if required is not None and size is not None:
+            symbol = "by_cubic" if name == CUBIC else "by_location"
+            sizes[symbol] = size
+            yield from step(
+                f"Allowable by requirements.{name}, {with_unit(required, unit)}, without share and gain",
+                f"{symbol} = {with_unit(size, row.unit)}",
+            )
     if row.allowable is None:
-        yield from step("Allowable: no limit", printable(row.reason or "this effect has none"))
+        yield from step("Allowable: no limit", printable(row.reason or "no requirement limits this error"))
         return
-    values = {"limit": limit, "QPE/unit": abs(qpe_per_unit)}
-    yield from step("Allowable", *equation("allowable", "limit/(QPE/unit)", values, row.allowable, row.unit))
+    text = f"min({', '.join(number(size) for size in sizes.values())})" if len(sizes) > 1 else number(row.allowable)
+    yield from step(
+        f"Allowable: the smallest, by {', '.join(sizes)}",
+        Sum(f"allowable = {text} = {with_unit(row.allowable, row.unit)}"),
+    )
 
 
 def _limit(allocation: Allocation, owner: str, limit: float) -> Iterator[Step]:
@@ -232,21 +264,14 @@ def _shared_frequency(mission: Mission, platform: str, index: int, total: float)
     yield from step(title, f"declared = {sizes} = {total:.6g} m")
 
 
-def _phase_aggregate(
-    mission: Mission, found: MissionFindings, row: Row, sources: Iterable[ErrorSource]
-) -> Iterator[Step]:
+def _phase_aggregate(together: Together, found: MissionFindings, row: Row) -> Iterator[Step]:
     owner = {"timing": "clock"}.get(row.id.split(".")[0], row.id.split(".")[0])
-    members = [
-        source
-        for source in sources
-        if source.declared is not None
-        and source.is_independent
-        and (owner == "mission" or found.allocation.qpe.includes(source.owner, owner))
-    ]
-    rule = "sum" if row.id == "mission.autofocus_pull_in" else found.combine
-    parts = phase_parts(members, "qpe", found.model, rule, correlated_errors(mission))
+    is_pull_in = row.id == "mission.autofocus_pull_in"
+    rule = "sum" if is_pull_in else found.combine
+    phases = together.phases(together.members(found.allocation, owner))
+    parts = phase_parts(phases, rule, together.groups)
     yield from _combined("QPE", rule, [(name, abs(size)) for name, size in parts], row)
-    if row.id == "mission.autofocus_pull_in":
+    if is_pull_in:
         values = {"N_pull": found.allocation.n_pull or 0.0}
         lines = equation("allowable", "π*N_pull", values, row.allowable or 0.0, "rad")
         yield from step("What autofocus corrects, Section VI", *lines)
@@ -254,33 +279,19 @@ def _phase_aggregate(
         yield from _limit(found.allocation, owner, row.allowable or 0.0)
 
 
-def _cubic_aggregate(
-    mission: Mission, found: MissionFindings, row: Row, sources: Iterable[ErrorSource]
-) -> Iterator[Step]:
-    members = [
-        source
-        for source in sources
-        if source.declared is not None and source.is_motion and (source.is_independent or found.combine == "each")
-    ]
-    parts = phase_parts(members, "cubic", found.model, found.combine, correlated_errors(mission))
+def _cubic_aggregate(together: Together, found: MissionFindings, row: Row) -> Iterator[Step]:
+    parts = phase_parts(together.cubics(), found.combine, together.groups)
     yield from _combined("Cubic phase", found.combine, [(name, abs(size)) for name, size in parts], row)
     if row.allowable is not None:
         yield from step("Allowable", f"requirements.cubic_phase_error = {row.allowable:.6g} rad")
 
 
-def _spatial_variance(
-    mission: Mission, found: MissionFindings, row: Row, sources: Iterable[ErrorSource]
-) -> Iterator[Step]:
+def _spatial_variance(analysis: Analysis, found: MissionFindings, row: Row) -> Iterator[Step]:
     """Phases at the centre and at the worst place of the scene's edge, and the largest difference."""
     scene = found.scene
     if scene is None or scene.degeneracy or row.declared is None:
         return
-    members = [
-        source
-        for source in sources
-        if source.declared is not None and source.is_motion and (source.is_independent or found.combine == "each")
-    ]
-    edge = ScenePhases(mission, found.geometry, members)
+    edge = ScenePhases(analysis)
     east, north = at(scene.radius, scene.azimuth)
     sizes = [(name, abs(phase)) for name, phase in edge.parts(edge.differences(scene.radius, scene.azimuth))]
     yield from step(
@@ -290,34 +301,34 @@ def _spatial_variance(
     yield from step("Budget of what one autofocus correction leaves", f"total = {found.allocation.qpe_total:.6g} rad")
 
 
-def _location_aggregate(
-    mission: Mission, found: MissionFindings, row: Row, sources: Iterable[ErrorSource]
-) -> Iterator[Step]:
-    members, title = [], "(25), (30)"
-    for source in sources:
-        if source.declared is None or not source.is_motion:
-            continue
-        plane, by_model, title = plane_and_effect(mission, found, source)
-        moved = plane.displacement(by_model, source.declared)
-        if moved is not None and (source.is_independent or found.combine == "each"):
-            members.append((source.id, moved))
+def _location_aggregate(mission: Mission, together: Together, found: MissionFindings, row: Row) -> Iterator[Step]:
     rule = "the longest sum over all signs of the vectors" if found.combine == "sum" else _RULES[found.combine]
-    parts = displacement_parts(members, found.combine, correlated_errors(mission))
-    sizes = [(name, math.hypot(*moved)) for name, moved in parts]
-    combined = [] if row.declared is None else [f"combined = {row.declared:.6g} m"]
-    yield from step(f"{title}: displacements, {rule}", *_listed(sizes, "m"), *combined)
+    parts = displacement_parts(together.moves() or [], found.combine, together.groups)
+    title = "(25), (30)" if row.model == "published" else "Full model, each by the sign that moves farther"
+    if found.combine == "sum":
+        vectors = [
+            f"{printable(name)}: {with_unit(x, 'm')} east, {with_unit(y, 'm')} north" for name, (x, y) in parts
+        ]
+        combined = [] if row.declared is None else [f"combined = {row.declared:.6g} m"]
+        yield from step(f"{title}: displacements, {rule}", *(vectors or ["none"]), *combined)
+    else:
+        yield from _combined(
+            f"{title}: displacement", found.combine, [(n, math.hypot(*m)) for n, m in parts], row, "m"
+        )
     if row.allowable is not None:
         where = place(mission, ("requirements", "location_error"))
         yield from step("Allowable", f"requirements.location_error = {row.allowable:.6g} m, {where}")
 
 
-def _combined(symbol: str, rule: str, members: Sequence[tuple[str, float]], row: Row) -> Iterator[Step]:
+def _combined(
+    symbol: str, rule: str, members: Sequence[tuple[str, float]], row: Row, unit: str = "rad"
+) -> Iterator[Step]:
     title = f"{symbol} of the declared errors, {_RULES[rule]}"
     # What is left of terms that cancel exactly is rounding.
     largest = max((size for _, size in members), default=0.0)
     members = [(name, size if size > ROUNDING * largest else 0.0) for name, size in members]
     if row.declared is None or not members:
-        yield from step(title, *_listed(members, "rad"))
+        yield from step(title, *_listed(members, unit))
         return
     sizes = [number(size) for _, size in members if size] or ["0"]
     if rule == "sum":
@@ -326,7 +337,7 @@ def _combined(symbol: str, rule: str, members: Sequence[tuple[str, float]], row:
         text = "sqrt(" + " + ".join(f"{size}^2" for size in sizes) + ")"
     else:
         text = f"max(0, {', '.join(sizes)})"
-    yield from step(title, *_listed(members, "rad"), Sum(f"combined = {text} = {row.declared:.6g} rad"))
+    yield from step(title, *_listed(members, unit), Sum(f"combined = {text} = {row.declared:.6g} {unit}"))
 
 
 def _listed(members: Sequence[tuple[str, float]], unit: str) -> list[str]:

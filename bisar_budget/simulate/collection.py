@@ -6,11 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bisar_budget.budget.exact_arrays import aperture_nodes
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import BistaticGeometry, GroundVector
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.simulate.exact import ExactEffect, exact_effect
-from bisar_budget.simulate.image_formation import backprojection, ground_grid, taylor_window
+from bisar_budget.simulate.image_formation import backprojection, taylor_window
 from bisar_budget.simulate.phase_history import (
     Complexes,
     Floats,
@@ -20,12 +21,13 @@ from bisar_budget.simulate.phase_history import (
     path,
     phase_history,
 )
+from bisar_budget.simulate.range_lines import Flown
 
 OVERSAMPLING = 2.5  # samples of an image per resolution cell
 CELLS = 48  # resolution cells of a cross-range cut; fewer blur the aperture by over 1 % of a phase under a taper
-RANGE_CELLS = 12  # of a chip
-_FREQUENCIES = 64  # a chip stays within a few range cells
-_MAX_CELLS = 1024
+RANGE_CELLS = 8  # of a chip
+_FREQUENCIES = 64  # at least; half of them for the response itself
+MAX_CELLS = 1024
 _BYTES_PER_PIXEL = 16 * 8  # the image, its grid, and what forming it holds at once
 _BYTES_PER_PULSE = 16 * 6 * _FREQUENCIES  # samples and oversampled range profile
 _PULSES_PER_CELL = 4  # a response repeats after as many cells as there are pulses
@@ -41,6 +43,11 @@ class Errors(NamedTuple):
     def of(self, platform: str, error: MotionError) -> "Errors":
         """Give one platform an error."""
         return self._replace(transmitter=error) if platform == "transmitter" else self._replace(receiver=error)
+
+    def smooth(self) -> "Errors":
+        """The polynomials alone: no vibration."""
+        still = (one._replace(sinusoids=(), wideband_rms=0.0) for one in (self.transmitter, self.receiver))
+        return Errors(*still, clock=self.clock)
 
 
 def superposed(parts: Iterable[Errors]) -> Errors:
@@ -69,14 +76,15 @@ def superposed_motion(a: MotionError, b: MotionError) -> MotionError:
 
 
 class Chip(NamedTuple):
-    """Image of a patch, (nx, ny), and its pixels, (nx, ny, 3) [m]; y′ runs along lines of equal range.
+    """Image of a patch, (nx, ny), and its pixels, (nx, ny, 3) [m], `spacing` apart at the middle [m].
 
-    The phase of the range to each pixel at the midpoint is taken out, so that the spectrum is that of the
-    aperture, about zero.
+    Lines, along y′, are lines of equal range, columns those of equal Doppler, by the measured paths. The phase of the
+    range to each pixel at the midpoint is taken out, so that the spectrum is that of the aperture, about zero.
     """
 
     image: Complexes
     grid: Floats
+    spacing: tuple[float, float]
 
     @property
     def cut(self) -> Complexes:
@@ -88,7 +96,7 @@ class Chip(NamedTuple):
 class PointCollection:
     """A mission's collection, for images of a single point.
 
-    `spacing` (2,) [m] is that of a chip's pixels along x′ and y′.
+    `resolution` and `spacing` (2,) [m] are those of cells and of a chip's pixels at the scene centre, along x′ and y′.
     """
 
     def __init__(self, mission: Mission, geometry: BistaticGeometry) -> None:
@@ -103,6 +111,8 @@ class PointCollection:
             geometry.cross_range_resolution(self.wavelength, self.aperture_time),
         )
         self.spacing = (self.resolution[0] / OVERSAMPLING, self.resolution[1] / OVERSAMPLING)
+        self._nodes = aperture_nodes(self.aperture_time)
+        self._kept: tuple[object, Floats, tuple[float, float]] | None = None
 
     def paths(self, errors: Errors, slow_time: Floats, rng: np.random.Generator | None = None) -> tuple[Path, Path]:
         """Fly both platforms."""
@@ -112,21 +122,22 @@ class PointCollection:
         )
 
     def effect(self, errors: Errors) -> ExactEffect:
-        """Displacement and phases of a point at the scene centre, by exact ranges."""
-        slow_time = cell_centres(self.aperture_time, 256)
-        clock = self.clock(errors, slow_time)
-        return exact_effect(slow_time, *self.paths(errors, slow_time), clock, self.wavelength, self.aperture_time)
+        """Displacement and phases of a point at the scene centre, by exact ranges.
 
-    def spatial_frequency(self, chip: Chip) -> tuple[Floats, Floats]:
-        """Slow time over the aperture, -1 to 1, and the frequency at the middle of a chip's cut then. [cycles/m]"""
-        slow_time = cell_centres(self.aperture_time, 257)
-        cut = chip.grid[chip.grid.shape[0] // 2]
-        middle = cut.shape[0] // 2
-        slope = np.zeros_like(slow_time)
-        for one in self.paths(Errors(), slow_time):
-            for pixel, sign in ((cut[middle + 1], 1), (cut[middle - 1], -1)):
-                slope += sign * np.linalg.norm(pixel - one.actual, axis=1) / (2 * self.spacing[1])
-        return slow_time / (self.aperture_time / 2), (slope - slope[slope.size // 2]) / self.wavelength
+        Raises
+        ------
+        ValueError
+            No ground point has the recorded range history.
+        """
+        clock = self.clock(errors, self._nodes)
+        flown = self.paths(errors, self._nodes)
+        return exact_effect(self._nodes, *flown, clock, self.wavelength, self.aperture_time)
+
+    def flown(self, errors: Errors) -> Flown:
+        """Measured paths, vibration left out: what a processor lays its grid by."""
+        ends = np.array([-1.0, 0.0, 1.0]) * self.aperture_time / 2
+        transmitter, receiver = self.paths(errors.smooth(), ends)
+        return Flown(transmitter.measured, receiver.measured)
 
     def clock(self, errors: Errors, slow_time: Floats) -> Floats:
         """Clock error over slow time. [s]"""
@@ -141,6 +152,7 @@ class PointCollection:
         scatterer: GroundVector = (0.0, 0.0),
         cells: int = CELLS,
         range_cells: int = 0,
+        is_reference: bool = False,
     ) -> Chip:
         """Form the image of a scatterer around a ground point, without noise.
 
@@ -149,38 +161,94 @@ class PointCollection:
         centre : (2,) float
             East, north. [m]
         errors : Errors
-            In the recorded data.
+            In the recorded data, and in the paths that the image is formed with.
         scatterer : (2,) float
             East, north. [m]
         cells, range_cells : int
             Extent in resolution cells along y′ and x′; no range cells give the single line through the centre.
+        is_reference : bool
+            The platforms flew as they were measured, by a perfect clock: what the image of the same processor
+            would be without error.
 
         Raises
         ------
         ValueError
             The patch aliases with the mission's pulses, or is too large to be formed.
         """
-        self._require_room(cells, range_cells)
+        grid, spacing = self._grid(centre, errors, cells, range_cells)
         slow_time = cell_centres(self.aperture_time, _PULSES_PER_CELL * cells)
         transmitter, receiver = self.paths(errors, slow_time)
+        clock = self.clock(errors, slow_time)
+        if is_reference:
+            transmitter, receiver = (Path(actual=p.measured, measured=p.measured) for p in (transmitter, receiver))
+            clock = 0 * clock
+        frequencies = self._frequencies(grid, transmitter, receiver, scatterer)
         history = phase_history(
             np.array([[*scatterer, 0.0]]),
             np.ones(1, dtype=complex),
             slow_time=slow_time,
-            frequency=self.radar.center_frequency + cell_centres(self.radar.bandwidth, _FREQUENCIES),
+            frequency=self.radar.center_frequency + cell_centres(self.radar.bandwidth, frequencies),
             transmitter=transmitter,
             receiver=receiver,
-            clock_error=self.clock(errors, slow_time),
+            clock_error=clock,
         )
         if self.is_tapered:
-            history.samples[:] *= np.outer(taylor_window(slow_time.size), taylor_window(_FREQUENCIES))
-        grid = self._grid(centre, range_cells, cells)
-        return Chip(backprojection(history, grid) * baseband(self.geometry, grid, self.wavelength), grid)
+            history.samples[:] *= np.outer(taylor_window(slow_time.size), taylor_window(frequencies))
+        image = backprojection(history, grid) * baseband(self.flown(errors), grid, self.wavelength)
+        return Chip(image, grid, spacing)
+
+    def pair(
+        self, errors: Errors, place: GroundVector, cells: int = CELLS, range_cells: int = RANGE_CELLS
+    ) -> tuple[Chip, Chip]:
+        """Image of errors around the place they move the point to, and of no error there: see `chip`."""
+        size = {"cells": cells, "range_cells": range_cells}
+        return (
+            self.chip(place, errors, **size),
+            self.chip(place, errors, scatterer=place, is_reference=True, **size),
+        )
+
+    def _grid(
+        self, centre: GroundVector, errors: Errors, cells: int, range_cells: int
+    ) -> tuple[Floats, tuple[float, float]]:
+        """Pixels of a chip and their spacing; the last one is kept, since images come in pairs."""
+        key = (centre, errors.smooth(), cells, range_cells)
+        if self._kept is None or self._kept[0] != key:
+            self._require_room(cells, range_cells)
+            flown = self.flown(errors)
+            cell = flown.cells(centre, self.radar.bandwidth, self.wavelength)
+            spacing = (cell[0] / OVERSAMPLING, cell[1] / OVERSAMPLING)
+            shape = (max(1, 2 * round(range_cells * OVERSAMPLING / 2)), 2 * round(cells * OVERSAMPLING / 2))
+            self._kept = (key, flown.grid(centre, spacing, shape), spacing)
+        return self._kept[1:]
+
+    def _frequencies(self, grid: Floats, transmitter: Path, receiver: Path, scatterer: GroundVector) -> int:
+        """How many keep a range profile from repeating within a patch: its range walk sets that."""
+        farthest = 0.0
+        point = np.array([*scatterer, 0.0])
+        for pulse in (0, -1):
+            off = np.zeros(grid.shape[:-1])
+            for one in (transmitter, receiver):
+                off += np.linalg.norm(grid - one.measured[pulse], axis=-1)
+                off -= np.linalg.norm(point - one.actual[pulse])
+            farthest = max(farthest, float(np.abs(off).max()))
+        cells = 2 * farthest * self.radar.bandwidth / SPEED_OF_LIGHT
+        return max(_FREQUENCIES, 16 * math.ceil((cells + _FREQUENCIES / 2) / 16))
+
+    def spatial_frequency(self, chip: Chip) -> tuple[Floats, Floats]:
+        """Slow time over the aperture, -1 to 1, and the frequency at the middle of a chip's cut then. [cycles/m]"""
+        slow_time = cell_centres(self.aperture_time, 257)
+        cut = chip.grid[chip.grid.shape[0] // 2]
+        middle = cut.shape[0] // 2
+        slope = np.zeros_like(slow_time)
+        for one in self.paths(Errors(), slow_time):
+            for pixel, sign in ((cut[middle + 1], 1), (cut[middle - 1], -1)):
+                slope += sign * np.linalg.norm(pixel - one.actual, axis=1) / (2 * chip.spacing[1])
+        return slow_time / (self.aperture_time / 2), (slope - slope[slope.size // 2]) / self.wavelength
 
     def _require_room(self, cells: int, range_cells: int) -> None:
         """Refuse a patch that aliases or is too large. More pulses than it takes would change nothing."""
-        if cells > _MAX_CELLS:
-            raise ValueError(f"a patch of {cells} resolution cells, at most {_MAX_CELLS} are formed")
+        if cells > MAX_CELLS:
+            raise ValueError(f"a patch of {cells} resolution cells, at most {MAX_CELLS} are formed")
         if self.pulses is not None and self.pulses < 2 * cells:
             raise ValueError(
                 f"collection.pulses is {self.pulses}, but the patch with its echoes is {cells} resolution cells wide "
@@ -190,42 +258,15 @@ class PointCollection:
         needed = pixels * _BYTES_PER_PIXEL + _PULSES_PER_CELL * cells * _BYTES_PER_PULSE
         if needed > self.memory_limit:
             limit = f"simulation.memory_limit is {self.memory_limit / 1e6:.0f} MB"
-            raise ValueError(f"the image needs about {needed / 1e6:.0f} MB, {limit}")
-
-    def _grid(self, centre: GroundVector, range_cells: int, cells: int) -> Floats:
-        """Pixels along y′ at the range sum of the middle one.
-
-        The ridge of a response follows an ellipse on the ground; near a platform a straight line leaves it.
-        """
-        nx, ny = (max(1, 2 * round(n * OVERSAMPLING / 2)) for n in (range_cells, cells))
-        look = self.geometry.look_azimuth
-        size = (max(1, nx) * self.spacing[0], ny * self.spacing[1])
-        grid = ground_grid(centre, look, size, (nx, ny))
-        along = np.array([math.cos(look), math.sin(look), 0.0])
-        wanted = range_sum(self.geometry, grid[:, ny // 2])[:, None]
-        for _ in range(8):
-            slope = sum(
-                (grid - np.asarray(p.position)) @ along / np.linalg.norm(grid - np.asarray(p.position), axis=-1)
-                for p in (self.geometry.transmitter, self.geometry.receiver)
-            )
-            grid = grid + ((wanted - range_sum(self.geometry, grid)) / slope)[..., None] * along
-        return grid
+            raise ValueError(f"the image needs about {needed / 1e6:.0f} MB, {limit}: raise it")
 
 
-def range_sum(geometry: BistaticGeometry, points: Floats) -> Floats:
-    """Distance of points (..., 3) to both platforms at the aperture midpoint, (...). [m]"""
-    total: Floats = np.zeros(points.shape[:-1])
-    for state in (geometry.transmitter, geometry.receiver):
-        total += np.linalg.norm(points - np.asarray(state.position), axis=-1)
-    return total
-
-
-def baseband(geometry: BistaticGeometry, points: Floats, wavelength_m: float) -> Complexes:
+def baseband(flown: Flown, points: Floats, wavelength_m: float) -> Complexes:
     """Phase that takes the range history at the midpoint out of an image of points (..., 3).
 
     What stays is the aperture's own spectrum. A backprojected image carries the phase of the range to each
     pixel, which close to a platform is a chirp across the patch and hides the aperture from autofocus.
     """
-    reference = geometry.transmitter.slant_range + geometry.receiver.slant_range
-    phase: Complexes = np.exp(-2j * math.pi / wavelength_m * (range_sum(geometry, points) - reference))
+    reference = float(np.linalg.norm(flown.transmitter[1]) + np.linalg.norm(flown.receiver[1]))
+    phase: Complexes = np.exp(-2j * math.pi / wavelength_m * (flown.range_sum(points) - reference))
     return phase

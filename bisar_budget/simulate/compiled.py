@@ -126,14 +126,15 @@ def backproject(history: PhaseHistory, points: Floats, spline: Spline) -> Comple
     if lattice is not None and _neglected_phase(history, lattice) < _PHASE_LIMIT:
         centre, radius = lattice.disc()
         padded = np.zeros((lattice.shape[0], -(-lattice.shape[1] // _LINE) * _LINE), dtype=complex)
-        for block in _profile_blocks(history, centre, radius, spline):
+        middle = sum(np.linalg.norm(one - centre, axis=1) for one in (history.transmitter, history.receiver))
+        # Neither leg's range changes faster than the pixel moves.
+        for block in _profile_blocks(history, middle - 2 * radius, middle + 2 * radius, spline):
             _add_lattice(*block, lattice.origin, lattice.across, lattice.along, spline == "cubic", padded)
         image = padded[:, : lattice.shape[1]].reshape(shape)
         image = np.ascontiguousarray(image if shape == points.shape[:-1] else image.T)
     else:
         flat = np.ascontiguousarray(points.reshape(-1, 3))
-        low, high = flat.min(axis=0), flat.max(axis=0)
-        for block in _profile_blocks(history, (low + high) / 2, float(np.linalg.norm(high - low)) / 2, spline):
+        for block in _profile_blocks(history, *_reach(history.transmitter, history.receiver, flat), spline):
             _add_points(*block, flat, spline == "cubic", image.reshape(-1))
     image /= history.samples.size
     return image
@@ -167,8 +168,12 @@ class _Block(NamedTuple):
     cycles_per_metre: float
 
 
-def _profile_blocks(history: PhaseHistory, centre: Floats, radius: float, spline: Spline) -> Iterator[_Block]:
-    """Cut from each profile what pixels in a ball can need, and refine that; as many pulses as fit in a cache."""
+def _profile_blocks(history: PhaseHistory, nearest: Floats, farthest: Floats, spline: Spline) -> Iterator[_Block]:
+    """Cut from each profile what pixels between two range sums, (pulses,) [m], can need, and refine that.
+
+    As many pulses as fit in a cache. Patches follow resolution cells, which may be a hundred times longer than wide:
+    what a ball around one would need is not what its pixels need.
+    """
     length, factor, order = profile_length(history, _OVERSAMPLING), _REFINEMENT[spline], _ORDER[spline]
     coarse = cells_per_metre(history, length)
     harmonic = harmonics(history)
@@ -178,10 +183,8 @@ def _profile_blocks(history: PhaseHistory, centre: Floats, radius: float, spline
     offset = np.arange(factor) / factor - (np.arange(_TAPS)[:, None] - _TAPS // 2 + 1)
     weights = kernel(offset, _TAPS, _OVERSAMPLING).astype(np.float32)
     reference = np.linalg.norm(history.transmitter, axis=1) + np.linalg.norm(history.receiver, axis=1)
-    middle = np.linalg.norm(history.transmitter - centre, axis=1) + np.linalg.norm(history.receiver - centre, axis=1)
-    # Neither leg's range changes faster than the pixel moves.
-    first = np.floor((middle - reference - 2 * radius) * coarse).astype(np.int64) - _MARGIN
-    count = math.ceil(4 * radius * coarse) + 2 * _MARGIN
+    first = np.floor((nearest - reference) * coarse).astype(np.int64) - _MARGIN
+    count = math.ceil(float((farthest - nearest).max()) * coarse) + 2 * _MARGIN
     pulses = max(1, int(_BLOCK_BYTES / (count * factor * 8)))
     for start in range(0, history.slow_time.size, pulses):
         part = slice(start, start + pulses)
@@ -399,6 +402,27 @@ def _add_lattice(
         for i in range(rows):
             for j in range(_LINE):
                 image[top + i, left + j] += complex(real[i, j], imag[i, j])
+
+
+@_parallel
+def _reach(transmitter, receiver, points):
+    """Smallest and largest range sum of points at each pulse."""
+    nearest, farthest = np.empty(transmitter.shape[0]), np.empty(transmitter.shape[0])
+    for pulse in prange(transmitter.shape[0]):
+        low, high = np.inf, 0.0
+        for n in range(points.shape[0]):
+            far = 0.0
+            for leg in range(2):
+                platform = transmitter if leg == 0 else receiver
+                x, y, z = (
+                    points[n, 0] - platform[pulse, 0],
+                    points[n, 1] - platform[pulse, 1],
+                    points[n, 2] - platform[pulse, 2],
+                )
+                far += math.sqrt(x * x + y * y + z * z)
+            low, high = min(low, far), max(high, far)
+        nearest[pulse], farthest[pulse] = low, high
+    return nearest, farthest
 
 
 @_parallel

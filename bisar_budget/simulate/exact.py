@@ -1,25 +1,19 @@
-"""What a motion error does, from exact ranges and a fit over the aperture: no expansion, no image."""
+"""What a motion error of an image does, by exact ranges: paths sampled at pulses instead of nodes."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from bisar_budget.budget.exact_arrays import displaced
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.simulate.aperture_fit import edge_phases
 from bisar_budget.simulate.phase_history import Floats, Path
 
-_ORDER = 6  # of the fit in slow time
-_ITERATIONS = 20
-_SETTLED_M = 1e-6  # a satellite's range in double precision gives no more
+_ORDER = 12  # of the fit to samples anywhere else
 
 
 @dataclass(frozen=True, kw_only=True)
 class ExactEffect:
-    """Displacement (east, north) [m]; phases at the aperture edge, signed like the range error [rad].
-
-    The phases are those of the best fit over the whole aperture (`aperture_fit`), whatever its length.
-    """
+    """Displacement (east, north) [m]; phases at the aperture edge, signed like the range error [rad]."""
 
     displacement: tuple[float, float]
     quadratic: float
@@ -34,31 +28,25 @@ def exact_effect(
     wavelength_m: float,
     aperture_time_s: float,
 ) -> ExactEffect:
-    """Find where the response of a scatterer at the scene centre goes, and what phase is left there.
-
-    The response sits at the ground point whose range history, for the measured positions, has the recorded
-    constant and linear term at the aperture midpoint; what remains of the history at that point is what defocuses.
+    """Effect of one error, its paths sampled anywhere over the aperture: see `budget/exact_arrays.py`.
 
     Raises
     ------
     ValueError
-        The iteration for the displaced point does not settle.
+        No ground point has the recorded range history.
     """
     recorded = np.linalg.norm(transmitter.actual, axis=1) + np.linalg.norm(receiver.actual, axis=1)
-    recorded = recorded + SPEED_OF_LIGHT * clock_error
-    place = slow_time / (aperture_time_s / 2)
-    point = np.zeros(3)
-    for _ in range(_ITERATIONS):
-        sight = [p.measured - point for p in (transmitter, receiver)]
-        distance = [np.linalg.norm(s, axis=1) for s in sight]
-        left = np.polynomial.polynomial.polyfit(place, recorded - distance[0] - distance[1], _ORDER)
-        gradient = sum(-s[:, :2] / d[:, None] for s, d in zip(sight, distance, strict=True))
-        slope = np.polynomial.polynomial.polyfit(place, gradient, _ORDER)
-        step = np.linalg.solve(slope[:2], left[:2])
-        point[:2] += step
-        if np.hypot(*step) < _SETTLED_M:
-            phases = edge_phases(2 * math.pi / wavelength_m * left)
-            return ExactEffect(
-                displacement=(float(point[0]), float(point[1])), quadratic=phases.quadratic, cubic=phases.cubic
-            )
-    raise ValueError("no ground point has the recorded range history")
+    recorded = recorded + SPEED_OF_LIGHT * np.asarray(clock_error, dtype=float)
+    weights = _projection(slow_time / (aperture_time_s / 2))
+    found = displaced(transmitter.measured, receiver.measured, recorded, weights, wavelength_m, None)
+    if not found.found:
+        raise ValueError("no ground point has the recorded range history")
+    east, north = (float(part) for part in found.displacement)
+    return ExactEffect(displacement=(east, north), quadratic=float(found.quadratic), cubic=float(found.cubic))
+
+
+def _projection(place: Floats) -> Floats:
+    """Weights (4, samples) that project on P₀ … P₃ the polynomial through samples anywhere in -1 … 1."""
+    legendre = np.polynomial.legendre.legvander(place, min(_ORDER, max(3, place.size // 4)))
+    weights: Floats = np.linalg.pinv(legendre)[:4]
+    return weights

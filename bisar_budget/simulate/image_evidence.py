@@ -11,7 +11,7 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.simulate.collection import OVERSAMPLING, Chip
 from bisar_budget.simulate.impulse_response import upsampled
 from bisar_budget.simulate.phase_history import Floats
-from bisar_budget.simulate.verify import Study
+from bisar_budget.simulate.study import Study
 
 _FINE = 4  # interpolation of a cut, so that its nulls look like nulls
 _AROUND = 10  # resolution cells of a cut each way, beyond the smear
@@ -45,21 +45,21 @@ def _evidence(study: Study, file: str, verdict: Verdict) -> ImageEvidence:
         file=file,
         verdict=verdict,
         look_azimuth_rad=study.geometry.look_azimuth,
-        at_limit=_point_image(study, chip, reference, verdict.predicted_qpe_rad or 0.0),
+        at_limit=_point_image(chip, reference, verdict.predicted_qpe_rad or 0.0),
     )
     if verdict.boundary_autofocus is None or verdict.measured_residual_qpe_rad is None:
         return found
     chip, reference = study.images(verdict.id, verdict.boundary_autofocus)
     smear = (verdict.predicted_qpe_rad or 0.0) * verdict.boundary_autofocus / verdict.boundary_error
     return found._replace(
-        before_autofocus=_point_image(study, chip, reference, smear),
-        after_autofocus=_point_image(study, study.focused(chip), reference, smear),
+        before_autofocus=_point_image(chip, reference, smear),
+        after_autofocus=_point_image(study.focused(chip), reference, smear),
     )
 
 
-def _point_image(study: Study, chip: Chip, reference: Chip, quadratic: float) -> PointImage:
+def _point_image(chip: Chip, reference: Chip, quadratic: float) -> PointImage:
     """Reduce a chip to what is shown: as far as the response of a quadratic phase reaches, and sidelobes."""
-    spacing, middle = study.collection.spacing, chip.cut.size // 2
+    spacing, middle = chip.spacing, chip.cut.size // 2
     reach = _AROUND + 2 * abs(quadratic) / math.pi  # cells, from the slope of the phase at the aperture edge
     half = min(math.ceil(reach * OVERSAMPLING), middle - 1)
     stride = math.ceil(2 * half / _MAX_PIXELS)

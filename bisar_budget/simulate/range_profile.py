@@ -5,6 +5,7 @@ needs, and read by convolution with a short kernel by whose transform the spectr
 """
 
 import math
+from functools import cache
 
 import numpy as np
 
@@ -25,9 +26,15 @@ def kernel(offset: Floats, taps: int, oversampling: int) -> Floats:
 
 def kernel_transform(angle: Floats, taps: int, oversampling: int) -> Floats:
     """Fourier transform of the kernel at an angular frequency per cell, by Gauss-Legendre quadrature."""
-    nodes, weights = np.polynomial.legendre.leggauss(64)
+    nodes, weights = _gauss()
     offset = nodes * taps / 2
     return np.cos(np.outer(angle, offset)) @ (weights * kernel(offset, taps, oversampling)) * taps / 2
+
+
+@cache
+def _gauss() -> tuple[Floats, Floats]:
+    nodes, weights = np.polynomial.legendre.leggauss(64)
+    return nodes, weights
 
 
 def profile_length(history: PhaseHistory, oversampling: int) -> int:

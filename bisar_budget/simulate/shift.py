@@ -25,8 +25,11 @@ class Shift(NamedTuple):
     smear_azimuth: float
 
 
-def measured_shift(chip: Chip, reference: Chip) -> Shift:
+def measured_shift(chip: Chip, reference: Chip, across_pixels: float | None = None) -> Shift:
     """Compare a response with an error-free one on the same grid.
+
+    `across_pixels` is the place along y′ where it is known better, as from the linear part of the phase over the
+    aperture: a cubic phase moves the centre of gravity, not that part.
 
     Raises
     ------
@@ -46,7 +49,10 @@ def measured_shift(chip: Chip, reference: Chip) -> Shift:
     # A shift by d turns the spectrum by −2π·d/extent from one frequency to the next.
     pixels = np.stack([-step * count / (2 * math.pi) for step, count in zip(steps, product.shape, strict=True)])
     ground = _pixel_vectors(reference.grid) @ pixels
-    mean = np.average(ground, axis=1, weights=weights)
+    middle = np.average(pixels, axis=1, weights=weights)
+    if across_pixels is not None:
+        middle[1] = across_pixels
+    mean = _pixel_vectors(reference.grid) @ middle
     spread = np.cov(ground, aweights=weights)
     east, north = np.linalg.eigh(spread)[1][:, -1]
     return Shift((float(mean[0]), float(mean[1])), math.atan2(north, east) % math.pi)

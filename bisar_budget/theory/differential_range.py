@@ -78,6 +78,14 @@ def clock_polynomial() -> Expr:
     return sum(coefficient * tau**n for n, coefficient in enumerate(clock_coefficients))
 
 
+def first_order_range_error(platform: Platform) -> Expr:
+    """Return |r| − |r + r̃| of one platform to first order in r̃ of (22): −r·r̃/|r|. [m]"""
+    error = Matrix([Function(f"e_{axis}")(tau) for axis in range(3)])
+    measured = sqrt(sum((r + _EPSILON * e) ** 2 for r, e in zip(platform.position, error, strict=True)))
+    first_order = diff(platform.exact_slant_range() - measured, _EPSILON).subs(_EPSILON, 0)
+    return first_order.subs(dict(zip(error, error_polynomial(platform), strict=True)))
+
+
 @cache
 def range_error(platforms: tuple[Platform, ...] = PLATFORMS) -> Expr:
     """Return (23) with (22) put in: error of the differential range, a cubic in slow time. [m]
@@ -87,11 +95,7 @@ def range_error(platforms: tuple[Platform, ...] = PLATFORMS) -> Expr:
     """
     total = c * clock_polynomial()
     for platform in platforms:
-        error = Matrix([Function(f"e_{axis}")(tau) for axis in range(3)])
-        measured = sqrt(sum((r + _EPSILON * e) ** 2 for r, e in zip(platform.position, error, strict=True)))
-        first_order = diff(platform.exact_slant_range() - measured, _EPSILON).subs(_EPSILON, 0)
-        linear = hold_range_constant(first_order, (platform,))
-        total += linear.subs(dict(zip(error, error_polynomial(platform), strict=True)))
+        total += hold_range_constant(first_order_range_error(platform), (platform,))
     return expand(total)
 
 

@@ -25,9 +25,11 @@ from bisar_budget.theory.symbols import (
     positive,
     pslr,
     share,
+    tau,
     wavelength,
 )
 
+NODES = (6, 10, 16)  # of a fit over the aperture: the longer the way of the platforms, the more
 SYMPY_VERSION: str = sympy.__version__
 TARGET = Path(__file__).resolve().parent.parent / "evaluators.py"
 
@@ -84,82 +86,6 @@ def both_platforms_arguments() -> tuple[tuple[Symbol, str], ...]:
     return tuple(arguments)
 
 
-def look_arguments(platform: Platform) -> tuple[tuple[Symbol, str], ...]:
-    """Return the line of sight and its derivatives as arguments without a subscript."""
-    names = ("u", "u_dot", "u_ddot", "u_dddot", "u_ddddot")
-    return tuple(
-        (symbol, f"{name}_{axis}")
-        for name, vector in zip(names, platform.look, strict=True)
-        for axis, symbol in zip("xyz", vector, strict=True)
-    )
-
-
-def _full_evaluators(motion: tuple[Symbol, ...], phase_arguments: tuple[tuple[Symbol, str], ...]) -> list[Evaluator]:
-    """Return the evaluators of the full model."""
-    beta = full.range_error()
-    growth = full.growth(TRANSMITTER)
-    acceleration = zip(TRANSMITTER.acceleration, ("a_x", "a_y", "a_z"), strict=True)
-    *track, slant_range = platform_arguments(TRANSMITTER)
-    # The sums of both platforms' derivatives stand where one platform's do: (u_t + u_r) → s.
-    alone = {symbol: 0 for look in RECEIVER.look for symbol in look}
-    history = [vector.subs(alone) for vector in full.ground_history()]
-    names = ("s", "s_dot", "s_ddot", "s_dddot", "s_ddddot")
-    sums = [
-        (vector[axis], f"{name}_{'xy'[axis]}") for vector, name in zip(history, names, strict=True) for axis in (0, 1)
-    ]
-    Q = full.ground_matrix().subs(alone)
-    adjugate = Q.adjugate()
-    added = full.displacement_coefficients()
-    phases = [phase(added).subs(alone) for phase in (full.quadratic_phase, full.cubic_phase)]
-    return [
-        Evaluator(
-            name="look_series",
-            summary="Line of sight to a platform and its first four derivatives at the aperture midpoint.",
-            details=(
-                "Rows are orders 0 to 4 [1/sⁿ], columns x, y, z, on a path of constant acceleration. Derived here."
-            ),
-            arguments=(*track, *acceleration, slant_range),
-            rows=tuple(tuple(look.subs(growth)) for look in full.look_series(TRANSMITTER)),
-            row_names=("u", *(f"{order} derivative" for order in ("first", "second", "third", "fourth"))),
-        ),
-        Evaluator(
-            name="full_motion",
-            summary="Effects of one unit of each motion error of one platform, every first-order term kept.",
-            details=(
-                "Columns as in published_motion, before what the displacement of the image adds; the quadratic phase "
-                "is that of the quadratic fitted over the aperture, in which the quartic term has a part. "
-                "u and its derivatives as look_series gives them. Derived here."
-            ),
-            arguments=(*look_arguments(TRANSMITTER), *phase_arguments),
-            rows=tuple(full_effects(beta, error) for error in motion),
-            row_names=tuple(f"{kind} {axis}" for kind in published.KINDS for axis in "xyz"),
-        ),
-        Evaluator(
-            name="full_ground",
-            summary="Adjugate and determinant of Q, and the phases that a displacement of one metre adds.",
-            details=(
-                "s is the sum of both platforms' look_series on the ground. Displacement of the image [m] = "
-                "adjugate · (constant term, linear term) / determinant; quadratic and cubic phase at the aperture "
-                "edge per metre of displacement east and north [rad/m]. Derived here."
-            ),
-            arguments=(*sums, *phase_arguments),
-            rows=(
-                tuple(adjugate[0, :]),
-                tuple(adjugate[1, :]),
-                (Q[0, 0] * Q[1, 1] - Q[0, 1] * Q[1, 0],),
-                *(tuple(published.sensitivity(phase, axis) for axis in full.DISPLACEMENT) for phase in phases),
-            ),
-            row_names=(
-                "adjugate, first row",
-                "adjugate, second row",
-                "determinant",
-                "quadratic phase",
-                "cubic phase",
-            ),
-        ),
-    ]
-
-
 def effects(beta: Sequence[Expr], error: Symbol) -> tuple[Expr, ...]:
     """Return what one unit of an error does: β̃₀, β̃₁, QPE, cubic phase at the aperture edge, signed like β̃."""
     per_unit = [published.sensitivity(term, error) for term in beta]
@@ -169,12 +95,6 @@ def effects(beta: Sequence[Expr], error: Symbol) -> tuple[Expr, ...]:
         published.edge_phase(per_unit[2], 2),
         published.edge_phase(per_unit[3], 3),
     )
-
-
-def full_effects(beta: Sequence[Expr], error: Symbol) -> tuple[Expr, ...]:
-    """Return the same of the full model, whose quadratic phase holds its part of the quartic term."""
-    per_unit = [published.sensitivity(term, error) for term in beta]
-    return (per_unit[0], per_unit[1], full.quadratic_phase(per_unit), full.cubic_phase(per_unit))
 
 
 def evaluators() -> tuple[Evaluator, ...]:
@@ -232,7 +152,24 @@ def evaluators() -> tuple[Evaluator, ...]:
             rows=(tuple(adjugate[0, :]), tuple(adjugate[1, :]), (determinant,)),
             row_names=("adjugate, first row", "adjugate, second row", "determinant"),
         ),
-        *_full_evaluators(motion, phase_arguments),
+        Evaluator(
+            name="full_motion",
+            summary="Range error of one unit of each motion error of one platform at one slow time. [m/unit]",
+            details=(
+                "−u·r̃(τ): the line of sight is that of the position then, nothing is held constant. Position and "
+                "slant range are those at the slow time. Derived here."
+            ),
+            arguments=(*platform_arguments(TRANSMITTER)[:3], (TRANSMITTER.slant_range, "slant_range"), (tau, "tau")),
+            rows=tuple(
+                tuple(published.sensitivity(full.range_error_at(TRANSMITTER), error) for error in motion[k : k + 3])
+                for k in (0, 3, 6)
+            ),
+            row_names=tuple(f"{kind} x, y, z" for kind in published.KINDS),
+            quotients=tuple(
+                (f"along_{axis}", component, TRANSMITTER.slant_range)
+                for axis, component in zip("xyz", TRANSMITTER.position, strict=True)
+            ),
+        ),
         Evaluator(
             name="vibration_limit",
             summary="Largest sinusoidal amplitude, 0 to peak, or wideband rms along the line of sight. [m]",
@@ -281,6 +218,21 @@ def _function(evaluator: Evaluator) -> str:
     return "".join(lines)
 
 
+def _legendre_fits() -> str:
+    """Write the nodes and weights of a fit over the aperture."""
+    lines = [
+        "\n\n# Nodes over -1 … 1, in half apertures, and the weights that fit a history sampled there: value P₀,",
+        "# slope P₁, quadratic at the edge (3/2 of P₂), cubic at the edge (5/2 of P₃); by the number of nodes.",
+        "LEGENDRE_FITS: dict[int, tuple[tuple[float, ...], ...]] = {",
+    ]
+    for count in NODES:
+        lines.append(f"    {count}: (")
+        for row in full.legendre_fit(count):
+            lines.append(f"        ({', '.join(repr(float(value)) for value in row)}),")
+        lines.append("    ),")
+    return "\n".join([*lines, "}"]) + "\n"
+
+
 def source() -> str:
     """Return the text of `evaluators.py` as the derivation gives it today."""
-    return HEADER + "".join(_function(evaluator) for evaluator in evaluators())
+    return HEADER + "".join(_function(evaluator) for evaluator in evaluators()) + _legendre_fits()

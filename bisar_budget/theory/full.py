@@ -30,6 +30,7 @@ from sympy import (
     solve,
     sqrt,
 )
+from sympy.integrals.quadrature import gauss_legendre
 
 from bisar_budget.theory import differential_range as dr
 from bisar_budget.theory import published
@@ -88,6 +89,28 @@ def range_error() -> tuple[Expr, ...]:
         total -= look.dot(dr.error_polynomial(platform))
     polynomial = Poly(expand(total), tau)
     return tuple(polynomial.coeff_monomial(tau**n) for n in range(ORDER + 1))
+
+
+def range_error_at(platform: Platform) -> Expr:
+    """Range error of one platform at one slow time to first order, −u·r̃(τ), its position being that at τ. [m]"""
+    first_order = dr.first_order_range_error(platform)
+    return first_order.subs(platform.exact_slant_range(), platform.slant_range)
+
+
+def legendre_fit(count: int, digits: int = 17) -> tuple[tuple[Expr, ...], ...]:
+    """Gauss-Legendre nodes of a history over −1 … 1, and the weights that fit it there, (5, count).
+
+    The fit of a history f is its projection on Legendre polynomials, (2n + 1)/2 ∫ f·Pₙ. Rows: nodes; value P₀;
+    slope P₁; quadratic at the edge, 3/2 of P₂ = (3x² - 1)/2; cubic at the edge, 5/2 of P₃ = (5x³ - 3x)/2.
+    """
+    x = real("x")
+    nodes, weights = gauss_legendre(count, digits + 5)
+    rows = []
+    for n, leading in enumerate((1, 1, Rational(3, 2), Rational(5, 2))):
+        factor = leading * Rational(2 * n + 1, 2)
+        at_nodes = zip(nodes, weights, strict=True)
+        rows.append(tuple((factor * w * legendre(n, x).subs(x, at)).evalf(digits) for at, w in at_nodes))
+    return (tuple(at.evalf(digits) for at in nodes), *rows)
 
 
 def ground_history() -> tuple[Matrix, ...]:

@@ -137,7 +137,7 @@ SCHEMA_SEES = (
     "unknown_key_near", "unknown_key_far", "unknown_nested_key", "missing_section", "missing_key", "two_components",
     "section_is_text", "share_of_nobody", "split_misspelt", "combine_unknown", "covariance",
     "common_motion_error", "frame_unknown", "waiver_without_reason",
-    "schema_version", "no_schema_version", "pulses_fraction", "scalar_position",
+    "schema_version", "no_schema_version", "pulses_fraction", "scalar_position", "bare_angle",
 )  # fmt: skip
 
 

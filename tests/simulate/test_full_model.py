@@ -5,11 +5,11 @@ import math
 
 import numpy as np
 import pytest
+from bisar_budget.budget.validity import FLOOR_M, FLOOR_RAD, SHARE, FirstOrder
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.budget.effects import full_ground
 from bisar_budget.budget.sources import error_sources
-from bisar_budget.budget.validity import FLOOR_M, FLOOR_RAD, SHARE, FirstOrder
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.errors import MissionError
 from bisar_budget.geometry import norm

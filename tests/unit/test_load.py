@@ -269,9 +269,9 @@ def test_a_decimal_comma_in_a_list_is_refused(value: str, is_refused: bool) -> N
     [
         ("requirements__quadratic_phase_error", "360 deg", None),
         ("requirements__quadratic_phase_error", "361 deg", ""),
-        ("requirements__quadratic_phase_error", "45", "Did you mean 45 deg?"),
-        ("requirements__cubic_phase_error", "6.28", None),
-        ("requirements__cubic_phase_error", "6.29", "Did you mean 6.29 deg?"),
+        ("requirements__quadratic_phase_error", "0", ""),
+        ("requirements__cubic_phase_error", "6.28 rad", None),
+        ("requirements__cubic_phase_error", "6.29 rad", ""),
         ("allocation__warn_above", "1", None),
         ("allocation__warn_above", "80", "Did you mean 80 %?"),
         ("radar__center_frequency", "9.6", "A bare number is in Hz"),
@@ -286,6 +286,33 @@ def test_a_number_out_of_bounds_is_asked_for_its_unit(key: str, value: str, hint
         return
     (fault,) = faults_of(text).faults
     assert fault.hint == hint
+
+
+@pytest.mark.parametrize("value", ["45", "0.7", "-1e-3", "+.5"])
+@pytest.mark.parametrize(
+    "key",
+    [
+        "requirements__quadratic_phase_error",
+        "requirements__cubic_phase_error",
+        "platforms__receiver__azimuth",
+        "platforms__receiver__elevation",
+        "platforms__receiver__motion_azimuth",
+    ],
+)
+def test_a_bare_angle_is_refused_and_offered_both_units(key: str, value: str) -> None:
+    """45 was 45 rad, which is 58 deg: nothing in the file said so."""
+    angles = {"azimuth": "45 deg", "elevation": "13.6 deg", "motion_azimuth": "135 deg"}
+    polar = {"platforms__receiver": {"slant_range": "8.5 km", "speed": "60 m/s", **angles}}
+    faults = faults_of(mission_text(**polar, **{key: value})).faults
+    (fault,) = [fault for fault in faults if fault.key == key.replace("__", ".")]
+    assert (fault.problem, fault.given) == ("has no unit", value)
+    assert fault.hint == f"Did you mean '{value} deg' or '{value} rad'?"
+
+
+@pytest.mark.parametrize("zero", ["0", "0.0", "-0", "0e3"])
+def test_a_zero_angle_needs_no_unit(zero: str) -> None:
+    other = [{"name": "air", "quadratic_phase_error": zero}]
+    assert parse_mission(mission_text(other_errors=other)).other_errors[0].quadratic_phase_error == 0
 
 
 @pytest.mark.parametrize(("azimuth", "is_refused"), [("360 deg", False), ("-360 deg", False), ("361 deg", True)])

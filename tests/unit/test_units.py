@@ -7,8 +7,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bisar_budget import units
+from bisar_budget.budget.check import check_mission
 from bisar_budget.errors import InvalidValueError
-from bisar_budget.units import format_quantity, parse_quantity
+from bisar_budget.mission.load import parse_mission
+from bisar_budget.units import format_limit, format_quantity, parse_quantity
+from tests.conftest import ROOT, TODAY
 
 
 @pytest.mark.parametrize(
@@ -30,6 +33,18 @@ from bisar_budget.units import format_quantity, parse_quantity
         ("100 ug", units.ACCELERATION, 100e-6 * 9.80665),
         ("1e-14 1/s", units.RATE, 1e-14),
         ("0 1/s^2", units.RATE_SQUARED, 0.0),
+        ("1e-14/s", units.RATE, 1e-14),
+        ("1e-14 /s", units.RATE, 1e-14),
+        ("2e-16/s²", units.RATE_SQUARED, 2e-16),
+        ("2e-16 / s^2", units.RATE_SQUARED, 2e-16),
+        ("90 kn", units.SPEED, 46.3),
+        ("90 kt", units.SPEED, 46.3),
+        ("2 NM", units.LENGTH, 3704.0),
+        ("2 nm", units.LENGTH, 2e-9),
+        ("3 ppm", units.RATIO, 3e-6),
+        ("3 ppb", units.RATIO, 3e-9),
+        ("0", units.ANGLE, 0.0),
+        (0, units.ANGLE, 0.0),
         ("10 ns", units.TIME, 1e-8),
         ("-30 dB", units.POWER_RATIO, -30.0),
         ("-30", units.POWER_RATIO, -30.0),
@@ -74,6 +89,11 @@ def test_decimal_prefixes_add_no_rounding() -> None:
         (None, units.LENGTH, "must be a length"),
         ([1], units.LENGTH, "must be a length"),
         (math.nan, units.LENGTH, "finite"),
+        ("45", units.ANGLE, "has no unit"),
+        (0.7, units.ANGLE, "has no unit"),
+        ("1e-300", units.ANGLE, "has no unit"),
+        ("nan", units.ANGLE, "finite"),
+        ("45 m", units.ANGLE, "must be an angle, but 'm' makes it a length"),
     ],
 )
 def test_refuses(text: object, dimension: units.Dimension, says: str) -> None:
@@ -116,20 +136,37 @@ def test_writes(value: float, unit: str, text: str) -> None:
     assert format_quantity(value, unit) == text
 
 
-@given(st.floats(1e-12, 1e9), st.sampled_from(["m", "m/s", "m/s^2", "rad", "1/s", "s"]))
+# Every unit that a report prints behind a number, as rows and sentences name it.
+PRINTED = {
+    "m": units.LENGTH,
+    "m/s": units.SPEED,
+    "m/s^2": units.ACCELERATION,
+    "rad": units.ANGLE,
+    "s": units.TIME,
+    "s/s": units.RATIO,
+    "1/s": units.RATE,
+    "1/s^2": units.RATE_SQUARED,
+    "Hz": units.FREQUENCY,
+    "dB": units.POWER_RATIO,
+}
+
+
+@given(st.floats(1e-30, 1e15), st.sampled_from([1, -1]), st.sampled_from(sorted(PRINTED)), st.integers(3, 6))
+def test_what_a_report_prints_is_read_back(size: float, sign: int, unit: str, digits: int) -> None:
+    """Half of the last printed digit is the most that is lost."""
+    value = sign * size
+    read = parse_quantity(format_quantity(value, unit, digits), PRINTED[unit])
+    assert read == pytest.approx(value, rel=0.5001 * 10.0 ** (1 - digits))
+
+
+@given(st.floats(1e-12, 1e9), st.sampled_from(sorted(PRINTED)))
 def test_a_limit_is_never_written_larger_than_it_is(value: float, unit: str) -> None:
-    text = format_quantity(value, unit, rounding="down")
-    number, _, written_unit = text.partition(" ")
-    if not written_unit:  # 1e-14/s
-        number, _, _ = text.partition("/")
-        read = float(number)
-    else:
-        dimension = {
-            "m": units.LENGTH,
-            "m/s": units.SPEED,
-            "m/s^2": units.ACCELERATION,
-            "rad": units.ANGLE,
-            "s": units.TIME,
-        }[unit]
-        read = parse_quantity(text, dimension)
-    assert value * 0.98 < read <= value * (1 + 1e-9)
+    for text in (format_quantity(value, unit, rounding="down"), format_limit(value, unit)):
+        assert value * 0.98 < parse_quantity(text, PRINTED[unit]) <= value * (1 + 1e-9)
+
+
+def test_no_row_has_a_unit_that_is_not_read_back() -> None:
+    text = (ROOT / "tests/acceptance/good/every_key.yaml").read_text(encoding="utf-8")
+    found = check_mission(parse_mission(text), TODAY)
+    assert {row.unit for row in found.rows} <= PRINTED.keys()
+    assert len({row.unit for row in found.rows}) >= 8

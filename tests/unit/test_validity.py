@@ -8,6 +8,7 @@ import sys
 
 import numpy as np
 import pytest
+from bisar_budget.budget.validity import FirstOrder
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -15,7 +16,6 @@ from bisar_budget.budget.effects import full_ground
 from bisar_budget.budget.exact_ranges import ExactRanges
 from bisar_budget.budget.findings import Report
 from bisar_budget.budget.sources import error_sources
-from bisar_budget.budget.validity import FirstOrder
 from bisar_budget.geometry import norm
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.report import Style, render

@@ -1,0 +1,84 @@
+"""What a mission's checks share: its geometry, every error it can have, and what the models say of them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from bisar_budget.budget.allocation import Allocation, allocate
+from bisar_budget.budget.correlation import Correlated, correlated_errors
+from bisar_budget.budget.effects import ErrorSource
+from bisar_budget.budget.exact_ranges import ExactRanges
+from bisar_budget.budget.models import Declared, FullModel, PublishedModel
+from bisar_budget.budget.sources import error_sources
+from bisar_budget.geometry import BistaticGeometry
+from bisar_budget.mission.model import Mission
+
+Model = PublishedModel | FullModel
+
+
+@dataclass(frozen=True, eq=False)
+class Analysis:
+    """One mission, analysed once."""
+
+    mission: Mission
+
+    @cached_property
+    def geometry(self) -> BistaticGeometry:
+        """Both platforms at the aperture midpoint."""
+        return self.mission.geometry
+
+    @cached_property
+    def exact(self) -> ExactRanges:
+        """Exact ranges over the aperture."""
+        return ExactRanges(self.geometry, self.mission.radar.wavelength, self.mission.collection.aperture_time)
+
+    @cached_property
+    def sources(self) -> list[ErrorSource]:
+        """Every error the mission can have, declared or not, in the order of the contract."""
+        return error_sources(self.mission, self.geometry, self.exact)
+
+    @cached_property
+    def stated(self) -> list[ErrorSource]:
+        """Declared errors, along the axes that the file states them in."""
+        return [source for source in self.sources if source.declared is not None and source.is_independent]
+
+    @cached_property
+    def published(self) -> PublishedModel:
+        """Tables I and II, and (25)."""
+        return PublishedModel(self.geometry)
+
+    @cached_property
+    def full(self) -> FullModel:
+        """The full model."""
+        return FullModel(self.exact, self.geometry)
+
+    @cached_property
+    def groups(self) -> Sequence[Correlated]:
+        """Covariances of the mission."""
+        return correlated_errors(self.mission)
+
+    def models(self, gating: str) -> tuple[Model, Model]:
+        """The model that gates, `published` or `full`, and the other one."""
+        return (self.full, self.published) if gating == "full" else (self.published, self.full)
+
+    def declared(self, model: Model) -> dict[str, Declared]:
+        """What each declared error does by a model, by row id."""
+        if model.name not in self._declared:
+            self._declared[model.name] = {s.id: model.declared(s) for s in self.sources if s.declared is not None}
+        return self._declared[model.name]
+
+    @cached_property
+    def _declared(self) -> dict[str, dict[str, Declared]]:
+        return {}
+
+    @cached_property
+    def allocation(self) -> Allocation:
+        """Budgets as divided; `balanced` weighs phases by the gating model, under `strictest` the larger of both."""
+        gating = self.mission.allocation.model
+        both: tuple[Model, ...] = (self.published, self.full)
+        models = [model for model in both if gating in (model.name, "strictest")]
+        phases = {
+            source.id: max((self.declared(model)[source.id].qpe for model in models), key=abs)
+            for source in self.stated
+        }
+        return allocate(self.mission, self.stated, phases)

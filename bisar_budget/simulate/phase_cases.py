@@ -1,0 +1,256 @@
+"""Verdicts on the limits of quadratic and cubic phase, and on what autofocus makes of them."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from bisar_budget.budget.effects import ErrorSource
+from bisar_budget.budget.images import Verdict
+from bisar_budget.geometry import GroundVector
+from bisar_budget.simulate.aperture_reading import ApertureReading
+from bisar_budget.simulate.collection import Chip, Errors
+from bisar_budget.simulate.exact import ExactEffect
+from bisar_budget.simulate.impulse_response import impulse_response
+from bisar_budget.simulate.shift import measured_shift
+from bisar_budget.simulate.study import Sizes, Study
+from bisar_budget.units import format_limit
+
+TOLERANCE = 0.05  # of the budget: nearer than this a limit is confirmed
+INSIDE, BEYOND = 0.9, 1.1  # of the limit: the phase on both sides shows that the limit is the limit
+HALF_CELL = 0.5  # of range walk; beyond, one-dimensional autofocus leaves a loss (0.34 dB there, uniform)
+_READ_RANGE_CELLS = 1  # of a chip from which nothing but the phase is read
+_COARSE_CELL_RAD = 1.0  # of phase between points a range cell apart; beyond, a response moves along range instead
+
+
+def quadratic(study: Study, source: ErrorSource) -> Verdict:
+    """Limit of one error."""
+    budget, gain = study.allocation.qpe_limit(source.owner), study.allocation.autofocus_gain
+    boundary = study.boundary(source, budget)
+    blank = Verdict(
+        id=source.id, model=study.model, boundary_error=boundary or 0.0, unit=source.unit, budget_rad=budget
+    )
+    if boundary is None:
+        blank = blank._replace(reason="without autofocus there is no limit")
+    else:
+        blank = _judged(study, blank, [(source, 1.0)], boundary)
+    farther = study.boundary(source, gain * budget) if gain > 1 else None
+    if farther is None:
+        return blank
+    return blank._replace(boundary_autofocus=farther, **refocused(study, [(source, 1.0)], farther, budget))
+
+
+def total(study: Study, row_id: str, owner: str) -> Verdict:
+    """All declared errors of an owner at once, each with the sign that makes their phases add."""
+    members = study.members(owner)
+    budget = study.allocation.qpe_limit(owner)
+    blank = Verdict(id=row_id, model=study.model, boundary_error=budget, unit="rad", budget_rad=budget)
+    if study.mission.allocation.combine == "rss":
+        return blank._replace(reason="a root-sum-square speaks of many flights, an image shows one")
+    sizes = study.aligned(members)
+    if not sizes:
+        return blank._replace(reason="no declared error has a quadratic phase")
+    return _judged(study, blank, sizes, budget / math.fsum(abs(s.by(study.model).qpe * size) for s, size in sizes))
+
+
+def other(study: Study, source: ErrorSource) -> Verdict:
+    """Phase stated as such."""
+    budget = study.allocation.qpe_limit(source.owner)
+    return Verdict(
+        id=source.id,
+        model=study.model,
+        boundary_error=budget,
+        unit=source.unit,
+        budget_rad=budget,
+        reason="stated as a phase: there is no motion to form an image of",
+    )
+
+
+def edge(study: Study) -> Verdict:
+    """Difference between two places of the scene; what images and exact ranges say of it is in the tests."""
+    budget = study.allocation.qpe_total
+    blank = Verdict(
+        id="mission.spatial_variance", model=study.model, boundary_error=budget, unit="rad", budget_rad=budget
+    )
+    return blank._replace(reason="the difference of two places of the scene: images are formed of its centre")
+
+
+def cubic(study: Study, requirement: float) -> Verdict:
+    """All declared errors scaled together until the gating model's cubic phase reaches the requirement."""
+    blank = Verdict(
+        id="mission.cubic_phase_error",
+        model=study.model,
+        boundary_error=requirement,
+        unit="rad",
+        budget_rad=requirement,
+    )
+    sizes = [(s, s.declared or 0.0) for s in study.declared]
+    if not sizes:
+        return blank._replace(reason="no error with a motion is declared")
+    by_model = abs(math.fsum(s.cubic(study.model) for s, _ in sizes))
+    if not by_model:
+        return blank._replace(reason=f"no declared error has a cubic phase by the {study.model} model")
+    try:
+        scale = requirement / by_model
+        if study.model == "full":
+            scale = _scale_of_cubic(study, sizes, scale, requirement)
+        errors = study.together(sizes, scale)
+        effect = study.collection.effect(errors)
+        reading = study.read(errors, effect.displacement, *study.chips(errors, effect, _READ_RANGE_CELLS))
+    except (ValueError, np.linalg.LinAlgError) as error:
+        return blank._replace(reason=f"no image: {error}")
+    measured = abs(reading.cubic)
+    return blank._replace(
+        **predicted(effect), measured_cubic_rad=measured, verdict=compare(measured / requirement - 1, TOLERANCE)
+    )
+
+
+def pull_in(study: Study, n_pull: float) -> Verdict:
+    """A clock error of π·N_pull, which bends no geometry, refocused; range walk bounds what can work."""
+    phase, budget, radar = math.pi * n_pull, study.allocation.qpe_total, study.mission.radar
+    walk = n_pull * radar.bandwidth / radar.center_frequency / 2  # λN/2 over c/B
+    blank = Verdict(
+        id="mission.autofocus_pull_in", model=study.model, boundary_error=phase, unit="rad", budget_rad=budget
+    )
+    clock = next(s for s in study.sources if s.id == "timing.quadratic")
+    found = refocused(study, [(clock, 1.0)], phase / abs(clock.effect.qpe), budget)
+    verdict = str(found["verdict_autofocus"])
+    bound = radar.center_frequency / radar.bandwidth
+    reason = f"range walk of {walk:.2g} cells; it stays within half a cell up to n_pull {bound:.3g}, f0/B"
+    if verdict == "confirmed" and walk > HALF_CELL:
+        verdict = "optimistic"
+    return blank._replace(
+        boundary_autofocus=phase, **{**found, "verdict_autofocus": verdict}, verdict=verdict, reason=reason
+    )
+
+
+def refocused(study: Study, sizes: Sizes, scale: float, budget: float) -> dict[str, Any]:
+    """Form the image at the limit with autofocus and refocus it; hold what is left to the plain budget."""
+    try:
+        errors = study.together(sizes, study.worse_sign(sizes, scale))
+        effect = study.collection.effect(errors)
+        chip, reference = study.chips(errors, effect)
+        focused = study.focused(chip)
+        residual = abs(study.read(errors, effect.displacement, focused, reference).quadratic)
+        peaks = [impulse_response(one.cut, one.spacing[1]).peak for one in (reference, focused)]
+        loss = 20 * math.log10(peaks[0] / peaks[1])
+    except (ValueError, np.linalg.LinAlgError) as error:
+        return {"verdict_autofocus": "not_evaluated", "reason_autofocus": f"no image: {error}"}
+    is_met = residual <= budget * (1 + TOLERANCE)
+    return {
+        "measured_residual_qpe_rad": residual,
+        "refocused_loss_db": loss,
+        "verdict_autofocus": "confirmed" if is_met else "optimistic",
+        "reason_autofocus": None
+        if is_met
+        else f"autofocus leaves {residual:.3g} rad, {format_limit(budget, 'rad')} allowed",
+    }
+
+
+def predicted(effect: ExactEffect) -> dict[str, Any]:
+    """Fields of a verdict that exact ranges fill."""
+    return {
+        "predicted_qpe_rad": abs(effect.quadratic),
+        "predicted_cubic_rad": abs(effect.cubic),
+        "displacement_m": effect.displacement,
+    }
+
+
+def moved(place: GroundVector, by: GroundVector) -> GroundVector:
+    """Sum of two displacements."""
+    return (place[0] + by[0], place[1] + by[1])
+
+
+def compare(excess: float, tolerance: float) -> str:
+    """Say what an excess over the budget means for the limit."""
+    if abs(excess) <= tolerance:
+        return "confirmed"
+    return "optimistic" if excess > 0 else "conservative"
+
+
+def published_displacement(study: Study, sizes: Sizes, scale: float) -> GroundVector | None:
+    """Displacement of errors together by (25); None where it has none."""
+    moves = [study.plane.displacement(source.effect, scale * size) for source, size in sizes]
+    if any(move is None for move in moves):
+        return None
+    return (math.fsum(m[0] for m in moves if m), math.fsum(m[1] for m in moves if m))
+
+
+def _judged(study: Study, blank: Verdict, sizes: Sizes, scale: float) -> Verdict:
+    """Form the images of errors at the limit and on both sides, and hold the phase to the budget."""
+    budget = blank.budget_rad or 0.0
+    by_table = abs(math.fsum(s.effect.qpe * scale * size for s, size in sizes))
+    blank = blank._replace(published_qpe_rad=by_table)
+    try:
+        scale = study.worse_sign(sizes, scale)
+        errors = study.together(sizes, scale)
+        effect = study.collection.effect(errors)
+        chip, reference = study.chips(errors, effect)
+        reading = study.read(errors, effect.displacement, chip, reference)
+    except (ValueError, np.linalg.LinAlgError) as error:
+        return blank._replace(reason=f"no image: {error}")
+    measured = abs(reading.quadratic)
+    return blank._replace(
+        **predicted(effect),
+        **_of_response(chip, reference, effect, reading),
+        full_qpe_rad=abs(effect.quadratic),
+        measured_qpe_rad=measured,
+        measured_cubic_rad=None,
+        measured_inside_rad=_phase(study, sizes, INSIDE * scale),
+        measured_beyond_rad=_phase(study, sizes, BEYOND * scale),
+        displacement_published_m=published_displacement(study, sizes, scale),
+        displacement_full_m=effect.displacement,
+        smear_azimuth_published_rad=(study.geometry.look_azimuth + math.pi / 2) % math.pi,
+        verdict=compare(measured / budget - 1, TOLERANCE),
+        reason=_remark(study, errors, effect, reading.coverage),
+    )
+
+
+def _of_response(chip: Chip, reference: Chip, effect: ExactEffect, reading: ApertureReading) -> dict[str, Any]:
+    """Measures of the response; those that a long smear or a bent patch leaves without value are missing."""
+    found: dict[str, Any] = {}
+    try:
+        shift = measured_shift(chip, reference, reading.across_pixels)
+        found["measured_displacement_m"] = moved(effect.displacement, shift.displacement)
+        found["measured_smear_azimuth_rad"] = shift.smear_azimuth
+    except (ValueError, np.linalg.LinAlgError):
+        pass
+    try:
+        clean = impulse_response(reference.cut, reference.spacing[1])
+        response = impulse_response(chip.cut, chip.spacing[1], mask_m=clean.mask_m)
+    except ValueError:
+        return found
+    return found | {
+        "irw_ratio": response.irw_m / clean.irw_m,
+        "peak_loss_db": 20 * math.log10(clean.peak / response.peak),
+        "pslr_db": response.pslr_db,
+        "islr_db": response.islr_db,
+    }
+
+
+def _phase(study: Study, sizes: Sizes, scale: float) -> float | None:
+    """Quadratic phase that the image of errors shows; None where there is no image."""
+    errors: Errors = study.together(sizes, scale)
+    try:
+        effect = study.collection.effect(errors)
+        chips = study.chips(errors, effect, _READ_RANGE_CELLS)
+        return abs(study.read(errors, effect.displacement, *chips).quadratic)
+    except (ValueError, np.linalg.LinAlgError):
+        return None
+
+
+def _remark(study: Study, errors: Errors, effect: ExactEffect, coverage: float) -> str | None:
+    """Say what of the image is unusual: a smear beyond the patch, or range cells that absorb phase."""
+    if coverage < 0.9:
+        return f"the smear leaves the patch, which holds {100 * coverage:.0f} % of the aperture"
+    return None
+
+
+def _scale_of_cubic(study: Study, sizes: Sizes, scale: float, requirement: float) -> float:
+    """Scale at which exact ranges give the cubic phase, from a first guess."""
+    for _ in range(12):
+        found = abs(study.effect(sizes, scale).cubic)
+        if not found or abs(found / requirement - 1) < 1e-4:
+            break
+        scale *= min(4.0, max(0.25, requirement / found))
+    return scale

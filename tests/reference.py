@@ -1,0 +1,383 @@
+"""What errors of any size do to an image, by exact ranges alone: the reference that the check is held against.
+
+Nothing here comes from the package's own exact ranges, full model or theory. It takes the mission as loaded, frames
+of axes and the speed of light, and has its own quadrature (24 Gauss-Legendre nodes over the aperture).
+
+Recorded are the ranges of the true paths to the scene centre, and c·t̃(τ). Predicted are those of the measured paths,
+path + error, to a point x of the ground plane. The response stands at the x for which recorded − predicted has no P₀
+and no P₁ part over the aperture; it is followed from the scene centre while the error grows from nothing, so that it
+is the response and no other solution. Then QPE = (2π/λ)·3/2·(coefficient of P₂), cubic = (2π/λ)·5/2·(that of P₃),
+both at the aperture edge. Where the followed solution ends, no ground point has that range history.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.geometry import FRAME_AXES, PlatformState
+from bisar_budget.mission.model import Mission
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+KINDS = ("position", "velocity", "acceleration")
+CLOCK = ("constant", "linear", "quadratic", "cubic")
+FAR = 0.1  # of a slant range; an error that takes a platform farther is none of navigation
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)  # over -1 … 1
+_BASIS = np.array([np.polynomial.legendre.Legendre.basis(n)(_NODES) for n in range(4)])
+_PROJECT = (_BASIS * _WEIGHTS * (np.arange(4)[:, None] + 0.5)).T  # (24, 4): values at the nodes to P₀ … P₃
+_STEP_M, _STEP = 1e-5, 1e-6  # that Newton's last step may make, besides of the distance; the next is its square
+_NEWTON, _HALVINGS = 8, 14
+
+
+class Error(NamedTuple):
+    """One error of a mission: what one unit of it does to the paths and the clock.
+
+    `paths` (2, 3, 3) is position, velocity, acceleration of transmitter and receiver along x, y, z; `clock` (4,) the
+    terms of t̃. `declared` carries sign and coverage factor. `cap` is the size at which it takes a platform farther
+    than a tenth of its slant range within the aperture. `is_stated` tells the axes of the file from those of the
+    scene, along which the same error is shown again.
+    """
+
+    id: str
+    owner: str
+    paths: Array
+    clock: Array
+    declared: float | None
+    cap: float
+    is_stated: bool = True
+
+
+def errors_of(mission: Mission) -> Iterator[Error]:
+    """Every error with a row of its own, declared or not; `other_errors` are phases and need no ranges."""
+    T, factor = mission.collection.aperture_time, mission.allocation.coverage_factor
+    edge = (1.0, T / 2, T**2 / 8)
+    states = _states(mission)
+    ranges = [math.hypot(*state.position) for state in states]
+    for index, (name, state) in enumerate(zip(("transmitter", "receiver"), states, strict=True)):
+        error = getattr(mission.platforms, name).motion_error
+        axes = np.array(state.frame(error.frame))
+        for order, kind in enumerate(KINDS):
+            stated = getattr(error, kind)
+            sizes = None if stated is None else factor * np.array(stated)
+            cap = FAR * ranges[index] / edge[order]
+            is_scene = error.frame == "scene"
+            for axis, letter in enumerate("xyz"):
+                on_axis = None if sizes is None else _along(sizes, axes[:, axis], is_scene, error.distribution)
+                paths = _unit_path((index,), order, np.eye(3)[axis])
+                yield Error(f"{name}.{kind}.{letter}", name, paths, np.zeros(4), on_axis, cap, is_scene)
+            if sizes is None or is_scene:
+                continue
+            for letter, direction, size in zip(FRAME_AXES[error.frame], axes, sizes, strict=True):
+                paths = _unit_path((index,), order, direction)
+                yield Error(f"{name}.{kind}.{letter}", name, paths, np.zeros(4), float(size), cap)
+    near, still = FAR * min(ranges), np.zeros((2, 3, 3))
+    for order, term in enumerate(CLOCK):
+        value = getattr(mission.timing_error, term)
+        cap = near / SPEED_OF_LIGHT / (T / 2) ** order
+        size = None if value is None else factor * value
+        yield Error(f"timing.{term}", "clock", still, np.eye(4)[order], size, cap)
+    both = (0, 1)
+    if mission.common_motion_error is not None:
+        for order, kind in enumerate(KINDS):
+            stated = getattr(mission.common_motion_error, kind)
+            for axis, letter in enumerate("xyz"):
+                size = None if stated is None else factor * stated[axis]
+                paths = _unit_path(both, order, np.eye(3)[axis])
+                yield Error(f"common.{kind}.{letter}", "mission", paths, np.zeros(4), size, near / edge[order])
+    if mission.scene.height_error is not None:
+        # A scene that is higher than the processor takes it for: both platforms are measured too high above it.
+        paths = _unit_path(both, 0, np.eye(3)[2])
+        yield Error("mission.terrain", "mission", paths, np.zeros(4), mission.scene.height_error, near)
+
+
+def _states(mission: Mission) -> tuple[PlatformState, PlatformState]:
+    return mission.geometry.transmitter, mission.geometry.receiver
+
+
+def _unit_path(platforms: Sequence[int], order: int, direction: Array) -> Array:
+    paths = np.zeros((2, 3, 3))
+    for index in platforms:
+        paths[index, order] = direction
+    return paths
+
+
+def _along(sizes: Array, parts: Array, is_scene: bool, distribution: str) -> float:
+    """Size along one axis of the scene of three independent errors: sigmas add as squares, bounds as magnitudes."""
+    signed = sizes * parts
+    if is_scene:
+        return float(signed.sum())
+    size = math.hypot(*signed) if distribution == "normal" else float(np.abs(signed).sum())
+    return math.copysign(size, signed.sum())
+
+
+class Responses(NamedTuple):
+    """Signed QPE and cubic phase [rad] and place on the ground (…, 2) [m]; NaN where there is no ground point."""
+
+    qpe: Array
+    cubic: Array
+    place: Array
+
+    @property
+    def moved(self) -> Array:
+        """Distance from where the error-free response stands. [m]"""
+        moved: Array = np.hypot(self.place[..., 0], self.place[..., 1])
+        return moved
+
+
+class Lanes:
+    """Several errors side by side, each followed from nothing to its own sizes.
+
+    Parameters
+    ----------
+    mission : Mission
+        As loaded.
+    errors : sequence of Error
+        (L,), one lane each.
+    points : (L, 2) array, optional
+        Points of the ground in place of the scene centre. [m]
+    """
+
+    def __init__(self, mission: Mission, errors: Sequence[Error], points: Array | None = None) -> None:
+        half = mission.collection.aperture_time / 2
+        tau = half * _NODES
+        self.wavenumber = 2 * math.pi / mission.radar.wavelength
+        powers = np.array([np.ones_like(tau), tau, tau**2 / 2])  # (3, n)
+        motion = np.array([(s.position, s.velocity, s.acceleration) for s in _states(mission)])  # (2, 3, 3)
+        self.true = np.einsum("kof,on->knf", motion, powers)[None]  # (1, 2, n, 3)
+        if points is not None:
+            ground = np.concatenate([points, np.zeros((len(points), 1))], axis=1)
+            self.true = self.true - ground[:, None, None, :]  # (L, 2, n, 3)
+        self.recorded = np.linalg.norm(self.true, axis=-1)
+        self.error = np.einsum("lkof,on->lknf", np.array([e.paths for e in errors]), powers)
+        clock = np.array([e.clock for e in errors])
+        self.clock = SPEED_OF_LIGHT * clock @ np.array([tau**order for order in range(4)])  # (L, n)
+        self.count = len(errors)
+        _, slopes = self._left(np.zeros(self.count), np.zeros((self.count, 2)), slice(None))
+        self.orientation = np.sign(_determinant(slopes))
+
+    def _left(self, size: Array, place: Array, lanes: Any) -> tuple[Array, Array]:
+        """Recorded − predicted as P₀ … P₃ (L, 4), and the slopes of P₀ and P₁ over the ground (L, 2, 2)."""
+        at = lanes if len(self.true) > 1 else slice(None)
+        true, recorded = self.true[at], self.recorded[at]
+        off = size[:, None, None, None] * self.error[lanes]
+        off[..., :2] -= place[:, None, None, :]
+        measured = true + off
+        predicted = np.linalg.norm(measured, axis=-1)
+        # |a| − |b| without the rounding of either: a satellite's range is 10⁶ m, what is left is 10⁻⁶ m.
+        left = -np.einsum("lknf,lknf->lkn", off, true + measured) / (recorded + predicted)
+        total = left.sum(axis=1) + size[:, None] * self.clock[lanes]
+        look = (measured[..., :2] / predicted[..., None]).sum(axis=1)  # (L, n, 2)
+        slopes = np.einsum("lnf,no->lof", look, _PROJECT[:, :2])
+        return total @ _PROJECT, slopes
+
+    def _solved(self, size: Array, start: Array, lanes: Any) -> tuple[Array, Flags]:
+        """Place where P₀ = P₁ = 0, by Newton's steps from `start`, and whether there is one of the same branch."""
+        place, orientation = start.copy(), self.orientation[lanes]
+        done = np.zeros(len(place), bool)
+        for _ in range(_NEWTON):
+            left, slopes = self._left(size, place, lanes)
+            determinant = _determinant(slopes)
+            with np.errstate(all="ignore"):
+                step = -np.stack(
+                    [
+                        (slopes[:, 1, 1] * left[:, 0] - slopes[:, 0, 1] * left[:, 1]) / determinant,
+                        (slopes[:, 0, 0] * left[:, 1] - slopes[:, 1, 0] * left[:, 0]) / determinant,
+                    ],
+                    axis=1,
+                )
+                moves = np.hypot(step[:, 0], step[:, 1])
+                sound = np.isfinite(moves) & (moves < 1e9)
+                place = np.where(sound[:, None], place + step, place)
+                done = sound & (moves <= _STEP_M + _STEP * np.hypot(place[:, 0], place[:, 1]))
+            if done.all():
+                break
+        _, slopes = self._left(size, place, lanes)
+        return place, done & (np.sign(_determinant(slopes)) == orientation)
+
+    def follow(self, sizes: Array, all_or_none: bool = False) -> Responses:
+        """Follow each error through its sizes.
+
+        Parameters
+        ----------
+        sizes : (L, S) array
+            Signed; each row starts near nothing and moves away from it.
+        all_or_none : bool
+            Give up where one of them ends: all are then NaN.
+
+        Returns
+        -------
+        Responses
+            (L, S) each.
+        """
+        lanes, steps = sizes.shape
+        places, qpe, cubic = (np.full(shape, np.nan) for shape in ((lanes, steps, 2), (lanes, steps), (lanes, steps)))
+        before, place_before = np.zeros(lanes), np.zeros((lanes, 2))
+        slope, alive = np.zeros((lanes, 2)), np.ones(lanes, bool)
+        for step in range(steps):
+            size = sizes[:, step]
+            place, found = self._solved(size, place_before + slope * (size - before)[:, None], slice(None))
+            for lane in np.flatnonzero(alive & ~found):
+                place[lane], found[lane] = self._crept(int(lane), before[lane], size[lane], place_before[lane])
+                if all_or_none and not found[lane]:
+                    return Responses(qpe * np.nan, cubic * np.nan, places * np.nan)
+            alive &= found
+            left, _ = self._left(size, place, slice(None))
+            places[alive, step] = place[alive]
+            qpe[alive, step] = 1.5 * self.wavenumber * left[alive, 2]
+            cubic[alive, step] = 2.5 * self.wavenumber * left[alive, 3]
+            made = (size - before)[:, None]
+            with np.errstate(all="ignore"):
+                slope = np.where(made != 0, (place - place_before) / made, slope)
+            slope[~alive] = 0.0
+            place[~alive] = 0.0
+            before, place_before = size, place
+        return Responses(qpe, cubic, places)
+
+    def _crept(self, lane: int, start: float, end: float, place: Array) -> tuple[Array, bool]:
+        """Follow one lane in steps as small as it takes; False where the solution ends."""
+        at, step, only, halved = start, (end - start) / 2, [lane], 1
+        place, slope = place[None], np.zeros((1, 2))
+        while at != end:
+            target = at + step if abs(at + step - start) < abs(end - start) else end
+            found, is_found = self._solved(np.array([target]), place + slope * (target - at), only)
+            if is_found[0]:
+                slope, place, at = (found - place) / (target - at), found, target
+            elif halved >= _HALVINGS:
+                return place[0], False
+            else:
+                step, halved = step / 2, halved + 1
+        return place[0], True
+
+
+def _determinant(slopes: Array) -> Array:
+    determinant: Array = slopes[:, 0, 0] * slopes[:, 1, 1] - slopes[:, 0, 1] * slopes[:, 1, 0]
+    return determinant
+
+
+def at_declared(mission: Mission, errors: Sequence[Error], points: Array | None = None) -> Responses:
+    """Responses to the declared errors: (2, L) each, with the declared sign and with the other.
+
+    `points` (L, 2) stand in place of the scene centre [m]; places are relative to them, and all is NaN where one of
+    the errors has no ground point.
+    """
+    declared = np.array([error.declared or 0.0 for error in errors])
+    grow = np.array([0.02, 0.1, 0.3, 0.6, 1.0])
+    sizes = np.concatenate([declared, -declared])[:, None] * grow
+    twice = None if points is None else np.concatenate([points, points])
+    found = Lanes(mission, [*errors, *errors], twice).follow(sizes, all_or_none=points is not None)
+    count = len(errors)
+    return Responses(
+        found.qpe[:, -1].reshape(2, count),
+        found.cubic[:, -1].reshape(2, count),
+        found.place[:, -1].reshape(2, count, 2),
+    )
+
+
+def scanned(
+    mission: Mission, errors: Sequence[Error], ends: Array, marks: Array, steps: int, bound: Array
+) -> tuple[Array, Responses]:
+    """Follow each error of both signs up to `ends`, densely enough to see each rise of a phase.
+
+    Parameters
+    ----------
+    errors : sequence of Error
+        (L,)
+    ends : (L,) array
+        Last size. [unit of each]
+    marks : (L, M) array
+        Sizes to stop at besides, where they are within the ends; NaN where there is none.
+    steps : int
+        Number of other sizes, in equal ratios.
+    bound : (L,) array
+        A QPE [rad] that matters: the scan starts where first and second order stay below a fiftieth of it.
+
+    Returns
+    -------
+    (L, S) array
+        The sizes, ascending, positive.
+    Responses
+        (2, L, S) each, with size positive and negative.
+    """
+    count = len(errors)
+    lanes = Lanes(mission, [*errors, *errors])
+    signs = np.repeat([1.0, -1.0], count)
+    starts = _beginning(lanes, signs, ends, bound)
+    ratio = np.linspace(0, 1, steps)
+    grid = starts[:, None] * (ends / starts)[:, None] ** ratio
+    marks = np.where(np.isfinite(marks) & (marks > 0) & (marks <= ends[:, None]), marks, ends[:, None])
+    grid = np.sort(np.concatenate([grid, marks], axis=1), axis=1)
+    found = lanes.follow(signs[:, None] * np.concatenate([grid, grid]))
+    shape = (2, *grid.shape)
+    return grid, Responses(found.qpe.reshape(shape), found.cubic.reshape(shape), found.place.reshape(*shape, 2))
+
+
+def _beginning(lanes: Lanes, signs: Array, ends: Array, bound: Array) -> Array:
+    """Size (L,) of either sign below which no phase comes near its bound, by the first two orders at a small size."""
+    count = len(ends)
+    begin = ends * 1e-3
+    for _ in range(4):
+        probe = signs[:, None] * np.concatenate([begin, begin])[:, None] * np.array([0.25, 0.5, 1.0])
+        found = lanes.follow(probe)
+        qpe = np.where(np.isfinite(found.qpe), found.qpe, np.inf)
+        largest = np.abs(qpe).max(axis=1).reshape(2, count).max(axis=0)
+        large = largest > 0.02 * bound
+        if not large.any():
+            break
+        # A phase grows at least as the size does here, so that the same share less of it is small enough.
+        shrink = np.where(large, 0.01 * bound / np.where(np.isfinite(largest), largest, 100 * bound), 1.0)
+        begin = begin * np.where(large, np.minimum(shrink, 0.5), 1.0)
+    return begin
+
+
+def combined(phases: Array, rule: str) -> float:
+    """Largest, sum or root-sum-square of magnitudes. [rad]"""
+    sizes = np.abs(phases)
+    if not len(sizes):
+        return 0.0
+    if rule == "each":
+        return float(sizes.max())
+    return float(sizes.sum() if rule == "sum" else np.linalg.norm(sizes))
+
+
+def combined_places(places: Array, rule: str) -> float:
+    """Largest length, largest sum over both signs of each error, or root-sum-square; (2, L, 2) both signs. [m]"""
+    lengths = np.hypot(places[..., 0], places[..., 1]).max(axis=0)
+    if rule != "sum":
+        return combined(lengths, rule)
+    angle = np.linspace(0, 2 * math.pi, 3600, endpoint=False)
+    along = np.einsum("slf,fa->sla", places, np.array([np.cos(angle), np.sin(angle)]))
+    return float(along.max(axis=0).sum(axis=0).max())
+
+
+def at_the_edge(mission: Mission, errors: Sequence[Error], rule: str) -> tuple[float, float] | None:
+    """Largest difference of QPE between the scene's rim and its centre, combined by the rule. [rad]
+
+    Of each error the sign with the larger difference, and likewise the declared sign alone. None where a part of the
+    rim has no image of an error.
+    """
+    radius = mission.scene.radius
+    assert radius is not None
+    centre = at_declared(mission, errors).qpe
+    azimuths = np.linspace(0, 2 * math.pi, 72, endpoint=False)
+    best = [0.0, 0.0]
+    spacing = azimuths[1]
+    for _ in range(3):
+        rim = radius * np.stack([np.cos(azimuths), np.sin(azimuths)], axis=1)
+        points = np.repeat(rim, len(errors), axis=0)
+        found = at_declared(mission, list(errors) * len(rim), points)
+        difference = found.qpe.reshape(2, len(rim), len(errors)) - centre[:, None, :]
+        if not np.isfinite(difference).all():
+            return None
+        worse = [combined(row, rule) for row in np.abs(difference).max(axis=0)]
+        declared = [combined(row, rule) for row in difference[0]]
+        best = [max(best[0], *worse), max(best[1], *declared)]
+        crest = azimuths[int(np.argmax(worse))]
+        azimuths = crest + np.linspace(-spacing, spacing, 9)
+        spacing /= 4
+    return best[0], best[1]

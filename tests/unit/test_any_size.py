@@ -1,0 +1,135 @@
+"""The full model is true for errors of any size: a sample of the proof in `docs/prove_any_size.py`."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.polynomial import legendre
+
+from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.geometry import PlatformState
+from bisar_budget.mission.load import load_mission, parse_mission
+from bisar_budget.mission.model import Mission
+from tests import reference
+from tests.compared import FLOOR_RAD, SHARE, _allowable, compared
+from tests.families import FAMILIES, LARGEST_TURN, largest_turn, mission_text
+from tests.reference import Error
+
+SPECS = Path(__file__).resolve().parents[2] / "specs" / "missions"
+SEEDS, STEPS = 12, 40
+TANDEM_X = """schema_version: 1
+name: TanDEM-X on its circular orbit
+radar: {{ center_frequency: 9.65 GHz, bandwidth: 100 MHz }}
+collection: {{ aperture_time: 5 s }}
+scene: {{ height_error: 100 m }}
+platforms:
+  transmitter: {{ position: [353.9 km, 0, 505.4 km], velocity: [0, 7.6 km/s, 0]{curved} }}
+  receiver: {{ position: [354.2 km, 50 m, 505.4 km], velocity: [0, 7.6 km/s, 0]{curved} }}
+"""
+
+
+def named(mission: Mission, row_id: str) -> Error:
+    return next(error for error in reference.errors_of(mission) if error.id == row_id)
+
+
+class TestTheCheckIsThatOfExactRanges:
+    @pytest.mark.parametrize("seed", range(SEEDS))
+    @pytest.mark.parametrize("family", FAMILIES)
+    def test_every_number_of_a_random_mission(self, family: str, seed: int) -> None:
+        found = compared(parse_mission(mission_text(family, seed)), STEPS)
+        assert len(found) > 20
+        assert [str(one) for one in found if one.is_miss] == []
+
+
+class TestTheReferenceItself:
+    """It is held to print and to a plain fit of directly computed ranges before anything is held to it."""
+
+    def test_section_v_of_both_signs(self) -> None:
+        """Section V, receiver ṽ_z = ±1.9 m/s: 0.78 and 0.02 rad, of images (physics by exact ranges)."""
+        mission = load_mission(str(SPECS / "rigling_moses_section_v.yaml"))
+        error = named(mission, "receiver.velocity.z")._replace(declared=1.9)
+        both = sorted(np.abs(reference.at_declared(mission, [error]).qpe[:, 0]))
+        assert both == pytest.approx([0.02, 0.78], abs=0.005)  # printed digits
+
+    @pytest.mark.parametrize(
+        ("curved", "want", "floor"), [("", 0.0, 1e-5), (", acceleration: [-0.431, 0, -8.378]", 1.59, 0.005)]
+    )
+    def test_a_height_error_under_a_satellite(self, curved: str, want: float, floor: float) -> None:
+        mission = parse_mission(TANDEM_X.format(curved=curved))
+        (qpe,) = np.abs(reference.at_declared(mission, [named(mission, "mission.terrain")]).qpe).max(axis=0)
+        assert qpe == pytest.approx(want, abs=floor)
+
+    @pytest.mark.parametrize("family", FAMILIES)
+    def test_against_a_plain_fit_of_ranges(self, family: str) -> None:
+        """What is left at the place found, sampled evenly and fitted to order 12: no P₀, no P₁, and the phases."""
+        mission = parse_mission(mission_text(family, 1))
+        declared = [error for error in reference.errors_of(mission) if error.declared]
+        responses = reference.at_declared(mission, declared)
+        assert np.isfinite(responses.qpe).mean() > 0.9
+        x = np.linspace(-1, 1, 801)
+        tau = x * mission.collection.aperture_time / 2
+        states = (mission.geometry.transmitter, mission.geometry.receiver)
+        for index, error in enumerate(declared):
+            for sign, size in enumerate((error.declared or 0.0, -(error.declared or 0.0))):
+                place = (*responses.place[sign, index], 0.0)
+                if math.isnan(place[0]):  # no ground point
+                    continue
+                left = size * SPEED_OF_LIGHT * sum(t * tau**n for n, t in enumerate(error.clock))
+                for state, paths in zip(states, error.paths, strict=True):
+                    true = path(state, tau)
+                    measured = true + size * (
+                        paths[0][:, None] + paths[1][:, None] * tau + paths[2][:, None] * tau**2 / 2
+                    )
+                    left = left + np.linalg.norm(true, axis=0)
+                    left = left - np.linalg.norm(measured - np.array(place)[:, None], axis=0)
+                p = 2 * math.pi / mission.radar.wavelength * legendre.legfit(x, left, 12)[:4]
+                # Directly computed ranges of a geostationary satellite are rounded to 7e-9 m.
+                assert p[:2] == pytest.approx([0, 0], abs=1e-4)
+                assert 1.5 * p[2] == pytest.approx(responses.qpe[sign, index], rel=1e-6, abs=1e-4)
+                assert 2.5 * p[3] == pytest.approx(responses.cubic[sign, index], rel=1e-6, abs=1e-4)
+
+    def test_a_horizontal_error_of_both_platforms_moves_the_image_by_itself(self) -> None:
+        text = mission_text("aircraft", 1).replace("platforms:", "common_motion_error: { position: 0 }\nplatforms:")
+        mission = parse_mission(text)
+        error = named(mission, "common.position.x")._replace(declared=7.0)
+        found = reference.at_declared(mission, [error])
+        assert found.place[:, 0] == pytest.approx(np.array([[7, 0], [-7, 0]]), abs=1e-6)
+        assert np.abs(found.qpe).max() < 1e-6
+
+    def test_an_allowable_is_held_from_both_sides(self) -> None:
+        """A phase that grows as the size: the limit, 1 rad, is reached at 1."""
+        error = Error("a", "transmitter", np.zeros((2, 3, 3)), np.zeros(4), None, 2.0)
+        sizes = np.sort(np.append(np.geomspace(0.01, 2, 200), [1 - SHARE, 1, 1 + SHARE]))
+        excess = (sizes - 1) / max(SHARE, FLOOR_RAD)
+
+        def missed(found: float | None, sizes: np.ndarray = sizes, excess: np.ndarray = excess) -> bool:
+            return _allowable("allowable", error, found, sizes, excess).is_miss
+
+        assert not missed(1.0)
+        assert not missed(1 + 0.9 * SHARE)
+        assert missed(0.95)
+        assert missed(1.05)
+        assert missed(None)
+        below = sizes <= 0.99
+        assert not missed(None, sizes[below], excess[below])
+        assert missed(2.1, sizes, np.where(sizes > 2, 0.0, -5.0))
+        assert missed(1.0, sizes, np.where((sizes > 0.3) & (sizes < 0.4), 3.0, excess))
+        assert missed(None, sizes, np.where(sizes > 1.5, np.inf, -5.0))
+
+
+class TestFamilies:
+    @pytest.mark.parametrize("family", FAMILIES)
+    def test_a_seed_names_one_mission_within_the_bounds(self, family: str) -> None:
+        texts = [mission_text(family, seed) for seed in range(20)]
+        assert texts == [mission_text(family, seed) for seed in range(20)]
+        assert len(set(texts)) == 20
+        missions = [parse_mission(text) for text in texts]
+        assert max(map(largest_turn, missions)) <= LARGEST_TURN
+        squints = [state.squint for m in missions for state in (m.geometry.transmitter, m.geometry.receiver)]
+        assert max(abs(squint or 0) for squint in squints) <= math.radians(60.1)
+
+
+def path(state: PlatformState, tau: np.ndarray) -> np.ndarray:
+    """Positions (3, n). [m]"""
+    return np.array([state.at(float(t))[0] for t in tau]).T
