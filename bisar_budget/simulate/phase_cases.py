@@ -16,7 +16,7 @@ from bisar_budget.simulate.exact import ExactEffect
 from bisar_budget.simulate.impulse_response import impulse_response, impulse_response_2d
 from bisar_budget.simulate.shift import measured_shift
 from bisar_budget.simulate.study import Sizes, Study
-from bisar_budget.units import format_limit
+from bisar_budget.units import format_limit, format_quantity
 
 TOLERANCE = 0.05  # of the budget: nearer than this a limit is confirmed
 INSIDE, BEYOND = 0.9, 1.1  # of the limit: the phase on both sides shows that the limit is the limit
@@ -163,7 +163,9 @@ def refocused(study: Study, sizes: Sizes, budget: float) -> dict[str, Any]:
         effect = study.collection.effect(errors)
         room = max(ROOM.values())
         if room * study.smear(effect) > MAX_CELLS:
-            reason = f"autofocus needs a patch of {room * study.smear(effect):.0f} cells, at most {MAX_CELLS} are formed"
+            reason = (
+                f"autofocus needs a patch of {room * study.smear(effect):.0f} cells, at most {MAX_CELLS} are formed"
+            )
             return {"verdict_autofocus": "not_evaluated", "reason_autofocus": reason}
         chip, reference = study.chips(errors, effect, room=room)
         focused = study.focused(chip)

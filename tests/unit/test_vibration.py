@@ -12,7 +12,7 @@ from bisar_budget.budget.allocation import Split
 from bisar_budget.budget.check import check_mission
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.mission.model import MotionError, Sinusoid
+from bisar_budget.mission.model import MotionError
 from bisar_budget.units import format_limit
 from tests.conftest import TODAY, findings, mission_text, row
 
@@ -194,7 +194,12 @@ class TestSharedFrequency:
         level = echo_db(*[2 * math.pi * 4e-5 / LAMBDA] * 2)
         for name, other in (("transmitter", "receiver"), ("receiver", "transmitter")):
             notes = row(found, f"{name}.vibration.sinusoidal.0").notes
-            assert any(f"{level:.1f} dB" in note and f"the {other} vibrates" in note and "the worst phases echoes of both together" in note for note in notes)
+            assert any(
+                f"{level:.1f} dB" in note
+                and f"the {other} vibrates" in note
+                and "the worst phases echoes of both together" in note
+                for note in notes
+            )
 
     @pytest.mark.parametrize(("apart", "is_near"), [(1.0, True), (2.4, True), (2.6, False)])
     def test_platforms_near_each_other_too(self, apart: float, is_near: bool) -> None:
