@@ -190,7 +190,7 @@ def _location_row(analysis: Analysis, mine: Together, theirs: Together) -> Row:
     if combine == "each" and moves is not None:
         doubt = _of_all("displacement", combined_displacement(moves, "rss", groups), limit, "m") or doubt
     is_published = mine.model.name == "published"
-    no_image = "a declared error leaves no ground point with its range history: the image has no place for it"
+    no_image = "with a declared error no ground point has the recorded range history: there is no image"
     return judged(
         mission,
         id="mission.location_error",
@@ -232,7 +232,7 @@ def _pull_in_row(analysis: Analysis, mine: Together, theirs: Together, pull_in: 
         equation="Section VI",
         never_fails=True,
         over=_exceeded("QPE", total, pull_in, "rad", lambda: phases)
-        + "; autofocus corrects one total, not each error its own",
+        + "; autofocus corrects one total, not each error separately",
         doubt=_doubt(theirs.model, by_other, pull_in, "rad"),
     )
 

@@ -199,4 +199,4 @@ def _cause(source: ErrorSource) -> str:
 def _stated_elsewhere(analysis: Analysis, source: ErrorSource) -> str:
     frame = getattr(analysis.mission.platforms, source.owner).motion_error.frame
     axes = ", ".join(axis.replace("_", " ") for axis in FRAME_AXES[frame])
-    return f"stated along other axes ({axes}): the rows along those decide"
+    return f"the file states this error along other axes ({axes}): those rows decide"

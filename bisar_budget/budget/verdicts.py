@@ -49,7 +49,7 @@ def _with_verdict(row: Row, verdict: Verdict) -> Row:
     if verdict.verdict_autofocus == "optimistic":
         notes = (*notes, f"{_OPTIMISTIC} with autofocus: {verdict.reason_autofocus}")
         if row.status == "pass_with_autofocus":
-            reason = "passes by autofocus alone, and the image at that limit refutes it"
+            reason = "passes only with autofocus, and the image at that limit shows that autofocus fails"
             return row._replace(status="warn", reason=reason, notes=notes)
     if row.metric == "location_error" and row.status == "pass" and verdict.verdict == "optimistic":
         return row._replace(status="warn", reason="the image is not where the gating model puts it", notes=notes)

@@ -88,20 +88,23 @@ _DISTRIBUTIONS = {
 }
 _VALIDITY = {
     "published": (
-        "Rigling & Moses, Tables I and II: first order in the errors, the slant ranges held constant over the "
-        "aperture. True near broadside; at a squint its velocity rows can be a third too generous or several times "
-        "too strict. A row that the full model fails is a warning."
+        "Rigling & Moses, Tables I and II. It is of first order in the errors and holds the slant ranges constant "
+        "over the aperture. It is accurate near broadside. At a squint, a look off broadside, limits of velocity "
+        "errors can be a third too generous or several times too strict. A row that the full model fails is a warning."
     ),
     "full": (
-        "Exact ranges, for errors of any size: lines of sight turn over the aperture, and the displaced response has "
+        "Exact ranges, for errors of any size. Lines of sight turn over the aperture, and the displaced response has "
         "a phase of its own. A row that the published model fails is a warning."
     ),
-    "strictest": "Of the published model (Rigling & Moses, Tables I and II) and the full one the stricter, by row.",
+    "strictest": (
+        "Two complete checks, by the published model (Rigling & Moses, Tables I and II) and by the full model "
+        "(exact ranges). Each row is that of the stricter verdict."
+    ),
 }
 _RULES = {
     "each": "each error alone is held to its share of the budget",
-    "sum": "the errors of a platform are added at their worst and held to its share",
-    "rss": "the errors of a platform are taken for independent, and their root-sum-square is held to its share",
+    "sum": "the worst-case sum of a platform's errors is held to its share",
+    "rss": "the errors of a platform are taken as independent; their root-sum-square is held to its share",
 }
 
 
@@ -330,7 +333,7 @@ def _draws_remarks(drawn: "MonteCarlo | None") -> Iterator[str]:
     yield from drawn.warnings
     yield from drawn.notes
     if drawn.probability is None:
-        yield "nothing is declared that a requirement here is about"
+        yield "no declared error has a requirement to hold"
 
 
 def _digest(data: bytes | None) -> str:
@@ -523,7 +526,7 @@ def _validity(mission: Mission, found: MissionFindings) -> Iterator[tuple[str, s
     common = mission.common_motion_error
     if common is not None:
         said = _DISTRIBUTIONS[common.distribution]
-        yield "Errors of both platforms alike", f"along the axes of the scene; {said}"
+        yield "Errors of both platforms", f"along the axes of the scene; {said}"
     yield (
         "Autofocus",
         _gain(found.allocation) + ("" if found.allocation.n_pull is None else f" ({mission.autofocus.algorithm})"),

@@ -36,7 +36,7 @@ def render(report: Report, style: Style) -> str:
     """Write one command per finding; a run without findings says so in a line that is no command."""
     annotations = sorted(_annotations(report, style), key=lambda found: _ORDER.index(found.command))
     lines = [_command(annotation) for annotation in annotations]
-    return "\n".join(lines or [f"bisar-budget: {_counted(report)}, nothing to remark"]) + "\n"
+    return "\n".join(lines or [f"bisar-budget: {_counted(report)}, no findings"]) + "\n"
 
 
 def _annotations(report: Report, style: Style) -> Iterator[_Annotation]:

@@ -218,7 +218,7 @@ def _table_key(rows: Sequence[Row], hidden: Sequence[Row]) -> str:
     """Say what the columns are, and what is not in the table."""
     key = "use: declared / allowable"
     if any(row.binding_requirement not in (None, "quadratic_phase_error") for row in rows):
-        key += "; by: what limits, QPE where it names a table, equation or model"
+        key += "; by: what sets the allowable; a table, an equation or a model stands for QPE"
     counts = [
         (sum(row.status == "not_declared" for row in hidden), "not declared"),
         (sum(row.status != "not_declared" for row in hidden), "that limit nothing"),

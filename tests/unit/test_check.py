@@ -484,7 +484,7 @@ class TestWaivers:
         assert "names every row" in warning.message
 
     @pytest.mark.parametrize(
-        ("glob", "says"), [("transmiter.*", "matches no row"), ("receiver.*", "unused, no row it names fails")]
+        ("glob", "says"), [("transmiter.*", "matches no row"), ("receiver.*", "not used: no row that it names fails")]
     )
     def test_useless_waivers_are_said(self, glob: str, says: str) -> None:
         (warning,) = self.waived("2027-01-01", glob).warnings

@@ -268,7 +268,7 @@ class TestCommand:
         (tmp_path / "m.yaml").write_text(mission_text())
         result = run("diff", tmp_path / "m.yaml", "--base", "HEAD", env={"GIT_CEILING_DIRECTORIES": str(tmp_path)})
         assert result.exit_code == 2
-        assert "no git repository" in result.stderr
+        assert "not in a git repository" in result.stderr
 
     def test_no_git(self, run, repository) -> None:
         result = run("diff", repository, "--base", "HEAD", env={"PATH": ""})

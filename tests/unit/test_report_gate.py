@@ -372,7 +372,7 @@ class TestGithub:
 
     def test_nothing_to_say_is_no_command(self) -> None:
         passing = findings(timing_error__constant=0)
-        assert render("github", report(passing), Style()) == "bisar-budget: 1 mission, nothing to remark\n"
+        assert render("github", report(passing), Style()) == "bisar-budget: 1 mission, no findings\n"
 
     def test_standard_input_is_no_place_in_the_repository(self) -> None:
         for _, properties, message in self.commands(findings(**STATUSES)._replace(file="-")):

@@ -215,7 +215,7 @@ def test_notes_that_decide_nothing_stand_in_the_verbose_text_only() -> None:
     short, long = (render("text", Report("1", (noted,)), Style(verbosity=verbosity)) for verbosity in (0, 1))
     assert "note: " not in short
     assert "by a hair" not in short
-    assert "note: collection.pulses: no part in" in " ".join(long.split())
+    assert "note: collection.pulses: not used by this check" in " ".join(long.split())
     assert long.count("holds by a hair") == len(noted.rows)
 
 
@@ -263,7 +263,7 @@ def test_a_row_says_which_requirement_binds_it() -> None:
     lines = [line.split() for line in text.splitlines() if re.match(r"\w.* receiver\.velocity\.[xy]  ", line)]
     ends = {next(word for word in line if word.startswith("receiver.")): line[-1] for line in lines}
     assert (ends["receiver.velocity.x"], ends["receiver.velocity.y"]) == ("location", "cubic")
-    assert "by: what limits" in text
+    assert "by: what sets the allowable" in text
 
 
 def test_gradients_below_30_degrees_are_said_in_the_verdict() -> None:
