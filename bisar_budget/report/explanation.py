@@ -7,11 +7,11 @@ from bisar_budget.budget.aggregates import Together
 from bisar_budget.budget.allocation import Allocation
 from bisar_budget.budget.analysis import Analysis
 from bisar_budget.budget.correlation import displacement_parts, phase_parts
+from bisar_budget.budget.echoes import near_lines, sinc, worst_phases
 from bisar_budget.budget.effects import ErrorSource, image_plane
 from bisar_budget.budget.findings import MissionFindings, Row
 from bisar_budget.budget.models import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.budget.scene import ScenePhases, at
-from bisar_budget.budget.echoes import near_lines, sinc, worst_phases
 from bisar_budget.budget.vibration import (
     amplitude_share,
     cubic_part,
@@ -344,7 +344,7 @@ def _spatial_variance(analysis: Analysis, found: MissionFindings, row: Row) -> I
 
 def _location_aggregate(mission: Mission, together: Together, found: MissionFindings, row: Row) -> Iterator[Step]:
     rule = "the longest sum over all signs of the vectors" if found.combine == "sum" else _RULES[found.combine]
-    parts = displacement_parts(together.moves() or [], found.combine, together.groups)
+    parts = displacement_parts(together.moves(found.combine) or [], found.combine, together.groups)
     title = "(25), (30)" if row.model == "published" else "Full model, each by the sign that moves farther"
     if found.combine == "sum":
         vectors = [
