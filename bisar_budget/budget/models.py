@@ -22,7 +22,7 @@ _FLOOR_RAD, _FLOOR_M = 5e-4, 1e-3  # and whatever the size
 _CLOSE = 2e-4  # of a limit: near enough to go on in a straight line
 _STEPS = 60
 _AS_LINEAR = 0.2  # of a displacement; farther from where the linear model has it, a point is followed
-_FIRST_STEPS, _LEAST_STEP = 8, 1e-4  # of the way from no error on
+_FIRST_STEPS, _LEAST_STEP = 8, 1e-5  # of the way from no error on
 _STRAY = 0.3  # of a step; farther from where it led, a point is not the one that was followed
 _INNER = (0.5, 0.25)  # of a size, where a phase that bends back may have been larger
 
@@ -205,22 +205,28 @@ class FullModel:
 
         Where the way bends back no larger error has an image of the point: that is no step away, however small.
         """
-        unit = self.plane.displacement(source.full, 1.0) or (0.0, 0.0)
-        done, place, slope, step = 0.0, (0.0, 0.0), unit, size / _FIRST_STEPS
+        done, place, slope = 0.0, (0.0, 0.0), self.plane.displacement(source.full, 1.0) or (0.0, 0.0)
+        step, is_tangent = size / _FIRST_STEPS, True
         found: ExactPhases | None = None
         while done != size:
-            step = min(step, size - done, key=abs)
-            ahead = done + step if abs(size - done - step) > 1e-9 * abs(size) else size
-            way = (slope[0] * step, slope[1] * step)
+            ahead = size if abs(size - done) < 1.5 * abs(step) else done + step
+            way = (slope[0] * (ahead - done), slope[1] * (ahead - done))
             found = self.exact.phases([(source, ahead)], (place[0] + way[0], place[1] + way[1]))
             made = None if found is None else (found.displacement[0] - place[0], found.displacement[1] - place[1])
-            if made is None or math.dist(made, way) > _STRAY * math.hypot(*way) + _FLOOR_M:
+            if made is not None and math.dist(made, way) <= _STRAY * math.hypot(*way) + _FLOOR_M:
+                slope = (made[0] / (ahead - done), made[1] / (ahead - done))
+                place, done, step, is_tangent = (place[0] + made[0], place[1] + made[1]), ahead, 2 * step, False
+            elif is_tangent:
                 step /= 2
-                if abs(step) < abs(size) * _LEAST_STEP:
+                if abs(step) < _LEAST_STEP * abs(size):
                     return None
-                continue
-            slope = (made[0] / (ahead - done), made[1] / (ahead - done))
-            place, done, step = (place[0] + made[0], place[1] + made[1]), ahead, 2 * step
+            else:  # a chord leads astray where the way turns: look which way it goes
+                probe = _LEAST_STEP * size
+                near = self.exact.phases([(source, done + probe)], place)
+                if near is None:
+                    return None
+                slope = ((near.displacement[0] - place[0]) / probe, (near.displacement[1] - place[1]) / probe)
+                step, is_tangent = step / 2, True
         return found
 
     def worst(self, source: ErrorSource, size: float, requirement: str) -> float:
