@@ -7,19 +7,14 @@ from bisar_budget.budget.aggregates import Together
 from bisar_budget.budget.allocation import Allocation
 from bisar_budget.budget.analysis import Analysis
 from bisar_budget.budget.correlation import displacement_parts, phase_parts
+from bisar_budget.budget.echoes import near_lines, sinc, worst_phases
 from bisar_budget.budget.effects import ErrorSource, image_plane
 from bisar_budget.budget.findings import MissionFindings, Row
 from bisar_budget.budget.models import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.budget.scene import ScenePhases, at
-from bisar_budget.budget.echoes import near_lines, sinc, worst_phases
-from bisar_budget.budget.vibration import (
-    amplitude_share,
-    cubic_part,
-    echo_phase,
-    lines_of,
-    quadratic_part,
-    slow_limits,
-)
+from bisar_budget.budget.slow_vibration import cubic_part, quadratic_part, slow_limits
+from bisar_budget.budget.vibration import amplitude_share, echo_phase
+from bisar_budget.budget.vibration_lines import lines_of
 from bisar_budget.constants import ROUNDING
 from bisar_budget.errors import KeyPath, printable
 from bisar_budget.geometry import dot, without_rounding

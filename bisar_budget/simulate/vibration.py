@@ -6,7 +6,7 @@ model's limits both in phase fill it.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -15,7 +15,8 @@ from bisar_budget.budget.allocation import Allocation
 from bisar_budget.budget.echoes import near_lines, sinc, worst_phases
 from bisar_budget.budget.effects import PLATFORMS
 from bisar_budget.budget.images import Verdict
-from bisar_budget.budget.vibration import Line, lines_of, vibration_limits
+from bisar_budget.budget.vibration import vibration_limits
+from bisar_budget.budget.vibration_lines import Line, lines_of
 from bisar_budget.mission.model import Mission
 from bisar_budget.simulate.collection import CELLS, Errors, PointCollection
 from bisar_budget.simulate.impulse_response import upsampled
@@ -121,7 +122,7 @@ def _near(
 def _echo(
     collection: PointCollection,
     blank: Verdict,
-    sinusoids: dict[str, tuple[Sinusoid, ...]],
+    sinusoids: Mapping[str, tuple[Sinusoid, ...]],
     who: str,
     assumed: str = "",
 ) -> Verdict:
