@@ -112,7 +112,8 @@ def displaced(
                     break
                 scale[farther] /= 2
             point[alive], parts[alive], step[alive], turn[alive] = ahead, new_parts, new_step, new_turn
-    is_settled &= np.sign(turn) == orientation
+    # Beyond a line on which range and Doppler gradients are parallel no error leads from nothing.
+    is_settled &= turn * orientation > 0
     k = 2 * math.pi / wavelength_m
     parts[~is_settled] = np.nan
     point = np.where(is_settled[:, None], point, np.nan)

@@ -25,12 +25,12 @@ _RANK = {status: index for index, status in enumerate(READING)}
 class Row(NamedTuple):
     """One line of the budget. Numbers in SI and radians; None where a value does not exist.
 
-    `is_independent` marks the rows that sums run over: errors as the file states them. Along the scene's
-    axes an error stated in another frame is shown again, but not counted again. `qpe_exact_rad` is the phase by exact
-    ranges, of errors beyond first order; `published_margin_db` how far the published rule of a vibration stays inside
-    first principles. `binding_requirement` is the requirement that sets `allowable`, `cubic_rad` the magnitude of the
-    declared error's cubic phase at the aperture edge, `islr_db` the ISLR that a declared random error adds, `model` the one
-    whose numbers these are.
+    `is_independent` marks the rows that sums run over: errors as the file states them. Along the scene's axes an
+    error stated in another frame is shown again, but not counted again. `qpe_exact_rad` is `qpe_full_rad`, which is
+    that of exact ranges; `published_margin_db` how far the published rule of a vibration stays inside first
+    principles. `binding_requirement` is the requirement that sets `allowable`, `cubic_rad` the magnitude of the
+    declared error's cubic phase at the aperture edge, `islr_db` the ISLR that a declared random error adds, `model`
+    the one whose numbers these are.
     """
 
     id: str

@@ -94,8 +94,8 @@ _VALIDITY = {
         "too strict. A row that the full model fails is a warning."
     ),
     "full": (
-        "Every first-order term of the range error: lines of sight that turn, and the phase that the displaced "
-        "response has of its own. A row that the published model fails is a warning."
+        "Exact ranges, for errors of any size: lines of sight turn over the aperture, and the displaced response has "
+        "a phase of its own. A row that the published model fails is a warning."
     ),
     "strictest": "Of the published model (Rigling & Moses, Tables I and II) and the full one the stricter, by row.",
 }

@@ -12,10 +12,10 @@ import numpy as np
 
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import GroundVector
-from bisar_budget.simulate.collection import OVERSAMPLING, Chip, Errors, PointCollection
+from bisar_budget.simulate.collection import CELLS, OVERSAMPLING, Chip, Errors, PointCollection
 from bisar_budget.simulate.phase_history import Complexes, Floats, cell_centres
 
-_LINES = 6  # read around the middle one: the range walk of a phase of tens of radians
+READ_CELLS = 2  # of range that are read at most, beside what a response walks
 _TIMES = 65  # at least
 _INNER = 0.95  # of the aperture; its edges ring in a patch of finite extent
 _ORDER = 6  # of the polynomial; a turn of ±0.5 rad shows sixth powers
@@ -26,17 +26,25 @@ _BLOCK = 1 << 20  # contributions held at once
 class ApertureReading(NamedTuple):
     """Phases at the aperture edge, signed like the range error [rad].
 
-    `across_pixels` is how far the response lies from the middle along y′, by the linear part of the phase; `coverage` is the part of the aperture that the patch holds: 1 unless a smear leaves it.
+    `across_pixels` is how far the response lies from the middle along y′, by the linear part of the phase.
+    `walked_pixels` is what the other parts put the centre of gravity nearer along x′: at a frequency of y′ it is where
+    the range error less its slope times slow time puts it. `coverage` is the part of the aperture that the patch holds: 1 unless a smear leaves it.
     """
 
     quadratic: float
     cubic: float
     across_pixels: float
+    walked_pixels: float
     coverage: float
 
 
 def read_aperture(
-    collection: PointCollection, errors: Errors, centre: GroundVector, chip: Chip, reference: Chip
+    collection: PointCollection,
+    errors: Errors,
+    centre: GroundVector,
+    chip: Chip,
+    reference: Chip,
+    range_cells: float = 0.0,
 ) -> ApertureReading:
     """Read quadratic and cubic phase of a response.
 
@@ -50,6 +58,8 @@ def read_aperture(
         Middle of the chips and place of the reference. [m]
     chip, reference : Chip
         With and without error, on the same pixels.
+    range_cells : float
+        Read around the middle line: what the response walks, and no more where a range cell is long.
 
     Raises
     ------
@@ -58,7 +68,7 @@ def read_aperture(
     """
     count = max(_TIMES, round(2 * chip.image.shape[1] / OVERSAMPLING) + 1)
     slow_time = cell_centres(collection.aperture_time, count)
-    seen, clean = _by_pulse(collection, errors, centre, slow_time, [chip, reference])
+    seen, clean = _by_pulse(collection, errors, centre, slow_time, [chip, reference], range_cells)
     place = slow_time / (collection.aperture_time / 2)
     inner = np.abs(place) < _INNER
     product, strength = seen * clean.conj(), np.abs(seen) / np.maximum(np.abs(clean), 1e-30)
@@ -78,23 +88,37 @@ def read_aperture(
     # A pixel along y′ changes the range sum over the aperture by λ / OVERSAMPLING, twice its P₁ part.
     turn = 1 if collection.flown(errors).turns_left(centre) else -1
     across = -turn * OVERSAMPLING / math.pi * float(fit[1])
-    return ApertureReading(float(-1.5 * fit[2]), float(-2.5 * fit[3]), across, min(1.0, float(covered) * 1.02))
+    slope = np.polynomial.legendre.legder([0.0, 0.0, *fit[2:]])
+    mean = float(np.mean(place[inner] * np.polynomial.legendre.legval(place[inner], slope)))
+    walked = mean / (2 * math.pi) * collection.relative_bandwidth * OVERSAMPLING
+    return ApertureReading(
+        float(-1.5 * fit[2]), float(-2.5 * fit[3]), across, -walked, min(1.0, float(covered) * 1.02)
+    )
 
 
 def _by_pulse(
-    collection: PointCollection, errors: Errors, centre: GroundVector, slow_time: Floats, chips: list[Chip]
+    collection: PointCollection,
+    errors: Errors,
+    centre: GroundVector,
+    slow_time: Floats,
+    chips: list[Chip],
+    range_cells: float,
 ) -> list[Complexes]:
     """Correlation of images, tapered to their ends, with what a point at the centre contributes at each time."""
     grid = chips[0].grid
     lines, columns = grid.shape[:2]
-    start = max(0, lines // 2 - _LINES // 2)
-    rows = slice(start, min(lines, start + _LINES))
+    middle = lines // 2
+    half = min(middle, lines - 1 - middle, round(range_cells * OVERSAMPLING / 2))
+    rows = slice(middle - half, middle + half + 1)
     pixels = grid[rows].reshape(-1, 3)
-    taper = np.cos(math.pi * (np.arange(columns) - columns // 2) / columns) ** 2
+    # The ends of the patch are half the cells of a response without smear; what is smeared stays as it is.
+    ramp = round(CELLS * OVERSAMPLING / 2)
+    inside = np.minimum(np.arange(columns) + 0.5, columns - np.arange(columns) - 0.5) / ramp
+    taper = np.sin(math.pi / 2 * np.clip(inside, 0, 1)) ** 2
     images = np.stack([(one.image[rows] * taper).reshape(-1) for one in chips])
     flown = collection.flown(errors)
     k = 2 * math.pi / collection.wavelength
-    middle = flown.range_sum(pixels) - flown.range_sum(np.asarray(centre, dtype=float))
+    at_middle = flown.range_sum(pixels) - flown.range_sum(np.asarray(centre, dtype=float))
     point = np.array([*centre, 0.0])
     paths = [one.measured for one in collection.paths(errors.smooth(), slow_time)]
     found = np.empty((len(chips), slow_time.size), dtype=complex)
@@ -104,7 +128,7 @@ def _by_pulse(
         farther = np.zeros((slow_time[part].size, pixels.shape[0]))
         for track in paths:
             farther += _distance(track[part], pixels) - _distance(track[part], point[None])
-        contribution = np.exp(1j * k * (farther - middle))
+        contribution = np.exp(1j * k * (farther - at_middle))
         contribution *= np.sinc(farther * (collection.radar.bandwidth / SPEED_OF_LIGHT))
         found[:, part] = images @ contribution.conj().T
     return list(found)

@@ -30,7 +30,7 @@ _FREQUENCIES = 64  # at least; half of them for the response itself
 MAX_CELLS = 1024
 _BYTES_PER_PIXEL = 16 * 8  # the image, its grid, and what forming it holds at once
 _BYTES_PER_PULSE = 16 * 6 * _FREQUENCIES  # samples and oversampled range profile
-_PULSES_PER_CELL = 4  # a response repeats after as many cells as there are pulses
+_PULSES_PER_CELL, _LARGE_CELLS = 4, 128  # a response repeats after as many cells as there are pulses
 
 
 class Errors(NamedTuple):
@@ -114,6 +114,11 @@ class PointCollection:
         self._nodes = aperture_nodes(self.aperture_time)
         self._kept: tuple[object, Floats, tuple[float, float]] | None = None
 
+    @property
+    def relative_bandwidth(self) -> float:
+        """Over the centre frequency: range cells that a wavelength of range error walks."""
+        return self.radar.bandwidth / self.radar.center_frequency
+
     def paths(self, errors: Errors, slow_time: Floats, rng: np.random.Generator | None = None) -> tuple[Path, Path]:
         """Fly both platforms."""
         return (
@@ -176,7 +181,7 @@ class PointCollection:
             The patch aliases with the mission's pulses, or is too large to be formed.
         """
         grid, spacing = self._grid(centre, errors, cells, range_cells)
-        slow_time = cell_centres(self.aperture_time, _PULSES_PER_CELL * cells)
+        slow_time = cell_centres(self.aperture_time, _pulses(cells))
         transmitter, receiver = self.paths(errors, slow_time)
         clock = self.clock(errors, slow_time)
         if is_reference:
@@ -255,10 +260,15 @@ class PointCollection:
                 f"and aliases below {2 * cells} pulses; omit the key to get what it takes"
             )
         pixels = max(1, range_cells * OVERSAMPLING) * cells * OVERSAMPLING
-        needed = pixels * _BYTES_PER_PIXEL + _PULSES_PER_CELL * cells * _BYTES_PER_PULSE
+        needed = pixels * _BYTES_PER_PIXEL + _pulses(cells) * _BYTES_PER_PULSE
         if needed > self.memory_limit:
             limit = f"simulation.memory_limit is {self.memory_limit / 1e6:.0f} MB"
             raise ValueError(f"the image needs about {needed / 1e6:.0f} MB, {limit}: raise it")
+
+
+def _pulses(cells: int) -> int:
+    """Pulses of an image; of a large patch half as many, its repeats being far enough away."""
+    return max(_PULSES_PER_CELL * min(cells, _LARGE_CELLS), _PULSES_PER_CELL // 2 * cells)
 
 
 def baseband(flown: Flown, points: Floats, wavelength_m: float) -> Complexes:

@@ -25,7 +25,7 @@ def location(study: Study, requirement: float) -> Verdict:
     sizes = [(s, s.declared or 0.0) for s in study.declared]
     if not sizes:
         return blank._replace(reason="no error that moves the image is declared")
-    rule = "(25)" if study.model == "published" else "the full model"
+    rule = "the full model" if study.is_full else "(25)"
     try:
         scale = _scale(study, sizes, requirement)
         if scale is None:
@@ -34,14 +34,14 @@ def location(study: Study, requirement: float) -> Verdict:
         errors = study.together(sizes, scale)
         effect = study.collection.effect(errors)
         chips = study.chips(errors, effect)
-        reading = study.read(errors, effect.displacement, *chips)
-        shift = measured_shift(*chips, reading.across_pixels)
+        reading = study.read(errors, effect, *chips)
+        shift = measured_shift(*chips, reading)
     except (ValueError, np.linalg.LinAlgError) as error:
         return blank._replace(reason=f"no image: {error}")
     assert said is not None
     measured = moved(effect.displacement, shift.displacement)
     seen = [("all of them together", said, measured)]
-    if study.model == "published":
+    if not study.is_full:
         # Together, errors may hide each other: the sign each is declared with is not the sign it will fly with.
         for source, size in sizes:
             alone = published_displacement(study, [(source, size)], scale)
@@ -50,6 +50,10 @@ def location(study: Study, requirement: float) -> Verdict:
                 seen.append((f"{source.id} alone", alone, exact))
     verdict, farthest = _judged(study, seen)
     along, across = _pixels_apart(study, said, measured)
+    if study.is_full:
+        # What exact ranges predict is the middle of the chip, whose lines and columns are those of range and Doppler.
+        along, across = abs(shift.pixels[0]), abs(shift.pixels[1])
+        verdict = "confirmed" if max(along, across) <= HALF_PIXEL else "optimistic"
     reason = f"{rule} and the image differ by {along:.2g} and {across:.2g} pixels along x' and y'"
     if verdict != "confirmed":
         who, by_rule, is_at = farthest
@@ -82,18 +86,19 @@ def _judged(study: Study, seen: list[_Seen]) -> tuple[str, _Seen]:
 
 def _places(study: Study, sizes: Sizes, scale: float) -> GroundVector | None:
     """Displacement of errors together by the gating model; None where (25) has none."""
-    if study.model == "published":
+    if not study.is_full:
         return published_displacement(study, sizes, scale)
     return study.effect(sizes, scale).displacement
 
 
 def _scale(study: Study, sizes: Sizes, requirement: float) -> float | None:
     """Scale at which the gating model moves the image by the requirement; None where it moves nothing."""
-    if study.model == "published":
+    if not study.is_full:
         place = published_displacement(study, sizes, 1.0)
         length = math.hypot(*place) if place else 0.0
         return requirement / length if length else None
-    moves = [study.ground.plane.displacement(source.full, size) or (0.0, 0.0) for source, size in sizes]
+    plane = study.analysis.full.plane
+    moves = [plane.displacement(source.full, size) or (0.0, 0.0) for source, size in sizes]
     length = math.hypot(math.fsum(m[0] for m in moves), math.fsum(m[1] for m in moves))
     if not length:
         return None

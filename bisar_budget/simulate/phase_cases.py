@@ -7,19 +7,21 @@ import numpy as np
 
 from bisar_budget.budget.effects import ErrorSource
 from bisar_budget.budget.images import Verdict
+from bisar_budget.budget.models import CUBIC
+from bisar_budget.budget.pull_in import ROOM
 from bisar_budget.geometry import GroundVector
-from bisar_budget.simulate.aperture_reading import ApertureReading
-from bisar_budget.simulate.collection import Chip, Errors
+from bisar_budget.simulate.aperture_reading import READ_CELLS, ApertureReading
+from bisar_budget.simulate.collection import MAX_CELLS, Chip, Errors
 from bisar_budget.simulate.exact import ExactEffect
-from bisar_budget.simulate.impulse_response import impulse_response
+from bisar_budget.simulate.impulse_response import impulse_response, impulse_response_2d
 from bisar_budget.simulate.shift import measured_shift
 from bisar_budget.simulate.study import Sizes, Study
-from bisar_budget.units import format_limit
+from bisar_budget.units import format_limit, format_quantity
 
 TOLERANCE = 0.05  # of the budget: nearer than this a limit is confirmed
 INSIDE, BEYOND = 0.9, 1.1  # of the limit: the phase on both sides shows that the limit is the limit
 HALF_CELL = 0.5  # of range walk; beyond, one-dimensional autofocus leaves a loss (0.34 dB there, uniform)
-_READ_RANGE_CELLS = 1  # of a chip from which nothing but the phase is read
+_BESIDE_CELLS = 64  # of smear; beyond, no images are formed on both sides of a limit
 _COARSE_CELL_RAD = 1.0  # of phase between points a range cell apart; beyond, a response moves along range instead
 
 
@@ -27,30 +29,60 @@ def quadratic(study: Study, source: ErrorSource) -> Verdict:
     """Limit of one error."""
     budget, gain = study.allocation.qpe_limit(source.owner), study.allocation.autofocus_gain
     boundary = study.boundary(source, budget)
-    blank = Verdict(
-        id=source.id, model=study.model, boundary_error=boundary or 0.0, unit=source.unit, budget_rad=budget
-    )
     if boundary is None:
-        blank = blank._replace(reason="without autofocus there is no limit")
-    else:
-        blank = _judged(study, blank, [(source, 1.0)], boundary)
+        return _bound_elsewhere(study, source)
+    blank = Verdict(id=source.id, model=study.model, boundary_error=boundary, unit=source.unit, budget_rad=budget)
+    verdict = _judged(study, blank, [(source, boundary)])
     farther = study.boundary(source, gain * budget) if gain > 1 else None
     if farther is None:
-        return blank
-    return blank._replace(boundary_autofocus=farther, **refocused(study, [(source, 1.0)], farther, budget))
+        return verdict
+    return verdict._replace(boundary_autofocus=farther, **refocused(study, [(source, farther)], budget))
+
+
+def _bound_elsewhere(study: Study, source: ErrorSource) -> Verdict:
+    """Limit of an error that no quadratic phase bounds: by the cubic phase, or by the location."""
+    allowed = study.allowed(source)
+    size = allowed.smallest or 0.0
+    blank = Verdict(id=source.id, model=study.model, boundary_error=size, unit=source.unit)
+    requirements = study.mission.requirements
+    try:
+        errors = study.together([(source, study.worse_sign([(source, size)], 1.0) * size)])
+        effect = study.collection.effect(errors)
+        chips = study.chips(errors, effect)
+        reading = study.read(errors, effect, *chips)
+    except (ValueError, np.linalg.LinAlgError) as error:
+        return blank._replace(reason=f"no image: {error}")
+    blank = blank._replace(**predicted(effect), measured_qpe_rad=abs(reading.quadratic))
+    if allowed.binding == CUBIC and requirements.cubic_phase_error is not None:
+        return blank._replace(
+            budget_rad=requirements.cubic_phase_error,
+            measured_cubic_rad=abs(reading.cubic),
+            verdict=compare(abs(reading.cubic) / requirements.cubic_phase_error - 1, TOLERANCE),
+            reason="bound by the cubic phase",
+        )
+    shift = measured_shift(*chips, reading)
+    measured = moved(effect.displacement, shift.displacement)
+    required = requirements.location_error or 0.0
+    pixel = min(chips[0].spacing)
+    excess = math.hypot(*measured) - required
+    return blank._replace(
+        measured_displacement_m=measured,
+        verdict="confirmed" if abs(excess) <= pixel / 2 else compare(excess, 0.0),
+        reason=f"bound by the location: the image moves by {format_quantity(math.hypot(*measured), 'm', 4)}, "
+        f"{format_quantity(required, 'm', 4)} allowed",
+    )
 
 
 def total(study: Study, row_id: str, owner: str) -> Verdict:
     """All declared errors of an owner at once, each with the sign that makes their phases add."""
-    members = study.members(owner)
     budget = study.allocation.qpe_limit(owner)
     blank = Verdict(id=row_id, model=study.model, boundary_error=budget, unit="rad", budget_rad=budget)
-    if study.mission.allocation.combine == "rss":
+    if study.mission.allocation.combine != "sum":
         return blank._replace(reason="a root-sum-square speaks of many flights, an image shows one")
-    sizes = study.aligned(members)
+    sizes = study.summed(study.members(owner), budget)
     if not sizes:
         return blank._replace(reason="no declared error has a quadratic phase")
-    return _judged(study, blank, sizes, budget / math.fsum(abs(s.by(study.model).qpe * size) for s, size in sizes))
+    return _judged(study, blank, sizes)
 
 
 def other(study: Study, source: ErrorSource) -> Verdict:
@@ -87,16 +119,16 @@ def cubic(study: Study, requirement: float) -> Verdict:
     sizes = [(s, s.declared or 0.0) for s in study.declared]
     if not sizes:
         return blank._replace(reason="no error with a motion is declared")
-    by_model = abs(math.fsum(s.cubic(study.model) for s, _ in sizes))
+    by_model = abs(math.fsum((s.full if study.is_full else s.effect).cubic * size for s, size in sizes))
     if not by_model:
         return blank._replace(reason=f"no declared error has a cubic phase by the {study.model} model")
     try:
         scale = requirement / by_model
-        if study.model == "full":
+        if study.is_full:
             scale = _scale_of_cubic(study, sizes, scale, requirement)
         errors = study.together(sizes, scale)
         effect = study.collection.effect(errors)
-        reading = study.read(errors, effect.displacement, *study.chips(errors, effect, _READ_RANGE_CELLS))
+        reading = study.read(errors, effect, *study.chips(errors, effect, READ_CELLS))
     except (ValueError, np.linalg.LinAlgError) as error:
         return blank._replace(reason=f"no image: {error}")
     measured = abs(reading.cubic)
@@ -113,7 +145,7 @@ def pull_in(study: Study, n_pull: float) -> Verdict:
         id="mission.autofocus_pull_in", model=study.model, boundary_error=phase, unit="rad", budget_rad=budget
     )
     clock = next(s for s in study.sources if s.id == "timing.quadratic")
-    found = refocused(study, [(clock, 1.0)], phase / abs(clock.effect.qpe), budget)
+    found = refocused(study, [(clock, phase / abs(clock.effect.qpe))], budget)
     verdict = str(found["verdict_autofocus"])
     bound = radar.center_frequency / radar.bandwidth
     reason = f"range walk of {walk:.2g} cells; it stays within half a cell up to n_pull {bound:.3g}, f0/B"
@@ -124,15 +156,21 @@ def pull_in(study: Study, n_pull: float) -> Verdict:
     )
 
 
-def refocused(study: Study, sizes: Sizes, scale: float, budget: float) -> dict[str, Any]:
+def refocused(study: Study, sizes: Sizes, budget: float) -> dict[str, Any]:
     """Form the image at the limit with autofocus and refocus it; hold what is left to the plain budget."""
     try:
-        errors = study.together(sizes, study.worse_sign(sizes, scale))
+        errors = study.together(sizes, study.worse_sign(sizes, 1.0))
         effect = study.collection.effect(errors)
-        chip, reference = study.chips(errors, effect)
+        room = max(ROOM.values())
+        if room * study.smear(effect) > MAX_CELLS:
+            reason = (
+                f"autofocus needs a patch of {room * study.smear(effect):.0f} cells, at most {MAX_CELLS} are formed"
+            )
+            return {"verdict_autofocus": "not_evaluated", "reason_autofocus": reason}
+        chip, reference = study.chips(errors, effect, room=room)
         focused = study.focused(chip)
-        residual = abs(study.read(errors, effect.displacement, focused, reference).quadratic)
-        peaks = [impulse_response(one.cut, one.spacing[1]).peak for one in (reference, focused)]
+        residual = abs(study.read(errors, effect, focused, reference).quadratic)
+        peaks = [impulse_response_2d(one.image, one.spacing).peak for one in (reference, focused)]
         loss = 20 * math.log10(peaks[0] / peaks[1])
     except (ValueError, np.linalg.LinAlgError) as error:
         return {"verdict_autofocus": "not_evaluated", "reason_autofocus": f"no image: {error}"}
@@ -176,28 +214,30 @@ def published_displacement(study: Study, sizes: Sizes, scale: float) -> GroundVe
     return (math.fsum(m[0] for m in moves if m), math.fsum(m[1] for m in moves if m))
 
 
-def _judged(study: Study, blank: Verdict, sizes: Sizes, scale: float) -> Verdict:
+def _judged(study: Study, blank: Verdict, sizes: Sizes) -> Verdict:
     """Form the images of errors at the limit and on both sides, and hold the phase to the budget."""
     budget = blank.budget_rad or 0.0
-    by_table = abs(math.fsum(s.effect.qpe * scale * size for s, size in sizes))
+    by_table = abs(math.fsum(s.effect.qpe * size for s, size in sizes))
     blank = blank._replace(published_qpe_rad=by_table)
     try:
-        scale = study.worse_sign(sizes, scale)
+        scale = study.worse_sign(sizes, 1.0)
         errors = study.together(sizes, scale)
         effect = study.collection.effect(errors)
         chip, reference = study.chips(errors, effect)
-        reading = study.read(errors, effect.displacement, chip, reference)
+        reading = study.read(errors, effect, chip, reference)
     except (ValueError, np.linalg.LinAlgError) as error:
         return blank._replace(reason=f"no image: {error}")
     measured = abs(reading.quadratic)
+    is_small = study.smear(effect) <= _BESIDE_CELLS
+    beside = [_phase(study, sizes, factor * scale) if is_small else None for factor in (INSIDE, BEYOND)]
     return blank._replace(
         **predicted(effect),
         **_of_response(chip, reference, effect, reading),
         full_qpe_rad=abs(effect.quadratic),
         measured_qpe_rad=measured,
         measured_cubic_rad=None,
-        measured_inside_rad=_phase(study, sizes, INSIDE * scale),
-        measured_beyond_rad=_phase(study, sizes, BEYOND * scale),
+        measured_inside_rad=beside[0],
+        measured_beyond_rad=beside[1],
         displacement_published_m=published_displacement(study, sizes, scale),
         displacement_full_m=effect.displacement,
         smear_azimuth_published_rad=(study.geometry.look_azimuth + math.pi / 2) % math.pi,
@@ -210,7 +250,7 @@ def _of_response(chip: Chip, reference: Chip, effect: ExactEffect, reading: Aper
     """Measures of the response; those that a long smear or a bent patch leaves without value are missing."""
     found: dict[str, Any] = {}
     try:
-        shift = measured_shift(chip, reference, reading.across_pixels)
+        shift = measured_shift(chip, reference, reading)
         found["measured_displacement_m"] = moved(effect.displacement, shift.displacement)
         found["measured_smear_azimuth_rad"] = shift.smear_azimuth
     except (ValueError, np.linalg.LinAlgError):
@@ -233,8 +273,8 @@ def _phase(study: Study, sizes: Sizes, scale: float) -> float | None:
     errors: Errors = study.together(sizes, scale)
     try:
         effect = study.collection.effect(errors)
-        chips = study.chips(errors, effect, _READ_RANGE_CELLS)
-        return abs(study.read(errors, effect.displacement, *chips).quadratic)
+        chips = study.chips(errors, effect, READ_CELLS)
+        return abs(study.read(errors, effect, *chips).quadratic)
     except (ValueError, np.linalg.LinAlgError):
         return None
 

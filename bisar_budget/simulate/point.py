@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bisar_budget.budget.analysis import Analysis
 from bisar_budget.budget.correlation import correlated_errors, likely_error
 from bisar_budget.budget.effects import PLATFORMS
-from bisar_budget.budget.sources import error_sources
 from bisar_budget.budget.vibration_lines import along_line_of_sight, lines_of
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vector
@@ -285,7 +285,7 @@ def _paths(
 ) -> tuple[Path, Path]:
     factor = mission.allocation.coverage_factor
     common = mission.common_motion_error
-    likely = _likely_errors(mission, geometry)
+    likely = _likely_errors(mission)
     flown = []
     for name in ("transmitter", "receiver"):
         declared: DeclaredError = getattr(mission.platforms, name).motion_error
@@ -317,13 +317,13 @@ def _paths(
     return flown[0], flown[1]
 
 
-def _likely_errors(mission: Mission, geometry: BistaticGeometry) -> dict[str, tuple[Vector, Vector]]:
+def _likely_errors(mission: Mission) -> dict[str, tuple[Vector, Vector]]:
     """Position and velocity error along the frame's axes of each platform with a covariance: one of its errors.
 
     A covariance has no sign to fly with. Shown is its most probable error of one sigma of quadratic phase.
     """
     groups = correlated_errors(mission)
-    sources = {source.id: source for source in error_sources(mission, geometry)} if groups else {}
+    sources = {source.id: source for source in Analysis(mission).sources} if groups else {}
     errors = {}
     for group in groups:
         a, b, c, d, e, f = likely_error(group, [sources[row_id] for row_id in group.ids])

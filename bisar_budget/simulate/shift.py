@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bisar_budget.geometry import GroundVector
+from bisar_budget.simulate.aperture_reading import ApertureReading
 from bisar_budget.simulate.collection import Chip
 from bisar_budget.simulate.phase_history import Complexes, Floats
 
@@ -19,17 +20,21 @@ _SUPPORT = 0.4  # of the largest error-free spectral magnitude; the band's edges
 
 
 class Shift(NamedTuple):
-    """Displacement on the ground (east, north) [m], and azimuth of the line of smear, 0 to π [rad]."""
+    """Displacement on the ground (east, north) [m], azimuth of the line of smear, 0 to π [rad].
+
+    `pixels` is the displacement along x′ and y′ of the image.
+    """
 
     displacement: GroundVector
     smear_azimuth: float
+    pixels: tuple[float, float]
 
 
-def measured_shift(chip: Chip, reference: Chip, across_pixels: float | None = None) -> Shift:
+def measured_shift(chip: Chip, reference: Chip, reading: ApertureReading | None = None) -> Shift:
     """Compare a response with an error-free one on the same grid.
 
-    `across_pixels` is the place along y′ where it is known better, as from the linear part of the phase over the
-    aperture: a cubic phase moves the centre of gravity, not that part.
+    A `reading` of the aperture says better where the response is: a cubic phase moves the centre of gravity along y′,
+    a quadratic one along x′, neither what is displaced.
 
     Raises
     ------
@@ -50,12 +55,14 @@ def measured_shift(chip: Chip, reference: Chip, across_pixels: float | None = No
     pixels = np.stack([-step * count / (2 * math.pi) for step, count in zip(steps, product.shape, strict=True)])
     ground = _pixel_vectors(reference.grid) @ pixels
     middle = np.average(pixels, axis=1, weights=weights)
-    if across_pixels is not None:
-        middle[1] = across_pixels
+    if reading is not None:
+        middle = np.array([middle[0] - reading.walked_pixels, reading.across_pixels])
     mean = _pixel_vectors(reference.grid) @ middle
     spread = np.cov(ground, aweights=weights)
     east, north = np.linalg.eigh(spread)[1][:, -1]
-    return Shift((float(mean[0]), float(mean[1])), math.atan2(north, east) % math.pi)
+    return Shift(
+        (float(mean[0]), float(mean[1])), math.atan2(north, east) % math.pi, (float(middle[0]), float(middle[1]))
+    )
 
 
 def _step(product: Complexes, axis: int) -> Floats:

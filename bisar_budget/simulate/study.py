@@ -3,13 +3,12 @@
 import math
 from collections.abc import Sequence
 
-from bisar_budget.budget.allocation import allocate
-from bisar_budget.budget.effects import ErrorSource, full_ground, image_plane
-from bisar_budget.budget.pull_in import ROOM
-from bisar_budget.budget.sources import error_sources
-from bisar_budget.geometry import GroundVector
+from bisar_budget.budget.analysis import Analysis, Model
+from bisar_budget.budget.effects import ErrorSource
+from bisar_budget.budget.error_rows import Allowed, allowed_by
+from bisar_budget.budget.models import QUADRATIC
 from bisar_budget.mission.model import Mission
-from bisar_budget.simulate.aperture_reading import ApertureReading, read_aperture
+from bisar_budget.simulate.aperture_reading import READ_CELLS, ApertureReading, read_aperture
 from bisar_budget.simulate.autofocus import ALGORITHMS
 from bisar_budget.simulate.collection import (
     CELLS,
@@ -25,38 +24,51 @@ from bisar_budget.simulate.phase_history import MotionError
 
 Sizes = Sequence[tuple[ErrorSource, float]]  # errors and how large each is, signed
 _CLOCK_TERMS = ("constant", "linear", "quadratic", "cubic")
+_SCALED, _SCALINGS = 1e-4, 40  # of a budget; steps at most
+_SMEAR_SHARE = 2.4  # of a cubic without its linear part: its slope at the aperture edge
 
 
 class Study:
     """One mission with what its rows share."""
 
     def __init__(self, mission: Mission) -> None:
-        self.mission, self.geometry = mission, mission.geometry
+        self.mission, self.analysis = mission, Analysis(mission)
+        self.geometry, self.sources = self.analysis.geometry, self.analysis.sources
         self.model = mission.allocation.model
-        self.sources = error_sources(mission, self.geometry)
-        self.allocation = allocate(mission, self.sources)
-        self.plane = image_plane(self.geometry)
-        self.ground = full_ground(mission, self.geometry)
+        self.allocation = self.analysis.allocation
+        self.plane = self.analysis.published.plane  # (25)
         self.collection = PointCollection(mission, self.geometry)
+
+    @property
+    def is_full(self) -> bool:
+        """Whether exact ranges say where the image goes and what its cubic phase is; else Table I and (25)."""
+        return self.model != "published"
+
+    @property
+    def models(self) -> tuple[Model, ...]:
+        """Those that gate: under `strictest` both."""
+        full, published = self.analysis.models("full")
+        return {"full": (full,), "published": (published,)}.get(self.model, (published, full))
 
     @property
     def declared(self) -> list[ErrorSource]:
         """Declared errors that an image can show; `other` errors are phases without a motion."""
-        return [s for s in self.sources if s.declared and s.is_independent and s.is_motion]
+        return [s for s in self.analysis.stated if s.declared and s.is_motion]
 
     def members(self, owner: str) -> list[ErrorSource]:
         """Declared errors that count against an owner's budget."""
         return [s for s in self.declared if owner == "mission" or self.allocation.qpe.includes(s.owner, owner)]
 
     def boundary(self, source: ErrorSource, limit: float) -> float | None:
-        """Size of an error at which the gating model has it reach a quadratic phase [rad]; None without one."""
-        per_unit = abs(source.by(self.model).qpe)
-        return limit / per_unit if per_unit else None
+        """Smallest size at which a gating model has an error reach a quadratic phase [rad]; None without one."""
+        sizes = (model.allowable(source, QUADRATIC, limit) for model in self.models)
+        return min((size for size in sizes if size is not None), default=None)
 
-    def has_limit(self, source: ErrorSource) -> bool:
-        """Whether an error has an allowable by quadratic phase, gain included."""
+    def allowed(self, source: ErrorSource) -> Allowed:
+        """Allowable of an error's row by all requirements, autofocus included, and which one binds."""
         limit = self.allocation.qpe_limit(source.owner) * self.allocation.autofocus_gain
-        return self.boundary(source, limit) is not None
+        found = [allowed_by(self.analysis, model, source, limit) for model in self.models]
+        return min(found, key=lambda one: math.inf if one.smallest is None else one.smallest)
 
     def errors(self, source: ErrorSource, size: float) -> Errors:
         """Return one error of a given size and nothing else."""
@@ -102,19 +114,47 @@ class Study:
             raise none
         return max(phases, key=lambda signed: phases[signed])
 
-    def aligned(self, members: Sequence[ErrorSource]) -> list[tuple[ErrorSource, float]]:
-        """Declared errors, each with the sign that makes their phases add."""
-        return [(s, math.copysign(s.declared or 0.0, s.by(self.model).qpe)) for s in members if s.by(self.model).qpe]
+    def summed(self, members: Sequence[ErrorSource], budget: float) -> list[tuple[ErrorSource, float]]:
+        """Declared errors scaled until their phases by the gating model, of the worse sign each, sum to a budget.
+
+        Signs are those that make the phases add; empty where there is no phase.
+        """
+        model = self.models[-1]
+
+        def phases(scale: float) -> list[float]:
+            return [self._worst(model, s, scale * (s.declared or 0.0)) for s in members]
+
+        total = math.fsum(map(abs, phases(1.0)))
+        if not total:
+            return []
+        scale = 1.0
+        for _ in range(_SCALINGS):
+            if not math.isfinite(total):
+                scale /= 2
+            elif abs(total / budget - 1) < _SCALED:
+                break
+            else:
+                scale *= min(4.0, max(0.25, budget / total))
+            total = math.fsum(map(abs, phases(scale)))
+        return [
+            (s, math.copysign(scale * (s.declared or 0.0), qpe * (s.declared or 0.0)))
+            for s, qpe in zip(members, phases(scale), strict=True)
+            if qpe
+        ]
+
+    def _worst(self, model: Model, source: ErrorSource, size: float) -> float:
+        """Quadratic phase of the worse sign of an error, with the sign of a small one. [rad]"""
+        found = model.declared(source._replace(declared=size)).qpe
+        return found if math.isfinite(found) else math.inf
 
     def at_limit(self, row_id: str, limit: float) -> Errors:
         """Return the errors that a verdict of quadratic phase was read with."""
         source = next((s for s in self.sources if s.id == row_id), None)
         if source is not None:
-            sizes, scale = [(source, 1.0)], limit
+            sizes = [(source, limit)]
         else:
-            sizes = self.aligned(self.members(row_id.partition(".")[0].replace("timing", "clock")))
-            scale = limit / math.fsum(abs(s.by(self.model).qpe * size) for s, size in sizes)
-        return self.together(sizes, self.worse_sign(sizes, scale))
+            sizes = self.summed(self.members(row_id.partition(".")[0].replace("timing", "clock")), limit)
+        return self.together(sizes, self.worse_sign(sizes, 1.0))
 
     def images(self, row_id: str, limit: float) -> tuple[Chip, Chip]:
         """Image at a limit of a row of quadratic phase, as its verdict reads it, and of no error at that place."""
@@ -125,13 +165,29 @@ class Study:
         """Refocus a chip by the mission's algorithm."""
         return chip._replace(image=ALGORITHMS[self.mission.autofocus.algorithm](chip.image).image)
 
-    def chips(self, errors: Errors, effect: ExactEffect, range_cells: int = RANGE_CELLS) -> tuple[Chip, Chip]:
-        """Image of the errors and of no error at the place they move the point to, large enough for the smear."""
-        slope = 2 * abs(effect.quadratic) + 3 * abs(effect.cubic)  # at the aperture edge
-        smear = 2 * math.ceil(min(slope / math.pi, 1e6))  # cells
-        cells = max(CELLS + smear, math.ceil(max(ROOM.values()) * smear))  # with less, autofocus gives out
-        return self.collection.pair(errors, effect.displacement, min(cells, MAX_CELLS), range_cells)
+    def smear(self, effect: ExactEffect) -> int:
+        """Cells of cross range that a response is smeared over."""
+        slope = 2 * abs(effect.quadratic) + _SMEAR_SHARE * abs(effect.cubic)  # at the aperture edge
+        return 2 * math.ceil(min(slope / math.pi, 1e6))
 
-    def read(self, errors: Errors, place: GroundVector, chip: Chip, reference: Chip) -> ApertureReading:
+    def chips(
+        self, errors: Errors, effect: ExactEffect, range_cells: int = RANGE_CELLS, room: float = 1.0
+    ) -> tuple[Chip, Chip]:
+        """Image of the errors and of no error at the place they move the point to, large enough for the smear.
+
+        `room` is how often the smear must fit: autofocus gives out in less than it needs.
+        """
+        smear = self.smear(effect)
+        cells = min(MAX_CELLS, max(CELLS + smear, math.ceil(room * smear)))
+        return self.collection.pair(errors, effect.displacement, cells, range_cells + self._walk(effect))
+
+    def _walk(self, effect: ExactEffect) -> int:
+        """Range cells that a smear walks, both ways."""
+        wavelengths = (abs(effect.quadratic) + abs(effect.cubic)) / (2 * math.pi)
+        return 2 * math.ceil(min(wavelengths * self.collection.relative_bandwidth - 0.25, 64))
+
+    def read(self, errors: Errors, effect: ExactEffect, chip: Chip, reference: Chip) -> ApertureReading:
         """Quadratic and cubic phase of a response, measured."""
-        return read_aperture(self.collection, errors, place, chip, reference)
+        sidelobes = CELLS / 2 * self.collection.relative_bandwidth  # walked by those at the patch's ends
+        cells = min(READ_CELLS, sidelobes) + self._walk(effect)
+        return read_aperture(self.collection, errors, effect.displacement, chip, reference, cells)

@@ -6,6 +6,8 @@ from fnmatch import fnmatchcase
 from functools import partial
 from multiprocessing import get_context
 
+from bisar_budget.budget.aggregates import aggregate_rows
+from bisar_budget.budget.findings import Row
 from bisar_budget.budget.images import Verdict, VerifiedMission
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.simulate import phase_cases, vibration
@@ -67,6 +69,11 @@ def cases(study: Study) -> dict[str, Case]:
     return dict(_cases(study))
 
 
+def _aggregates(study: Study) -> Iterator[Row]:
+    for model in study.models:
+        yield from aggregate_rows(study.analysis, *study.analysis.models(model.name), study.allocation)
+
+
 def _verify_row(mission: Mission, row_id: str) -> Verdict:
     return cases(Study(mission))[row_id]()
 
@@ -85,11 +92,16 @@ def _cases(study: Study) -> Iterator[tuple[str, Case]]:
     for source in study.sources:
         if not source.is_motion:
             yield source.id, partial(phase_cases.other, study, source)
-        elif study.has_limit(source):
+        elif study.allowed(source).smallest is not None:
             yield source.id, partial(phase_cases.quadratic, study, source)
     yield from vibration.cases(mission, allocation, study.collection)
     requirements = mission.requirements
-    if mission.allocation.combine != "each":
+    if mission.allocation.combine == "each":
+        # The row exists only where it warns.
+        if any(row.id == "mission.quadratic_phase_error" for row in _aggregates(study)):
+            row_id = "mission.quadratic_phase_error"
+            yield row_id, partial(phase_cases.total, study, row_id, "mission")
+    else:
         owners = ["transmitter", "receiver", "mission"]
         if allocation.qpe.clock is not None:
             owners.insert(2, "clock")
