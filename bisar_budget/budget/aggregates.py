@@ -19,7 +19,7 @@ from bisar_budget.budget.findings import Row
 from bisar_budget.budget.judgement import judged
 from bisar_budget.budget.models import CUBIC, LOCATION, QUADRATIC, Declared
 from bisar_budget.budget.pull_in import caps, needed_sentence
-from bisar_budget.budget.vibration import slow_phases
+from bisar_budget.budget.slow_vibration import slow_phases
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.model import Mission
