@@ -143,7 +143,7 @@ def _over(
         )
     if allowed.binding == LOCATION and requirements.location_error is not None:
         moved = "out of sight" if mine.farthest is None else f"by {format_quantity(math.hypot(*mine.farthest), 'm')}"
-        by = "(25)" if model.name == "published" else "full model"
+        by = "equation (25)" if model.name == "published" else "full model"
         return f"moves the image {moved}, {format_limit(requirements.location_error, 'm')} allowed ({by})"
     qpe = abs(mine.qpe)
     text = f"QPE {_phase(qpe)}, {format_limit(limit, 'rad')} allowed ({model.equation(source)})"

@@ -25,7 +25,6 @@ from bisar_budget.report.compliance_view import (
     Compliance,
     Contribution,
     Derivation,
-    Document,
     Driver,
     Evidence,
     General,
@@ -208,7 +207,7 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
         anchor=anchor,
         file=file,
         sha256=_digest(mission.data),
-        document=_document(mission),
+        document=found.document,
         alone=_ALONE if judged and found.combine == "each" else "",
         narrow=narrow_gradients(found.geometry),
         status=found.status,
@@ -430,9 +429,6 @@ def _requirement(mission: Mission, found: MissionFindings, row: Row, source: Err
 def _method(found: MissionFindings, row: Row, verdict: str | None) -> str:
     """Say how the row is verified: by analysis, and by the image where one was formed."""
     analysis = f"analysis: {row.equation}"
-    is_error = row.metric == "quadratic_phase_error" and row.unit != "rad"
-    if found.model == "strictest" and is_error and row.equation != "full model":
-        analysis += " and full model"
     return analysis if verdict is None else f"{analysis}; simulation: {STATUS_WORDS.get(verdict, verdict)}"
 
 
@@ -496,17 +492,6 @@ def _moves(found: MissionFindings, stated: Iterable[ErrorSource]) -> tuple[Move,
     return tuple(
         Move(source.id, *_kind(source), format_quantity(size, "m"), size / largest) for source, size in moving
     )
-
-
-def _document(mission: Mission) -> Document:
-    document = getattr(mission, "document", None)
-    return Document(*(getattr(document, key, None) or "" for key in Document._fields))
-
-
-def document_words(document: Document) -> str:
-    """Number and issue of a document; empty where the file gives neither."""
-    issue = f"issue {document.issue}" if document.issue else ""
-    return ", ".join(text for text in (document.number, issue) if text)
 
 
 def _kind(source: ErrorSource) -> tuple[str, str, str]:

@@ -10,6 +10,7 @@ from bisar_budget.budget.verdicts import image_notes
 from bisar_budget.budget.waivers import waiver_notes
 from bisar_budget.errors import printable
 from bisar_budget.geometry import BistaticGeometry, PlatformState
+from bisar_budget.mission.model import Document
 from bisar_budget.report import Piece, Style
 from bisar_budget.report.layout import WIDTH, wrapped, wrapped_counts
 from bisar_budget.units import format_quantity
@@ -82,7 +83,9 @@ def _mission(mission: MissionFindings, style: Style) -> list[str]:
         return [_lead(_summary(mission) + warned, mission.status, style)]
     alone = "; each error alone" if mission.combine == "each" else ""
     first, *rest = wrapped_counts(_summary(mission) + alone)
-    lines = [_lead(first, mission.status, style), *rest, *wrapped(mission.name, "  ")]
+    document = ", ".join(filter(None, (document_words(mission.document), mission.document.author)))
+    name = f"{mission.name} ({document})" if document else mission.name
+    lines = [_lead(first, mission.status, style), *rest, *wrapped(name, "  ")]
     if sentence := narrow_gradients(mission.geometry):
         lines += wrapped(sentence, "  ")
     lines += ["", *(line for key, text in head(mission) for line in wrapped(f"{key:<12} {text}", " " * 13))]
@@ -99,6 +102,11 @@ def _mission(mission: MissionFindings, style: Style) -> list[str]:
 
         lines += ["", "Images with each error at its limit", "", *evidence(mission.verdicts, style)]
     return lines
+
+
+def document_words(document: Document) -> str:
+    """Number and issue of a document; empty where the file gives neither."""
+    return ", ".join(filter(None, (document.number, document.issue and f"issue {document.issue}")))
 
 
 def narrow_gradients(geometry: BistaticGeometry) -> str:
