@@ -180,7 +180,7 @@ class PointCollection:
             The patch aliases with the mission's pulses, or is too large to be formed.
         """
         grid, spacing = self._grid(centre, errors, cells, range_cells)
-        slow_time = cell_centres(self.aperture_time, _pulses(cells))
+        slow_time = cell_centres(self.aperture_time, pulses_for(cells))
         transmitter, receiver = self.paths(errors, slow_time)
         clock = self.clock(errors, slow_time)
         if is_reference:
@@ -259,13 +259,13 @@ class PointCollection:
                 f"and aliases below {2 * cells} pulses; omit the key to get what it takes"
             )
         pixels = max(1, range_cells * OVERSAMPLING) * cells * OVERSAMPLING
-        needed = pixels * _BYTES_PER_PIXEL + _pulses(cells) * _BYTES_PER_PULSE
+        needed = pixels * _BYTES_PER_PIXEL + pulses_for(cells) * _BYTES_PER_PULSE
         if needed > self.memory_limit:
             limit = f"simulation.memory_limit is {self.memory_limit / 1e6:.0f} MB"
             raise ValueError(f"the image needs about {needed / 1e6:.0f} MB, {limit}: raise it")
 
 
-def _pulses(cells: int) -> int:
+def pulses_for(cells: int) -> int:
     """Pulses of an image; of a large patch half as many, its repeats being far enough away."""
     return max(_PULSES_PER_CELL * min(cells, _LARGE_CELLS), _PULSES_PER_CELL // 2 * cells)
 

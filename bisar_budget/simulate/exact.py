@@ -20,6 +20,7 @@ from bisar_budget.simulate.phase_history import Floats, Path
 NODES = 24  # of Gauss-Legendre quadrature; more change nothing where platforms travel less than their slant range
 _ORDER = 12  # of the fit to samples anywhere else
 _ITERATIONS = 50
+_FOLLOWED = 8  # steps from no error on
 _HALVINGS = 6  # of a step that leads farther away
 _SETTLED_M = 1e-6  # a satellite's range in double precision gives no more
 
@@ -78,9 +79,8 @@ def exact_effects(
         NaN where no ground point has the recorded history.
     """
     weights = _quadrature(transmitter.shape[-2])[1]
-    recorded = np.linalg.norm(actual_transmitter, axis=-1) + np.linalg.norm(actual_receiver, axis=-1)
-    recorded = recorded + np.asarray(clock_range, dtype=float)
-    return _displaced(transmitter, receiver, recorded, weights, wavelength_m, near)
+    actual = (actual_transmitter, actual_receiver)
+    return _found((transmitter, receiver), actual, np.asarray(clock_range, dtype=float), weights, wavelength_m, near)
 
 
 def exact_effect(
@@ -98,14 +98,43 @@ def exact_effect(
     ValueError
         No ground point has the recorded range history.
     """
-    recorded = np.linalg.norm(transmitter.actual, axis=1) + np.linalg.norm(receiver.actual, axis=1)
-    recorded = recorded + SPEED_OF_LIGHT * np.asarray(clock_error, dtype=float)
     weights = _projection(slow_time / (aperture_time_s / 2))
-    found = _displaced(transmitter.measured, receiver.measured, recorded, weights, wavelength_m, None)
+    measured, actual = (transmitter.measured, receiver.measured), (transmitter.actual, receiver.actual)
+    clock_range = SPEED_OF_LIGHT * np.asarray(clock_error, dtype=float)
+    found = _found(measured, actual, clock_range, weights, wavelength_m, None)
     if not found.found:
         raise ValueError("no ground point has the recorded range history")
     east, north = (float(part) for part in found.displacement)
     return ExactEffect(displacement=(east, north), quadratic=float(found.quadratic), cubic=float(found.cubic))
+
+
+def _found(
+    measured: tuple[Floats, Floats],
+    actual: tuple[Floats, Floats],
+    clock_range: Floats,
+    weights: Floats,
+    wavelength_m: float,
+    near: Floats | None,
+) -> ExactEffects:
+    """Displaced points, those that are not found at once followed from no error on."""
+    history = np.linalg.norm(actual[0], axis=-1) + np.linalg.norm(actual[1], axis=-1)
+    found = _displaced(*measured, history + clock_range, weights, wavelength_m, near)
+    missed = ~found.found
+    if not missed.any():
+        return found
+    lead = missed.shape
+    tracks = [np.broadcast_to(one, (*lead, *one.shape[-2:]))[missed] for one in measured]
+    clock = np.broadcast_to(clock_range, (*lead, weights.shape[1]))[missed]
+    before = np.zeros((tracks[0].shape[0], 2))
+    for step in range(1, _FOLLOWED + 1):
+        part = step / _FOLLOWED
+        there = [own + part * (one - own) for one, own in zip(tracks, actual, strict=True)]
+        ahead = before * (step / (step - 1) if step > 1 else 1.0)
+        followed = _displaced(there[0], there[1], history + part * clock, weights, wavelength_m, ahead)
+        before = followed.displacement  # NaN from the first step on that finds nothing
+    for whole, later in zip(found, followed, strict=True):
+        whole[missed] = later
+    return found
 
 
 def _displaced(
@@ -153,11 +182,11 @@ def _displaced(
     is_settled &= turn * orientation > 0
     k = 2 * math.pi / wavelength_m
     parts[~is_settled] = np.nan
-    point = np.where(is_settled[:, None], point, np.nan)
+    point[~is_settled] = np.nan
     return ExactEffects(
         point.reshape((*lead, 2)),
-        (1.5 * k * parts[:, 2]).reshape(lead),  # P₂ = (3t² - 1)/2
-        (2.5 * k * parts[:, 3]).reshape(lead),  # P₃ = (5t³ - 3t)/2
+        np.asarray(1.5 * k * parts[:, 2]).reshape(lead),  # P₂ = (3t² - 1)/2
+        np.asarray(2.5 * k * parts[:, 3]).reshape(lead),  # P₃ = (5t³ - 3t)/2
         is_settled.reshape(lead),
     )
 

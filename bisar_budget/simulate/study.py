@@ -182,12 +182,11 @@ class Study:
         return self.collection.pair(errors, effect.displacement, cells, range_cells + self._walk(effect))
 
     def _walk(self, effect: ExactEffect) -> int:
-        """Range cells that a smear walks, both ways."""
-        wavelengths = (abs(effect.quadratic) + abs(effect.cubic)) / (2 * math.pi)
+        """Range cells that a smear walks, both ways: at its place along y′, the error less its slope times slow time."""
+        wavelengths = (4 / 3 * abs(effect.quadratic) + 2 * abs(effect.cubic)) / (2 * math.pi)
         return 2 * math.ceil(min(wavelengths * self.collection.relative_bandwidth - 0.25, 64))
 
     def read(self, errors: Errors, effect: ExactEffect, chip: Chip, reference: Chip) -> ApertureReading:
         """Quadratic and cubic phase of a response, measured."""
-        sidelobes = CELLS / 2 * self.collection.relative_bandwidth  # walked by those at the patch's ends
-        cells = min(READ_CELLS, sidelobes) + self._walk(effect)
-        return read_aperture(self.collection, errors, effect.displacement, chip, reference, cells)
+        walk = self._walk(effect)
+        return read_aperture(self.collection, errors, effect.displacement, chip, reference, walk and walk + READ_CELLS)
