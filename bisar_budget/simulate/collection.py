@@ -114,6 +114,11 @@ class PointCollection:
         self._kept: tuple[object, Floats, tuple[float, float]] | None = None
 
     @property
+    def range_cell(self) -> float:
+        """Resolution of the range sum, c/B. [m]"""
+        return SPEED_OF_LIGHT / self.radar.bandwidth
+
+    @property
     def relative_bandwidth(self) -> float:
         """Over the centre frequency: range cells that a wavelength of range error walks."""
         return self.radar.bandwidth / self.radar.center_frequency
