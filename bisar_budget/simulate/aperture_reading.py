@@ -170,7 +170,9 @@ def _contributions(
     weights = taylor_window(257)
     frequency = cell_centres(1.0, 257)
     kernel = np.cos(2 * math.pi * np.outer(_KERNEL, frequency)) @ weights / 257
-    return contribution * np.interp(np.abs(cells), _KERNEL, kernel, right=0.0) * _weights(collection, slow_time)[:, None]
+    return (
+        contribution * np.interp(np.abs(cells), _KERNEL, kernel, right=0.0) * _weights(collection, slow_time)[:, None]
+    )
 
 
 def _weights(collection: PointCollection, slow_time: Floats) -> Floats:

@@ -45,8 +45,11 @@ class Errors(NamedTuple):
 
     def smooth(self) -> "Errors":
         """The polynomials alone: no vibration."""
-        still = (one._replace(sinusoids=(), wideband_rms=0.0) for one in (self.transmitter, self.receiver))
-        return Errors(*still, clock=self.clock)
+        return Errors(_still(self.transmitter), _still(self.receiver), self.clock)
+
+
+def _still(error: MotionError) -> MotionError:
+    return error._replace(sinusoids=(), wideband_rms=0.0)
 
 
 def superposed(parts: Iterable[Errors]) -> Errors:
@@ -210,10 +213,9 @@ class PointCollection:
         self, errors: Errors, place: GroundVector, cells: int = CELLS, range_cells: int = RANGE_CELLS
     ) -> tuple[Chip, Chip]:
         """Image of errors around the place they move the point to, and of no error there: see `chip`."""
-        size = {"cells": cells, "range_cells": range_cells}
         return (
-            self.chip(place, errors, **size),
-            self.chip(place, errors, scatterer=place, is_reference=True, **size),
+            self.chip(place, errors, cells=cells, range_cells=range_cells),
+            self.chip(place, errors, scatterer=place, cells=cells, range_cells=range_cells, is_reference=True),
         )
 
     def _grid(

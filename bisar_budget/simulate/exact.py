@@ -214,7 +214,8 @@ def _quadrature(count: int) -> tuple[Floats, Floats]:
     """Gauss-Legendre nodes in -1 … 1, and the weights (4, count) that project on P₀ … P₃."""
     nodes, weights = np.polynomial.legendre.leggauss(count)
     legendre = np.polynomial.legendre.legvander(nodes, 3)
-    return nodes, np.ascontiguousarray((legendre * weights[:, None] * (np.arange(4) + 0.5)).T)
+    projection: Floats = np.asarray((legendre * weights[:, None] * (np.arange(4) + 0.5)).T, dtype=float)
+    return np.asarray(nodes, dtype=float), projection
 
 
 def _projection(place: Floats) -> Floats:

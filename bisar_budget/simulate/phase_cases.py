@@ -163,7 +163,9 @@ def refocused(study: Study, sizes: Sizes, budget: float) -> dict[str, Any]:
         effect = study.collection.effect(errors)
         room = max(ROOM.values())
         if room * study.smear(effect) > MAX_CELLS:
-            reason = f"autofocus needs a patch of {room * study.smear(effect):.0f} cells, at most {MAX_CELLS} are formed"
+            reason = (
+                f"autofocus needs a patch of {room * study.smear(effect):.0f} cells, at most {MAX_CELLS} are formed"
+            )
             return {"verdict_autofocus": "not_evaluated", "reason_autofocus": reason}
         chip, reference = study.chips(errors, effect, room=room)
         focused = study.focused(errors, effect, chip)

@@ -156,12 +156,16 @@ def simulate_point(mission: Mission, progress: Callable[[int, int], None] = lamb
         effect = exact_effect(
             nodes, *_paths(mission, geometry, nodes, vibrating=False), _clock(mission, nodes), wavelength, T
         )
-        begin, middle, end = (_paths(mission, geometry, np.array([tau]), vibrating=False) for tau in (-T / 2, 0.0, T / 2))
+        begin, middle, end = (
+            _paths(mission, geometry, np.array([tau]), vibrating=False) for tau in (-T / 2, 0.0, T / 2)
+        )
         flown = Flown(*(np.concatenate([at[leg].measured for at in (begin, middle, end)]) for leg in (0, 1)))
         cells = flown.cells(effect.displacement, mission.radar.bandwidth, wavelength)
     except ValueError as error:
         raise SimulationError(f"the declared errors leave no image of a point: {error}") from None
-    left = _left_over(_paths(mission, geometry, fine, vibrating=False), effect) + SPEED_OF_LIGHT * _clock(mission, fine)
+    left = _left_over(_paths(mission, geometry, fine, vibrating=False), effect) + SPEED_OF_LIGHT * _clock(
+        mission, fine
+    )
     slope = np.gradient(left, fine)
     plan = _plan(mission, flown, effect, cells, left, slope)
     plan.require_memory((settings or Simulation()).memory_limit, mission.collection.pulses)

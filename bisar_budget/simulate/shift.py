@@ -60,7 +60,9 @@ def measured_shift(chip: Chip, reference: Chip, reading: ApertureReading | None 
     mean = _pixel_vectors(reference.grid) @ middle
     spread = np.cov(ground, aweights=weights)
     east, north = np.linalg.eigh(spread)[1][:, -1]
-    return Shift((float(mean[0]), float(mean[1])), math.atan2(north, east) % math.pi, (float(middle[0]), float(middle[1])))
+    return Shift(
+        (float(mean[0]), float(mean[1])), math.atan2(north, east) % math.pi, (float(middle[0]), float(middle[1]))
+    )
 
 
 def _step(product: Complexes, axis: int) -> Floats:

@@ -202,4 +202,6 @@ class Study:
     def read(self, errors: Errors, effect: ExactEffect, chip: Chip, reference: Chip) -> ApertureReading:
         """Quadratic and cubic phase of a response, measured."""
         walk = self._walk(effect)
-        return read_aperture(self.collection, errors, effect.displacement, chip, reference, walk and walk + READ_CELLS)
+        return read_aperture(
+            self.collection, errors, effect.displacement, chip, reference, walk and walk + READ_CELLS
+        )
