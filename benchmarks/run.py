@@ -2,6 +2,7 @@
 
     python benchmarks/run.py            # all
     python benchmarks/run.py cold       # one of: cold, gate, formats, report, evaluators, montecarlo
+    python benchmarks/run.py --against ../before    # cold and gate of another checkout and of this one, in turn
 
 Absolute times on a shared machine mean little; each figure is measured side by side with its yardstick,
 A B A B …, and the ratio of the medians is what counts. Accuracy stands beside each figure.
@@ -40,7 +41,7 @@ def in_turn(runs: int, *tasks: Callable[[], Times]) -> list[Times]:
     return [tuple(statistics.median(column) for column in zip(*kept, strict=True)) for kept in figures]
 
 
-def process(*command: str) -> Callable[[], Times]:
+def process(*command: str, cwd: Path = ROOT) -> Callable[[], Times]:
     """Seconds by the clock, and of CPU (user and system), of a fresh process, output to a pipe.
 
     Python may keep what it compiles, as it does for a user, in a folder of this run.
@@ -48,7 +49,7 @@ def process(*command: str) -> Callable[[], Times]:
 
     def run() -> Times:
         before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-        done = subprocess.run(command, capture_output=True, cwd=ROOT, check=False, env=ENVIRONMENT)
+        done = subprocess.run(command, capture_output=True, cwd=cwd, check=False, env=ENVIRONMENT)
         wall, after = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
         assert done.returncode in (0, 1), done.stderr.decode()
         return wall, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
@@ -72,7 +73,7 @@ def cold(runs: int) -> None:
     check = process(script, "check", str(MISSION))
     yardstick = process(sys.executable, "-c", "import yaml, click")
     bare = process(sys.executable, "-c", "pass")
-    print("check of one mission, cold process, output to a pipe ÷ python -c 'import yaml, click' (at most 2.5)")
+    print("check of one mission, cold process, output to a pipe ÷ python -c 'import yaml, click' (at most 2.0)")
     for label, a, b, empty in zip(("clock", "CPU"), *in_turn(runs, check, yardstick, bare), strict=True):
         print(
             f"  {label:5} {a * 1e3:6.0f} ms ÷ {b * 1e3:6.0f} ms = {a / b:.2f}   "
@@ -80,35 +81,88 @@ def cold(runs: int) -> None:
         )
 
 
-def gate(runs: int) -> None:
-    examples = sorted(MISSION.parent.glob("*.yaml"))
-    every_key = ROOT / "tests" / "acceptance" / "good" / "every_key.yaml"
-    print("1000 missions in one call ÷ parsing the same files with PyYAML's C loader (at most 3, by the clock)")
-    fleets = {"the examples of specs/missions": examples, "missions that use every key": [every_key]}
-    for label, sources in fleets.items():
-        texts = [path.read_text(encoding="utf-8") for path in sources]
-        with tempfile.TemporaryDirectory() as folder:
-            files = []
-            for index in range(1000):
-                path = Path(folder) / f"mission_{index:04}.yaml"
-                text = texts[index % len(texts)]
-                path.write_text(re.sub(r"(?m)^name: .*", f"name: mission {index}", text), encoding="utf-8")
-                files.append(str(path))
-            parse = """import sys, yaml
+PARSE = """import sys, yaml
 for name in sys.argv[1:]:
     with open(name, "rb") as file:
         yaml.load(file, Loader=yaml.CSafeLoader)"""
+
+
+def fleets(checkout: Path) -> dict[str, list[Path]]:
+    """Mission files of a checkout that a thousand are made from."""
+    return {
+        "the examples of specs/missions": sorted((checkout / "specs" / "missions").glob("*.yaml")),
+        "missions that use every key": [checkout / "tests" / "acceptance" / "good" / "every_key.yaml"],
+    }
+
+
+def a_thousand(folder: str, sources: list[Path]) -> list[str]:
+    """Write a thousand missions of different names into a folder."""
+    texts = [path.read_text(encoding="utf-8") for path in sources]
+    files = []
+    for index in range(1000):
+        path = Path(folder) / f"mission_{index:04}.yaml"
+        text = texts[index % len(texts)]
+        path.write_text(re.sub(r"(?m)^name: .*", f"name: mission {index}", text), encoding="utf-8")
+        files.append(str(path))
+    return files
+
+
+def gate(runs: int) -> None:
+    print(
+        "1000 missions in one call ÷ parsing the same files with PyYAML's C loader (examples: at most 4 by the clock)"
+    )
+    for label, sources in fleets(ROOT).items():
+        with tempfile.TemporaryDirectory() as folder:
+            files = a_thousand(folder, sources)
             script = str(Path(sys.executable).with_name("bisar-budget"))
             size = sum(os.path.getsize(file) for file in files) / len(files)
             print(f"  {label}, {size:.0f} bytes each")
             formats = ("text", "json", "csv")
             checks = [process(script, "check", "--format", name, *files) for name in formats]
-            *found, parsed = in_turn(runs, *checks, process(sys.executable, "-c", parse, *files))
+            *found, parsed = in_turn(runs, *checks, process(sys.executable, "-c", PARSE, *files))
             for name, (wall, cpu) in zip(formats, found, strict=True):
                 print(
                     f"    {name:5} {wall:6.2f} s ÷ {parsed[0]:6.2f} s = {wall / parsed[0]:.2f}"
                     f"   (CPU of all processes {cpu / parsed[1]:.2f})"
                 )
+
+
+def against(before: Path, task: str, runs: int | None) -> None:
+    """Another checkout and this one side by side, with one interpreter and on the other's mission files."""
+    sides = {"before": before.resolve(), "after": ROOT}
+    for checkout in sides.values():
+        where = (sys.executable, "-c", "import bisar_budget; print(bisar_budget.__file__)")
+        imported = subprocess.run(where, capture_output=True, cwd=checkout, check=False, text=True).stdout
+        if imported.strip() != str(checkout / "bisar_budget" / "__init__.py"):
+            sys.exit(f"{checkout}: no checkout of bisar-budget")
+    command = (
+        "import sys; from bisar_budget.cli import main; sys.exit(main())"  # as installed, of the folder it is in
+    )
+
+    def compare(runs: int, yardstick: Callable[[], Times], *arguments: str) -> None:
+        checks = [
+            process(sys.executable, "-c", command, "check", *arguments, cwd=checkout) for checkout in sides.values()
+        ]
+        *found, measure = in_turn(runs, *checks, yardstick)
+        for index, label in enumerate(("clock", "CPU")):
+            for side, times in zip(sides, found, strict=True):
+                time, unit = times[index] * 1e3, measure[index] * 1e3
+                print(f"    {label:5} {side:6} {time:7.0f} ms ÷ {unit:6.0f} ms = {time / unit:.2f}")
+            print(f"    {label:5} after ÷ before = {found[1][index] / found[0][index]:.2f}")
+
+    if task in ("cold", "all"):
+        print("check of one mission, cold process, output to a pipe ÷ python -c 'import yaml, click' (at most 2.0)")
+        mission = sides["before"] / MISSION.relative_to(ROOT)
+        compare(runs or TASKS["cold"][1], process(sys.executable, "-c", "import yaml, click"), str(mission))
+    if task in ("gate", "all"):
+        print(
+            "1000 missions in one call to text ÷ parsing the same files with PyYAML's C loader (examples: at most 4)"
+        )
+        for label, sources in fleets(sides["before"]).items():
+            print(f"  {label}")
+            with tempfile.TemporaryDirectory() as folder:
+                files = a_thousand(folder, sources)
+                compare(runs or TASKS["gate"][1], process(sys.executable, "-c", PARSE, *files), *files)
 
 
 def formats(runs: int) -> None:
@@ -306,9 +360,17 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("task", nargs="?", choices=[*TASKS, "all"], default="all")
     parser.add_argument("--runs", type=int, help="rounds, after one of warm-up")
+    parser.add_argument(
+        "--against", type=Path, metavar="PATH", help="another checkout: cold and gate of both, in turn"
+    )
     chosen = parser.parse_args()
+    if chosen.against is not None and chosen.task not in ("cold", "gate", "all"):
+        parser.error(f"--against measures cold and gate, not {chosen.task}")
     with tempfile.TemporaryDirectory() as folder:
         ENVIRONMENT["PYTHONPYCACHEPREFIX"] = folder
+        if chosen.against is not None:
+            against(chosen.against, chosen.task, chosen.runs)
+            sys.exit()
         for name, (task, default) in TASKS.items():
             if chosen.task in (name, "all"):
                 task(chosen.runs or default)

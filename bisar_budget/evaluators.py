@@ -134,8 +134,8 @@ def vibration_limit(
     return 0.5*root_power*wavelength/3.1415926535897932
 
 
-# Nodes over -1 … 1, in half apertures, and the weights that fit a history sampled there: value P₀, slope P₁,
-# quadratic at the edge (3/2 of P₂) and cubic at the edge (5/2 of P₃), by the number of nodes. Derived here.
+# Nodes over -1 … 1, in half apertures, and the weights that fit a history sampled there: value P₀,
+# slope P₁, quadratic at the edge (3/2 of P₂), cubic at the edge (5/2 of P₃); by the number of nodes.
 LEGENDRE_FITS: dict[int, tuple[tuple[float, ...], ...]] = {
     6: (
         (-0.932469514203152, -0.6612093864662645, -0.2386191860831969, 0.2386191860831969, 0.6612093864662645, 0.932469514203152),

@@ -69,7 +69,8 @@ LENGTH = Dimension("a length", "m", _LENGTHS | {"NM": 1852.0})
 SPEED = Dimension(
     "a speed",
     "m/s",
-    {f"{unit}/s": factor for unit, factor in _LENGTHS.items()} | {"km/h": 1 / 3.6, "kt": 1852 / 3600, "kn": 1852 / 3600},
+    {f"{unit}/s": factor for unit, factor in _LENGTHS.items()}
+    | {"km/h": 1 / 3.6, "kt": 1852 / 3600, "kn": 1852 / 3600},
 )
 ACCELERATION = Dimension(
     "an acceleration",
@@ -82,9 +83,7 @@ ANGLE = Dimension(
 )
 RATIO = Dimension("a number", "", {"": 1.0, "%": 1e-2, "ppm": 1e-6, "ppb": 1e-9, "s/s": 1.0})
 RATE = Dimension("a rate", "1/s", {"1/s": 1.0, "/s": 1.0, "s^-1": 1.0, "Hz": 1.0, "s/s^2": 1.0})
-RATE_SQUARED = Dimension(
-    "a rate per second", "1/s^2", {"1/s^2": 1.0, "/s^2": 1.0, "s^-2": 1.0, "s/s^3": 1.0}
-)
+RATE_SQUARED = Dimension("a rate per second", "1/s^2", {"1/s^2": 1.0, "/s^2": 1.0, "s^-2": 1.0, "s/s^3": 1.0})
 POWER_RATIO = Dimension("a power ratio in decibel", "dB", {"dB": 1.0})
 POSITION_VARIANCE = Dimension("a position variance", "m^2", _scaled("m^2", "kcmu", 2))
 POSITION_VELOCITY = Dimension("a covariance of position and velocity", "m^2/s", _scaled("m^2/s", "kcmu", 2))

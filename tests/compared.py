@@ -81,9 +81,9 @@ def _allowables(
     mission: Mission, found: MissionFindings, rows: dict[str, Row], errors: Sequence[Error], steps: int
 ) -> Iterator[Compared]:
     """At the allowable the worse sign is at a limit, at no smaller size above one; none, where none is reached."""
-    gain, required = found.allocation.autofocus_gain, mission.requirements
+    required = mission.requirements
     is_full = mission.allocation.model == "full"
-    limits = np.array([found.allocation.qpe_limit(error.owner) * gain for error in errors])
+    limits = _limits(mission, found, rows, errors)
     caps = np.array([error.cap for error in errors])
     of_phase = np.array([_number(rows[error.id].allowable_full) for error in errors])
     of_all = np.array([_number(rows[error.id].allowable) if is_full else math.nan for error in errors])
@@ -102,6 +102,25 @@ def _allowables(
         over = np.maximum(over, _excess(responses.moved, required.location_error, FLOOR_M))
     for index, error in enumerate(errors):
         yield _allowable("allowable", error, rows[error.id].allowable, grid[index], over[index])
+
+
+def _limits(mission: Mission, found: MissionFindings, rows: dict[str, Row], errors: Sequence[Error]) -> Array:
+    """QPE limit of each error, gain included (L,). [rad]
+
+    The strictest are two checks, each balanced by its own model: where a row is not that of the first it has to be
+    that of the second.
+    """
+    allocations = [found.allocation]
+    if mission.allocation.model == "strictest":
+        models = ("published", "full")
+        single = [mission._replace(allocation=mission.allocation._replace(model=model)) for model in models]
+        allocations = [check_mission(one, DAY).allocation for one in single]
+    choices = np.array([[a.qpe_limit(e.owner) * a.autofocus_gain for a in allocations] for e in errors])
+    if len(allocations) == 1 or np.ptp(choices, axis=1).max() == 0:
+        return choices[:, 0]
+    first = {row.id: row for row in check_mission(single[0], DAY).rows}
+    is_first = [rows[e.id].allowable_full == first[e.id].allowable_full for e in errors]
+    return np.where(is_first, choices[:, 0], choices[:, 1])
 
 
 def _number(value: float | None) -> float:
@@ -125,6 +144,8 @@ def _allowable(quantity: str, error: Error, found: float | None, sizes: Array, e
     before = float(excess[sizes < end * (1 - SHARE) * (1 + 1e-12)].max(initial=-math.inf))
     reached = float(excess[sizes <= end * (1 + SHARE) * (1 + 1e-12)].max(initial=-math.inf))
     off = max(before, 0.0) if found is None else max(before, -reached, 0.0)
+    if found is not None and off <= 1:  # say how far off the phase there is, not only that it agrees
+        off = max(off, min(1.0, abs(float(excess[np.searchsorted(sizes, found)]))))
     return Compared(quantity, error.id, found, want, off)
 
 
@@ -190,10 +211,20 @@ def _together(
 ) -> Iterator[Compared]:
     """Aggregates by the contract's rules, from the reference's own rows."""
     rule, allocation = mission.allocation.combine, found.allocation
+    owners = [error.owner for error in members]
     is_full = mission.allocation.model == "full"
     qpe, cubic = (np.abs(of).max(axis=0) for of in (responses.qpe, responses.cubic))
+    if is_full and mission.allocation.split == "balanced":
+        weights = [
+            reference.combined(
+                qpe[[(owner == "transmitter") == is_first and owner != "mission" for owner in owners]], rule
+            )
+            for is_first in (True, False)
+        ]
+        share = weights[0] / sum(weights) if sum(weights) else 0.5
+        share = min(0.95, max(0.05, share))
+        yield _against("balanced share", "transmitter", allocation.qpe.transmitter, share, 0.001)
     others = np.array([abs(other.quadratic_phase_error) for other in mission.other_errors])
-    owners = [error.owner for error in members]
     if rule != "each":
         for owner in ("transmitter", "receiver", "clock"):
             row_id = f"{'timing' if owner == 'clock' else owner}.quadratic_phase_error"

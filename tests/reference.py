@@ -5,9 +5,10 @@ of axes and the speed of light, and has its own quadrature (24 Gauss-Legendre no
 
 Recorded are the ranges of the true paths to the scene centre, and c·t̃(τ). Predicted are those of the measured paths,
 path + error, to a point x of the ground plane. The response stands at the x for which recorded − predicted has no P₀
-and no P₁ part over the aperture; it is followed from the scene centre while the error grows from nothing, so that it
-is the response and no other solution. Then QPE = (2π/λ)·3/2·(coefficient of P₂), cubic = (2π/λ)·5/2·(that of P₃),
-both at the aperture edge. Where the followed solution ends, no ground point has that range history.
+and no P₁ part over the aperture. It is followed from the scene centre while the error grows from nothing, in short
+steps along its tangent, so that it is the response and no other solution. Then QPE = (2π/λ)·3/2·(coefficient of P₂)
+and cubic = (2π/λ)·5/2·(that of P₃), both at the aperture edge. Where the followed solution ends, no ground point has
+that range history.
 """
 
 import math
@@ -32,7 +33,10 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)  # over -1 … 1
 _BASIS = np.array([np.polynomial.legendre.Legendre.basis(n)(_NODES) for n in range(4)])
 _PROJECT = (_BASIS * _WEIGHTS * (np.arange(4)[:, None] + 0.5)).T  # (24, 4): values at the nodes to P₀ … P₃
 _STEP_M, _STEP = 1e-5, 1e-6  # that Newton's last step may make, besides of the distance; the next is its square
-_NEWTON, _HALVINGS = 8, 14
+_NEWTON = 8
+_CORRECTION, _TRIFLE_M = 0.3, 1e-4  # of the tangent's way that Newton may add; what is no way to speak of
+_CHANGE = 0.25  # of the slopes' determinant, within one step
+_SMALLEST = 2.0**-16  # of the way to the next size; where no step of that is found, the solution ends
 
 
 class Error(NamedTuple):
@@ -157,9 +161,6 @@ class Lanes:
         self.error = np.einsum("lkof,on->lknf", np.array([e.paths for e in errors]), powers)
         clock = np.array([e.clock for e in errors])
         self.clock = SPEED_OF_LIGHT * clock @ np.array([tau**order for order in range(4)])  # (L, n)
-        self.count = len(errors)
-        _, slopes = self._left(np.zeros(self.count), np.zeros((self.count, 2)), slice(None))
-        self.orientation = np.sign(_determinant(slopes))
 
     def _left(self, size: Array, place: Array, lanes: Any) -> tuple[Array, Array]:
         """Recorded − predicted as P₀ … P₃ (L, 4), and the slopes of P₀ and P₁ over the ground (L, 2, 2)."""
@@ -176,29 +177,39 @@ class Lanes:
         slopes = np.einsum("lnf,no->lof", look, _PROJECT[:, :2])
         return total @ _PROJECT, slopes
 
-    def _solved(self, size: Array, start: Array, lanes: Any) -> tuple[Array, Flags]:
-        """Place where P₀ = P₁ = 0, by Newton's steps from `start`, and whether there is one of the same branch."""
-        place, orientation = start.copy(), self.orientation[lanes]
-        done = np.zeros(len(place), bool)
-        for _ in range(_NEWTON):
-            left, slopes = self._left(size, place, lanes)
-            determinant = _determinant(slopes)
-            with np.errstate(all="ignore"):
-                step = -np.stack(
-                    [
-                        (slopes[:, 1, 1] * left[:, 0] - slopes[:, 0, 1] * left[:, 1]) / determinant,
-                        (slopes[:, 0, 0] * left[:, 1] - slopes[:, 1, 0] * left[:, 0]) / determinant,
-                    ],
-                    axis=1,
-                )
+    def _tangent(self, size: Array, place: Array, lanes: Any) -> tuple[Array, Array]:
+        """How fast the place moves with size (L, 2), and the determinant of the slopes there (L,)."""
+        at = lanes if len(self.true) > 1 else slice(None)
+        measured = self.true[at] + size[:, None, None, None] * self.error[lanes]
+        measured[..., :2] -= place[:, None, None, :]
+        look = measured / np.linalg.norm(measured, axis=-1)[..., None]
+        grown = self.clock[lanes] - np.einsum("lknf,lknf->ln", look, self.error[lanes])
+        slopes = np.einsum("lnf,no->lof", look[..., :2].sum(axis=1), _PROJECT[:, :2])
+        return _against(slopes, grown @ _PROJECT[:, :2]), _determinant(slopes)
+
+    def _advanced(self, at: "_Reached", size: Array, lanes: Any) -> tuple["_Reached", Flags]:
+        """Solution of P₀ = P₁ = 0 at other sizes, by Newton's steps from along the tangent.
+
+        The flags tell where it is one, on the same branch: Newton had to correct the tangent's way by less than a
+        third of it, and the determinant of the slopes has kept its sign and much of its size.
+        """
+        start = at.place + at.tangent * (size - at.size)[:, None]
+        place, done = start.copy(), np.zeros(len(start), bool)
+        with np.errstate(all="ignore"):
+            for _ in range(_NEWTON):
+                left, slopes = self._left(size, place, lanes)
+                step = _against(slopes, left[:, :2])
                 moves = np.hypot(step[:, 0], step[:, 1])
                 sound = np.isfinite(moves) & (moves < 1e9)
                 place = np.where(sound[:, None], place + step, place)
                 done = sound & (moves <= _STEP_M + _STEP * np.hypot(place[:, 0], place[:, 1]))
-            if done.all():
-                break
-        _, slopes = self._left(size, place, lanes)
-        return place, done & (np.sign(_determinant(slopes)) == orientation)
+                if done.all():
+                    break
+            tangent, determinant = self._tangent(size, place, lanes)
+            corrected = np.linalg.norm(place - start, axis=1) / (_TRIFLE_M + np.linalg.norm(start - at.place, axis=1))
+            change = determinant / at.determinant
+            found = done & (corrected < _CORRECTION) & (change > _CHANGE) & (change < 1 / _CHANGE)
+        return _Reached(size, place, tangent, determinant), found
 
     def follow(self, sizes: Array, all_or_none: bool = False) -> Responses:
         """Follow each error through its sizes.
@@ -206,7 +217,7 @@ class Lanes:
         Parameters
         ----------
         sizes : (L, S) array
-            Signed; each row starts near nothing and moves away from it.
+            Signed; each row moves away from nothing.
         all_or_none : bool
             Give up where one of them ends: all are then NaN.
 
@@ -217,42 +228,67 @@ class Lanes:
         """
         lanes, steps = sizes.shape
         places, qpe, cubic = (np.full(shape, np.nan) for shape in ((lanes, steps, 2), (lanes, steps), (lanes, steps)))
-        before, place_before = np.zeros(lanes), np.zeros((lanes, 2))
-        slope, alive = np.zeros((lanes, 2)), np.ones(lanes, bool)
+        none, nowhere = np.zeros(lanes), np.zeros((lanes, 2))
+        reached = _Reached(none, nowhere, *self._tangent(none, nowhere, slice(None)))
+        alive = np.arange(lanes)
         for step in range(steps):
-            size = sizes[:, step]
-            place, found = self._solved(size, place_before + slope * (size - before)[:, None], slice(None))
-            for lane in np.flatnonzero(alive & ~found):
-                place[lane], found[lane] = self._crept(int(lane), before[lane], size[lane], place_before[lane])
-                if all_or_none and not found[lane]:
-                    return Responses(qpe * np.nan, cubic * np.nan, places * np.nan)
-            alive &= found
-            left, _ = self._left(size, place, slice(None))
-            places[alive, step] = place[alive]
-            qpe[alive, step] = 1.5 * self.wavenumber * left[alive, 2]
-            cubic[alive, step] = 2.5 * self.wavenumber * left[alive, 3]
-            made = (size - before)[:, None]
-            with np.errstate(all="ignore"):
-                slope = np.where(made != 0, (place - place_before) / made, slope)
-            slope[~alive] = 0.0
-            place[~alive] = 0.0
-            before, place_before = size, place
+            size = sizes[alive, step]
+            arrived, found = self._advanced(reached, size, alive)
+            for index in np.flatnonzero(~found):
+                one, found[index] = self._crept(int(alive[index]), reached.only(index), size[index])
+                for whole, part in zip(arrived, one, strict=True):
+                    whole[index] = part[0]
+            if all_or_none and not found.all():
+                return Responses(qpe * np.nan, cubic * np.nan, places * np.nan)
+            alive, reached = alive[found], arrived.only(found)
+            left, _ = self._left(reached.size, reached.place, alive)
+            places[alive, step] = reached.place
+            qpe[alive, step] = 1.5 * self.wavenumber * left[:, 2]
+            cubic[alive, step] = 2.5 * self.wavenumber * left[:, 3]
         return Responses(qpe, cubic, places)
 
-    def _crept(self, lane: int, start: float, end: float, place: Array) -> tuple[Array, bool]:
+    def _crept(self, lane: int, at: "_Reached", end: float) -> tuple["_Reached", bool]:
         """Follow one lane in steps as small as it takes; False where the solution ends."""
-        at, step, only, halved = start, (end - start) / 2, [lane], 1
-        place, slope = place[None], np.zeros((1, 2))
-        while at != end:
-            target = at + step if abs(at + step - start) < abs(end - start) else end
-            found, is_found = self._solved(np.array([target]), place + slope * (target - at), only)
-            if is_found[0]:
-                slope, place, at = (found - place) / (target - at), found, target
-            elif halved >= _HALVINGS:
-                return place[0], False
+        whole = end - float(at.size[0])
+        step = whole / 2
+        while at.size[0] != end:
+            target = at.size + step
+            if abs(end - at.size[0]) <= abs(step):
+                target = np.array([end])
+            there, found = self._advanced(at, target, [lane])
+            if found[0]:
+                at, step = there, step * 1.5
+            elif abs(step) < abs(whole) * _SMALLEST:
+                return at, False
             else:
-                step, halved = step / 2, halved + 1
-        return place[0], True
+                step /= 2
+        return at, True
+
+
+class _Reached(NamedTuple):
+    """Where the lanes are: size (L,), place (L, 2), how that moves with size (L, 2), determinant of slopes (L,)."""
+
+    size: Array
+    place: Array
+    tangent: Array
+    determinant: Array
+
+    def only(self, lanes: Any) -> "_Reached":
+        """Some of them; of a number that one."""
+        lanes = [lanes] if np.ndim(lanes) == 0 else lanes
+        return _Reached(*(of[lanes] for of in self))
+
+
+def _against(slopes: Array, residual: Array) -> Array:
+    """Step (L, 2) on the ground that takes a residual of P₀ and P₁ (L, 2) away, to first order."""
+    determinant = _determinant(slopes)
+    return -np.stack(
+        [
+            (slopes[:, 1, 1] * residual[:, 0] - slopes[:, 0, 1] * residual[:, 1]) / determinant,
+            (slopes[:, 0, 0] * residual[:, 1] - slopes[:, 1, 0] * residual[:, 0]) / determinant,
+        ],
+        axis=1,
+    )
 
 
 def _determinant(slopes: Array) -> Array:

@@ -19,6 +19,7 @@ from bisar_budget.budget.findings import Row
 from bisar_budget.budget.judgement import judged
 from bisar_budget.budget.models import CUBIC, LOCATION, QUADRATIC, Declared
 from bisar_budget.budget.pull_in import caps, needed_sentence
+from bisar_budget.budget.vibration import slow_phases
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.model import Mission
@@ -38,6 +39,7 @@ class Together:
         self.found: Mapping[str, Declared] = analysis.declared(model)
         self.stated = analysis.stated
         self.motion = [source for source in self.stated if source.is_motion]
+        self.slow = slow_phases(analysis.mission)
 
     def members(self, allocation: Allocation, owner: str) -> list[ErrorSource]:
         """Those that count against the share of an owner; against the mission's all."""
@@ -47,15 +49,37 @@ class Together:
         """Quadratic phase of each, signed. [rad]"""
         return [(source.id, self.found[source.id].qpe) for source in members]
 
+    def owed(self, allocation: Allocation, owner: str) -> Phases:
+        """Quadratic phases that count against the share of an owner, those of slow vibrations too. [rad]"""
+        slow = [s for s in self.slow if owner == "mission" or allocation.qpe.includes(s.owner, owner)]
+        return [*self.phases(self.members(allocation, owner)), *((s.row_id, s.qpe_rad) for s in slow)]
+
+    def all_cubics(self) -> Phases:
+        """Cubic phases of motion, the clock and slow vibrations. [rad]"""
+        return [*self.cubics(), *((s.row_id, s.cubic_rad) for s in self.slow)]
+
     def cubics(self) -> Phases:
         """Cubic phase of each error that moves something, signed. [rad]"""
         return [(source.id, self.found[source.id].cubic) for source in self.motion]
 
-    def moves(self) -> Moves | None:
-        """Displacement of each by its worse sign; None where one has none. [m]"""
-        moves = [(source.id, self.found[source.id].farthest) for source in self.motion]
-        known = [(row_id, move) for row_id, move in moves if move is not None]
-        return known if len(known) == len(moves) and moves else None
+    def moves(self, rule: str) -> Moves | None:
+        """Displacement of each, to be combined by a rule; None where one has none. [m]
+
+        By the sign that moves farther. For a sum over all signs half of what lies between the two signs, and once the
+        rest, which all signs have in common.
+        """
+        moves: Moves = []
+        rest = (0.0, 0.0)
+        for source in self.motion:
+            found = self.found[source.id]
+            if found.displacement is None or found.opposite is None or found.farthest is None:
+                return None
+            (x, y), (u, v) = found.displacement, found.opposite
+            moves.append((source.id, found.farthest if rule != "sum" else ((x - u) / 2, (y - v) / 2)))
+            rest = (rest[0] + (x + u) / 2, rest[1] + (y + v) / 2)
+        if rule == "sum" and any(rest):
+            moves.append(("whatever the signs", rest))
+        return moves or None
 
 
 def aggregate_rows(analysis: Analysis, model: Model, other: Model, allocation: Allocation) -> Iterator[Row]:
@@ -88,9 +112,8 @@ def _qpe_rows(analysis: Analysis, mine: Together, theirs: Together, allocation: 
     if allocation.qpe.clock is not None:
         owners.insert(2, "clock")  # else it counts with the receiver
     for owner in owners:
-        members = mine.members(allocation, owner)
-        phases, others = mine.phases(members), theirs.phases(members)
-        qpe, by_other = (combined_phase(of, combine, groups) if members else None for of in (phases, others))
+        phases, others = mine.owed(allocation, owner), theirs.owed(allocation, owner)
+        qpe, by_other = (combined_phase(of, combine, groups) if of else None for of in (phases, others))
         published, full = (qpe, by_other) if mine.model.name == "published" else (by_other, qpe)
         limit = allocation.qpe_limit(owner) * gain
         over = ""
@@ -121,12 +144,14 @@ def _qpe_rows(analysis: Analysis, mine: Together, theirs: Together, allocation: 
 
 def _qpe_of_all(analysis: Analysis, mine: Together, allocation: Allocation) -> Iterator[Row]:
     """Where each error stands alone: a warning if all together, by root-sum-square, exceed the total."""
-    mission, phases = analysis.mission, mine.phases(mine.stated)
+    mission, phases = analysis.mission, mine.owed(allocation, "mission")
     limit = allocation.qpe_total * allocation.autofocus_gain
     warning = _of_all("QPE", combined_phase(phases, "rss", analysis.groups), limit, "rad")
     if not warning:
         return
     largest = combined_phase(phases, "each", analysis.groups)
+    if largest > limit * (1 + UTILIZATION_TOLERANCE):
+        return  # its own row says so
     yield _judged(
         mission,
         id="mission.quadratic_phase_error",
@@ -137,7 +162,6 @@ def _qpe_of_all(analysis: Analysis, mine: Together, allocation: Allocation) -> I
         path=("platforms",),
         equation="largest of the rows",
         gain=allocation.autofocus_gain,
-        over=_exceeded("QPE", largest, limit, "rad", lambda: phases),
         doubt=warning,
         limits=(limit, limit),
     )
@@ -146,8 +170,8 @@ def _qpe_of_all(analysis: Analysis, mine: Together, allocation: Allocation) -> I
 def _cubic_row(analysis: Analysis, mine: Together, theirs: Together) -> Row:
     mission, groups = analysis.mission, analysis.groups
     combine, limit = mission.allocation.combine, mission.requirements.cubic_phase_error
-    phases = mine.cubics()
-    cubic, by_other = (combined_phase(of, combine, groups) if of else None for of in (phases, theirs.cubics()))
+    phases = mine.all_cubics()
+    cubic, by_other = (combined_phase(of, combine, groups) if of else None for of in (phases, theirs.all_cubics()))
     over = _exceeded("cubic phase", cubic, limit, "rad", lambda: phase_parts(phases, combine, groups))
     doubt = _doubt(theirs.model, by_other, limit, "rad")
     if combine == "each":
@@ -173,7 +197,7 @@ def _cubic_row(analysis: Analysis, mine: Together, theirs: Together) -> Row:
 def _location_row(analysis: Analysis, mine: Together, theirs: Together) -> Row:
     mission, groups = analysis.mission, analysis.groups
     combine, limit = mission.allocation.combine, mission.requirements.location_error
-    moves, others = mine.moves(), theirs.moves()
+    moves, others = mine.moves(combine), theirs.moves(combine)
     moved, by_other = (None if of is None else combined_displacement(of, combine, groups) for of in (moves, others))
     doubt = _doubt(theirs.model, by_other, limit, "m")
     if combine == "each" and moves is not None:
@@ -208,10 +232,8 @@ def _location_row(analysis: Analysis, mine: Together, theirs: Together) -> Row:
 
 
 def _pull_in_row(analysis: Analysis, mine: Together, theirs: Together, pull_in: float) -> Row:
-    phases = mine.phases(mine.stated)
-    total, by_other = (
-        math.fsum(abs(phase) for _, phase in of) if of else None for of in (phases, theirs.phases(theirs.stated))
-    )
+    phases, others = (one.owed(analysis.allocation, "mission") for one in (mine, theirs))
+    total, by_other = (math.fsum(abs(phase) for _, phase in of) if of else None for of in (phases, others))
     return _judged(
         analysis.mission,
         id="mission.autofocus_pull_in",
@@ -272,5 +294,3 @@ def _said(size: float, unit: str) -> str:
     if not math.isfinite(size):
         return "without a value (no ground point has this range history)"
     return format_quantity(size, unit) if unit == "m" else f"{size:.3g} {unit}"
-
-

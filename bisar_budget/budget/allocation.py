@@ -86,9 +86,7 @@ def _divide_power(split: object) -> Split:
     return _split(split) if isinstance(split, Shares) else EQUAL  # `balanced` weighs phase, not power
 
 
-def _divide(
-    split: object, mission: Mission, stated: Sequence[ErrorSource], phases: Mapping[str, float]
-) -> Split:
+def _divide(split: object, mission: Mission, stated: Sequence[ErrorSource], phases: Mapping[str, float]) -> Split:
     if isinstance(split, Shares):
         return _split(split)
     if split != "balanced":

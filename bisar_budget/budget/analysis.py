@@ -74,8 +74,9 @@ class Analysis:
     @cached_property
     def allocation(self) -> Allocation:
         """Budgets as divided; `balanced` weighs phases by the gating model, under `strictest` the larger of both."""
-        names = {"published": (self.published,), "full": (self.full,)}
-        models: tuple[Model, ...] = names.get(self.mission.allocation.model, (self.published, self.full))
+        gating = self.mission.allocation.model
+        both: tuple[Model, ...] = (self.published, self.full)
+        models = [model for model in both if gating in (model.name, "strictest")]
         phases = {
             source.id: max((self.declared(model)[source.id].qpe for model in models), key=abs)
             for source in self.stated

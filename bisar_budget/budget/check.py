@@ -5,7 +5,6 @@ from collections.abc import Iterator, Sequence
 from datetime import date
 from typing import TYPE_CHECKING, NamedTuple
 
-from bisar_budget.budget import vibration
 from bisar_budget.budget.aggregates import aggregate_rows
 from bisar_budget.budget.allocation import Allocation
 from bisar_budget.budget.analysis import Analysis
@@ -14,7 +13,10 @@ from bisar_budget.budget.correlation import unused_correlations
 from bisar_budget.budget.error_rows import error_rows
 from bisar_budget.budget.findings import READING, FileWarning, MissionFindings, Resolution, Row
 from bisar_budget.budget.judgement import judged
+from bisar_budget.budget.orbit import straight_orbits
 from bisar_budget.budget.pull_in import pull_in_caps
+from bisar_budget.budget.required import with_required
+from bisar_budget.budget.vibration import vibration_rows
 from bisar_budget.budget.waivers import apply_waivers
 from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
 from bisar_budget.mission.model import Mission
@@ -45,7 +47,7 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
         checked = stricter(_checked(analysis, "published"), _checked(analysis, "full"))
     else:
         checked = _checked(analysis, gating)
-    rows, warnings = apply_waivers(checked.rows, mission, today)
+    rows, warnings = apply_waivers(with_required(checked.rows, mission), mission, today)
     geometry = analysis.geometry
     resolution = Resolution(
         range=geometry.range_resolution(mission.radar.bandwidth, SPEED_OF_LIGHT),
@@ -69,11 +71,13 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
             *_unknown_requirement_ids(mission, rows),
             *warnings,
             *_unused_correlations(mission),
+            *straight_orbits(mission),
             *pull_in_caps(mission, resolution),
             *_nothing_declared(rows),
         ),
         scene=checked.scene,
         notes=(*collection_notes(analysis), *_unused_keys(mission)),
+        document=mission.document,
     )
 
 
@@ -90,7 +94,7 @@ def _checked(analysis: Analysis, gating: str) -> _Checked:
     allocation = analysis.allocation
     rows = [
         *error_rows(analysis, model, other, allocation),
-        *_vibration_rows(mission, allocation, gating),
+        *vibration_rows(mission, allocation, gating),
         *aggregate_rows(analysis, model, other, allocation),
     ]
     scene = None
@@ -111,32 +115,6 @@ def stricter(published: _Checked, full: _Checked) -> _Checked:
 def _strictness(row: Row) -> tuple[int, float, float]:
     allowable = math.inf if row.allowable is None else row.allowable
     return (-READING.index(row.status), row.utilization or 0.0, -allowable)
-
-
-def _vibration_rows(mission: Mission, allocation: Allocation, model: str) -> Iterator[Row]:
-    mission = mission._replace(allocation=mission.allocation._replace(model=model))
-    for case in vibration.cases(mission, allocation):
-        allowed = case.limits
-        yield judged(
-            mission,
-            id=case.id,
-            metric=case.metric,
-            unit="m",
-            declared=case.declared,
-            allowable=None if allowed is None else allowed.by(model),
-            path=case.path,
-            equation=case.equation,
-            no_limit=case.missing,
-            not_evaluated=case.not_evaluated,
-            is_declared=case.declared is not None,
-            over=case.over,
-            doubt=case.doubt,
-            limits=allowed or (None, None),
-            qpe_full=case.qpe,
-            evidence=case.evidence,
-            notes=case.notes,
-            published_margin_db=None if allowed is None else allowed.margin_db,
-        )
 
 
 def _scene_row(analysis: Analysis, model: str, allocation: Allocation) -> tuple["SceneEdge | None", Row]:

@@ -1,6 +1,5 @@
 """What a collection's geometry does to what a report says of it."""
 
-import math
 from collections.abc import Iterator
 
 from bisar_budget.budget.analysis import Analysis

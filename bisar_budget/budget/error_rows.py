@@ -47,9 +47,7 @@ def error_rows(analysis: Analysis, model: Model, other: Model, allocation: Alloc
         limit = limits[source.owner]
         allowed = allowed_by(analysis, model, source, limit)
         allowed_other = allowed_by(analysis, other, source, limit)
-        published, full = (
-            (allowed, allowed_other) if model.name == "published" else (allowed_other, allowed)
-        )
+        published, full = (allowed, allowed_other) if model.name == "published" else (allowed_other, allowed)
         declared = None if source.declared is None else abs(source.declared)
         info = over = doubt = ""
         qpe_published = qpe_full = cubic = displacement = None
@@ -155,7 +153,11 @@ def _over(
 
 
 def _phase(phase: float) -> str:
-    return f"{abs(phase):.3g} rad" if math.isfinite(phase) else "without a value (no ground point has this range history)"
+    return (
+        f"{abs(phase):.3g} rad"
+        if math.isfinite(phase)
+        else "without a value (no ground point has this range history)"
+    )
 
 
 def _doubt(
@@ -174,7 +176,8 @@ def _doubt(
     requirements = analysis.mission.requirements
     says = f"the {other.name} model says fail"
     if allowed.binding == CUBIC and requirements.cubic_phase_error is not None:
-        return f"{says}: cubic phase {_phase(theirs.cubic)}, {format_limit(requirements.cubic_phase_error, 'rad')} allowed"
+        allows = format_limit(requirements.cubic_phase_error, "rad")
+        return f"{says}: cubic phase {_phase(theirs.cubic)}, {allows} allowed"
     if allowed.binding == LOCATION and requirements.location_error is not None:
         moved = "out of sight" if theirs.farthest is None else format_quantity(math.hypot(*theirs.farthest), "m")
         return f"{says}: displacement {moved}, {format_limit(requirements.location_error, 'm')} allowed"

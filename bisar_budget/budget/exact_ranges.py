@@ -110,7 +110,7 @@ class ExactRanges:
 
     @cached_property
     def plane(self) -> ImagePlane:
-        """Q⁻¹: from the constant [m] and linear [m/s] part of a range error to the displacement. ZeroDivisionError if none."""
+        """Q⁻¹: from the constant [m] and the linear part [m/s] of a range error to the displacement."""
         (s_x, rate_x, *_), (s_y, rate_y, *_) = self._gradient
         rate_x, rate_y = rate_x / self.half, rate_y / self.half
         return ImagePlane(((-rate_y, s_y), (rate_x, -s_x)), s_x * rate_y - s_y * rate_x, "")
@@ -131,7 +131,7 @@ class ExactRanges:
         return tuple(_sum(weights, samples) for weights in self.fit)
 
     def motion_effects(self) -> dict[str, list[Effect]]:
-        """Effects of a small unit error of each platform: position, velocity, acceleration along x, y, z, nine each."""
+        """Effects of a small unit error of each platform, nine: position, velocity, acceleration along x, y, z."""
         found = {}
         for name in PLATFORMS:
             at_nodes = [
@@ -226,7 +226,9 @@ class ExactRanges:
             recorded = [whole + size * metres for whole, metres in zip(recorded, self.shape(source), strict=True)]
         east, north = place
         return [
-            whole - sqrt((x - east) ** 2 + (y - north) ** 2 + z * z) - sqrt((u - east) ** 2 + (v - north) ** 2 + w * w)
+            whole
+            - sqrt((x - east) ** 2 + (y - north) ** 2 + z * z)
+            - sqrt((u - east) ** 2 + (v - north) ** 2 + w * w)
             for whole, (x, y, z), (u, v, w) in zip(recorded, *measured.values(), strict=True)
         ]
 
@@ -289,10 +291,18 @@ class ExactRanges:
                     return None
                 return ExactPhases(
                     (east, north),
-                    self.k * (sum(map(mul, quadratic, left)) + sum(map(mul, quadratic, by_east)) * step_east
-                              + sum(map(mul, quadratic, by_north)) * step_north),
-                    self.k * (sum(map(mul, cubic, left)) + sum(map(mul, cubic, by_east)) * step_east
-                              + sum(map(mul, cubic, by_north)) * step_north),
+                    self.k
+                    * (
+                        sum(map(mul, quadratic, left))
+                        + sum(map(mul, quadratic, by_east)) * step_east
+                        + sum(map(mul, quadratic, by_north)) * step_north
+                    ),
+                    self.k
+                    * (
+                        sum(map(mul, cubic, left))
+                        + sum(map(mul, cubic, by_east)) * step_east
+                        + sum(map(mul, cubic, by_north)) * step_north
+                    ),
                 )
             if not step < 1e30:
                 return None
@@ -302,9 +312,7 @@ class ExactRanges:
 def _track(state: PlatformState, times: Samples, east: float, north: float) -> Track:
     (x, y, z), (u, v, w), (a, b, c) = state.position, state.velocity, state.acceleration
     x, y = x - east, y - north
-    return [
-        (x + tau * (u + tau * a / 2), y + tau * (v + tau * b / 2), z + tau * (w + tau * c / 2)) for tau in times
-    ]
+    return [(x + tau * (u + tau * a / 2), y + tau * (v + tau * b / 2), z + tau * (w + tau * c / 2)) for tau in times]
 
 
 def _sum(weights: Samples, samples: Samples) -> float:

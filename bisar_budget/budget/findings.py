@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from bisar_budget.budget.allocation import Allocation
 from bisar_budget.errors import Fault
 from bisar_budget.geometry import BistaticGeometry, GroundVector
-from bisar_budget.mission.model import Mission
+from bisar_budget.mission.model import Document, Mission
 
 if TYPE_CHECKING:
     from bisar_budget.budget.images import ImageEvidence, Verdict
@@ -25,12 +25,12 @@ _RANK = {status: index for index, status in enumerate(READING)}
 class Row(NamedTuple):
     """One line of the budget. Numbers in SI and radians; None where a value does not exist.
 
-    `is_independent` marks the rows that sums run over: errors as the file states them. Along the scene's
-    axes an error stated in another frame is shown again, but not counted again. `qpe_exact_rad` is the phase by exact
-    ranges, of errors beyond first order; `published_margin_db` how far the published rule of a vibration stays inside
-    first principles. `binding_requirement` is the requirement that sets `allowable`, `cubic_rad` the magnitude of the
-    declared error's cubic phase at the aperture edge, `islr_db` the ISLR that a declared random error adds, `model` the one whose numbers
-    these are.
+    `is_independent` marks the rows that sums run over: errors as the file states them. Along the scene's axes an
+    error stated in another frame is shown again, but not counted again. `qpe_exact_rad` is `qpe_full_rad`, which is
+    that of exact ranges; `published_margin_db` how far the published rule of a vibration stays inside first
+    principles. `binding_requirement` is the requirement that sets `allowable`, `cubic_rad` the magnitude of the
+    declared error's cubic phase at the aperture edge, `islr_db` the ISLR that a declared random error adds, `model`
+    the one whose numbers these are.
     """
 
     id: str
@@ -62,10 +62,14 @@ class Row(NamedTuple):
 
 
 class FileWarning(NamedTuple):
-    """Something about the mission file that changes no verdict but should not go unsaid."""
+    """Something about the mission file that should not go unsaid.
+
+    Most change no verdict. One that `is_doubt` puts in doubt what was checked: the status is `warn` at least.
+    """
 
     line: int | None
     message: str
+    is_doubt: bool = False
 
 
 class Resolution(NamedTuple):
@@ -101,12 +105,23 @@ class MissionFindings(NamedTuple):
     is_unverified: bool = False  # images were asked for, and none gave a verdict
     image_evidence: "tuple[ImageEvidence, ...]" = ()  # a few of those images, where a report shows them
     monte_carlo: "MonteCarlo | None" = None  # if errors were drawn
+    document: Document = Document()
+
+    @property
+    def is_empty(self) -> bool:
+        """The file declares no error at all: nothing was judged."""
+        return all(row.status == "not_declared" for row in self.rows)
 
     @property
     def status(self) -> str:
-        """Worst status of the rows; no better than `not_evaluated` if images were formed and verified nothing."""
-        doubt = ["not_evaluated"] if self.is_unverified else []
-        return worst([*(row.status for row in self.rows), *doubt])
+        """Worst status of the rows and of what is doubtful about the whole.
+
+        No better than `not_evaluated` if nothing was judged, or if images were formed and verified nothing; no better
+        than `warn` if a warning doubts what was checked.
+        """
+        doubts = ["not_evaluated"] if self.is_unverified or self.is_empty else []
+        doubts += ["warn" for warning in self.warnings if warning.is_doubt]
+        return worst([*(row.status for row in self.rows), *doubts])
 
     @property
     def summary(self) -> dict[str, int]:

@@ -1,8 +1,9 @@
 """Monte Carlo: errors drawn from their declared distributions, and how often each requirement then holds.
 
 The referee of root-sum-square and worst case. All declared errors are drawn at once, their effects by the full model
-add, and the magnitude of the sum is held to the requirement. The full model is linear in the errors, so a draw is a
-sum of standard variables times effects; a covariance is six of them, along the axes of its correlation matrix.
+add, and the magnitude of the sum is held to the requirement. Of small errors a draw is a sum of standard variables
+times effects, of large ones it goes through exact ranges (`draws`); a covariance is six variables, along the axes of
+its correlation matrix.
 
 Draws come from the distributions themselves: the coverage factor, which makes bounds of sigmas, has no part in them.
 Vibration is not drawn: its amplitude is declared and its limits are those of echoes.
@@ -12,11 +13,12 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from bisar_budget.budget.allocation import Allocation, allocate
-from bisar_budget.budget.correlation import Correlated, combined_displacement, combined_phase, correlated_errors
-from bisar_budget.budget.draws import BLOCK, Counted, Judged, Variable, count
-from bisar_budget.budget.effects import PLATFORMS, ErrorSource, FullGround, full_ground
-from bisar_budget.budget.sources import error_sources
+from bisar_budget.budget.aggregates import Together
+from bisar_budget.budget.allocation import Allocation
+from bisar_budget.budget.analysis import Analysis
+from bisar_budget.budget.correlation import combined_displacement, combined_phase
+from bisar_budget.budget.draws import Judged, Variable, count
+from bisar_budget.budget.effects import PLATFORMS, ErrorSource, ImagePlane
 from bisar_budget.constants import MAX_DRAWS
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.mission.symmetric import eigensystem
@@ -28,7 +30,6 @@ _SURE_QUANTILE = 3.2905267314919255  # at 99.95 %: a warning is not to be chance
 _MATERIAL = 0.1  # of the probability to fail: a difference that is sure but smaller changes nobody's mind
 
 _DIGITS = 9  # of sampled sigmas: further ones differ between processors, and mean nothing
-_BEYOND = 0.01  # share of draws beyond first order from which that is said
 _ANGLES = 4096  # of a mean over a circle of a smooth function
 
 
@@ -61,7 +62,7 @@ class Requirement(NamedTuple):
 class MonteCarlo(NamedTuple):
     """What the draws say. `probability` is that all requirements hold at once; None without a requirement.
 
-    `beyond_first_order` is the share of draws whose second-order phase is above 2 % or 0.02 rad, of the first block.
+    `is_exact` says that every draw went through exact ranges: the errors are too large for sums of effects.
     """
 
     draws: int
@@ -72,7 +73,7 @@ class MonteCarlo(NamedTuple):
     probability: float | None
     probability_low: float | None
     probability_high: float | None
-    beyond_first_order: float
+    is_exact: bool
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
 
@@ -98,16 +99,11 @@ def monte_carlo(mission: Mission, draws: int, seed: int | None = None) -> MonteC
         raise ValueError(f"the number of draws must be from 1 to {MAX_DRAWS}, not {draws}")
     if seed is None:
         seed = (mission.simulation or Simulation()).seed
-    geometry = mission.geometry
-    ground = full_ground(mission, geometry)
-    sources = error_sources(mission, geometry, ground)
-    declared = [source for source in sources if source.declared is not None and source.is_independent]
-    groups = correlated_errors(mission)
-    allocation = allocate(mission, sources)
-    variables = list(_variables(mission, declared, groups, ground))
-    judged = list(_requirements(mission, allocation, declared))
-    counted = count(mission, geometry, ground, variables, judged, draws, seed)
-    predictions = _Predictions(mission, ground, variables, declared, groups)
+    analysis = Analysis(mission)
+    variables = list(_variables(analysis))
+    judged = list(_requirements(mission, analysis.allocation, analysis.stated))
+    counted = count(analysis, variables, judged, draws, seed)
+    predictions = _Predictions(analysis, variables)
     requirements = tuple(
         _requirement(one, holds, mean_square, draws, predictions)
         for one, holds, mean_square in zip(judged, counted.holds, counted.mean_squares, strict=True)
@@ -122,9 +118,9 @@ def monte_carlo(mission: Mission, draws: int, seed: int | None = None) -> MonteC
         probability=counted.all_hold / draws if judged else None,
         probability_low=low,
         probability_high=high,
-        beyond_first_order=counted.beyond_first_order,
-        warnings=tuple(_warnings(counted, draws)),
-        notes=tuple(_notes(mission, declared)),
+        is_exact=counted.is_exact,
+        warnings=(),
+        notes=tuple(_notes(mission, analysis.stated, counted.is_exact)),
     )
 
 
@@ -137,32 +133,31 @@ def _distribution(mission: Mission, source: ErrorSource) -> str:
     return "normal" if source.owner == "clock" else "bound"
 
 
-def _variables(
-    mission: Mission, declared: Sequence[ErrorSource], groups: Sequence[Correlated], ground: FullGround
-) -> Iterator[Variable]:
+def _variables(analysis: Analysis) -> Iterator[Variable]:
+    mission, plane = analysis.mission, analysis.full.plane
     factor = mission.allocation.coverage_factor
-    left = {source.id: source for source in declared}
-    for group in groups:
+    left = {source.id: source for source in analysis.stated}
+    for group in analysis.groups:
         members = [left.pop(row_id) for row_id in group.ids]
         values, vectors = eigensystem(group.correlation)
         for index, value in enumerate(values):
             # To six decimals a correlation matrix may have an eigenvalue just below zero.
             scale = math.sqrt(max(0.0, value)) / factor
             parts = [(s, (s.declared or 0.0) * vectors[i][index] * scale) for i, s in enumerate(members)]
-            yield _variable(f"{group.id}.{index}", group.platform, "normal", parts, ground)
+            yield _variable(f"{group.id}.{index}", group.platform, "normal", parts, plane)
     for source in left.values():
         distribution = _distribution(mission, source)
         is_covered = source.owner != "mission" or source.id.startswith("common.")
         size = abs(source.declared or 0.0) / (factor if is_covered else 1.0)
         if distribution == "uniform":
             size /= math.sqrt(3)  # the standard uncertainty of ±a, GUM 4.3.7
-        yield _variable(source.id, source.owner, distribution, [(source, size)], ground)
+        yield _variable(source.id, source.owner, distribution, [(source, size)], plane)
 
 
 def _variable(
-    id: str, owner: str, distribution: str, parts: Sequence[tuple[ErrorSource, float]], ground: FullGround
+    id: str, owner: str, distribution: str, parts: Sequence[tuple[ErrorSource, float]], plane: ImagePlane
 ) -> Variable:
-    moves = [ground.plane.displacement(source.full, size) or (0.0, 0.0) for source, size in parts]
+    moves = [plane.displacement(source.full, size) or (0.0, 0.0) for source, size in parts]
     effects = (
         math.fsum(source.full.qpe * size for source, size in parts),
         math.fsum(source.full.cubic * size for source, size in parts),
@@ -197,27 +192,18 @@ def _requirements(mission: Mission, allocation: Allocation, declared: Sequence[E
 class _Predictions:
     """What needs no draws: combinations by the rules of `check`, standard uncertainties, the normal distribution."""
 
-    def __init__(
-        self,
-        mission: Mission,
-        ground: FullGround,
-        variables: Sequence[Variable],
-        declared: Sequence[ErrorSource],
-        groups: Sequence[Correlated],
-    ) -> None:
-        self.mission, self.ground = mission, ground
-        self.variables, self.declared, self.groups = variables, declared, groups
+    def __init__(self, analysis: Analysis, variables: Sequence[Variable]) -> None:
+        self.together, self.variables = Together(analysis, analysis.full), variables
 
     def combined(self, judged: Judged, rule: str) -> float:
         """What a rule of `allocation.combine` holds to the limit, coverage factor included."""
-        members = [source for source in self.declared if source.owner in judged.owners]
+        together = self.together
         if judged.columns == (0,):
-            return combined_phase(members, "qpe", "full", rule, self.groups)
-        motion = [source for source in members if source.is_motion]
+            members = [source for source in together.stated if source.owner in judged.owners]
+            return combined_phase(together.phases(members), rule, together.groups)
         if judged.columns == (1,):
-            return combined_phase(motion, "cubic", "full", rule, self.groups)
-        moves = [(s.id, self.ground.plane.displacement(s.full, s.declared or 0.0) or (0.0, 0.0)) for s in motion]
-        return combined_displacement(moves, rule, self.groups)
+            return combined_phase(together.cubics(), rule, together.groups)
+        return combined_displacement(together.moves(rule) or [], rule, together.groups)
 
     def variances(self, judged: Judged) -> dict[str, float]:
         """Variance that each error, or each covariance, brings."""
@@ -322,17 +308,10 @@ def _doubts(found: Requirement, holds: int, draws: int, predictions: _Prediction
         )
 
 
-def _warnings(counted: Counted, draws: int) -> Iterator[str]:
-    if counted.beyond_first_order > _BEYOND and counted.holds_with_second_order is not None:
-        share, held = 100 * counted.beyond_first_order, 100 * counted.holds_with_second_order
-        yield (
-            f"{share:.3g} % of the first {min(draws, BLOCK)} draws leave the first order; with the second order "
-            f"mission.quadratic_phase_error holds in {held:.4g} % of them"
-        )
-
-
-def _notes(mission: Mission, declared: Sequence[ErrorSource]) -> Iterator[str]:
+def _notes(mission: Mission, declared: Sequence[ErrorSource], is_exact: bool) -> Iterator[str]:
     """Say what is drawn by a rule of ours, and what is not drawn."""
+    if is_exact:
+        yield "every draw goes through exact ranges: the declared errors are too large for sums of their effects"
     if mission.allocation.model != "full":
         yield f"drawn by the full model; the rows are judged by allocation.model, {mission.allocation.model}"
     if mission.allocation.combine == "each":

@@ -44,9 +44,7 @@ def error_sources(
     return sources
 
 
-def _motion(
-    mission: Mission, name: str, state: PlatformState, full_effects: list[Effect]
-) -> Iterator[ErrorSource]:
+def _motion(mission: Mission, name: str, state: PlatformState, full_effects: list[Effect]) -> Iterator[ErrorSource]:
     wavelength, T = mission.radar.wavelength, mission.collection.aperture_time
     rows = evaluators.published_motion(*state.position, *state.velocity, state.slant_range, wavelength, T)
     error: MotionError = getattr(mission.platforms, name).motion_error

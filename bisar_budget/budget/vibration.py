@@ -9,6 +9,9 @@ their echoes add in amplitude in the worst phase, so that amplitudes are divided
 power set; where the motions are noise, which is independent from platform to platform, variances add and powers are
 divided. The paper's rule, φ² ≤ PSLR·share and σ² ≤ ISLR·share, stays 3 dB inside the first at equal shares and equals
 the second where σ² is small; the same noise on both platforms would add 3 dB.
+
+Slower than one cycle per aperture a vibration makes no echoes: it is a quadratic and a cubic phase of unknown sign and
+size up to its worst phase, and is judged as one. Between one and three cycles it is both, and counts as echoes.
 """
 
 import math
@@ -18,11 +21,16 @@ from typing import NamedTuple
 
 from bisar_budget import evaluators
 from bisar_budget.budget.allocation import Allocation, Split
+from bisar_budget.budget.echoes import NEAR_CYCLES, SLOWEST, near_lines, worst_phases
 from bisar_budget.budget.effects import PLATFORMS
+from bisar_budget.budget.findings import Row
+from bisar_budget.budget.judgement import judged
+from bisar_budget.budget.models import CUBIC, QUADRATIC
+from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.errors import KeyPath
 from bisar_budget.geometry import FRAME_AXES, PlatformState, Vector, dot, without_rounding
-from bisar_budget.mission.model import Mission, MotionError, Sinusoid
+from bisar_budget.mission.model import Mission, MotionError
 from bisar_budget.units import format_limit, format_quantity
 
 ECHO_CYCLES = 3.0  # per aperture; below, echoes lie beside the mainlobe and the motion is a quadratic phase as well
@@ -47,10 +55,11 @@ class VibrationLimits(NamedTuple):
 
 
 class VibrationCase(NamedTuple):
-    """One row to be judged: a line, lines that share a frequency, or the noise of a platform.
+    """One row to be judged: a line, lines near each other, or the noise of a platform.
 
-    `declared` and the limits are along the line of sight [m]; `qpe` is the worst-phase quadratic phase [rad], where
-    the motion is slow enough to have one. The texts are those of a row.
+    `declared` and the limits are along the line of sight [m]; `qpe` and `cubic` are the worst-phase quadratic and cubic
+    phases [rad], where the motion is slow enough to have them; `islr_db` is what noise adds [dB]. The texts are those
+    of a row.
     """
 
     id: str
@@ -66,6 +75,17 @@ class VibrationCase(NamedTuple):
     evidence: str | None
     notes: tuple[str, ...]
     qpe: float | None = None
+    cubic: float | None = None
+    islr_db: float | None = None
+
+
+class SlowPhase(NamedTuple):
+    """A vibration below one cycle per aperture: row id, platform, worst-phase QPE and cubic phase. [rad]"""
+
+    row_id: str
+    owner: str
+    qpe_rad: float
+    cubic_rad: float
 
 
 def along_line_of_sight(value: float | Vector, error: MotionError, state: PlatformState, metric: str) -> float:
@@ -155,17 +175,136 @@ def power_share(split: Split, name: str) -> float:
     return math.sqrt(split.of(name))
 
 
-def cases(mission: Mission, allocation: Allocation) -> Iterator[VibrationCase]:
-    """Every row about vibration, declared or not, in the order of the contract."""
+def vibration_rows(mission: Mission, allocation: Allocation, model: str) -> Iterator[Row]:
+    """Every row about vibration, declared or not, in the order of the contract, by the `published` or `full` model."""
+    mission = mission._replace(allocation=mission.allocation._replace(model=model))
     sinusoidal, wideband = (vibration_limits(mission, allocation, metric) for metric in ("pslr", "islr"))
+    T = mission.collection.aperture_time
     lines = {name: lines_of(mission, name) for name in PLATFORMS}
+    joint = _of_both_platforms(mission, lines)
     for name in PLATFORMS:
         error: MotionError = getattr(mission.platforms, name).motion_error
         for index, line in enumerate(lines[name] or (None,)):
-            yield _line(mission, allocation, sinusoidal.get(name), name, index, line, lines)
-        for index, members in enumerate(shared_frequencies(lines[name], mission.collection.aperture_time)):
-            yield _together(mission, sinusoidal.get(name), name, index, [lines[name][m] for m in members], members)
-        yield _noise(mission, wideband.get(name), name, error)
+            if line is not None and line.frequency * T < SLOWEST:
+                yield _slow_row(mission, allocation, name, index, line)
+            else:
+                both = joint.get((name, index), _Together())
+                yield _row(mission, _line(mission, allocation, sinusoidal.get(name), name, index, line, both), model)
+        for index, members in enumerate(near_lines([line.frequency * T for line in lines[name]])):
+            near = [lines[name][member] for member in members]
+            yield _row(mission, _together(mission, sinusoidal.get(name), name, index, near, members), model)
+        yield _row(mission, _noise(mission, wideband.get(name), name, error), model)
+
+
+def _row(mission: Mission, case: VibrationCase, model: str) -> Row:
+    allowed = case.limits
+    row = judged(
+        mission,
+        id=case.id,
+        metric=case.metric,
+        unit="m",
+        declared=case.declared,
+        allowable=None if allowed is None else allowed.by(model),
+        path=case.path,
+        equation=case.equation,
+        no_limit=case.missing,
+        not_evaluated=case.not_evaluated,
+        is_declared=case.declared is not None,
+        over=case.over,
+        doubt=case.doubt,
+        limits=allowed or (None, None),
+        qpe_full=case.qpe,
+        evidence=case.evidence,
+        notes=case.notes,
+        published_margin_db=None if allowed is None else allowed.margin_db,
+    )
+    if case.cubic is None and case.islr_db is None:
+        return row
+    return row._replace(cubic_rad=case.cubic, islr_db=case.islr_db)
+
+
+def slow_phases(mission: Mission) -> list[SlowPhase]:
+    """Phases of the declared vibrations below one cycle per aperture, which count with those of other errors."""
+    T = mission.collection.aperture_time
+    found = []
+    for name in PLATFORMS:
+        for index, line in enumerate(lines_of(mission, name)):
+            cycles = line.frequency * T
+            if cycles < SLOWEST:
+                phase = 2 * math.pi * line.amplitude / mission.radar.wavelength
+                row_id = f"{name}.vibration.sinusoidal.{index}"
+                found.append(SlowPhase(row_id, name, phase * quadratic_part(cycles), phase * cubic_part(cycles)))
+    return found
+
+
+class SlowLimits(NamedTuple):
+    """Amplitudes at which a slow vibration reaches a platform's quadratic and the required cubic phase. [m]"""
+
+    quadratic: float
+    cubic: float | None
+
+    @property
+    def smallest(self) -> float:
+        """The one that gates."""
+        return self.quadratic if self.cubic is None else min(self.quadratic, self.cubic)
+
+    @property
+    def binding(self) -> str:
+        """The requirement that sets it."""
+        return CUBIC if self.smallest < self.quadratic else QUADRATIC
+
+
+def slow_limits(mission: Mission, allocation: Allocation, name: str, cycles: float) -> SlowLimits:
+    """Largest amplitude of a vibration below one cycle per aperture, in its worst phase.
+
+    The quadratic phase is held to the platform's share, autofocus gain included; the cubic phase, where it is
+    required, to the whole requirement without gain.
+    """
+    wavenumber = 2 * math.pi / mission.radar.wavelength
+    quadratic = allocation.qpe_limit(name) * allocation.autofocus_gain / (wavenumber * quadratic_part(cycles))
+    required = mission.requirements.cubic_phase_error
+    return SlowLimits(quadratic, None if required is None else required / (wavenumber * cubic_part(cycles)))
+
+
+def _slow_row(mission: Mission, allocation: Allocation, name: str, index: int, line: "Line") -> Row:
+    """Judge a vibration below one cycle per aperture as the quadratic and cubic phase that it is."""
+    error: MotionError = getattr(mission.platforms, name).motion_error
+    combine, gain = mission.allocation.combine, allocation.autofocus_gain
+    cycles = line.frequency * mission.collection.aperture_time
+    phase = 2 * math.pi * line.amplitude / mission.radar.wavelength
+    qpe, cubic = phase * quadratic_part(cycles), phase * cubic_part(cycles)
+    limits = slow_limits(mission, allocation, name, cycles)
+    limit = allocation.qpe_limit(name) * gain
+    if limits.binding == CUBIC:
+        allowed = format_limit(mission.requirements.cubic_phase_error or 0.0, "rad")
+        over = f"cubic phase {cubic:.3g} rad in the worst phase, {allowed} allowed; autofocus gain does not apply"
+    else:
+        needed = needed_sentence(allocation.n_pull_needed(qpe, name), caps(mission)) if qpe > limit else ""
+        over = f"QPE {qpe:.3g} rad in the worst phase, {format_limit(limit, 'rad')} allowed; {needed}"
+    use = line.amplitude / limits.smallest
+    row = judged(
+        mission,
+        id=f"{name}.vibration.sinusoidal.{index}",
+        metric=QUADRATIC,
+        unit="m",
+        declared=line.amplitude,
+        allowable=limits.smallest,
+        path=("platforms", name, "motion_error", "vibration", "sinusoidal", index, "amplitude"),
+        equation="first principles",
+        gain=qpe / (limit / gain) / use if use else 1.0,  # a cubic phase has none
+        over=over,
+        info="" if combine == "each" else f"combine is {combine}: the aggregate decides",
+        limits=(limits.quadratic, limits.quadratic),
+        qpe=qpe,
+        qpe_full=qpe,
+        evidence=error.source,
+        notes=(
+            *_projected(error.vibration.sinusoidal[index].amplitude, error, line.amplitude),
+            f"{cycles:.2g} cycles per aperture: below one a vibration makes no echoes but, in its worst phase, a "
+            f"quadratic phase of {qpe:.3g} rad or a cubic phase of {cubic:.3g} rad",
+        ),
+    )
+    return row._replace(binding_requirement=limits.binding, cubic_rad=cubic)
 
 
 class Line(NamedTuple):
@@ -185,27 +324,7 @@ def lines_of(mission: Mission, name: str) -> list[Line]:
     ]
 
 
-def shared_frequencies(lines: Sequence[Line | Sinusoid], aperture_time_s: float) -> list[tuple[int, ...]]:
-    """Indices of lines less than one cycle per aperture apart, each largest set once: their echoes are one.
-
-    Lines slower than one cycle per aperture make none.
-    """
-    order = sorted(range(len(lines)), key=lambda index: lines[index].frequency)
-    order = [index for index in order if lines[index].frequency * aperture_time_s >= 1]
-    found, reached = [], 0
-    for start, first in enumerate(order):
-        end = start
-        while (
-            end < len(order) and (lines[order[end]].frequency - lines[first].frequency) * aperture_time_s < 1 - 1e-9
-        ):
-            end += 1
-        if end - start > 1 and end > reached:
-            found.append(tuple(sorted(order[start:end])))
-            reached = end
-    return found
-
-
-def _row(
+def _case(
     mission: Mission, allowed: VibrationLimits | None, metric: str, name: str, own_id: str, *path: str | int
 ) -> VibrationCase:
     """What every row of a platform's vibration has, before anything is declared."""
@@ -224,11 +343,7 @@ def _blank(metric: str, name: str, own_id: str, path: KeyPath, model: str) -> Vi
     """The row of a mission that says nothing of vibration."""
     what, kind = ("paired echoes", "sinusoidal") if metric == "pslr" else ("power spread", "wideband")
     missing = f"no requirements.{metric} to hold it to"
-    rule = {
-        "published": f"Section V, {kind}",
-        "full": "first principles",
-        "strictest": f"Section V, {kind} and first principles",
-    }[model]
+    rule = f"Section V, {kind}" if model == "published" else "first principles"
     return VibrationCase(
         id=f"{name}.vibration.{own_id}",
         metric=metric,
@@ -252,10 +367,10 @@ def _line(
     name: str,
     index: int,
     line: Line | None,
-    lines: dict[str, list[Line]],
+    both: "_Together",
 ) -> VibrationCase:
     error: MotionError = getattr(mission.platforms, name).motion_error
-    case = _row(mission, allowed, "pslr", name, f"sinusoidal.{index}", index, "amplitude")
+    case = _case(mission, allowed, "pslr", name, f"sinusoidal.{index}", index, "amplitude")
     if line is None:
         return case
     case = _with_doubt(case._replace(declared=line.amplitude), mission.allocation.model)
@@ -263,17 +378,10 @@ def _line(
     cycles = line.frequency * mission.collection.aperture_time
     phase = 2 * math.pi * line.amplitude / mission.radar.wavelength
     if cycles >= ECHO_CYCLES:
-        together = _with_the_other_platform(mission, name, line, lines)
-        return case._replace(notes=(*notes, *together.notes), doubt=case.doubt or together.doubt)
+        return case._replace(notes=(*notes, *both.notes), doubt=case.doubt or both.doubt)
     qpe, cubic = phase * quadratic_part(cycles), phase * cubic_part(cycles)
     limit = allocation.qpe_limit(name) * allocation.autofocus_gain
     worst = f"in the worst phase a quadratic phase error of {qpe:.3g} rad, {format_limit(limit, 'rad')} allowed"
-    if cycles < 1:
-        slow = (
-            f"{cycles:.2g} cycles per aperture: slower than one it makes no echoes, but {worst}, or a cubic of "
-            f"{cubic:.3g} rad"
-        )
-        return case._replace(notes=tuple(notes), not_evaluated=case.missing or slow, doubt="", qpe=qpe)
     or_cubic = f"or a cubic of {cubic:.3g} rad"
     allowed_cubic = mission.requirements.cubic_phase_error
     if allowed_cubic is not None:
@@ -283,12 +391,7 @@ def _line(
     )
     breaks_cubic = allowed_cubic is not None and cubic > allowed_cubic * (1 + UTILIZATION_TOLERANCE)
     doubt = f"also {worst}, {or_cubic}" if breaks_cubic or qpe > limit * (1 + UTILIZATION_TOLERANCE) else ""
-    together = _with_the_other_platform(mission, name, line, lines)
-    return case._replace(
-        notes=(*notes, *together.notes),
-        doubt=case.doubt or doubt or together.doubt,
-        qpe=qpe,
-    )
+    return case._replace(notes=(*notes, *both.notes), doubt=case.doubt or doubt or both.doubt, qpe=qpe, cubic=cubic)
 
 
 def _together(
@@ -299,23 +402,40 @@ def _together(
     members: Sequence[Line],
     numbers: Sequence[int],
 ) -> VibrationCase:
-    """Lines of one platform at one frequency: in the worst phase their amplitudes add."""
+    """Lines of one platform so near each other that their echoes add: the one line that has an echo as high."""
+    T = mission.collection.aperture_time
     shown = ", ".join(map(str, numbers[:5])) + (f" and {len(numbers) - 5} more" if len(numbers) > 5 else "")
-    at = format_quantity(members[0].frequency, "Hz")
-    shared = f"entries {shown} share {at}, less than one cycle per aperture apart: amplitudes add"
-    case = _row(mission, allowed, "pslr", name, f"sinusoidal.sum.{index}", numbers[0], "frequency")
-    declared = math.fsum(line.amplitude for line in members)
-    return _with_doubt(case._replace(declared=declared, notes=(shared, *case.notes)), mission.allocation.model)
+    case = _case(mission, allowed, "pslr", name, f"sinusoidal.sum.{index}", numbers[0], "frequency")
+    declared = worst_phases([line.amplitude for line in members], [line.frequency * T for line in members]).amplitude
+    near = (
+        f"entries {shown}, at {_band(members)}, are at most {NEAR_CYCLES:g} cycles per aperture apart: in the worst "
+        f"phases their echoes together are as high as that of one vibration of {format_quantity(declared, 'm')}"
+    )
+    return _with_doubt(case._replace(declared=declared, notes=(near, *case.notes)), mission.allocation.model)
+
+
+def _band(lines: Sequence[Line]) -> str:
+    ends = [format_quantity(end(line.frequency for line in lines), "Hz", 4) for end in (min, max)]
+    return " to ".join(dict.fromkeys(ends))
 
 
 def _noise(mission: Mission, allowed: VibrationLimits | None, name: str, error: MotionError) -> VibrationCase:
     wideband = error.vibration.wideband
-    case = _row(mission, allowed, "islr", name, "wideband", "rms")
+    case = _case(mission, allowed, "islr", name, "wideband", "rms")
     if wideband is None:
         return case
     rms = along_line_of_sight(wideband.rms, error, getattr(mission.platforms, name).state, "islr")
     notes = (*_projected(wideband.rms, error, rms), *case.notes)
-    return _with_doubt(case._replace(declared=rms, notes=notes), mission.allocation.model)
+    variance = (2 * math.pi * rms / mission.radar.wavelength) ** 2
+    case = case._replace(declared=rms, notes=notes, islr_db=islr_db(variance))
+    return _with_doubt(case, mission.allocation.model)
+
+
+def islr_db(variance: float) -> float | None:
+    """ISLR that noise of a phase variance [rad²] adds, exp(σ²) - 1; None where there is none. [dB]"""
+    if not variance:
+        return None
+    return 10 / math.log(10) * (variance + math.log(-math.expm1(-variance)))  # without exp(σ²), which overflows
 
 
 def _margin(allowed: VibrationLimits | None) -> tuple[str, ...]:
@@ -339,7 +459,7 @@ def _projected(value: float | Vector, error: MotionError, along: float) -> tuple
 
 def _with_doubt(case: VibrationCase, model: str) -> VibrationCase:
     """Say that the model that does not gate fails it."""
-    if case.limits is None or case.declared is None or model == "strictest":
+    if case.limits is None or case.declared is None:
         return case
     other, limit = ("full", case.limits.full) if model == "published" else ("published", case.limits.published)
     if case.declared <= limit * (1 + UTILIZATION_TOLERANCE):
@@ -353,23 +473,29 @@ class _Together(NamedTuple):
     doubt: str = ""
 
 
-def _with_the_other_platform(mission: Mission, name: str, line: Line, lines: dict[str, list[Line]]) -> _Together:
-    """What both platforms make of one frequency: echoes that in the worst phase add."""
-    (other,) = (platform for platform in PLATFORMS if platform != name)
+def _of_both_platforms(mission: Mission, lines: dict[str, list[Line]]) -> dict[tuple[str, int], _Together]:
+    """What both platforms make of near frequencies: echoes that in the worst phases add. By platform and line."""
     requirement, T = mission.requirements.pslr, mission.collection.aperture_time
-    near = {
-        platform: [x for x in lines[platform] if x.frequency * T >= 1 > abs(x.frequency - line.frequency) * T + 1e-9]
-        for platform in PLATFORMS
-    }
-    if requirement is None or not near[other]:
-        return _Together()
-    amplitude = math.fsum(x.amplitude for platform in PLATFORMS for x in near[platform])
-    phase = 2 * math.pi * amplitude / mission.radar.wavelength
-    if not phase:
-        return _Together()
-    level = 20 * math.log10(echo_level(min(phase, _LARGEST)))
-    text = (
-        f"the {other} vibrates at this frequency too: in the worst phase echoes of both together are "
-        f"{'above ' if phase > _LARGEST else ''}{level:.1f} dB, {requirement:g} dB required"
-    )
-    return _Together((text,), text if level > requirement + 1e-6 else "")
+    if requirement is None or not all(lines.values()):
+        return {}
+    known = [((name, index), line) for name in PLATFORMS for index, line in enumerate(lines[name])]
+    found = {}
+    for group in near_lines([line.frequency * T for _, line in known]):
+        members = [known[index] for index in group]
+        if len({name for (name, _), _ in members}) < 2:
+            continue
+        near = [line for _, line in members]
+        amplitude = worst_phases([line.amplitude for line in near], [line.frequency * T for line in near]).amplitude
+        phase = 2 * math.pi * amplitude / mission.radar.wavelength
+        if not phase:
+            continue
+        level = 20 * math.log10(echo_level(min(phase, _LARGEST)))
+        for (name, index), _ in members:
+            (other,) = (platform for platform in PLATFORMS if platform != name)
+            text = (
+                f"the {other} vibrates at most {NEAR_CYCLES:g} cycles per aperture from this frequency too: in the worst "
+                f"phases echoes of both together are {'above ' if phase > _LARGEST else ''}{level:.1f} dB, "
+                f"{requirement:g} dB required"
+            )
+            found[name, index] = _Together((text,), text if level > requirement + 1e-6 else "")
+    return found

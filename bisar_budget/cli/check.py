@@ -120,6 +120,13 @@ class _Draws(click.ParamType[int]):
     ".sarif or .needs.json. Repeatable.",
 )
 @click.option(
+    "--detail",
+    type=click.Choice(["summary", "full"]),
+    default="summary",
+    show_default=True,
+    help="Of html and markdown: the summary alone, or with an annex of formulas, remarks and undeclared rows.",
+)
+@click.option(
     "--strict/--no-strict",
     envvar="BISAR_BUDGET_STRICT",
     help="Fail on warnings and on rows that could not be evaluated.",
@@ -185,6 +192,7 @@ def check(
     format_name: str,
     output: str | None,
     reports: Sequence[str],
+    detail: str,
     strict: bool,
     exit_zero: bool,
     model: str | None,
@@ -225,7 +233,7 @@ def check(
     day = today.date() if today else day_of_run()
     use_color = color == "always" or (color == "auto" and output is None and wants_color())
     verbosity = -1 if quiet else 1 if verbose else 0
-    style = Style(color=use_color, verbosity=verbosity, root=_repository(), all_rows=all_rows)
+    style = Style(color=use_color, verbosity=verbosity, root=_repository(), all_rows=all_rows, detail=detail)
     says_faults = format_name != "text" or output is not None or quiet or not is_terminal()
     if format_name in PIECEWISE and not (written or verifying or drawn):
         from bisar_budget.budget.fleet import check_files

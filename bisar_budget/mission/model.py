@@ -22,6 +22,7 @@ from bisar_budget.mission.readers import (
     Choice,
     Day,
     Key,
+    Label,
     Late,
     ListOf,
     OneOf,
@@ -33,6 +34,7 @@ from bisar_budget.mission.readers import (
     Triple,
     Version,
     Whole,
+    Words,
 )
 
 if TYPE_CHECKING:
@@ -58,6 +60,14 @@ SIDELOBE_REQUIREMENT = Quantity(units.POWER_RATIO, lt=0, ge=-200)
 SHARE = Quantity(units.RATIO, gt=0, ge=1e-6, le=1)
 DISTRIBUTION = Choice("normal", "uniform", "bound")
 DISTRIBUTIONS = "normal: the values are one sigma; uniform, bound: they are not exceeded."
+
+
+class Document(NamedTuple):
+    """The document that a report of this mission becomes; every report shows it."""
+
+    number: Annotated[str | None, Key(Label())] = None
+    issue: Annotated[str | None, Key(Label())] = None
+    author: Annotated[str | None, Key(Text())] = None
 
 
 class Radar(NamedTuple):
@@ -331,8 +341,11 @@ class OtherError(NamedTuple):
     source: Annotated[str | None, Key(Text())] = None
 
 
+DECLARABLE = ("position", "velocity", "acceleration", "timing")
+
+
 class Requirements(NamedTuple):
-    """What the image has to hold."""
+    """What the image has to hold, and what the file has to say for it."""
 
     quadratic_phase_error: Annotated[
         float, Key(PHASE_REQUIREMENT, "Total for any one error, at the aperture edge; default π/4.")
@@ -343,6 +356,14 @@ class Requirements(NamedTuple):
     location_error: Annotated[
         float | None, Key(Quantity(units.LENGTH, gt=0, ge=1e-9, le=1e9), "Displacement of the image on the ground.")
     ] = None
+    declare: Annotated[
+        tuple[str, ...],
+        Key(
+            Words(*DECLARABLE),
+            "Errors that the file must declare, for both platforms; what is missing is not_evaluated. "
+            "timing: any term of timing_error.",
+        ),
+    ] = ()
 
 
 class Shares(NamedTuple):
@@ -457,6 +478,7 @@ class Mission(NamedTuple):
     radar: Annotated[Radar, Key(Section(Radar))]
     collection: Annotated[Collection, Key(Section(Collection))]
     platforms: Annotated[Platforms, Key(Section(Platforms))]
+    document: Annotated[Document, Key(Section(Document), "Number, issue and author, for the reports.")] = Document()
     scene: Annotated[Scene, Key(Section(Scene))] = Scene()
     common_motion_error: Annotated[
         CommonMotionError | None, Key(Section(CommonMotionError), "The same for both platforms, in the scene's axes.")

@@ -186,6 +186,29 @@ class Choice(Reader):
         return {"enum": list(self.names)}
 
 
+class Words(Reader):
+    """A list of some of a few words, each once."""
+
+    def __init__(self, *names: str) -> None:
+        self.word = Choice(*names)
+
+    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
+        """Read each word at its own place."""
+        if not isinstance(value, list):
+            report(path, Problem("must be a list", f"accepted: some of {', '.join(self.word.names)}"))
+            return INVALID
+        words = tuple([_read(self.word, word, (*path, index), report) for index, word in enumerate(value)])
+        for index, word in enumerate(words):
+            if word is not INVALID and word in words[:index]:
+                report((*path, index), Problem("stands in the list twice"))
+                return INVALID
+        return INVALID if INVALID in words else words
+
+    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+        """Array of the words."""
+        return {"type": "array", "items": self.word.schema(definitions), "uniqueItems": True}
+
+
 class Whole(Reader):
     """A whole number within bounds."""
 

@@ -9,8 +9,8 @@ from hashlib import sha256
 from typing import TYPE_CHECKING
 
 from bisar_budget.budget.allocation import Allocation
-from bisar_budget.budget.effects import MOTION_UNITS, ErrorSource
 from bisar_budget.budget.analysis import Analysis
+from bisar_budget.budget.effects import MOTION_UNITS, ErrorSource
 from bisar_budget.budget.findings import MissionFindings, Report, Row, UnusableMission, worst_first
 from bisar_budget.budget.images import PointImage
 from bisar_budget.budget.waivers import waiver_notes
@@ -25,6 +25,7 @@ from bisar_budget.report.compliance_view import (
     Compliance,
     Contribution,
     Derivation,
+    Document,
     Driver,
     Evidence,
     General,
@@ -32,6 +33,7 @@ from bisar_budget.report.compliance_view import (
     Input,
     MatrixRow,
     MissionPage,
+    Move,
     Picture,
     PowerShare,
     Probability,
@@ -50,8 +52,16 @@ from bisar_budget.report.image_evidence import (
     impulse_response_cuts,
     numbers_in_words,
 )
-from bisar_budget.report.sentences import cause, measure
-from bisar_budget.report.text_table import head, percent
+from bisar_budget.report.sentences import measure
+from bisar_budget.report.text_table import (
+    EXPLAINED,
+    head,
+    matters,
+    multiple_of_pi,
+    narrow_gradients,
+    percent,
+    reasons,
+)
 from bisar_budget.units import format_quantity
 
 if TYPE_CHECKING:
@@ -66,8 +76,10 @@ _VERDICTS = {
     "pass": "Complies",
 }
 _NOTHING = "Nothing was judged"
+_ALONE = "; each error alone"
 _OWNERS = ("transmitter", "receiver", "clock", "reserve")
 _DRIVERS = 3
+_MATRIX_ROWS = 40  # of a summary; beyond, those that use least are left to the annex
 _JUDGED = ("fail", "not_evaluated", "warn", "waived", "pass_with_autofocus", "pass")
 _MET = ("pass_with_autofocus", "pass")
 _DISTRIBUTIONS = {
@@ -82,8 +94,8 @@ _VALIDITY = {
         "too strict. A row that the full model fails is a warning."
     ),
     "full": (
-        "Every first-order term of the range error: lines of sight that turn, and the phase that the displaced "
-        "response has of its own. A row that the published model fails is a warning."
+        "Exact ranges, for errors of any size: lines of sight turn over the aperture, and the displaced response has "
+        "a phase of its own. A row that the published model fails is a warning."
     ),
     "strictest": "Of the published model (Rigling & Moses, Tables I and II) and the full one the stricter, by row.",
 }
@@ -114,6 +126,7 @@ def compliance(report: Report, style: Style) -> Compliance:
         day=report.day,
         status=report.status,
         verdict=_overall(report, pages),
+        is_full=style.detail == "full",
         options=report.options,
         missions=tuple(pages),
     )
@@ -130,9 +143,14 @@ def _overall(report: Report, pages: Sequence[MissionPage]) -> str:
     usable = [mission for mission in report.missions if isinstance(mission, MissionFindings)]
     verdict = _verdict(report.status, sum(mission.summary.get("waived", 0) for mission in usable))
     empty = sum(page.verdict == _NOTHING for page in pages)
-    if report.status != "pass" or not empty:
+    if empty == len(pages):
+        return _NOTHING
+    if empty:
+        verdict = f"{verdict}; of {len(pages)} missions {empty} declare no error"
+    alone = sum(bool(page.alone) for page in pages)
+    if not alone:
         return verdict
-    return _NOTHING if empty == len(pages) else f"{verdict}; of {len(pages)} missions {empty} declare no error"
+    return verdict + (_ALONE if alone == len(pages) else f"{_ALONE} in {alone} of {len(pages)} missions")
 
 
 def _unusable(found: UnusableMission, style: Style, anchor: str) -> MissionPage:
@@ -161,6 +179,9 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
     file = source_path(found.file, style.root)
     placed = mission if mission.file == file else mission._replace(file=file)  # the same name in every section
     allocation = found.allocation
+    is_full = style.detail == "full"
+    important = [row for row in rows if matters(row)]
+    in_summary = {row.id for place, row in enumerate(important) if place < _MATRIX_ROWS or row.status in EXPLAINED}
     matrix = tuple(
         MatrixRow(
             id=row.id,
@@ -176,14 +197,20 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
             waiver="; ".join(waiver_notes(row)),
             line=row.line,
             remarks=_remarks(row),
+            in_summary=row.id in in_summary,
         )
         for row in rows
         if row.status != "not_declared"
     )
+    drivers = tuple(_drivers(judged, found.status))
+    driving = {driver.id for driver in drivers}
     return MissionPage(
         anchor=anchor,
         file=file,
         sha256=_digest(mission.data),
+        document=_document(mission),
+        alone=_ALONE if judged and found.combine == "each" else "",
+        narrow=narrow_gradients(found.geometry),
         status=found.status,
         verdict=_verdict(found.status, found.summary.get("waived", 0)) if judged else _NOTHING,
         name=found.name,
@@ -192,9 +219,13 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
         worst_use=_use(judged[0]) if judged else "",
         head=tuple(head(found)),
         tone="warn" if found.status in _MET and found.summary.get("waived") else found.status,
-        drivers=tuple(_drivers(judged, found.status)),
+        drivers=drivers,
         matrix=matrix,
-        remarks=tuple(_grouped(matrix)),
+        remarks=tuple(_grouped((row.id, row.remarks) for row in matrix)),
+        reasons=tuple(
+            _grouped((row.id, reasons(row)) for row in judged if row.status in EXPLAINED and row.id not in driving)
+        ),
+        hidden=sum(not row.in_summary for row in matrix),
         pictures=drawings(found),
         total=_limit(allocation.qpe_total, "rad"),
         gain=allocation.autofocus_gain,
@@ -202,6 +233,7 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
         shares=tuple(_shares(allocation)),
         power_shares=tuple(_power_shares(mission, allocation)),
         contributions=_contributions(analysis, found.model),
+        moves=_moves(found, analysis.stated),
         validity=tuple(_validity(mission, found)),
         inputs=tuple(_inputs(mission, found, file)),
         undeclared=tuple(
@@ -214,12 +246,12 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
         ),
         sources=_sources(found.rows),
         unsourced=tuple(row.id for row in found.rows if _may_have_a_source(row) and not row.evidence),
-        collection=tuple(collection_chain(found)),
+        collection=tuple(collection_chain(found)) if is_full else (),
         general=tuple(General(*equation) for equation in EQUATIONS if equation[0] not in ("(11)", "(31)")),
         derivations=tuple(
             Derivation(row.id, row.status, row.line, tuple(chain(placed, found, row)))
             for row in rows
-            if row.status != "not_declared"
+            if is_full and row.status != "not_declared"
         ),
         evidence=None if found.verdicts is None else tuple(_evidence(found)),
         evidence_remarks=tuple(verification.geometry_remarks(found.verdicts or ())),
@@ -351,7 +383,7 @@ def _drivers(judged: Sequence[Row], status: str) -> Iterator[Driver]:
 
 def _driver(row: Row) -> Driver:
     use = None if row.status == "not_evaluated" or row.allowable is None else row.utilization
-    return Driver(row.id, row.requirement_id or "", row.status, measure(row), cause(row), use)
+    return Driver(row.id, row.requirement_id or "", row.status, measure(row), "; ".join(reasons(row)), use)
 
 
 def _remarks(row: Row) -> tuple[str, ...]:
@@ -359,18 +391,19 @@ def _remarks(row: Row) -> tuple[str, ...]:
     return tuple(text for text in (row.reason, *row.notes) if text and text not in waivers)
 
 
-def _grouped(matrix: Sequence[MatrixRow]) -> Iterator[Remark]:
+def _grouped(said: Iterable[tuple[str, Sequence[str]]]) -> Iterator[Remark]:
     """Say once what several rows would say alike."""
     groups: dict[str, list[str]] = {}
-    for row in matrix:
-        if row.remarks:
-            groups.setdefault("; ".join(row.remarks), []).append(row.id)
+    for row_id, texts in said:
+        if texts:
+            groups.setdefault("; ".join(texts), []).append(row_id)
     yield from (Remark(tuple(ids), text) for text, ids in groups.items())
 
 
 def _requirement(mission: Mission, found: MissionFindings, row: Row, source: ErrorSource | None) -> str:
-    """Say what the row is held to."""
+    """Say what sets the allowable of the row."""
     allocation, requirements = found.allocation, mission.requirements
+    binding = row.binding_requirement if row.metric == "quadratic_phase_error" else row.metric
     if row.metric in ("pslr", "islr"):
         value = requirements.pslr if row.metric == "pslr" else requirements.islr
         what = "paired echoes" if row.metric == "pslr" else "power spread"
@@ -378,10 +411,10 @@ def _requirement(mission: Mission, found: MissionFindings, row: Row, source: Err
         if value is None:
             return "none stated"
         return f"{what} ≤ {value:g} dB, {split.of(row.id.split('.')[0]):.3g} of the power"
-    if row.metric == "cubic_phase_error":
+    if binding == "cubic_phase_error":
         value = requirements.cubic_phase_error
         return "none stated" if value is None else f"cubic phase ≤ {_limit(value, 'rad')}"
-    if row.metric == "location_error":
+    if binding == "location_error":
         value = requirements.location_error
         return "none stated" if value is None else f"displacement ≤ {_limit(value, 'm')}"
     if row.id == "mission.autofocus_pull_in":
@@ -407,8 +440,7 @@ def _gain(allocation: Allocation) -> str:
     if allocation.n_pull is None:
         return "no autofocus is declared"
     gain = f"limits of the quadratic phase × {allocation.autofocus_gain:.3g}"
-    corrected = f"{allocation.n_pull:g}π" if allocation.n_pull != 1 else "π"
-    return f"autofocus corrects {corrected} rad: {gain}"
+    return f"autofocus corrects {multiple_of_pi(allocation.n_pull)} rad: {gain}"
 
 
 def _shares(allocation: Allocation) -> Iterator[Share]:
@@ -440,7 +472,9 @@ def _contributions(analysis: Analysis, model: str) -> tuple[Contribution, ...]:
     by = {name: analysis.declared(one) for name, one in (("published", analysis.published), ("full", analysis.full))}
     sizes = {source.id: max(abs(found[source.id].qpe) for name, found in by.items() if model in (name, "strictest"))
              for source in analysis.stated}  # fmt: skip
-    declared = sorted((source for source in analysis.stated if sizes[source.id]), key=lambda source: -sizes[source.id])
+    declared = sorted(
+        (source for source in analysis.stated if sizes[source.id]), key=lambda source: -sizes[source.id]
+    )
     total, largest = math.fsum(sizes.values()), max(sizes.values(), default=0.0)
     result = []
     for source in declared:
@@ -450,6 +484,29 @@ def _contributions(analysis: Analysis, model: str) -> tuple[Contribution, ...]:
         part, of_sum = qpe / largest, percent(qpe / total)
         result.append(Contribution(source.id, owner, kind, axis, _phase(qpe), published, full, part, of_sum))
     return tuple(result)
+
+
+def _moves(found: MissionFindings, stated: Iterable[ErrorSource]) -> tuple[Move, ...]:
+    """Errors as the file states them, the largest displacement of the image first."""
+    rows = {row.id: row.displacement_m for row in found.rows}
+    known = [(source, rows.get(source.id)) for source in stated]
+    moving = [(source, math.hypot(*by)) for source, by in known if by is not None and any(by)]
+    moving.sort(key=lambda one: -one[1])
+    largest = max((size for _, size in moving), default=1.0)
+    return tuple(
+        Move(source.id, *_kind(source), format_quantity(size, "m"), size / largest) for source, size in moving
+    )
+
+
+def _document(mission: Mission) -> Document:
+    document = getattr(mission, "document", None)
+    return Document(*(getattr(document, key, None) or "" for key in Document._fields))
+
+
+def document_words(document: Document) -> str:
+    """Number and issue of a document; empty where the file gives neither."""
+    issue = f"issue {document.issue}" if document.issue else ""
+    return ", ".join(text for text in (document.number, issue) if text)
 
 
 def _kind(source: ErrorSource) -> tuple[str, str, str]:

@@ -31,7 +31,10 @@ class Driver(NamedTuple):
 
 
 class MatrixRow(NamedTuple):
-    """A line of the compliance matrix. `use` is the utilization; None where there is none to show."""
+    """A line of the compliance matrix. `use` is the utilization; None where there is none to show.
+
+    `in_summary` is whether it is declared or limits something, and among the worst: a summary shows no other.
+    """
 
     id: str
     requirement_id: str
@@ -46,6 +49,7 @@ class MatrixRow(NamedTuple):
     waiver: str
     line: int | None
     remarks: tuple[str, ...]
+    in_summary: bool
 
 
 class Remark(NamedTuple):
@@ -90,6 +94,25 @@ class Contribution(NamedTuple):
     full: str
     part: float
     of_sum: str
+
+
+class Move(NamedTuple):
+    """Displacement of the image by one declared error; `part` is that of the largest."""
+
+    id: str
+    owner: str
+    kind: str
+    axis: str
+    size: str
+    part: float
+
+
+class Document(NamedTuple):
+    """What a mission file says of itself as a document; empty where it says nothing."""
+
+    number: str = ""
+    issue: str = ""
+    author: str = ""
 
 
 class Input(NamedTuple):
@@ -192,6 +215,9 @@ class MissionPage(NamedTuple):
     status: str
     verdict: str
     name: str
+    document: Document = Document()
+    alone: str = ""  # behind the verdict where errors are judged one by one
+    narrow: str = ""  # what gradients close to parallel do to displacements
     tone: str = ""  # of the verdict: a pass that rests on waivers looks like a warning
     counts: str = ""
     worst: str = ""
@@ -201,6 +227,8 @@ class MissionPage(NamedTuple):
     drivers: tuple[Driver, ...] = ()
     matrix: tuple[MatrixRow, ...] = ()
     remarks: tuple[Remark, ...] = ()
+    reasons: tuple[Remark, ...] = ()  # of rows that do not pass and drive nothing
+    hidden: int = 0  # rows of the matrix that a summary leaves out
     pictures: tuple[Picture, ...] = ()
     total: str = ""
     gain: float = 1.0
@@ -208,6 +236,7 @@ class MissionPage(NamedTuple):
     shares: tuple[Share, ...] = ()
     power_shares: tuple[PowerShare, ...] = ()
     contributions: tuple[Contribution, ...] = ()
+    moves: tuple[Move, ...] = ()
     validity: tuple[tuple[str, str], ...] = ()
     inputs: tuple[Input, ...] = ()
     undeclared: tuple[Undeclared, ...] = ()
@@ -226,6 +255,10 @@ class MissionPage(NamedTuple):
     probabilities: tuple[Probability, ...] = ()
     draws_remarks: tuple[str, ...] = ()
 
+    def has_annex(self, is_full: bool) -> bool:
+        """Whether there is more than the summary: everything, or images and draws that somebody asked for."""
+        return not self.faults and (is_full or self.evidence is not None or bool(self.draws))
+
 
 class Compliance(NamedTuple):
     """A whole report."""
@@ -234,5 +267,6 @@ class Compliance(NamedTuple):
     day: date | None
     status: str
     verdict: str
+    is_full: bool
     options: tuple[Option, ...]
     missions: tuple[MissionPage, ...]

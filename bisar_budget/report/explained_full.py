@@ -42,7 +42,9 @@ class Left:
         terms = " + ".join(
             f"{number(w)}*{number(m)}" for w, m in zip(self.exact.fit[which], self.ranges, strict=True)
         )
-        return Sum(f"{symbol} = 2*π/{number(self.exact.wavelength)}*({terms}) = {with_unit(self.phase(which), 'rad')}")
+        return Sum(
+            f"{symbol} = 2*π/{number(self.exact.wavelength)}*({terms}) = {with_unit(self.phase(which), 'rad')}"
+        )
 
 
 def worse(analysis: Analysis, source: ErrorSource, size: float, which: int = _QUADRATIC) -> Left:

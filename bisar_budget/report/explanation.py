@@ -3,15 +3,23 @@
 import math
 from collections.abc import Iterator, Sequence
 
-from bisar_budget.budget.allocation import Allocation
 from bisar_budget.budget.aggregates import Together
+from bisar_budget.budget.allocation import Allocation
 from bisar_budget.budget.analysis import Analysis
 from bisar_budget.budget.correlation import displacement_parts, phase_parts
+from bisar_budget.budget.echoes import near_lines, sinc, worst_phases
 from bisar_budget.budget.effects import ErrorSource, image_plane
 from bisar_budget.budget.findings import MissionFindings, Row
 from bisar_budget.budget.models import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.budget.scene import ScenePhases, at
-from bisar_budget.budget.vibration import amplitude_share, echo_phase, lines_of, quadratic_part, shared_frequencies
+from bisar_budget.budget.vibration import (
+    amplitude_share,
+    cubic_part,
+    echo_phase,
+    lines_of,
+    quadratic_part,
+    slow_limits,
+)
 from bisar_budget.constants import ROUNDING
 from bisar_budget.errors import KeyPath, printable
 from bisar_budget.geometry import dot, without_rounding
@@ -137,7 +145,8 @@ def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]
         return
     text = f"min({', '.join(number(size) for size in sizes.values())})" if len(sizes) > 1 else number(row.allowable)
     yield from step(
-        f"Allowable: the smallest, by {', '.join(sizes)}", Sum(f"allowable = {text} = {with_unit(row.allowable, row.unit)}")
+        f"Allowable: the smallest, by {', '.join(sizes)}",
+        Sum(f"allowable = {text} = {with_unit(row.allowable, row.unit)}"),
     )
 
 
@@ -165,14 +174,14 @@ def _autofocus_gain(allocation: Allocation) -> Iterator[Step]:
 
 
 def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
-    """From the file to the limits of both models, for one line, lines that share a frequency, or noise."""
+    """From the file to the limits of both models, for one line, lines near each other, or noise."""
     platform, _, _, *rest = row.id.split(".")
-    is_sinusoid, is_sum = row.metric == "pslr", rest[:1] == ["sum"]
+    is_sinusoid, is_sum = row.metric != "islr", rest[:1] == ["sum"]
     path: KeyPath = ("platforms", platform, "motion_error", "vibration", "sinusoidal" if is_sinusoid else "wideband")
     if row.declared is None:
         yield Step(missing(mission, path))
     elif is_sum:
-        yield from _shared_frequency(mission, platform, int(rest[1]), row.declared)
+        yield from _near_lines(mission, platform, int(rest[1]), row.declared)
     else:
         path = (*path, int(rest[0]), "amplitude") if is_sinusoid else (*path, "rms")
         yield from step(f"Declared in {place(mission, path)}", as_written(mission, path))
@@ -189,6 +198,9 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[S
         }
         lines = equation("QPE_full", "2*π*A*q/λ", values, row.qpe_full_rad, "rad")
         yield from step("Quadratic phase in the worst phase, q = 7.5·j₂(π·f·T)", *lines)
+        if row.metric == QUADRATIC:
+            yield from _slow_vibration(mission, allocation, row, line.frequency * mission.collection.aperture_time)
+            return
     requirement = mission.requirements.pslr if is_sinusoid else mission.requirements.islr
     if requirement is None or row.allowable_published is None or row.allowable_full is None:
         return
@@ -236,6 +248,27 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[S
     )
 
 
+def _slow_vibration(mission: Mission, allocation: Allocation, row: Row, cycles: float) -> Iterator[Step]:
+    """From the phases of a vibration below one cycle per aperture to the amplitude that they allow."""
+    platform, wavelength = row.id.partition(".")[0], mission.radar.wavelength
+    values = {"A": row.declared or 0.0, "λ": wavelength, "c": cubic_part(cycles)}
+    lines = equation("cubic", "2*π*A*c/λ", values, row.cubic_rad or 0.0, "rad")
+    yield from step("Cubic phase in the worst phase, c = 17.5·j₃(π·f·T)", *lines)
+    limit = allocation.qpe_limit(platform) * allocation.autofocus_gain
+    yield from _limit(allocation, platform, limit)
+    limits, required = slow_limits(mission, allocation, platform, cycles), mission.requirements.cubic_phase_error
+    values = {"limit": limit, "λ": wavelength, "q": quadratic_part(cycles)}
+    lines = equation("by_QPE", "limit*λ/(2*π*q)", values, limits.quadratic, "m")
+    yield from step("Allowable by the quadratic phase", *lines)
+    if required is None or limits.cubic is None:
+        return
+    values = {"required": required, "λ": wavelength, "c": cubic_part(cycles)}
+    lines = equation("by_cubic", "required*λ/(2*π*c)", values, limits.cubic, "m")
+    yield from step("Allowable by requirements.cubic_phase_error", *lines)
+    sizes = {"by_QPE": limits.quadratic, "by_cubic": limits.cubic}
+    yield from step("Allowable", *equation("allowable", "min(by_QPE, by_cubic)", sizes, limits.smallest, "m"))
+
+
 def _line_of_sight(
     mission: Mission, platform: str, is_sinusoid: bool, rest: Sequence[str], declared: float
 ) -> Iterator[Step]:
@@ -255,11 +288,20 @@ def _line_of_sight(
     yield from step(f"Along the line of sight, {how}", Sum(f"declared = {text} = {with_unit(declared, 'm')}"))
 
 
-def _shared_frequency(mission: Mission, platform: str, index: int, total: float) -> Iterator[Step]:
-    lines = lines_of(mission, platform)
-    members = shared_frequencies(lines, mission.collection.aperture_time)[index]
-    sizes = " + ".join(number(lines[member].amplitude) for member in members)
-    title = f"Entries {', '.join(map(str, members))}, less than one cycle per aperture apart: amplitudes add"
+def _near_lines(mission: Mission, platform: str, index: int, total: float) -> Iterator[Step]:
+    """Lines near each other: what each adds where the echoes together are highest."""
+    lines, T = lines_of(mission, platform), mission.collection.aperture_time
+    members = near_lines([line.frequency * T for line in lines])[index]
+    near = [lines[member] for member in members]
+    worst = worst_phases([line.amplitude for line in near], [line.frequency * T for line in near])
+    sizes = " + ".join(
+        f"{number(line.amplitude)}*{number(abs(sinc(worst.cycles - line.frequency * T)))}" for line in near
+    )
+    entries = ", ".join(map(str, members))
+    title = (
+        f"Entries {entries} lie near each other: at x = {number(worst.cycles)} cells each adds A·|sinc(x − f·T)|, "
+        "sinc(x) = sin(πx)/(πx), in the worst phases"
+    )
     yield from step(title, f"declared = {sizes} = {total:.6g} m")
 
 
@@ -267,7 +309,7 @@ def _phase_aggregate(together: Together, found: MissionFindings, row: Row) -> It
     owner = {"timing": "clock"}.get(row.id.split(".")[0], row.id.split(".")[0])
     is_pull_in = row.id == "mission.autofocus_pull_in"
     rule = "sum" if is_pull_in else found.combine
-    phases = together.phases(together.members(found.allocation, owner))
+    phases = together.owed(found.allocation, owner)
     parts = phase_parts(phases, rule, together.groups)
     yield from _combined("QPE", rule, [(name, abs(size)) for name, size in parts], row)
     if is_pull_in:
@@ -279,7 +321,7 @@ def _phase_aggregate(together: Together, found: MissionFindings, row: Row) -> It
 
 
 def _cubic_aggregate(together: Together, found: MissionFindings, row: Row) -> Iterator[Step]:
-    parts = phase_parts(together.cubics(), found.combine, together.groups)
+    parts = phase_parts(together.all_cubics(), found.combine, together.groups)
     yield from _combined("Cubic phase", found.combine, [(name, abs(size)) for name, size in parts], row)
     if row.allowable is not None:
         yield from step("Allowable", f"requirements.cubic_phase_error = {row.allowable:.6g} rad")
@@ -302,7 +344,7 @@ def _spatial_variance(analysis: Analysis, found: MissionFindings, row: Row) -> I
 
 def _location_aggregate(mission: Mission, together: Together, found: MissionFindings, row: Row) -> Iterator[Step]:
     rule = "the longest sum over all signs of the vectors" if found.combine == "sum" else _RULES[found.combine]
-    parts = displacement_parts(together.moves() or [], found.combine, together.groups)
+    parts = displacement_parts(together.moves(found.combine) or [], found.combine, together.groups)
     title = "(25), (30)" if row.model == "published" else "Full model, each by the sign that moves farther"
     if found.combine == "sum":
         vectors = [
@@ -311,7 +353,9 @@ def _location_aggregate(mission: Mission, together: Together, found: MissionFind
         combined = [] if row.declared is None else [f"combined = {row.declared:.6g} m"]
         yield from step(f"{title}: displacements, {rule}", *(vectors or ["none"]), *combined)
     else:
-        yield from _combined(f"{title}: displacement", found.combine, [(n, math.hypot(*m)) for n, m in parts], row, "m")
+        yield from _combined(
+            f"{title}: displacement", found.combine, [(n, math.hypot(*m)) for n, m in parts], row, "m"
+        )
     if row.allowable is not None:
         where = place(mission, ("requirements", "location_error"))
         yield from step("Allowable", f"requirements.location_error = {row.allowable:.6g} m, {where}")

@@ -9,7 +9,7 @@ from markupsafe import Markup, escape
 from bisar_budget.budget.findings import Report
 from bisar_budget.errors import printable
 from bisar_budget.report import Style, typeset
-from bisar_budget.report.compliance import compliance
+from bisar_budget.report.compliance import compliance, document_words
 from bisar_budget.report.compliance_view import STATUS_WORDS
 from bisar_budget.report.formulas import Equation, Sum
 from bisar_budget.resources import resource
@@ -28,7 +28,12 @@ def render(report: Report, style: Style) -> str:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.filters |= {"breakable": _breakable, "sentence": _sentence}
+    environment.filters |= {
+        "breakable": _breakable,
+        "sentence": _sentence,
+        "css_string": _css_string,
+        "document_words": document_words,
+    }
     template = environment.get_template("report.html.j2")
     return template.render(
         report=compliance(report, style),
@@ -48,6 +53,12 @@ def _harmless(value: object) -> object:
 def _breakable(text: str) -> Markup:
     """Let a long name break after its dots, underscores and slashes."""
     return Markup(_AFTER.sub(r"\1<wbr>", str(escape(printable(text)))))
+
+
+def _css_string(text: str) -> Markup:
+    """A string of a style sheet: every character but letters, digits and blanks of ASCII is its number."""
+    safe = (c if c.isascii() and (c.isalnum() or c == " ") else f"\\{ord(c):x} " for c in printable(text))
+    return Markup(f'"{"".join(safe)}"')
 
 
 def _sentence(text: str) -> str:

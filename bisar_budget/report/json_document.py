@@ -86,6 +86,7 @@ def _mission(mission: MissionFindings) -> dict[str, Any]:
     return {
         "file": mission.file,
         "name": mission.name,
+        "document": mission.document._asdict(),
         "status": mission.status,
         "model": mission.model,
         "combine": mission.combine,

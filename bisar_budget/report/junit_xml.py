@@ -85,6 +85,7 @@ def _case(row: Row, class_name: str, file: str) -> Iterator[str]:
         ("unit", row.unit),
         ("declared", row.declared),
         ("allowable", row.allowable),
+        ("binding_requirement", row.binding_requirement),
         ("utilization", row.utilization),
         ("margin", row.margin),
         ("equation", row.equation),

@@ -10,7 +10,7 @@ from markupsafe import Markup
 from bisar_budget.budget.findings import MissionFindings, Report
 from bisar_budget.errors import printable
 from bisar_budget.report import Style, typeset
-from bisar_budget.report.compliance import compliance, drawings, illustrations
+from bisar_budget.report.compliance import compliance, document_words, drawings, illustrations
 from bisar_budget.report.compliance_view import STATUS_WORDS, Chip, Compliance
 from bisar_budget.report.escapes import markdown_text, uri
 from bisar_budget.report.formulas import Equation, Sum
@@ -31,6 +31,7 @@ def render(report: Report, style: Style) -> str:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
+    environment.filters["document_words"] = document_words
     page: Compliance = compliance(report, style)
     text = environment.get_template("report.md.j2").render(
         report=page,

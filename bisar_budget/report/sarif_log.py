@@ -152,6 +152,7 @@ def _result(row: Row, mission: MissionFindings, artifact: dict[str, Any]) -> dic
             ("unit", row.unit),
             ("declared", row.declared),
             ("allowable", row.allowable),
+            ("binding_requirement", row.binding_requirement),
             ("utilization", row.utilization),
             ("margin", row.margin),
             ("equation", row.equation),

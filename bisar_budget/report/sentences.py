@@ -1,7 +1,7 @@
 """What a row says, in a sentence: for formats that have room for one line of text."""
 
 from bisar_budget.budget.findings import Row
-from bisar_budget.report.text_table import percent
+from bisar_budget.report.text_table import binding_words, percent
 from bisar_budget.units import format_quantity
 
 
@@ -11,6 +11,8 @@ def measure(row: Row) -> str:
     if row.allowable is None:
         return declared
     text = f"{declared}, allowable {format_quantity(row.allowable, row.unit, 3, 'down')}"
+    if binding := binding_words(row):
+        text += f" (limited by the {binding})"
     return text if row.utilization is None else f"{text}, {percent(row.utilization)} of it used"
 
 

@@ -48,7 +48,7 @@ _MODELS = {
     "strictest": "strictest (the stricter of published and full for each row)",
 }
 RULES = {"each": "each error alone", "sum": "worst-case sum", "rss": "root-sum-square"}
-_EXPLAINED = ("fail", "not_evaluated", "warn", "waived")  # the rows whose reason decides something
+EXPLAINED = ("fail", "not_evaluated", "warn", "waived")  # the rows whose reason decides something
 _NARROW_DEG = 30.0  # between range and Doppler gradients; below it the verdict says what that does
 
 
@@ -179,8 +179,8 @@ def _table(mission: MissionFindings, style: Style) -> Iterator[str]:
     rows, hidden = worst_first(mission.rows), list[Row]()
     # Where nothing is declared the allowables are the answer.
     if not style.all_rows and style.verbosity <= 0 and any(row.status != "not_declared" for row in rows):
-        hidden = [row for row in rows if not _matters(row)]
-        rows = [row for row in rows if _matters(row)]
+        hidden = [row for row in rows if not matters(row)]
+        rows = [row for row in rows if matters(row)]
     cells = [_row(row) for row in rows]
     widths = [max(len(line[column]) for line in (_HEADER, *cells)) for column in range(len(_HEADER))]
     widths[0] = 8  # the same in every table: the eye and scripts look there
@@ -194,12 +194,12 @@ def _table(mission: MissionFindings, style: Style) -> Iterator[str]:
             yield _line(("", "", *line[2:]), widths)
         else:
             yield _word(row.status, style, widths[0]) + _line(line, widths)[widths[0] :]
-        if row.requirement_id and (row.status not in _EXPLAINED and style.verbosity < 1):
+        if row.requirement_id and (row.status not in EXPLAINED and style.verbosity < 1):
             yield f"{'':<{widths[0]}} [{row.requirement_id}]"  # the others have it with their reason
     yield from wrapped(_table_key(rows, hidden), "  ")
 
 
-def _matters(row: Row) -> bool:
+def matters(row: Row) -> bool:
     """Whether a row is declared or limits something; along other axes than the file's, only if it does not pass."""
     if row.status in ("info", "pass"):
         return row.is_independent and (row.status == "pass" or bool(row.declared))
@@ -241,12 +241,15 @@ def _row(row: Row) -> tuple[str, ...]:
     return WORDS[status], row.id, size, allowable, use, _limited_by(row)
 
 
+def binding_words(row: Row) -> str:
+    """Say which other requirement than the one the row is about sets its allowable; nothing if it is that one."""
+    return "" if row.binding_requirement == row.metric else BINDING_WORDS.get(row.binding_requirement or "", "")
+
+
 def _limited_by(row: Row) -> str:
     """What sets the allowable: another requirement than the row's own, else the place of its equation."""
-    binding = row.binding_requirement
-    if binding in BINDING_WORDS and binding != row.metric:
-        return BINDING_WORDS[binding].split()[0]
-    return _short_reference(row.equation)
+    binding = binding_words(row)
+    return binding.split()[0] if binding else _short_reference(row.equation)
 
 
 @cache
@@ -288,10 +291,9 @@ def _details(mission: MissionFindings, style: Style) -> Iterator[str]:
     groups: dict[tuple[str, tuple[str, ...]], list[Row]] = {}
     for row in worst_first(mission.rows):
         if style.verbosity > 0:
-            yield from _detail([row], [*_why(row, row.notes), *_more(row)], mission, style)
-        elif row.status in _EXPLAINED:
-            why = _why(row, (*waiver_notes(row), *image_notes(row)))
-            groups.setdefault((row.status, tuple(why)), []).append(row)
+            yield from _detail([row], [*filter(None, [row.reason]), *row.notes, *_more(row)], mission, style)
+        elif row.status in EXPLAINED:
+            groups.setdefault((row.status, reasons(row)), []).append(row)
     for (_, texts), rows in groups.items():
         yield from _detail(rows, texts, mission, style)
 
@@ -310,8 +312,9 @@ def _detail(rows: Sequence[Row], texts: Sequence[str], mission: MissionFindings,
         yield from wrapped(f"  {text}", "  ")
 
 
-def _why(row: Row, notes: Sequence[str]) -> list[str]:
-    return [row.reason, *notes] if row.reason else [*notes]
+def reasons(row: Row) -> tuple[str, ...]:
+    """What decides the status of a row: its reason, and of its notes those on waivers and images."""
+    return tuple(text for text in (row.reason, *waiver_notes(row), *image_notes(row)) if text)
 
 
 def _more(row: Row) -> Iterator[str]:

@@ -6,10 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bisar_budget.budget.exact_arrays import aperture_nodes
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import BistaticGeometry, GroundVector
 from bisar_budget.mission.model import Mission, Simulation
-from bisar_budget.simulate.exact import ExactEffect, aperture_nodes, exact_effect
+from bisar_budget.simulate.exact import ExactEffect, exact_effect
 from bisar_budget.simulate.image_formation import backprojection, taylor_window
 from bisar_budget.simulate.phase_history import (
     Complexes,

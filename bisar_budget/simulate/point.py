@@ -9,6 +9,7 @@ import numpy as np
 from bisar_budget.budget.analysis import Analysis
 from bisar_budget.budget.correlation import correlated_errors, likely_error
 from bisar_budget.budget.effects import PLATFORMS
+from bisar_budget.budget.exact_arrays import aperture_nodes
 from bisar_budget.budget.vibration import along_line_of_sight, lines_of
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vector
@@ -16,7 +17,7 @@ from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.mission.model import MotionError as DeclaredError
 from bisar_budget.simulate.autofocus import ALGORITHMS
 from bisar_budget.simulate.collection import baseband, superposed_motion
-from bisar_budget.simulate.exact import ExactEffect, aperture_nodes, exact_effect
+from bisar_budget.simulate.exact import ExactEffect, exact_effect
 from bisar_budget.simulate.image_formation import backprojection, ground_grid, taylor_window
 from bisar_budget.simulate.impulse_response import ImpulseResponse, impulse_response
 from bisar_budget.simulate.phase_history import (

@@ -6,15 +6,16 @@ model's limits both in phase fill it.
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
 import numpy as np
 
 from bisar_budget.budget.allocation import Allocation
+from bisar_budget.budget.echoes import near_lines, sinc, worst_phases
 from bisar_budget.budget.effects import PLATFORMS
 from bisar_budget.budget.images import Verdict
-from bisar_budget.budget.vibration import lines_of, shared_frequencies, vibration_limits
+from bisar_budget.budget.vibration import Line, lines_of, vibration_limits
 from bisar_budget.mission.model import Mission
 from bisar_budget.simulate.collection import CELLS, Errors, PointCollection
 from bisar_budget.simulate.impulse_response import upsampled
@@ -55,9 +56,10 @@ def cases(mission: Mission, allocation: Allocation, collection: PointCollection)
             for index, frequency in enumerate([line.frequency for line in lines[name]] or [None]):
                 row_id = f"{name}.vibration.sinusoidal.{index}"
                 yield row_id, partial(echo, row_id, frequency)
-            for index, members in enumerate(shared_frequencies(lines[name], T)):
+            for index, members in enumerate(near_lines([line.frequency * T for line in lines[name]])):
                 row_id = f"{name}.vibration.sinusoidal.sum.{index}"
-                yield row_id, partial(echo, row_id, lines[name][members[0]].frequency)
+                near = [lines[name][member] for member in members]
+                yield row_id, partial(_near, collection, model, pslr, {name: amplitude[name]}, row_id, near)
         if islr is not None:
             row_id = f"{name}.vibration.wideband"
             yield row_id, partial(_wideband, collection, model, islr, {name: rms[name]}, row_id, seed)
@@ -86,15 +88,51 @@ def _sinusoidal(
     declared: float | None,
 ) -> Verdict:
     """Measure the paired echo on the difference from the error-free image, which its sidelobes would bury."""
-    blank = _blank(row_id, model, limits, requirement_db)
     frequency = _UNDECLARED_CYCLES / collection.aperture_time if declared is None else declared
-    cycles = frequency * collection.aperture_time
-    if cycles < 3:
-        return blank._replace(reason=f"{cycles:.3g} cycles per aperture: below three the echoes lie on the mainlobe")
+    sinusoids = {name: (Sinusoid(amplitude=size, frequency=frequency),) for name, size in limits.items()}
+    who = "one platform alone" if len(limits) == 1 else "both platforms in phase"
+    assumed = ", a frequency assumed: the file declares no vibration" if declared is None else ""
+    return _echo(collection, _blank(row_id, model, limits, requirement_db), sinusoids, who, assumed)
+
+
+def _near(
+    collection: PointCollection,
+    model: str,
+    requirement_db: float,
+    limits: dict[str, float],
+    row_id: str,
+    lines: Sequence[Line],
+) -> Verdict:
+    """Lines near each other, in their declared ratio and their worst phases, scaled to their limit together."""
+    blank = _blank(row_id, model, limits, requirement_db)
+    (name,) = limits
+    cycles = [line.frequency * collection.aperture_time for line in lines]
+    worst = worst_phases([line.amplitude for line in lines], cycles)
+    if not worst.amplitude:
+        return blank._replace(reason="the lines have no amplitude")
+    scale = limits[name] / worst.amplitude
+    sinusoids = tuple(
+        Sinusoid(scale * line.amplitude, line.frequency, 0.0 if sinc(worst.cycles - n) >= 0 else math.pi)
+        for line, n in zip(lines, cycles, strict=True)
+    )
+    return _echo(collection, blank, {name: sinusoids}, "one platform's lines in their worst phases")
+
+
+def _echo(
+    collection: PointCollection,
+    blank: Verdict,
+    sinusoids: dict[str, tuple[Sinusoid, ...]],
+    who: str,
+    assumed: str = "",
+) -> Verdict:
+    every = [sinusoid.frequency * collection.aperture_time for those in sinusoids.values() for sinusoid in those]
+    slowest, cycles = min(every), max(every)
+    if slowest < 3:
+        return blank._replace(reason=f"{slowest:.3g} cycles per aperture: below three the echoes lie on the mainlobe")
     cells = 2 * math.ceil(min(cycles, 1e6)) + CELLS
     errors = Errors()
-    for name, amplitude in limits.items():
-        errors = errors.of(name, MotionError(sinusoids=(Sinusoid(amplitude=amplitude, frequency=frequency),)))
+    for name, those in sinusoids.items():
+        errors = errors.of(name, MotionError(sinusoids=those))
     try:
         clean = collection.chip((0.0, 0.0), Errors(), cells=cells).cut
         echo = collection.chip((0.0, 0.0), errors, cells=cells).cut - clean
@@ -105,11 +143,9 @@ def _sinusoidal(
     smeared = f", smeared over {walk:.2g} range cells" if walk > 0.3 else ""
     peaks = [float(np.abs(upsampled(cut, _FINE)).max()) for cut in (echo, clean)]
     level = 20 * math.log10(peaks[0] / peaks[1])
-    who = "one platform alone" if len(limits) == 1 else "both platforms in phase"
-    assumed = ", a frequency assumed: the file declares no vibration" if declared is None else ""
     return blank._replace(
         measured_db=level,
-        verdict=_compare(level - requirement_db),
+        verdict=_compare(level - (blank.requirement_db or 0.0)),
         reason=f"echoes of {who}, at {cycles:.3g} cells from the peak{smeared}{assumed}",
     )
 

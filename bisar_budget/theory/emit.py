@@ -156,8 +156,8 @@ def evaluators() -> tuple[Evaluator, ...]:
             name="full_motion",
             summary="Range error of one unit of each motion error of one platform at one slow time. [m/unit]",
             details=(
-                "−u·r̃(τ): the line of sight is that of the position then, nothing is held constant. Position and slant "
-                "range are those at the slow time. Derived here."
+                "−u·r̃(τ): the line of sight is that of the position then, nothing is held constant. Position and "
+                "slant range are those at the slow time. Derived here."
             ),
             arguments=(*platform_arguments(TRANSMITTER)[:3], (TRANSMITTER.slant_range, "slant_range"), (tau, "tau")),
             rows=tuple(
@@ -220,9 +220,11 @@ def _function(evaluator: Evaluator) -> str:
 
 def _legendre_fits() -> str:
     """Write the nodes and weights of a fit over the aperture."""
-    lines = ["\n\n# Nodes over -1 … 1, in half apertures, and the weights that fit a history sampled there: value P₀, slope P₁,"]
-    lines.append("# quadratic at the edge (3/2 of P₂) and cubic at the edge (5/2 of P₃), by the number of nodes. Derived here.")
-    lines.append("LEGENDRE_FITS: dict[int, tuple[tuple[float, ...], ...]] = {")
+    lines = [
+        "\n\n# Nodes over -1 … 1, in half apertures, and the weights that fit a history sampled there: value P₀,",
+        "# slope P₁, quadratic at the edge (3/2 of P₂), cubic at the edge (5/2 of P₃); by the number of nodes.",
+        "LEGENDRE_FITS: dict[int, tuple[tuple[float, ...], ...]] = {",
+    ]
     for count in NODES:
         lines.append(f"    {count}: (")
         for row in full.legendre_fit(count):

@@ -108,7 +108,8 @@ def legendre_fit(count: int, digits: int = 17) -> tuple[tuple[Expr, ...], ...]:
     rows = []
     for n, leading in enumerate((1, 1, Rational(3, 2), Rational(5, 2))):
         factor = leading * Rational(2 * n + 1, 2)
-        rows.append(tuple((factor * w * legendre(n, x).subs(x, at)).evalf(digits) for at, w in zip(nodes, weights)))
+        at_nodes = zip(nodes, weights, strict=True)
+        rows.append(tuple((factor * w * legendre(n, x).subs(x, at)).evalf(digits) for at, w in at_nodes))
     return (tuple(at.evalf(digits) for at in nodes), *rows)
 
 

@@ -3,8 +3,10 @@
 Skipped where no Chromium or no driver for it is installed; CI installs both.
 """
 
+import hashlib
 import re
 import shutil
+import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -58,7 +60,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     written = {}
     for name, report in REPORTS.items():
         written[name] = folder / f"{name}.html"
-        written[name].write_text(render("html", report(), Style()), encoding="utf-8")
+        written[name].write_text(render("html", report(), Style(detail="full")), encoding="utf-8")
     return written
 
 
@@ -194,3 +196,42 @@ def test_prints_to_a4_in_light_colours(show, name: str, scheme: str) -> None:
     color = page.evaluate("getComputedStyle(document.body).color")
     assert sum(map(int, re.findall(r"\d+", color)[:3])) < 200
     assert page.evaluate("getComputedStyle(document.querySelector('thead')).display") == "table-header-group"
+
+
+EXAMPLES = sorted((ROOT / "specs" / "missions").glob("*.yaml"))
+
+
+@pytest.mark.parametrize("model", ["published", "full", "strictest"])
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_the_summary_of_a_mission_prints_to_four_pages(browser, path: Path, model: str) -> None:
+    found = found_in(path, model)
+    page = browser.new_page()
+    page.set_content(render("html", Report("1.2.3", (found,)), Style()))
+    pdf = page.pdf(prefer_css_page_size=True)
+    page.close()
+    assert 1 <= pages_of(pdf) <= 4
+
+
+def test_pages_carry_mission_document_hash_and_number(browser, tmp_path: Path) -> None:
+    if shutil.which("pdftotext") is None:
+        pytest.skip("pdftotext is not installed")
+    reports = [found_in(EXAMPLES[0]), found_in(SECTION_V)]
+    page = browser.new_page()
+    page.set_content(render("html", Report("1.2.3", tuple(reports)), Style()))
+    (tmp_path / "report.pdf").write_bytes(page.pdf(prefer_css_page_size=True))
+    page.close()
+    command = ["pdftotext", "-layout", str(tmp_path / "report.pdf"), "-"]
+    text = subprocess.run(command, capture_output=True, check=True, text=True).stdout
+    printed = text.removesuffix("\f").split("\f")
+    for number, one in enumerate(printed, start=1):
+        assert re.search(rf"\b{number} ?/ ?{len(printed)}\b", one)
+    for found in reports:
+        digest = hashlib.sha256(found.mission.data).hexdigest()
+        own = [one for one in printed if f"SHA-256 {digest}" in one]
+        assert own
+        assert all(one.strip().startswith(found.name) for one in own)
+
+
+def pages_of(pdf: bytes) -> int:
+    """Pages of a document as the browser writes it: one object of this type each."""
+    return len(re.findall(rb"/Type\s*/Page\b", pdf))

@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 import pytest
+from bisar_budget.budget.validity import FirstOrder
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.budget.scene import ScenePhases, _where, at
-from bisar_budget.budget.validity import FirstOrder
 from bisar_budget.errors import MissionError
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.load import parse_mission

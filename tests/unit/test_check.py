@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bisar_budget.budget.check import check_mission
+from bisar_budget.budget.findings import exit_code
 from bisar_budget.mission.load import parse_mission
 from tests.conftest import TODAY, findings, mission_text, row
 
@@ -497,8 +498,27 @@ def test_requirement_ids_are_carried_and_unknown_ones_said() -> None:
     assert "receiver.velocity.w" in found.warnings[0].message
 
 
-def test_nothing_declared_is_said() -> None:
-    assert any("nothing was judged" in warning.message for warning in findings().warnings)
+def test_a_file_that_declares_nothing_is_not_evaluated() -> None:
+    """It was a pass: a gate that judged nothing let it through, `--strict` too."""
+    found = findings()
+    assert any("nothing was judged" in warning.message for warning in found.warnings)
+    assert found.status == "not_evaluated"
+    assert exit_code({found.status}, strict=True) == 1
+    assert exit_code({found.status}, strict=False) == 0
+
+
+@pytest.mark.parametrize(
+    "declared",
+    [
+        {"timing_error__constant": 0},
+        {"platforms__receiver__motion_error__position": 0},
+        {"scene__height_error": 0},
+        {"common_motion_error__velocity": 0},
+        {"other_errors": [{"name": "air", "quadratic_phase_error": 0}]},
+    ],
+)
+def test_an_error_of_zero_is_declared(declared: dict) -> None:
+    assert findings(**declared).status == "pass"
 
 
 def test_keys_without_a_part_in_the_check_are_said() -> None:

@@ -252,6 +252,7 @@ class TestInit:
         result = run("check", path, "--strict")
         assert result.exit_code == 0, result.output
         assert "warning" not in result.stdout
+        assert yaml.safe_load(path.read_text())["allocation"]["combine"] == "rss"
 
     def test_does_not_replace_without_force(self, run, good) -> None:
         result = run("init", good)
@@ -267,7 +268,7 @@ class TestInit:
         """Uncomment each optional block: what the starter suggests must load."""
         text = run("init", "-").stdout
         text, count = re.subn(r"(?m)^(\s*)# (\s*(?:- \{)?[a-z_]+: .*)$", r"\1\2", text)
-        assert count == 14
+        assert count == 16
         path = tmp_path / "m.yaml"
         path.write_text(text)
         result = run("check", path)

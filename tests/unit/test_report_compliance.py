@@ -8,6 +8,7 @@ import subprocess
 import sys
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given, settings
@@ -21,7 +22,8 @@ from bisar_budget.budget.monte_carlo import monte_carlo
 from bisar_budget.errors import Fault, printable
 from bisar_budget.mission.load import load_mission
 from bisar_budget.report import Style, pictures, render
-from bisar_budget.report.compliance import compliance
+from bisar_budget.report.compliance import _document, compliance, document_words
+from bisar_budget.report.compliance_view import Document
 from tests.conftest import ROOT, TODAY, findings, mission_text
 from tests.page import Element, read_page
 
@@ -30,6 +32,7 @@ WITH_AUTOFOCUS = ROOT / "specs" / "missions" / "rigling_moses_section_v_autofocu
 EVERY_KEY = ROOT / "tests" / "acceptance" / "good" / "every_key.yaml"
 FAULT = Fault(line=3, column=7, key="radar.bandwidth", problem="is missing")
 LANGUAGES = ("html", "markdown")
+FULL = Style(detail="full")  # the summary and its annex
 
 
 def found_in(path: Path, model: str | None = None) -> MissionFindings:
@@ -41,11 +44,11 @@ def report(*missions, **fields) -> Report:
 
 
 def html(*missions, **fields) -> Element:
-    return read_page(render("html", report(*missions, **fields), Style()))
+    return read_page(render("html", report(*missions, **fields), FULL))
 
 
 def markdown(*missions, style: Style | None = None, **fields) -> str:
-    return render("markdown", report(*missions, **fields), style or Style())
+    return render("markdown", report(*missions, **fields), style or FULL)
 
 
 def as_page(text: str) -> Element:
@@ -95,7 +98,7 @@ class TestView:
     @pytest.mark.parametrize("path", sorted((ROOT / "specs" / "missions").glob("*.yaml")), ids=lambda path: path.stem)
     def test_every_row_stands_once_with_its_numbers(self, path: Path, model: str) -> None:
         found = found_in(path, model)
-        (page,) = compliance(report(found), Style()).missions
+        (page,) = compliance(report(found), FULL).missions
         shown = {row.id: row for row in page.matrix}
         silent = {row.id for row in page.undeclared}
         assert len(page.matrix) + len(page.undeclared) == len(found.rows)
@@ -222,9 +225,9 @@ class TestBothLanguages:
         page = page_of(language, illustrated())
         heads = [squeezed(head.text).lower() for head in page.all("h2", "h3")]
         for section in (
-            "verdict", "compliance matrix", "geometry", "allocation", "where the quadratic phase error comes from",
-            "assumptions and validity", "sources", "image evidence", "formulas, with the numbers put in",
-            "how this report was made", "approval",
+            "verdict", "compliance matrix", "where phase and displacement come from", "geometry", "allocation",
+            "assumptions and validity", "how this report was made", "approval", "annex", "image evidence",
+            "rows in full", "sources", "formulas, with the numbers put in",
         ):  # fmt: skip
             assert section in heads
 
@@ -325,7 +328,7 @@ class TestHtml:
         from bisar_budget.theory.render import as_mathml_content
 
         formula = as_mathml_content(published.table_2().rows[3].cells[0])
-        assert formula in render("html", report(), Style())
+        assert formula in render("html", report(), FULL)
 
     def test_bars_have_the_length_of_the_utilization(self) -> None:
         found = found_in(WITH_AUTOFOCUS)
@@ -380,6 +383,123 @@ class TestMarkdown:
         for before, line in pairwise(lines):
             if before.startswith("|") and line.startswith("|"):
                 assert before.count("|") == line.count("|"), line
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+class TestSummary:
+    """What a report says without --detail full."""
+
+    @staticmethod
+    def page(language: str, *missions) -> Element:
+        text = render(language, report(*missions), Style())
+        return read_page(text) if language == "html" else as_page(text)
+
+    def test_has_no_annex_and_says_where_one_is(self, language: str) -> None:
+        page = self.page(language)
+        heads = [squeezed(head.text).lower() for head in page.all("h2", "h3")]
+        assert heads[-2:] == ["how this report was made", "approval"]
+        assert not {"annex", "formulas, with the numbers put in", "sources"} & set(heads)
+        text = squeezed(page.text)
+        assert "Not shown: 2 rows that pass or limit nothing, 23 not declared (--detail full has them)." in text
+        assert "receiver.velocity.x" not in text
+
+    def test_images_and_draws_that_somebody_asked_for_are_an_annex(self, language: str) -> None:
+        heads = [squeezed(head.text).lower() for head in self.page(language, illustrated()).all("h2", "h3")]
+        assert heads[heads.index("approval") + 1 :] == ["annex", "image evidence"]
+
+    def test_a_file_that_declares_nothing_shows_its_allowables(self, language: str) -> None:
+        rows = table_with(self.page(language, findings()), "id", "allowable", "from")
+        assert [cells[0] for cells in rows] == [row.id for row in findings().rows]
+
+    def test_contributions_to_phase_and_location(self, language: str) -> None:
+        """A position error of both platforms moves the image by its own size; a velocity error has a phase."""
+        common = {"position": ["3 m", "4 mm", 0], "velocity": [0, "5 mm/s", 0]}
+        found = findings(common_motion_error=common, allocation__model="full")
+        page = self.page(language, found)
+        moved = table_with(page, "owner", "kind", "displacement")
+        assert moved[0][:4] == ["both platforms", "position", "x", "3 m"]
+        assert table_with(page, "owner", "kind", "qpe")[0][1] == "velocity"
+
+    def test_only_the_largest_contributions(self, language: str) -> None:
+        errors = [{"name": f"e{n:02}", "quadratic_phase_error": 0.001 * (n + 1)} for n in range(12)]
+        page = self.page(language, findings(other_errors=errors))
+        assert [cells[2] for cells in table_with(page, "owner", "kind", "qpe")] == [
+            f"e{n:02}" for n in range(11, 3, -1)
+        ]
+        assert "the 8 largest of 12" in squeezed(page.text)
+
+    def test_a_long_matrix_leaves_the_rows_that_use_least_to_the_annex(self, language: str) -> None:
+        """And no row that does not pass, however many there are."""
+        sizes = [2.0] * 30 + [0.001] * 30
+        errors = [{"name": f"e{n:02}", "quadratic_phase_error": size} for n, size in enumerate(sizes)]
+        page = self.page(language, findings(other_errors=errors))
+        rows = table_with(page, "id", "requirement", "verified by")
+        assert len(rows) == 40
+        assert sum("fail" in cells for cells in rows) == 30
+        assert "the annex" not in squeezed(page.text)
+
+    def test_the_verdict_says_that_errors_are_judged_alone(self, language: str) -> None:
+        alone = self.page(language, findings(timing_error__quadratic=1e-14))
+        assert "Complies; each error alone" in squeezed(alone.text)
+        together = self.page(language, findings(timing_error__quadratic=1e-14, allocation__combine="rss"))
+        assert "each error alone" not in squeezed(together.text)
+        both = self.page(language, found_in(SECTION_V), findings(allocation__combine="rss"))
+        assert "each error alone in 1 of 2 missions" in squeezed(both.text)
+
+    def test_the_angle_between_the_gradients(self, language: str) -> None:
+        narrow = findings(platforms__receiver__velocity=[-40, -40, 0], platforms__transmitter__velocity=[-150, 5, 0])
+        text = squeezed(self.page(language, narrow).text)
+        assert "range and Doppler gradients 12.1° apart" in text
+        assert "displacements are 4.8 times those at right angles" in text.partition("Where phase and")[0]
+
+    def test_the_requirement_is_the_one_that_binds(self, language: str) -> None:
+        found = findings(timing_error__quadratic=1e-14, requirements={"location_error": 5, "cubic_phase_error": 0.2})
+        bound = {"timing.quadratic": "location_error"}
+        rows = tuple(row._replace(binding_requirement=bound.get(row.id)) for row in found.rows)
+        cells = {c[0]: c for c in table_with(self.page(language, found._replace(rows=rows)), "id", "requirement")}
+        assert "displacement ≤ 5 m" in cells["timing.quadratic"]
+        free = {c[0]: c for c in table_with(self.page(language, found), "id", "requirement")}
+        assert "QPE ≤ 392 mrad, 0.5 of the budget" in free["timing.quadratic"]
+
+    def test_many_missions_have_an_index_and_no_more_than_60_kb_each(self, language: str) -> None:
+        """Five hundred missions below 30 MB: the examples, the largest of which decide, ten times."""
+        paths = sorted((ROOT / "specs" / "missions").glob("*.yaml"))
+        found = [found_in(path) for path in paths]
+        count = 3
+        text = render(language, report(*found * count), Style())
+        assert len(text.encode()) < 60e3 * count * len(found)
+        page = read_page(text) if language == "html" else as_page(text)
+        index = table_with(page, "mission", "file", "status", "worst row", "use")
+        assert len(index) == count * len(found)
+        for cells, one in zip(index, found * count, strict=True):
+            assert cells[0] == one.name
+            assert cells[1].endswith(os.path.basename(one.file))
+        if language == "html":
+            linked = [a.attributes["href"] for table in page.all("table") for a in table.all("a")]
+            assert linked[: len(index)] == [f"#m{number}" for number in range(1, len(index) + 1)]
+
+
+def test_printed_pages_carry_mission_document_hash_and_page_number() -> None:
+    """In the margins; a name is a string of the style sheet there, and cannot end it."""
+    found = findings(name='A "name"; } body { color: red')
+    text = render("html", report(found), Style())
+    style = text[text.index("<style>") : text.index("</style>")]
+    (name,) = re.findall(r'@top-left { content: "([^"]*)"', style)
+    assert re.sub(r"\\([0-9a-f]+) ", lambda match: chr(int(match[1], 16)), name) == found.name
+    digest = hashlib.sha256(found.mission.data).hexdigest()
+    assert f'@bottom-left {{ content: "SHA\\2d 256 {digest}"' in style
+    assert "counter(page)" in style
+    several = render("html", report(found, found), Style())
+    assert re.findall(r"@page (m\d) { @top-left", several) == ["m1", "m2"]
+
+
+def test_number_issue_and_author_of_the_document() -> None:
+    assert document_words(Document("SYS-12", "C")) == "SYS-12, issue C"
+    assert document_words(Document("", "C")) == "issue C"
+    assert document_words(Document()) == ""
+    document = SimpleNamespace(number="SYS-12", issue=None, author="A. Writer")
+    assert _document(SimpleNamespace(document=document)) == Document("SYS-12", "", "A. Writer")
+    assert _document(SimpleNamespace(document=None)) == Document()
 
 
 # What could close a tag, end a cell, start markup, or turn the reading direction.
@@ -618,7 +738,7 @@ def test_markdown_has_no_macro_that_github_refuses() -> None:
 
 def test_the_file_has_one_name_in_every_section() -> None:
     """A path given as absolute was relative in the head and absolute in the formulas: bytes of the machine."""
-    (page,) = compliance(report(found_in(SECTION_V)), Style(root=str(ROOT))).missions
+    (page,) = compliance(report(found_in(SECTION_V)), Style(root=str(ROOT), detail="full")).missions
     assert page.file == "specs/missions/rigling_moses_section_v.yaml"
     titles = [step.title for derivation in page.derivations for step in derivation.steps]
     assert any(f"Declared in {page.file}:" in title for title in titles)

@@ -1,0 +1,58 @@
+"""Platforms as fast as satellites whose path the file leaves straight: orbits curve.
+
+Over an aperture T the missing acceleration a moves the true path by aT²/8 against the straight one: 25 m in 5 s.
+"""
+
+from collections.abc import Iterator
+
+from bisar_budget.budget.effects import PLATFORMS
+from bisar_budget.budget.findings import FileWarning
+from bisar_budget.constants import EARTH_GRAVITATIONAL_PARAMETER, EARTH_RADIUS
+from bisar_budget.errors import KeyPath
+from bisar_budget.geometry import Vector, norm
+from bisar_budget.mission.model import Mission, Platform
+
+FASTEST_FLIGHT = 3e3  # m/s; no aircraft is as fast, and no satellite in a low orbit as slow
+
+
+def orbital_acceleration(position: Vector) -> Vector:
+    """Acceleration of a circular orbit through a place: μ/r² towards the Earth's centre. [m/s²]
+
+    Parameters
+    ----------
+    position : (3,)
+        East, north, up of the scene centre, which lies on a sphere of the Earth's mean radius. [m]
+
+    Notes
+    -----
+    Derived here, for axes that do not turn. In the scene's axes, which turn with the Earth at ω = 7.3e-5 rad/s, the
+    acceleration is less by 2ω×v + ω×(ω×r): up to 1.1 m/s² at 7.6 km/s, by the latitude and the orbit's inclination.
+    """
+    x, y, up = position
+    from_centre = (x, y, up + EARTH_RADIUS)
+    factor = -EARTH_GRAVITATIONAL_PARAMETER / norm(from_centre) ** 3
+    return (factor * x, factor * y, factor * from_centre[2])
+
+
+def straight_orbits(mission: Mission) -> Iterator[FileWarning]:
+    """Doubt each platform that is as fast as a satellite and has no `acceleration`, and say what its orbit would have.
+
+    A file that writes an acceleration has decided, zero included.
+    """
+    for name in PLATFORMS:
+        platform: Platform = getattr(mission.platforms, name)
+        speed = norm(platform.state.velocity)
+        if speed <= FASTEST_FLIGHT or platform.acceleration is not None:
+            continue
+        key: KeyPath = ("speed",) if platform.velocity is None else ("velocity",)
+        parts = [f"{part + 0.0:.3f} m/s^2" for part in orbital_acceleration(platform.state.position)]
+        yield FileWarning(
+            line=mission.line(("platforms", name, *key)),
+            message=(
+                f"platforms.{name}: {speed / 1e3:.3g} km/s is the speed of a satellite, and the path is straight. "
+                f"A circular orbit has acceleration: [{', '.join(parts)}] "
+                "(towards the Earth's centre; the Earth's rotation changes it by up to 1.1 m/s^2, which needs the "
+                "latitude)"
+            ),
+            is_doubt=True,
+        )

@@ -1,0 +1,40 @@
+"""What `requirements.declare` asks the file to declare: what is missing cannot be shown to comply."""
+
+from collections.abc import Iterator, Sequence
+
+from bisar_budget.budget.effects import PLATFORMS
+from bisar_budget.budget.findings import Row
+from bisar_budget.mission.model import Mission
+
+
+def missing_declarations(mission: Mission) -> Iterator[tuple[str, str, str]]:
+    """Say what is asked for and missing: the start of its rows' ids, its word in the list, its key in the file.
+
+    A covariance declares position and velocity. The clock is declared by any term of its error. An error that is
+    common to both platforms says nothing of their own.
+    """
+    for kind in mission.requirements.declare:
+        if kind == "timing":
+            if all(term is None for term in mission.timing_error):
+                yield "timing.", kind, "timing_error"
+            continue
+        for name in PLATFORMS:
+            if getattr(mission.platforms, name).motion_error.stated(kind) is None:
+                yield f"{name}.{kind}.", kind, f"platforms.{name}.motion_error.{kind}"
+
+
+def with_required(rows: Sequence[Row], mission: Mission) -> list[Row]:
+    """Turn rows of errors that the file should declare and does not from `not_declared` into `not_evaluated`."""
+    missing = list(missing_declarations(mission))
+    if not missing:
+        return list(rows)
+    return [_required(row, missing) for row in rows]
+
+
+def _required(row: Row, missing: Sequence[tuple[str, str, str]]) -> Row:
+    if row.status == "not_declared":
+        for start, kind, key in missing:
+            if row.id.startswith(start):
+                reason = f"requirements.declare asks for {kind}, and the file has no {key}"
+                return row._replace(status="not_evaluated", reason=reason)
+    return row
