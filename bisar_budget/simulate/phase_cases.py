@@ -198,7 +198,7 @@ def refocused(study: Study, sizes: Sizes, budget: float) -> dict[str, Any]:
             )
             return {"verdict_autofocus": "not_evaluated", "reason_autofocus": reason}
         chip, reference = study.chips(errors, effect, room=room)
-        focused = study.focused(chip)
+        focused = study.focused(errors, effect, chip)
         residual = abs(study.read(errors, effect, focused, reference).quadratic)
         peaks = [impulse_response_2d(one.image, one.spacing).peak for one in (reference, focused)]
         loss = 20 * math.log10(peaks[0] / peaks[1])
