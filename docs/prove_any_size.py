@@ -1,6 +1,7 @@
 """Hold the check to exact ranges on random missions: limits, phases, displacements, aggregates, the scene's edge.
 
     python docs/prove_any_size.py                       # 10 000 missions of six families, two processes
+    python docs/prove_any_size.py --write               # records the result in docs/full-model.md
     python docs/prove_any_size.py --missions 60 --processes 1
     python docs/prove_any_size.py --family drones --seed 17 --missions 1 --all
 
@@ -11,6 +12,7 @@ if there is one. `python -m tests.families FAMILY SEED` prints a mission.
 
 import argparse
 import os
+import re
 import sys
 import time
 from collections import Counter
@@ -26,6 +28,7 @@ from bisar_budget.mission.load import parse_mission
 from tests.compared import Compared, compared
 from tests.families import FAMILIES, mission_text
 
+PAGE = Path(__file__).with_name("full-model.md")
 Outcome = tuple[str, int, list[Compared] | str]
 
 
@@ -83,9 +86,26 @@ class Tally:
         )
         for quantity, count in self.compared.items():
             seed, worst = self.worst[quantity]
-            yield f"  {quantity:26} {self.missed[quantity]:6} of {count:7}   worst: seed {seed}, {worst}"
+            of_what = f"  {quantity:26} {self.missed[quantity]:6} of {count:7}"
+            yield f"{of_what}   worst: seed {seed}, {worst}" if worst.off else of_what
         for crash in self.crashes[:20]:
             yield f"  crash: {crash}"
+
+
+def record(lines: list[str]) -> None:
+    """Replace what stands between the page's marks."""
+    block = "\n".join(
+        ["```text", f"$ python docs/{' '.join([Path(sys.argv[0]).name, *sys.argv[1:]])}", *lines, "```"]
+    )
+    text, found = re.subn(
+        r"(<!-- exact ranges -->\n).*?(\n<!-- end -->)",
+        lambda match: match[1] + block + match[2],
+        PAGE.read_text(encoding="utf-8"),
+        flags=re.DOTALL,
+    )
+    if found != 1:
+        sys.exit(f"{PAGE.name} has no place for the result")
+    PAGE.write_text(text, encoding="utf-8")
 
 
 def main() -> int:
@@ -97,6 +117,7 @@ def main() -> int:
     parser.add_argument("--steps", type=int, default=100, help="sizes at which each error is tried up to its limit")
     parser.add_argument("--processes", type=int, default=min(2, os.cpu_count() or 1))
     parser.add_argument("--all", action="store_true", help="print every miss, not the worst of each quantity alone")
+    parser.add_argument("--write", action="store_true", help="record the result in docs/full-model.md")
     chosen = parser.parse_args()
     families = list(dict.fromkeys(chosen.family or FAMILIES))
     each = -(-chosen.missions // len(families))
@@ -111,7 +132,11 @@ def main() -> int:
             print("\n".join(tallies[family].lines(family)), flush=True)
     missions = sum(tally.missions for tally in tallies.values())
     numbers, missed = (sum(of.total() for of in column) for column in zip(*_counts(tallies), strict=True))
-    print(f"{missions} missions, {numbers} numbers, {missed} misses ({time.perf_counter() - start:.0f} s)")
+    crashes = sum(len(tally.crashes) for tally in tallies.values())
+    in_all = f"{missions} missions, {numbers} numbers, {missed} misses, {crashes} crashes"
+    print(f"{in_all} ({time.perf_counter() - start:.0f} s)")
+    if chosen.write:
+        record([*(line for family in families for line in tallies[family].lines(family)), in_all])
     return 0 if all(tally.is_clean for tally in tallies.values()) else 1
 
 

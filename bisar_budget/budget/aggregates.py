@@ -19,7 +19,7 @@ from bisar_budget.budget.findings import Row
 from bisar_budget.budget.judgement import judged
 from bisar_budget.budget.models import CUBIC, LOCATION, QUADRATIC, Declared
 from bisar_budget.budget.pull_in import caps, needed_sentence
-from bisar_budget.budget.vibration import slow_phases
+from bisar_budget.budget.slow_vibration import slow_phases
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.model import Mission
@@ -62,11 +62,24 @@ class Together:
         """Cubic phase of each error that moves something, signed. [rad]"""
         return [(source.id, self.found[source.id].cubic) for source in self.motion]
 
-    def moves(self) -> Moves | None:
-        """Displacement of each by its worse sign; None where one has none. [m]"""
-        moves = [(source.id, self.found[source.id].farthest) for source in self.motion]
-        known = [(row_id, move) for row_id, move in moves if move is not None]
-        return known if len(known) == len(moves) and moves else None
+    def moves(self, rule: str) -> Moves | None:
+        """Displacement of each, to be combined by a rule; None where one has none. [m]
+
+        By the sign that moves farther. For a sum over all signs half of what lies between the two signs, and once the
+        rest, which all signs have in common.
+        """
+        moves: Moves = []
+        rest = (0.0, 0.0)
+        for source in self.motion:
+            found = self.found[source.id]
+            if found.displacement is None or found.opposite is None or found.farthest is None:
+                return None
+            (x, y), (u, v) = found.displacement, found.opposite
+            moves.append((source.id, found.farthest if rule != "sum" else ((x - u) / 2, (y - v) / 2)))
+            rest = (rest[0] + (x + u) / 2, rest[1] + (y + v) / 2)
+        if rule == "sum" and any(rest):
+            moves.append(("whatever the signs", rest))
+        return moves or None
 
 
 def aggregate_rows(analysis: Analysis, model: Model, other: Model, allocation: Allocation) -> Iterator[Row]:
@@ -184,7 +197,7 @@ def _cubic_row(analysis: Analysis, mine: Together, theirs: Together) -> Row:
 def _location_row(analysis: Analysis, mine: Together, theirs: Together) -> Row:
     mission, groups = analysis.mission, analysis.groups
     combine, limit = mission.allocation.combine, mission.requirements.location_error
-    moves, others = mine.moves(), theirs.moves()
+    moves, others = mine.moves(combine), theirs.moves(combine)
     moved, by_other = (None if of is None else combined_displacement(of, combine, groups) for of in (moves, others))
     doubt = _doubt(theirs.model, by_other, limit, "m")
     if combine == "each" and moves is not None:

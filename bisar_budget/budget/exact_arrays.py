@@ -16,6 +16,7 @@ Floats = NDArray[np.float64]
 
 NODES = 24  # of Gauss-Legendre quadrature; more change nothing where platforms travel less than their slant range
 _ITERATIONS = 50
+_FOLLOWED = 8  # steps from no error on
 _HALVINGS = 6  # of a step that leads farther away
 _SETTLED_M = 1e-6  # a satellite's range in double precision gives no more
 
@@ -66,12 +67,44 @@ def exact_effects(
         gradients are parallel.
     """
     weights = _quadrature(transmitter.shape[-2])[1]
-    recorded = np.linalg.norm(actual_transmitter, axis=-1) + np.linalg.norm(actual_receiver, axis=-1)
-    recorded = recorded + np.asarray(clock_range, dtype=float)
-    return displaced(transmitter, receiver, recorded, weights, wavelength_m, near)
+    actual = (actual_transmitter, actual_receiver)
+    return located((transmitter, receiver), actual, np.asarray(clock_range, dtype=float), weights, wavelength_m, near)
 
 
-def displaced(
+def located(
+    measured: tuple[Floats, Floats],
+    actual: tuple[Floats, Floats],
+    clock_range: Floats,
+    weights: Floats,
+    wavelength_m: float,
+    near: Floats | None = None,
+) -> ExactEffects:
+    """Displaced points; those that are not found at once are followed from no error on.
+
+    As `exact_effects`, with tracks of both platforms sampled anywhere, and the weights (4, samples) that project such
+    samples on P₀ … P₃.
+    """
+    history = np.linalg.norm(actual[0], axis=-1) + np.linalg.norm(actual[1], axis=-1)
+    found = _displaced(*measured, history + clock_range, weights, wavelength_m, near)
+    missed = ~found.found
+    if not missed.any():
+        return found
+    lead = missed.shape
+    tracks = [np.broadcast_to(one, (*lead, *one.shape[-2:]))[missed] for one in measured]
+    clock = np.broadcast_to(clock_range, (*lead, weights.shape[1]))[missed]
+    before = np.zeros((tracks[0].shape[0], 2))
+    for step in range(1, _FOLLOWED + 1):
+        part = step / _FOLLOWED
+        there = [own + part * (one - own) for one, own in zip(tracks, actual, strict=True)]
+        ahead = before * (step / (step - 1) if step > 1 else 1.0)
+        followed = _displaced(there[0], there[1], history + part * clock, weights, wavelength_m, ahead)
+        before = followed.displacement  # NaN from the first step on that finds nothing
+    for whole, later in zip(found, followed, strict=True):
+        whole[missed] = later
+    return found
+
+
+def _displaced(
     transmitter: Floats,
     receiver: Floats,
     recorded: Floats,
@@ -116,11 +149,11 @@ def displaced(
     is_settled &= turn * orientation > 0
     k = 2 * math.pi / wavelength_m
     parts[~is_settled] = np.nan
-    point = np.where(is_settled[:, None], point, np.nan)
+    point[~is_settled] = np.nan
     return ExactEffects(
         point.reshape((*lead, 2)),
-        (1.5 * k * parts[:, 2]).reshape(lead),  # P₂ = (3t² - 1)/2
-        (2.5 * k * parts[:, 3]).reshape(lead),  # P₃ = (5t³ - 3t)/2
+        np.asarray(1.5 * k * parts[:, 2]).reshape(lead),  # P₂ = (3t² - 1)/2
+        np.asarray(2.5 * k * parts[:, 3]).reshape(lead),  # P₃ = (5t³ - 3t)/2
         is_settled.reshape(lead),
     )
 

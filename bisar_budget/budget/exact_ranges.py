@@ -23,6 +23,7 @@ from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState
 # 1e-6 of themselves; beyond the last, 16 nodes are right to 1e-3 at 1.25.
 _NODES = ((0.1, 6), (0.5, 10), (math.inf, 16))
 _ITERATIONS = 40
+_EPSILON = 2e-15  # of a range sum: what rounding of a few operations leaves
 _UNSEEN_RAD = 1e-5  # what the last step of the search may change a phase by beyond the part counted linearly
 
 _CLOCK_POWERS = {unit: power for power, unit in enumerate(CLOCK_UNITS.values())}
@@ -71,6 +72,9 @@ class ExactRanges:
             self.tracks[name] = track = _track(state, self.times, east, north)
             self.ranges[name] = [sqrt(x * x + y * y + z * z) for x, y, z in track]
         self.recorded = [t + r for t, r in zip(*self.ranges.values(), strict=True)]
+
+        # Ranges in double precision hold no phase that is smaller.
+        self.rounding = _EPSILON * self.k * max(self.recorded)
 
     # ------------------------------------------------------------------ small errors
     @cached_property
@@ -289,21 +293,16 @@ class ExactRanges:
             if self.k * step < _UNSEEN_RAD * nearest:
                 if determinant * self.orientation <= 0:
                     return None
-                return ExactPhases(
-                    (east, north),
+                phases = (
                     self.k
                     * (
-                        sum(map(mul, quadratic, left))
-                        + sum(map(mul, quadratic, by_east)) * step_east
-                        + sum(map(mul, quadratic, by_north)) * step_north
-                    ),
-                    self.k
-                    * (
-                        sum(map(mul, cubic, left))
-                        + sum(map(mul, cubic, by_east)) * step_east
-                        + sum(map(mul, cubic, by_north)) * step_north
-                    ),
+                        _sum(weights, left)
+                        + _sum(weights, by_east) * step_east
+                        + _sum(weights, by_north) * step_north
+                    )
+                    for weights in (quadratic, cubic)
                 )
+                return ExactPhases((east, north), *(phase if abs(phase) > self.rounding else 0.0 for phase in phases))
             if not step < 1e30:
                 return None
         return None

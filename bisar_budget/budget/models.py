@@ -21,7 +21,9 @@ _SHARE = 0.002  # what the second order may add, of a phase, a displacement or a
 _FLOOR_RAD, _FLOOR_M = 5e-4, 1e-3  # and whatever the size
 _CLOSE = 2e-4  # of a limit: near enough to go on in a straight line
 _STEPS = 60
-_FOLLOWED = 8  # steps from no error on, where a point is not found at once
+_AS_LINEAR = 0.2  # of a displacement; farther from where the linear model has it, a point is followed
+_FIRST_STEPS, _LEAST_STEP = 8, 1e-5  # of the way from no error on
+_STRAY = 0.3  # of a step; farther from where it led, a point is not the one that was followed
 _INNER = (0.5, 0.25)  # of a size, where a phase that bends back may have been larger
 
 
@@ -29,14 +31,22 @@ class Declared(NamedTuple):
     """What one declared error does.
 
     Quadratic and cubic phase at the aperture edge, of the worse sign, signed like the first order of the declared
-    one [rad]; displacement by the declared sign, and by the sign that moves farther [m]. None where there is none: a
-    plane without an inverse, or no ground point that has the range history, which makes phases infinite.
+    one [rad]; displacement by the declared sign, and by the opposite one [m]. None where there is none: a plane
+    without an inverse, or no ground point that has the range history, which makes phases infinite.
     """
 
     qpe: float
     cubic: float
     displacement: GroundVector | None
-    farthest: GroundVector | None
+    opposite: GroundVector | None
+
+    @property
+    def farthest(self) -> GroundVector | None:
+        """Displacement by the sign that moves farther, turned to the declared one's side. [m]"""
+        if self.displacement is None or self.opposite is None:
+            return None
+        back = (-self.opposite[0], -self.opposite[1])
+        return max(self.displacement, back, key=lambda move: math.hypot(*move))
 
 
 NOTHING = Declared(0.0, 0.0, None, None)
@@ -68,7 +78,7 @@ class PublishedModel:
         if not size:
             return NOTHING if size is None or not source.is_motion else _still(self.plane)
         moved = self.plane.displacement(source.effect, size) if source.is_motion else None
-        return Declared(source.effect.qpe * size, source.effect.cubic * size, moved, moved)
+        return Declared(source.effect.qpe * size, source.effect.cubic * size, moved, _back(moved))
 
     def allowable(self, source: ErrorSource, requirement: str, limit: float) -> float | None:
         """Largest size of an error within a limit [rad], or [m] for the location; None: no limit."""
@@ -123,15 +133,13 @@ class FullModel:
             return Declared(full.qpe * size, full.cubic * size, None, None)
         if self.is_small(source, abs(size)):
             moved = self.plane.displacement(full, size)
-            return Declared(full.qpe * size, full.cubic * size, moved, moved)
+            return Declared(full.qpe * size, full.cubic * size, moved, _back(moved))
         ahead, back = self.at(source, size), self.at(source, -size)
         if ahead is None or back is None:
-            moved = None if ahead is None else ahead.displacement
-            return Declared(math.inf, math.inf, moved, None)
+            return Declared(math.inf, math.inf, ahead and ahead.displacement, back and back.displacement)
         qpe, cubic = max(abs(ahead.quadratic), abs(back.quadratic)), max(abs(ahead.cubic), abs(back.cubic))
-        moved = ahead.displacement
-        farthest = max(moved, (-back.displacement[0], -back.displacement[1]), key=lambda move: math.hypot(*move))
-        return Declared(math.copysign(qpe, full.qpe * size), math.copysign(cubic, full.cubic * size), moved, farthest)
+        signs = math.copysign(qpe, full.qpe * size), math.copysign(cubic, full.cubic * size)
+        return Declared(*signs, ahead.displacement, back.displacement)
 
     def allowable(self, source: ErrorSource, requirement: str, limit: float) -> float | None:
         """Smallest size, of either sign, at which an error reaches a limit [rad], or [m] for the location.
@@ -182,21 +190,43 @@ class FullModel:
         """Phases and displacement of an error of a size, with its sign, by exact ranges; None: no ground point."""
         key = (source.id, size)
         if key not in self._known:
-            near = self.plane.displacement(source.full, size) or (0.0, 0.0)
-            self._known[key] = self.exact.phases([(source, size)], near) or self._followed(source, size)
+            self._known[key] = self._found(source, size)
         return self._known[key]
 
+    def _found(self, source: ErrorSource, size: float) -> ExactPhases | None:
+        near = self.plane.displacement(source.full, size) or (0.0, 0.0)
+        found = self.exact.phases([(source, size)], near)
+        if found is not None and math.dist(found.displacement, near) <= _AS_LINEAR * math.hypot(*near) + _FLOOR_M:
+            return found
+        return self._followed(source, size)
+
     def _followed(self, source: ErrorSource, size: float) -> ExactPhases | None:
-        """Follow the point from no error on, where it is not found at once."""
-        near: GroundVector = (0.0, 0.0)
-        found = None
-        for step in range(1, _FOLLOWED + 1):
-            part = size * step / _FOLLOWED
-            stretch = step / (step - 1) if step > 1 else 1.0
-            found = self.exact.phases([(source, part)], (near[0] * stretch, near[1] * stretch))
-            if found is None:
-                return None
-            near = found.displacement
+        """Follow the point from no error on, where it is not near to where the linear model has it.
+
+        Where the way bends back no larger error has an image of the point: that is no step away, however small.
+        """
+        done, place, slope = 0.0, (0.0, 0.0), self.plane.displacement(source.full, 1.0) or (0.0, 0.0)
+        step, is_tangent = size / _FIRST_STEPS, True
+        found: ExactPhases | None = None
+        while done != size:
+            ahead = size if abs(size - done) < 1.5 * abs(step) else done + step
+            way = (slope[0] * (ahead - done), slope[1] * (ahead - done))
+            found = self.exact.phases([(source, ahead)], (place[0] + way[0], place[1] + way[1]))
+            made = None if found is None else (found.displacement[0] - place[0], found.displacement[1] - place[1])
+            if made is not None and math.dist(made, way) <= _STRAY * math.hypot(*way) + _FLOOR_M:
+                slope = (made[0] / (ahead - done), made[1] / (ahead - done))
+                place, done, step, is_tangent = (place[0] + made[0], place[1] + made[1]), ahead, 2 * step, False
+            elif is_tangent:
+                step /= 2
+                if abs(step) < _LEAST_STEP * abs(size):
+                    return None
+            else:  # a chord leads astray where the way turns: look which way it goes
+                probe = _LEAST_STEP * size
+                near = self.exact.phases([(source, done + probe)], place)
+                if near is None:
+                    return None
+                slope = ((near.displacement[0] - place[0]) / probe, (near.displacement[1] - place[1]) / probe)
+                step, is_tangent = step / 2, True
         return found
 
     def worst(self, source: ErrorSource, size: float, requirement: str) -> float:
@@ -285,6 +315,10 @@ def _still(plane: ImagePlane) -> Declared:
     """An error of no size."""
     place = None if plane.degeneracy else (0.0, 0.0)
     return Declared(0.0, 0.0, place, place)
+
+
+def _back(move: GroundVector | None) -> GroundVector | None:
+    return None if move is None else (-move[0], -move[1])
 
 
 def _per_unit(effect: Effect, plane: ImagePlane, requirement: str) -> float:

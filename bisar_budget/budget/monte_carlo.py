@@ -203,7 +203,7 @@ class _Predictions:
             return combined_phase(together.phases(members), rule, together.groups)
         if judged.columns == (1,):
             return combined_phase(together.cubics(), rule, together.groups)
-        return combined_displacement(together.moves() or [], rule, together.groups)
+        return combined_displacement(together.moves(rule) or [], rule, together.groups)
 
     def variances(self, judged: Judged) -> dict[str, float]:
         """Variance that each error, or each covariance, brings."""

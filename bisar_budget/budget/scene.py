@@ -150,7 +150,7 @@ class ScenePhases:
     def largest(self, rim: "Rim", radius: float) -> tuple[float, float]:
         """Largest difference on a circle, errors of any size counted, and its azimuth. [rad], [rad]
 
-        It is climbed from where it is largest of small errors.
+        It is climbed from the highest of some places of the circle, and of where it is largest of small errors.
         """
         if not self.large:
             return rim.difference, rim.azimuth
@@ -159,8 +159,9 @@ class ScenePhases:
             return self.together(self.differences(radius, azimuth))
 
         arc = math.pi / RIM_POINTS
-        size, azimuth = size_at(rim.azimuth), rim.azimuth
-        while arc > _FINEST:
+        places = [rim.azimuth, *(2 * arc * place for place in range(RIM_POINTS))]
+        size, azimuth = max((size_at(place), place) for place in places)
+        while arc > _FINEST and math.isfinite(size):
             sides = [(size_at(azimuth + step), azimuth + step) for step in (-arc, arc)]
             if max(sides)[0] > size:
                 size, azimuth = max(sides)

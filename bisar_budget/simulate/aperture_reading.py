@@ -2,7 +2,9 @@
 
 Every pulse contributes to every pixel what exact ranges by the measured paths say. Correlated with a pulse's
 contribution, an image gives that pulse's phase: the projection of the spectrum to slow time, with range walk and bent
-lines as they are. The error-free response, formed and read by the same paths, takes out what is common to both.
+lines as they are. The error-free response, formed and read by the same paths, takes out what is common to both. A
+polynomial through these phases then is fitted to the pixels themselves, so that the ends of the patch, where a finite
+image cuts sidelobes off, count as what they are.
 """
 
 import math
@@ -12,15 +14,20 @@ import numpy as np
 
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import GroundVector
-from bisar_budget.simulate.collection import CELLS, OVERSAMPLING, Chip, Errors, PointCollection
+from bisar_budget.simulate.collection import CELLS, OVERSAMPLING, Chip, Errors, PointCollection, pulses_for
+from bisar_budget.simulate.image_formation import taylor_window
 from bisar_budget.simulate.phase_history import Complexes, Floats, cell_centres
 
-READ_CELLS = 2  # of range that are read at most, beside what a response walks
-_TIMES = 65  # at least
-_INNER = 0.95  # of the aperture; its edges ring in a patch of finite extent
-_ORDER = 6  # of the polynomial; a turn of ±0.5 rad shows sixth powers
+READ_CELLS = 1  # of range that a chip needs around the middle line, beside what a response walks
+_STRIDE = 2  # lines from one that is read to the next
+_INNER = 0.95  # of the aperture, in the correlation; its edges ring in a patch of finite extent
+# Order of the polynomial: a turn of ±0.5 rad shows sixth powers; continued to what a patch does not hold, high ones
+# are worth nothing.
+_ORDERS = ((0.9, 6), (0.6, 3), (-1.0, 2))
 _PRESENT = 0.25  # of the median strength over the aperture; less is smeared out of the patch
-_BLOCK = 1 << 20  # contributions held at once
+_REFINEMENTS, _SETTLED_RAD = 8, 1e-6
+_HELD = 1 << 21  # contributions held at once
+_KERNEL = np.linspace(0, 64, 4097)  # range cells, of a tapered range response
 
 
 class ApertureReading(NamedTuple):
@@ -28,7 +35,8 @@ class ApertureReading(NamedTuple):
 
     `across_pixels` is how far the response lies from the middle along y′, by the linear part of the phase.
     `walked_pixels` is what the other parts put the centre of gravity nearer along x′: at a frequency of y′ it is where
-    the range error less its slope times slow time puts it. `coverage` is the part of the aperture that the patch holds: 1 unless a smear leaves it.
+    the range error less its slope times slow time puts it. `coverage` is the part of the aperture that the patch
+    holds: 1 unless a smear leaves it.
     """
 
     quadratic: float
@@ -44,7 +52,7 @@ def read_aperture(
     centre: GroundVector,
     chip: Chip,
     reference: Chip,
-    range_cells: float = 0.0,
+    walk_cells: float = 0.0,
 ) -> ApertureReading:
     """Read quadratic and cubic phase of a response.
 
@@ -58,80 +66,120 @@ def read_aperture(
         Middle of the chips and place of the reference. [m]
     chip, reference : Chip
         With and without error, on the same pixels.
-    range_cells : float
-        Read around the middle line: what the response walks, and no more where a range cell is long.
+    walk_cells : float
+        Range cells that the response walks, both ways: so many lines are read.
 
     Raises
     ------
     ValueError
         The response is not in the image.
     """
-    count = max(_TIMES, round(2 * chip.image.shape[1] / OVERSAMPLING) + 1)
-    slow_time = cell_centres(collection.aperture_time, count)
-    seen, clean = _by_pulse(collection, errors, centre, slow_time, [chip, reference], range_cells)
+    lines, columns = chip.image.shape
+    middle = lines // 2
+    half = min(middle, lines - 1 - middle, round(walk_cells * OVERSAMPLING / 2)) // _STRIDE * _STRIDE
+    rows = slice(middle - half, middle + half + 1, _STRIDE)
+    slow_time = cell_centres(collection.aperture_time, pulses_for(round(columns / OVERSAMPLING)))
     place = slow_time / (collection.aperture_time / 2)
-    inner = np.abs(place) < _INNER
+    pixels = chip.grid[rows].reshape(-1, 3)
+    images = [one.image[rows] for one in (chip, reference)]
+    tapered = np.stack([(one * _taper(columns)).reshape(-1) for one in images])
+    correlated = np.empty((2, slow_time.size), dtype=complex)
+    block = max(1, _HELD // pixels.shape[0])
+    for start in range(0, slow_time.size, block):
+        part = slice(start, start + block)
+        contribution = _contributions(collection, errors, centre, slow_time[part], pixels)
+        correlated[:, part] = tapered @ contribution.conj().T
+    seen, clean = correlated
     product, strength = seen * clean.conj(), np.abs(seen) / np.maximum(np.abs(clean), 1e-30)
+    inner = np.abs(place) < _INNER
     present = strength > _PRESENT * np.median(strength[inner])
-    middle = count // 2
-    if not np.isfinite(strength).all() or not present[middle]:
+    centre_pulse, count = place.size // 2, place.size
+    if not np.isfinite(strength).all() or not present[centre_pulse]:
         raise ValueError("the response is not in the image")
     gaps = np.nonzero(~(present & inner))[0]
-    first = int(gaps[gaps < middle].max(initial=-1)) + 1
-    last = int(gaps[gaps > middle].min(initial=count))
+    first = int(gaps[gaps < centre_pulse].max(initial=-1)) + 1
+    last = int(gaps[gaps > centre_pulse].min(initial=count))
     kept = slice(first, last)
+    covered = float(place[last - 1] - place[first]) / (2 * _INNER)
+    order = next(order for part, order in _ORDERS if covered > part)
     phase = np.unwrap(np.angle(product[kept]))
-    weights = np.abs(clean[kept])
-    fit = np.polynomial.legendre.legfit(place[kept], phase, _ORDER, w=weights)
-    covered = (place[last - 1] - place[first]) / (2 * _INNER)
-    # The image's phase is −2π/λ times the range error; P₂ = (3t² - 1)/2, P₃ = (5t³ - 3t)/2.
+    fit = np.zeros(max(4, order + 1))
+    fit[: order + 1] = np.polynomial.legendre.legfit(place[kept], phase, order, w=np.abs(clean[kept]))
+    if covered > _ORDERS[0][0]:
+        # Of a large patch some pixels are enough for a polynomial.
+        some = slice(None, None, -(-pixels.shape[0] * slow_time.size // _HELD))
+        contribution = _contributions(collection, errors, centre, slow_time, pixels[some])
+        fit = _refined(fit, place, contribution, *(one.reshape(-1)[some] for one in images))
     # A pixel along y′ changes the range sum over the aperture by λ / OVERSAMPLING, twice its P₁ part.
     turn = 1 if collection.flown(errors).turns_left(centre) else -1
     across = -turn * OVERSAMPLING / math.pi * float(fit[1])
     slope = np.polynomial.legendre.legder([0.0, 0.0, *fit[2:]])
-    mean = float(np.mean(place[inner] * np.polynomial.legendre.legval(place[inner], slope)))
+    mean = float(np.mean(place * np.polynomial.legendre.legval(place, slope)))
     walked = mean / (2 * math.pi) * collection.relative_bandwidth * OVERSAMPLING
-    return ApertureReading(
-        float(-1.5 * fit[2]), float(-2.5 * fit[3]), across, -walked, min(1.0, float(covered) * 1.02)
-    )
+    # The image's phase is −2π/λ times the range error; P₂ = (3t² - 1)/2, P₃ = (5t³ - 3t)/2.
+    return ApertureReading(float(-1.5 * fit[2]), float(-2.5 * fit[3]), across, -walked, min(1.0, covered * 1.02))
 
 
-def _by_pulse(
-    collection: PointCollection,
-    errors: Errors,
-    centre: GroundVector,
-    slow_time: Floats,
-    chips: list[Chip],
-    range_cells: float,
-) -> list[Complexes]:
-    """Correlation of images, tapered to their ends, with what a point at the centre contributes at each time."""
-    grid = chips[0].grid
-    lines, columns = grid.shape[:2]
-    middle = lines // 2
-    half = min(middle, lines - 1 - middle, round(range_cells * OVERSAMPLING / 2))
-    rows = slice(middle - half, middle + half + 1)
-    pixels = grid[rows].reshape(-1, 3)
-    # The ends of the patch are half the cells of a response without smear; what is smeared stays as it is.
+def _refined(fit: Floats, place: Floats, contribution: Complexes, seen: Complexes, clean: Complexes) -> Floats:
+    """Fit the phase's polynomial to the pixels, by Gauss and Newton; what does not settle is left as it was."""
+    legendre = np.polynomial.legendre.legvander(place, fit.size - 1)
+    gain = np.vdot(contribution.sum(axis=0), clean) / np.vdot(contribution.sum(axis=0), contribution.sum(axis=0))
+    found, before = fit.copy(), math.inf
+    for _ in range(_REFINEMENTS):
+        pulses = gain * np.exp(1j * (legendre @ found))
+        model = pulses @ contribution
+        amplitude = float(np.real(np.vdot(model, seen)) / np.real(np.vdot(model, model)))
+        columns = contribution.T @ (1j * amplitude * pulses[:, None] * legendre)
+        left = seen - amplitude * model
+        misfit = float(np.linalg.norm(left))
+        if not misfit <= before * (1 + 1e-9):
+            return fit
+        before = misfit
+        both = np.concatenate((columns.real, columns.imag))
+        step = np.linalg.lstsq(both, np.concatenate((left.real, left.imag)), rcond=1e-6)[0]
+        found = found + step
+        if np.abs(step).max() < _SETTLED_RAD:
+            break
+    return found
+
+
+def _taper(columns: int) -> Floats:
+    """Weights along a line: its ends, half the cells of a response without smear, fade."""
     ramp = round(CELLS * OVERSAMPLING / 2)
-    inside = np.minimum(np.arange(columns) + 0.5, columns - np.arange(columns) - 0.5) / ramp
-    taper = np.sin(math.pi / 2 * np.clip(inside, 0, 1)) ** 2
-    images = np.stack([(one.image[rows] * taper).reshape(-1) for one in chips])
+    place = np.arange(columns)
+    inside = np.minimum(place + 0.5, columns - place - 0.5) / ramp
+    taper: Floats = np.sin(math.pi / 2 * np.clip(inside, 0, 1)) ** 2
+    return taper
+
+
+def _contributions(
+    collection: PointCollection, errors: Errors, centre: GroundVector, slow_time: Floats, pixels: Floats
+) -> Complexes:
+    """What each pulse adds to the image of a point at a place, (pulses, pixels), at baseband."""
     flown = collection.flown(errors)
     k = 2 * math.pi / collection.wavelength
     at_middle = flown.range_sum(pixels) - flown.range_sum(np.asarray(centre, dtype=float))
-    point = np.array([*centre, 0.0])
-    paths = [one.measured for one in collection.paths(errors.smooth(), slow_time)]
-    found = np.empty((len(chips), slow_time.size), dtype=complex)
-    step = max(1, _BLOCK // pixels.shape[0])
-    for begin in range(0, slow_time.size, step):
-        part = slice(begin, begin + step)
-        farther = np.zeros((slow_time[part].size, pixels.shape[0]))
-        for track in paths:
-            farther += _distance(track[part], pixels) - _distance(track[part], point[None])
-        contribution = np.exp(1j * k * (farther - at_middle))
-        contribution *= np.sinc(farther * (collection.radar.bandwidth / SPEED_OF_LIGHT))
-        found[:, part] = images @ contribution.conj().T
-    return list(found)
+    point = np.array([[*centre, 0.0]])
+    farther = np.zeros((slow_time.size, pixels.shape[0]))
+    for one in collection.paths(errors.smooth(), slow_time):
+        farther += _distance(one.measured, pixels) - _distance(one.measured, point)
+    cells = farther * (collection.radar.bandwidth / SPEED_OF_LIGHT)
+    contribution: Complexes = np.exp(1j * k * (farther - at_middle))
+    if not collection.is_tapered:
+        return contribution * np.sinc(cells)
+    weights = taylor_window(257)
+    frequency = cell_centres(1.0, 257)
+    kernel = np.cos(2 * math.pi * np.outer(_KERNEL, frequency)) @ weights / 257
+    return (
+        contribution * np.interp(np.abs(cells), _KERNEL, kernel, right=0.0) * _weights(collection, slow_time)[:, None]
+    )
+
+
+def _weights(collection: PointCollection, slow_time: Floats) -> Floats:
+    """Of a Taylor window over the aperture."""
+    fine = taylor_window(1024)
+    weights: Floats = np.interp(slow_time, cell_centres(collection.aperture_time, fine.size), fine)
+    return weights
 
 
 def _distance(positions: Floats, points: Floats) -> Floats:

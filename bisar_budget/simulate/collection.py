@@ -46,8 +46,11 @@ class Errors(NamedTuple):
 
     def smooth(self) -> "Errors":
         """The polynomials alone: no vibration."""
-        still = (one._replace(sinusoids=(), wideband_rms=0.0) for one in (self.transmitter, self.receiver))
-        return Errors(*still, clock=self.clock)
+        return Errors(_still(self.transmitter), _still(self.receiver), self.clock)
+
+
+def _still(error: MotionError) -> MotionError:
+    return error._replace(sinusoids=(), wideband_rms=0.0)
 
 
 def superposed(parts: Iterable[Errors]) -> Errors:
@@ -113,6 +116,11 @@ class PointCollection:
         self.spacing = (self.resolution[0] / OVERSAMPLING, self.resolution[1] / OVERSAMPLING)
         self._nodes = aperture_nodes(self.aperture_time)
         self._kept: tuple[object, Floats, tuple[float, float]] | None = None
+
+    @property
+    def range_cell(self) -> float:
+        """Resolution of the range sum, c/B. [m]"""
+        return SPEED_OF_LIGHT / self.radar.bandwidth
 
     @property
     def relative_bandwidth(self) -> float:
@@ -181,7 +189,7 @@ class PointCollection:
             The patch aliases with the mission's pulses, or is too large to be formed.
         """
         grid, spacing = self._grid(centre, errors, cells, range_cells)
-        slow_time = cell_centres(self.aperture_time, _pulses(cells))
+        slow_time = cell_centres(self.aperture_time, pulses_for(cells))
         transmitter, receiver = self.paths(errors, slow_time)
         clock = self.clock(errors, slow_time)
         if is_reference:
@@ -206,10 +214,9 @@ class PointCollection:
         self, errors: Errors, place: GroundVector, cells: int = CELLS, range_cells: int = RANGE_CELLS
     ) -> tuple[Chip, Chip]:
         """Image of errors around the place they move the point to, and of no error there: see `chip`."""
-        size = {"cells": cells, "range_cells": range_cells}
         return (
-            self.chip(place, errors, **size),
-            self.chip(place, errors, scatterer=place, is_reference=True, **size),
+            self.chip(place, errors, cells=cells, range_cells=range_cells),
+            self.chip(place, errors, scatterer=place, cells=cells, range_cells=range_cells, is_reference=True),
         )
 
     def _grid(
@@ -260,13 +267,13 @@ class PointCollection:
                 f"and aliases below {2 * cells} pulses; omit the key to get what it takes"
             )
         pixels = max(1, range_cells * OVERSAMPLING) * cells * OVERSAMPLING
-        needed = pixels * _BYTES_PER_PIXEL + _pulses(cells) * _BYTES_PER_PULSE
+        needed = pixels * _BYTES_PER_PIXEL + pulses_for(cells) * _BYTES_PER_PULSE
         if needed > self.memory_limit:
             limit = f"simulation.memory_limit is {self.memory_limit / 1e6:.0f} MB"
             raise ValueError(f"the image needs about {needed / 1e6:.0f} MB, {limit}: raise it")
 
 
-def _pulses(cells: int) -> int:
+def pulses_for(cells: int) -> int:
     """Pulses of an image; of a large patch half as many, its repeats being far enough away."""
     return max(_PULSES_PER_CELL * min(cells, _LARGE_CELLS), _PULSES_PER_CELL // 2 * cells)
 

@@ -126,7 +126,8 @@ def backproject(history: PhaseHistory, points: Floats, spline: Spline) -> Comple
     if lattice is not None and _neglected_phase(history, lattice) < _PHASE_LIMIT:
         centre, radius = lattice.disc()
         padded = np.zeros((lattice.shape[0], -(-lattice.shape[1] // _LINE) * _LINE), dtype=complex)
-        middle = sum(np.linalg.norm(one - centre, axis=1) for one in (history.transmitter, history.receiver))
+        middle = np.linalg.norm(history.transmitter - centre, axis=1)
+        middle = middle + np.linalg.norm(history.receiver - centre, axis=1)
         # Neither leg's range changes faster than the pixel moves.
         for block in _profile_blocks(history, middle - 2 * radius, middle + 2 * radius, spline):
             _add_lattice(*block, lattice.origin, lattice.across, lattice.along, spline == "cubic", padded)
@@ -134,7 +135,8 @@ def backproject(history: PhaseHistory, points: Floats, spline: Spline) -> Comple
         image = np.ascontiguousarray(image if shape == points.shape[:-1] else image.T)
     else:
         flat = np.ascontiguousarray(points.reshape(-1, 3))
-        for block in _profile_blocks(history, *_reach(history.transmitter, history.receiver, flat), spline):
+        nearest, farthest = _reach(history.transmitter, history.receiver, flat)
+        for block in _profile_blocks(history, nearest, farthest, spline):
             _add_points(*block, flat, spline == "cubic", image.reshape(-1))
     image /= history.samples.size
     return image

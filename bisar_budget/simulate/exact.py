@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bisar_budget.budget.exact_arrays import displaced
+from bisar_budget.budget.exact_arrays import located
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.simulate.phase_history import Floats, Path
 
@@ -35,10 +35,10 @@ def exact_effect(
     ValueError
         No ground point has the recorded range history.
     """
-    recorded = np.linalg.norm(transmitter.actual, axis=1) + np.linalg.norm(receiver.actual, axis=1)
-    recorded = recorded + SPEED_OF_LIGHT * np.asarray(clock_error, dtype=float)
     weights = _projection(slow_time / (aperture_time_s / 2))
-    found = displaced(transmitter.measured, receiver.measured, recorded, weights, wavelength_m, None)
+    measured, actual = (transmitter.measured, receiver.measured), (transmitter.actual, receiver.actual)
+    clock_range = SPEED_OF_LIGHT * np.asarray(clock_error, dtype=float)
+    found = located(measured, actual, clock_range, weights, wavelength_m)
     if not found.found:
         raise ValueError("no ground point has the recorded range history")
     east, north = (float(part) for part in found.displacement)

@@ -6,6 +6,7 @@ import numpy as np
 
 from bisar_budget.budget.findings import MissionFindings
 from bisar_budget.budget.images import FLOOR_DB, ImageEvidence, PointImage, Verdict
+from bisar_budget.budget.pull_in import ROOM
 from bisar_budget.budget.verdicts import rows_worth_showing
 from bisar_budget.mission.model import Mission
 from bisar_budget.simulate.collection import OVERSAMPLING, Chip
@@ -40,27 +41,26 @@ def form_image_evidence(mission: Mission, findings: MissionFindings) -> tuple[Im
 
 
 def _evidence(study: Study, file: str, verdict: Verdict) -> ImageEvidence:
-    chip, reference = study.images(verdict.id, verdict.boundary_error)
+    chip, reference, _, effect = study.images(verdict.id, verdict.boundary_error)
     found = ImageEvidence(
         file=file,
         verdict=verdict,
         look_azimuth_rad=study.geometry.look_azimuth,
-        at_limit=_point_image(chip, reference, verdict.predicted_qpe_rad or 0.0),
+        at_limit=_point_image(chip, reference, study.smear(effect)),
     )
     if verdict.boundary_autofocus is None or verdict.measured_residual_qpe_rad is None:
         return found
-    chip, reference = study.images(verdict.id, verdict.boundary_autofocus)
-    smear = (verdict.predicted_qpe_rad or 0.0) * verdict.boundary_autofocus / verdict.boundary_error
+    chip, reference, errors, effect = study.images(verdict.id, verdict.boundary_autofocus, max(ROOM.values()))
     return found._replace(
-        before_autofocus=_point_image(chip, reference, smear),
-        after_autofocus=_point_image(study.focused(chip), reference, smear),
+        before_autofocus=_point_image(chip, reference, study.smear(effect)),
+        after_autofocus=_point_image(study.focused(errors, effect, chip), reference, study.smear(effect)),
     )
 
 
-def _point_image(chip: Chip, reference: Chip, quadratic: float) -> PointImage:
-    """Reduce a chip to what is shown: as far as the response of a quadratic phase reaches, and sidelobes."""
+def _point_image(chip: Chip, reference: Chip, smear_cells: float) -> PointImage:
+    """Reduce a chip to what is shown: as far as the response is smeared, and sidelobes."""
     spacing, middle = chip.spacing, chip.cut.size // 2
-    reach = _AROUND + 2 * abs(quadratic) / math.pi  # cells, from the slope of the phase at the aperture edge
+    reach = _AROUND + smear_cells / 2
     half = min(math.ceil(reach * OVERSAMPLING), middle - 1)
     stride = math.ceil(2 * half / _MAX_PIXELS)
     half -= half % stride

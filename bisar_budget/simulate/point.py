@@ -9,7 +9,8 @@ import numpy as np
 from bisar_budget.budget.analysis import Analysis
 from bisar_budget.budget.correlation import correlated_errors, likely_error
 from bisar_budget.budget.effects import PLATFORMS
-from bisar_budget.budget.vibration import along_line_of_sight, lines_of
+from bisar_budget.budget.exact_arrays import aperture_nodes
+from bisar_budget.budget.vibration_lines import along_line_of_sight, lines_of
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vector
 from bisar_budget.mission.model import Mission, Simulation
@@ -30,12 +31,14 @@ from bisar_budget.simulate.phase_history import (
     path,
     phase_history,
 )
+from bisar_budget.simulate.range_lines import Flown
 
 _MARGIN_CELLS = 16  # of the patch beyond the smear, each way
 _SAMPLES_PER_CELL = 3
 _MIN_PULSES, _MAX_PULSES = 256, 1 << 15
 _MIN_FREQUENCIES = 64
-_MAX_BEND = 0.5  # range cells
+_ECHO_CELLS = 256  # from the peak; paired echoes farther away are said, not shown
+_SCENE_PIXELS = 1 << 18  # of the image in (x, y)
 _BYTES_PER_PIXEL = 16 * 4  # image, grid and what forming a block of them holds
 _BYTES_PER_SAMPLE = 16 * 5  # of the phase history; it is a product of terms of its own size
 _BLOCK = 1 << 18  # pixels formed between two words on the progress
@@ -48,10 +51,11 @@ class SimulationError(Exception):
 class PointImages(NamedTuple):
     """Images of a point scatterer at the scene centre, and what explains them.
 
-    `in_scene` is on a grid along (x, y), the others along (x′, y′): (nx, ny) complex, all centred where the
-    errors move the point; `scene_spacing` and `spacing`, (2,) [m], are those of their pixels. `range_error` is its
-    quadratic and higher part over `slow_time`; `segments` are the slopes and `points` the ground points of
-    (26)-(29), relative to the displaced point.
+    `in_scene` is on a grid along (x, y), of as much of the patch as a quarter of a million pixels hold; the others are on `grid`,
+    (nx, ny, 3) [m], whose lines are lines of equal range, along y′. All are complex and centred where the errors move
+    the point; `scene_spacing` and `spacing`, (2,) [m], are those of their pixels there. `range_error` is its quadratic
+    and higher part over `slow_time`; `segments` are the slopes and `points` the ground points of (26)-(29), relative
+    to the displaced point. `outside` says which declared echoes lie beyond the patch.
     """
 
     slow_time: Floats
@@ -63,6 +67,7 @@ class PointImages(NamedTuple):
     spacing: tuple[float, float]
     scene_spacing: tuple[float, float]
     look_azimuth: float
+    grid: Floats
     in_scene: Complexes
     rotated: Complexes
     focused: Complexes
@@ -70,14 +75,14 @@ class PointImages(NamedTuple):
     response: ImpulseResponse
     focused_response: ImpulseResponse
     clean_response: ImpulseResponse
+    outside: str = ""
 
 
 class Patch(NamedTuple):
-    """Ground patch around the displaced point: direction of its first axis, extent [m] and pixels of both."""
+    """Ground patch around the displaced point: pixels along both axes, and their spacing there. [m]"""
 
-    azimuth: float
-    size: tuple[float, float]
     shape: tuple[int, int]
+    spacing: tuple[float, float]
 
     @property
     def pixels(self) -> int:
@@ -85,9 +90,9 @@ class Patch(NamedTuple):
         return self.shape[0] * self.shape[1]
 
     @property
-    def spacing(self) -> tuple[float, float]:
-        """Between pixels. [m]"""
-        return (self.size[0] / self.shape[0], self.size[1] / self.shape[1])
+    def size(self) -> tuple[float, float]:
+        """Extent. [m]"""
+        return (self.shape[0] * self.spacing[0], self.shape[1] * self.spacing[1])
 
 
 class Plan(NamedTuple):
@@ -97,6 +102,7 @@ class Plan(NamedTuple):
     in_scene: Patch
     pulses: int
     frequencies: int
+    outside: str
 
     @property
     def memory(self) -> float:
@@ -109,13 +115,16 @@ class Plan(NamedTuple):
         """Pixels times pulses: of the image in the scene's axes, of the rotated one and of the error-free one."""
         return self.pulses * (self.in_scene.pixels + 2 * self.rotated.pixels)
 
-    def require_memory(self, limit: float) -> None:
+    def require_memory(self, limit: float, given_pulses: int | None) -> None:
         """Raise SimulationError where the plan exceeds a limit. [B]"""
         if self.memory > limit:
-            x, y = self.in_scene.shape
+            x, y = self.rotated.shape
+            fewer = ""
+            if given_pulses is not None and given_pulses > 2 * y / _SAMPLES_PER_CELL:
+                fewer = f", or lower collection.pulses, of which {2 * math.ceil(y / _SAMPLES_PER_CELL)} are enough"
             raise SimulationError(
                 f"images of {x} x {y} pixels from {self.pulses} pulses of {self.frequencies} frequencies need about "
-                f"{self.memory / 1e6:.4g} MB, simulation.memory_limit is {limit / 1e6:.4g} MB: raise it"
+                f"{self.memory / 1e6:.4g} MB, simulation.memory_limit is {limit / 1e6:.4g} MB: raise it{fewer}"
             )
 
 
@@ -124,7 +133,9 @@ def simulate_point(mission: Mission, progress: Callable[[int, int], None] = lamb
 
     Signs and coverage factor of the file are used; of a covariance, which has no sign, the most probable error
     whose quadratic phase is one sigma, times the coverage factor. Vibration along the line of sight is in the
-    data, wideband by the file's seed.
+    data, wideband by the file's seed. The patch lies where the errors move the point, along the lines of equal range
+    of the measured paths, and is as long as the smear and the paired echoes. The error-free image is that of the same
+    processor: a point at the displaced place, recorded from where the paths were measured.
 
     Parameters
     ----------
@@ -136,18 +147,29 @@ def simulate_point(mission: Mission, progress: Callable[[int, int], None] = lamb
     Raises
     ------
     SimulationError
-        Too few pulses for the patch, lines of equal range that bend through cells, or images and phase history
+        No ground point has the recorded range history, too few pulses for the patch, or images and phase history
         beyond `simulation.memory_limit`. Nothing is formed before that is known.
     """
     geometry, settings = mission.geometry, mission.simulation
     T, wavelength = mission.collection.aperture_time, mission.radar.wavelength
-    fine = cell_centres(T, 2048)
-    smooth = _paths(mission, geometry, fine, vibrating=False)
-    effect = exact_effect(fine, *smooth, _clock(mission, fine), wavelength, T)
-    left = _left_over(smooth, effect) + SPEED_OF_LIGHT * _clock(mission, fine)
+    nodes, fine = aperture_nodes(T), cell_centres(T, 2049)
+    try:
+        effect = exact_effect(
+            nodes, *_paths(mission, geometry, nodes, vibrating=False), _clock(mission, nodes), wavelength, T
+        )
+        begin, middle, end = (
+            _paths(mission, geometry, np.array([tau]), vibrating=False) for tau in (-T / 2, 0.0, T / 2)
+        )
+        flown = Flown(*(np.concatenate([at[leg].measured for at in (begin, middle, end)]) for leg in (0, 1)))
+        cells = flown.cells(effect.displacement, mission.radar.bandwidth, wavelength)
+    except ValueError as error:
+        raise SimulationError(f"the declared errors leave no image of a point: {error}") from None
+    left = _left_over(_paths(mission, geometry, fine, vibrating=False), effect) + SPEED_OF_LIGHT * _clock(
+        mission, fine
+    )
     slope = np.gradient(left, fine)
-    plan = _plan(mission, left, slope)
-    plan.require_memory((settings or Simulation()).memory_limit)
+    plan = _plan(mission, flown, effect, cells, left, slope)
+    plan.require_memory((settings or Simulation()).memory_limit, mission.collection.pulses)
     slow_time = cell_centres(T, plan.pulses)
     frequency = mission.radar.center_frequency + cell_centres(mission.radar.bandwidth, plan.frequencies)
     rng = np.random.default_rng(settings.seed if settings else 1)
@@ -168,29 +190,34 @@ def simulate_point(mission: Mission, progress: Callable[[int, int], None] = lamb
             recorded.samples[:] *= np.outer(taylor_window(plan.pulses), taylor_window(plan.frequencies))
         return recorded
 
-    def image(recorded: PhaseHistory, patch: Patch) -> Complexes:
-        grid = ground_grid(effect.displacement, patch.azimuth, patch.size, patch.shape)
-        formed = np.empty(patch.shape, dtype=complex)
-        rows = max(1, _BLOCK // patch.shape[1])
-        for start in range(0, patch.shape[0], rows):
+    def image(recorded: PhaseHistory, grid: Floats) -> Complexes:
+        formed = np.empty(grid.shape[:2], dtype=complex)
+        rows = max(1, _BLOCK // grid.shape[1])
+        for start in range(0, grid.shape[0], rows):
             part = grid[start : start + rows]
-            formed[start : start + rows] = backprojection(recorded, part) * baseband(geometry, part, wavelength)
+            formed[start : start + rows] = backprojection(recorded, part) * baseband(flown, part, wavelength)
             progress(plan.pulses * part.shape[0] * part.shape[1], plan.work)
         return formed
 
-    flown = _paths(mission, geometry, slow_time, vibrating=True, rng=rng)
-    recorded = history(flown, _clock(mission, slow_time), (0.0, 0.0))
-    rotated, in_scene = image(recorded, plan.rotated), image(recorded, plan.in_scene)
-    still = (path(geometry.transmitter, slow_time), path(geometry.receiver, slow_time))
-    error_free = image(history(still, 0 * slow_time, effect.displacement), plan.rotated)
+    recorded = history(
+        _paths(mission, geometry, slow_time, vibrating=True, rng=rng), _clock(mission, slow_time), (0.0, 0.0)
+    )
+    lines = flown.grid(effect.displacement, plan.rotated.spacing, plan.rotated.shape)
+    scene = ground_grid(effect.displacement, 0.0, plan.in_scene.size, plan.in_scene.shape)
+    rotated, in_scene = image(recorded, lines), image(recorded, scene)
+    measured = [one.measured for one in _paths(mission, geometry, slow_time, vibrating=False)]
+    as_measured = (Path(actual=measured[0], measured=measured[0]), Path(actual=measured[1], measured=measured[1]))
+    error_free = image(history(as_measured, 0 * slow_time, effect.displacement), lines)
     focused = ALGORITHMS[mission.autofocus.algorithm](rotated).image
     across = plan.rotated.spacing[1]
     clean = _measured(error_free, across, None)
+    bent = left - left[fine.size // 2] - slope[fine.size // 2] * fine  # as Figure 3 has it, from mid-aperture on
+    bent_slope = slope - slope[fine.size // 2]
     times = np.array([-T / 3, 0.0, T / 3])  # centres of three sub-apertures
-    values, slopes = np.interp(times, fine, left), np.interp(times, fine, slope)
+    values, slopes = np.interp(times, fine, bent), np.interp(times, fine, bent_slope)
     return PointImages(
         slow_time=fine,
-        range_error=left,
+        range_error=bent,
         segment_times=times,
         segments=np.stack((values, slopes), axis=1),
         points=np.array([_indicated(geometry, *args) for args in zip(times, values, slopes, strict=True)]),
@@ -198,6 +225,7 @@ def simulate_point(mission: Mission, progress: Callable[[int, int], None] = lamb
         spacing=plan.rotated.spacing,
         scene_spacing=plan.in_scene.spacing,
         look_azimuth=geometry.look_azimuth,
+        grid=lines,
         in_scene=in_scene,
         rotated=rotated,
         focused=focused,
@@ -205,40 +233,50 @@ def simulate_point(mission: Mission, progress: Callable[[int, int], None] = lamb
         response=_measured(rotated, across, clean.mask_m),
         focused_response=_measured(focused, across, clean.mask_m),
         clean_response=clean,
+        outside=plan.outside,
     )
 
 
-def _plan(mission: Mission, left: Floats, slope: Floats) -> Plan:
+def _plan(
+    mission: Mission, flown: Flown, effect: ExactEffect, cell: tuple[float, float], left: Floats, slope: Floats
+) -> Plan:
     """Choose patches and samples no larger than the response asks for, from its range error and that one's slope.
 
-    In (x′, y′) the band of a response is a box, and its smear lies along y′; in (x, y) both are turned.
+    Along lines of equal range and of equal Doppler the band of a response is a box, and its smear lies along y′; in
+    (x, y) both are turned.
     """
-    geometry, T = mission.geometry, mission.collection.aperture_time
-    in_range = geometry.range_resolution(mission.radar.bandwidth, SPEED_OF_LIGHT)
-    cross_range = geometry.cross_range_resolution(mission.radar.wavelength, T)
+    T, radar = mission.collection.aperture_time, mission.radar
     # Cycles over the aperture are cells of cross range; what the range error walks, cells of c/B.
-    reach = float(np.abs(slope).max()) * T / mission.radar.wavelength
-    walk = float(np.abs(left).max()) * mission.radar.bandwidth / SPEED_OF_LIGHT
+    reach = float(np.abs(slope).max()) * T / radar.wavelength
+    time = cell_centres(T, left.size)
+    walk = float(np.abs(left - slope * time).max()) * radar.bandwidth / SPEED_OF_LIGHT
+    echoes = sorted(line.frequency * T for name in PLATFORMS for line in lines_of(mission, name) if line.amplitude)
+    shown = [cycles for cycles in echoes if cycles <= _ECHO_CELLS]
+    outside = "" if len(shown) == len(echoes) else (
+        f"echoes {', '.join(f'{cycles:.4g}' for cycles in echoes[len(shown) :])} resolution cells from the peak lie "
+        "outside the patch"
+    )  # fmt: skip
+    reach += max(shown, default=0.0)
     cells = [2 * math.ceil(extra + _MARGIN_CELLS) for extra in (walk, reach)]
     pulses = _pulses(mission, cells[1])
-    size = (cells[0] * in_range, cells[1] * cross_range)
-    shape = (_SAMPLES_PER_CELL * cells[0], _SAMPLES_PER_CELL * cells[1])
-    rotated = Patch(geometry.look_azimuth, size, shape)
-    nearest = min(geometry.transmitter.slant_range, geometry.receiver.slant_range)
-    bend = (size[1] / 2) ** 2 / (2 * nearest) / in_range
-    if bend > _MAX_BEND:
-        raise SimulationError(
-            f"lines of equal range bend by {bend:.2g} range cells within the patch of {size[1]:.0f} m, a platform "
-            f"being {nearest:.4g} m away: beyond {_MAX_BEND:g} the image is not separable and autofocus means nothing"
-        )
-    cosine, sine = abs(math.cos(geometry.look_azimuth)), abs(math.sin(geometry.look_azimuth))
+    rotated = Patch(
+        (_SAMPLES_PER_CELL * cells[0], _SAMPLES_PER_CELL * cells[1]),
+        (cell[0] / _SAMPLES_PER_CELL, cell[1] / _SAMPLES_PER_CELL),
+    )
+    by_range = flown.gradients(np.asarray(effect.displacement))[0]
+    cosine, sine = np.abs(by_range) / float(np.hypot(*by_range))
+    size = rotated.size
     extent = max(size[0] * cosine + size[1] * sine, size[0] * sine + size[1] * cosine)
-    band = (cosine / in_range + sine / cross_range, sine / in_range + cosine / cross_range)
-    nx, ny = (2 * math.ceil(_SAMPLES_PER_CELL * extent * one / 2) for one in band)
-    in_scene = Patch(0.0, (extent, extent), (nx, ny))
-    step = SPEED_OF_LIGHT / (4 * max(extent, *size))  # half of what keeps a profile from repeating within a patch
-    frequencies = max(_MIN_FREQUENCIES, math.ceil(mission.radar.bandwidth / step))
-    return Plan(rotated, in_scene, pulses, frequencies)
+    band = (cosine / cell[0] + sine / cell[1], sine / cell[0] + cosine / cell[1])
+    extent *= min(1.0, math.sqrt(_SCENE_PIXELS / (_SAMPLES_PER_CELL**2 * extent**2 * band[0] * band[1])))
+    shape = tuple(2 * math.ceil(_SAMPLES_PER_CELL * extent * one / 2) for one in band)
+    in_scene = Patch((shape[0], shape[1]), (extent / shape[0], extent / shape[1]))
+    # Twice what keeps a profile from repeating within a patch: over its range cells and what those across walk.
+    relative = radar.bandwidth / radar.center_frequency
+    diagonal = extent * (cosine + sine)
+    longest = max(cells[0] + cells[1] * relative, diagonal / cell[0] + diagonal / cell[1] * relative)
+    frequencies = max(_MIN_FREQUENCIES, math.ceil(2 * longest))
+    return Plan(rotated, in_scene, pulses, frequencies, outside)
 
 
 def _pulses(mission: Mission, cells: int) -> int:

@@ -13,6 +13,7 @@ from bisar_budget.simulate.autofocus import ALGORITHMS
 from bisar_budget.simulate.collection import (
     CELLS,
     MAX_CELLS,
+    OVERSAMPLING,
     RANGE_CELLS,
     Chip,
     Errors,
@@ -21,9 +22,11 @@ from bisar_budget.simulate.collection import (
 )
 from bisar_budget.simulate.exact import ExactEffect
 from bisar_budget.simulate.phase_history import MotionError
+from bisar_budget.simulate.refocus import refocused
 
 Sizes = Sequence[tuple[ErrorSource, float]]  # errors and how large each is, signed
 _CLOCK_TERMS = ("constant", "linear", "quadratic", "cubic")
+_SHARED_RAD = 0.5  # of phase by which lines on which one phase is estimated may differ
 _SCALED, _SCALINGS = 1e-4, 40  # of a budget; steps at most
 _SMEAR_SHARE = 2.4  # of a cubic without its linear part: its slope at the aperture edge
 
@@ -156,14 +159,24 @@ class Study:
             sizes = self.summed(self.members(row_id.partition(".")[0].replace("timing", "clock")), limit)
         return self.together(sizes, self.worse_sign(sizes, 1.0))
 
-    def images(self, row_id: str, limit: float) -> tuple[Chip, Chip]:
+    def images(self, row_id: str, limit: float, room: float = 1.0) -> tuple[Chip, Chip, Errors, ExactEffect]:
         """Image at a limit of a row of quadratic phase, as its verdict reads it, and of no error at that place."""
         errors = self.at_limit(row_id, limit)
-        return self.chips(errors, self.collection.effect(errors))
+        effect = self.collection.effect(errors)
+        return *self.chips(errors, effect, room=room), errors, effect
 
-    def focused(self, chip: Chip) -> Chip:
-        """Refocus a chip by the mission's algorithm."""
-        return chip._replace(image=ALGORITHMS[self.mission.autofocus.algorithm](chip.image).image)
+    def focused(self, errors: Errors, effect: ExactEffect, chip: Chip) -> Chip:
+        """Refocus a chip by the mission's algorithm, its phase estimated on lines that share it.
+
+        Where range cells are long, lines beside the response show it with a quadratic phase of their own.
+        """
+        algorithm = ALGORITHMS[self.mission.autofocus.algorithm]
+        per_line = abs(self.analysis.exact.phases_per_term[0][0]) * self.collection.range_cell / OVERSAMPLING
+        shared = int(min(_SHARED_RAD / per_line if per_line else 1e6, 1e6))
+        walked = round(self._walk(effect) * OVERSAMPLING / 2)
+        lines = chip.image.shape[0]
+        half = min(lines // 2, lines - 1 - lines // 2, max(shared, walked))
+        return refocused(self.collection, errors, effect.displacement, chip, algorithm, half)
 
     def smear(self, effect: ExactEffect) -> int:
         """Cells of cross range that a response is smeared over."""
@@ -182,12 +195,13 @@ class Study:
         return self.collection.pair(errors, effect.displacement, cells, range_cells + self._walk(effect))
 
     def _walk(self, effect: ExactEffect) -> int:
-        """Range cells that a smear walks, both ways."""
-        wavelengths = (abs(effect.quadratic) + abs(effect.cubic)) / (2 * math.pi)
+        """Range cells that a smear walks, both ways: at its place along y′, the error less its slope times slow time."""
+        wavelengths = (4 / 3 * abs(effect.quadratic) + 2 * abs(effect.cubic)) / (2 * math.pi)
         return 2 * math.ceil(min(wavelengths * self.collection.relative_bandwidth - 0.25, 64))
 
     def read(self, errors: Errors, effect: ExactEffect, chip: Chip, reference: Chip) -> ApertureReading:
         """Quadratic and cubic phase of a response, measured."""
-        sidelobes = CELLS / 2 * self.collection.relative_bandwidth  # walked by those at the patch's ends
-        cells = min(READ_CELLS, sidelobes) + self._walk(effect)
-        return read_aperture(self.collection, errors, effect.displacement, chip, reference, cells)
+        walk = self._walk(effect)
+        return read_aperture(
+            self.collection, errors, effect.displacement, chip, reference, walk and walk + READ_CELLS
+        )

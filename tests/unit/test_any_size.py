@@ -1,6 +1,8 @@
 """The full model is true for errors of any size: a sample of the proof in `docs/prove_any_size.py`."""
 
+import importlib.util
 import math
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +14,12 @@ from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import Mission
 from tests import reference
-from tests.compared import FLOOR_RAD, SHARE, _allowable, compared
+from tests.compared import FLOOR_RAD, SHARE, Compared, _allowable, compared
 from tests.families import FAMILIES, LARGEST_TURN, largest_turn, mission_text
 from tests.reference import Error
 
-SPECS = Path(__file__).resolve().parents[2] / "specs" / "missions"
+ROOT = Path(__file__).resolve().parents[2]
+SPECS = ROOT / "specs" / "missions"
 SEEDS, STEPS = 12, 40
 TANDEM_X = """schema_version: 1
 name: TanDEM-X on its circular orbit
@@ -128,6 +131,41 @@ class TestFamilies:
         assert max(map(largest_turn, missions)) <= LARGEST_TURN
         squints = [state.squint for m in missions for state in (m.geometry.transmitter, m.geometry.receiver)]
         assert max(abs(squint or 0) for squint in squints) <= math.radians(60.1)
+
+
+class TestTheScript:
+    """`docs/prove_any_size.py` counts what disagrees, and says so by its exit code."""
+
+    def run(self, monkeypatch: pytest.MonkeyPatch, found: list[Compared] | Exception) -> int:
+        spec = importlib.util.spec_from_file_location("prove_any_size", ROOT / "docs" / "prove_any_size.py")
+        assert spec is not None
+        assert spec.loader is not None
+        script = importlib.util.module_from_spec(spec)
+        monkeypatch.setattr(sys, "path", [*sys.path])
+        spec.loader.exec_module(script)
+
+        def given(*_: object) -> list[Compared]:
+            if isinstance(found, Exception):
+                raise found
+            return found
+
+        monkeypatch.setattr(script, "compared", given)
+        monkeypatch.setattr(sys, "argv", ["prove_any_size.py", "--missions", "6", "--processes", "1", "--all"])
+        code: int = script.main()
+        return code
+
+    def test_agreement_and_a_miss(self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+        near, far = (Compared("qpe_full_rad", "a", 1.0, 1.0 + off / 100, off) for off in (0.9, 1.1))
+        assert self.run(monkeypatch, [near]) == 0
+        assert "6 missions, 6 numbers, 0 misses" in capsys.readouterr().out
+        assert self.run(monkeypatch, [near, far]) == 1
+        assert "jets 0: qpe_full_rad of a" in capsys.readouterr().out
+
+    def test_a_crash_is_no_agreement(
+        self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        assert self.run(monkeypatch, ZeroDivisionError("x")) == 1
+        assert "crash: seed 0: ZeroDivisionError: x" in capsys.readouterr().out
 
 
 def path(state: PlatformState, tau: np.ndarray) -> np.ndarray:

@@ -191,9 +191,7 @@ class TestBinding:
         analysis = Analysis(parse_mission(mission_text()))
         source = next(s for s in analysis.sources if s.id == "receiver.acceleration.y")
         size = analysis.full.allowable(source, CUBIC, 0.2)
-        found = findings(
-            requirements__cubic_phase_error="0.2 rad", autofocus={"n_pull": 8}, allocation__model="full"
-        )
+        found = findings(requirements__cubic_phase_error="0.2 rad", autofocus={"n_pull": 8}, allocation__model="full")
         one = row(found, "receiver.acceleration.y")
         assert one.allowable == pytest.approx(min(size, one.allowable_full))
         assert (one.binding_requirement == CUBIC) == (size < one.allowable_full)

@@ -1,0 +1,103 @@
+"""Exact ranges with and without an array library, on random missions: one definition, two functions."""
+
+import math
+
+import numpy as np
+import pytest
+
+from bisar_budget.budget.analysis import Analysis
+from bisar_budget.budget.exact_arrays import aperture_nodes, exact_effects
+from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.mission.load import parse_mission
+from bisar_budget.simulate.exact import exact_effect
+from bisar_budget.simulate.phase_history import cell_centres
+from bisar_budget.simulate.study import Study
+from tests.conftest import mission_text
+from tests.families import FAMILIES
+from tests.families import mission_text as family_text
+
+
+def by_arrays(study: Study, source, sizes):
+    """Effects of one error at several sizes, at once."""
+    nodes = aperture_nodes(study.collection.aperture_time)
+    errors = study.errors(source, 1.0)
+    flown = study.collection.paths(errors, nodes)
+    scale = np.asarray(sizes)[:, None, None]
+    measured = [one.actual + scale * (one.measured - one.actual) for one in flown]
+    clock = SPEED_OF_LIGHT * study.collection.clock(errors, nodes) * scale[:, 0]
+    return exact_effects(*measured, flown[0].actual, flown[1].actual, clock, study.collection.wavelength)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("seed", range(3))
+def test_scalars_and_arrays_agree(family: str, seed: int) -> None:
+    """Every error, at a hundredth and at a tenth of the largest that is one of navigation, both signs.
+
+    As long as the image moves by less than a tenth of the nearest range: farther away a history may have two points.
+    """
+    study = Study(parse_mission(family_text(family, seed)))
+    full = Analysis(study.mission).full
+    compared, geometry = 0, study.geometry
+    nearest = min(geometry.transmitter.slant_range, geometry.receiver.slant_range)
+    for source in study.sources:
+        if not source.is_motion:
+            continue
+        farthest = full.farthest(source)
+        sizes = [part * farthest for part in (0.01, -0.01, 0.1, -0.1)]
+        found = by_arrays(study, source, sizes)
+        for index, size in enumerate(sizes):
+            scalar = full.at(source, size)
+            place = found.displacement[index]
+            if scalar is None or not np.hypot(*place) < 0.1 * nearest:
+                continue
+            compared += 1
+            assert scalar.displacement == pytest.approx(place, abs=1e-3, rel=1e-5), (source.id, size)
+            assert scalar.quadratic == pytest.approx(found.quadratic[index], abs=2e-3, rel=1e-4), (source.id, size)
+            assert scalar.cubic == pytest.approx(found.cubic[index], abs=2e-3, rel=1e-4), (source.id, size)
+    assert compared > 20
+
+
+def test_what_remains_has_no_constant_and_no_linear_part() -> None:
+    """The definition itself, on a dense aperture by a sum of rectangles: no Legendre weights, no nodes."""
+    study = Study(parse_mission(mission_text()))
+    errors = study.errors(next(s for s in study.sources if s.id == "receiver.velocity.y"), 0.5)
+    effect = study.collection.effect(errors)
+    T, k = study.collection.aperture_time, 2 * math.pi / study.collection.wavelength
+    tau = cell_centres(T, 20000)
+    flown, point = study.collection.paths(errors, tau), np.array([*effect.displacement, 0.0])
+    left = k * sum(np.linalg.norm(p.actual, axis=1) - np.linalg.norm(p.measured - point, axis=1) for p in flown)
+    place = tau / (T / 2)
+    parts = [(2 * n + 1) * np.mean(left * np.polynomial.legendre.Legendre.basis(n)(place)) for n in range(4)]
+    assert parts[:2] == pytest.approx([0.0, 0.0], abs=1e-4)
+    assert effect.quadratic == pytest.approx(1.5 * parts[2], abs=1e-5)
+    assert effect.cubic == pytest.approx(2.5 * parts[3], abs=1e-4)
+
+
+def test_samples_anywhere_give_the_same() -> None:
+    study = Study(parse_mission(mission_text()))
+    errors = study.errors(next(s for s in study.sources if s.id == "receiver.velocity.y"), 0.5)
+    want = study.collection.effect(errors)
+    tau = cell_centres(study.collection.aperture_time, 200)
+    got = exact_effect(tau, *study.collection.paths(errors, tau), 0.0, study.collection.wavelength, 6.0)
+    assert got.displacement == pytest.approx(want.displacement, abs=1e-5)
+    assert got.quadratic == pytest.approx(want.quadratic, abs=1e-5)
+
+
+def test_errors_without_a_point_are_marked_and_leave_the_others_alone() -> None:
+    study = Study(parse_mission(mission_text()))
+    source = next(s for s in study.sources if s.id == "timing.constant")
+    found = by_arrays(study, source, [1e-9, -1e-3, 2e-9])  # 300 km nearer than the scene is
+    assert found.found.tolist() == [True, False, True]
+    assert np.isnan(found.quadratic[1])
+    assert np.isfinite(found.displacement[[0, 2]]).all()
+
+
+def test_a_start_nearby_changes_nothing() -> None:
+    study = Study(parse_mission(mission_text()))
+    source = next(s for s in study.sources if s.id == "receiver.velocity.y")
+    nodes = aperture_nodes(6.0)
+    flown = study.collection.paths(study.errors(source, 0.5), nodes)
+    tracks = [one.measured for one in flown] + [one.actual for one in flown]
+    first = exact_effects(*tracks, 0.0, study.collection.wavelength)
+    again = exact_effects(*tracks, 0.0, study.collection.wavelength, near=first.displacement + 0.5)
+    assert again.displacement == pytest.approx(first.displacement, abs=1e-6)
