@@ -90,7 +90,8 @@ _VALIDITY = {
     "published": (
         "Rigling & Moses, Tables I and II. It is of first order in the errors and holds the slant ranges constant "
         "over the aperture. It is accurate near broadside. At a squint, a look off broadside, limits of velocity "
-        "errors can be a third too generous or several times too strict. A row that the full model fails is a warning."
+        "errors can be a third too generous or several times too strict. A row that fails by the full model is a "
+        "warning."
     ),
     "full": (
         "Exact ranges, for errors of any size. Lines of sight turn over the aperture, and the displaced response has "

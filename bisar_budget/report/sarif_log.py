@@ -54,8 +54,8 @@ RULES = {
     "location_error": (
         "Displacement of the image within its requirement",
         "Errors displace the image on the ground, by equation (25) of Rigling & Moses or by exact ranges. "
-        "The displacement may be at most requirements.location_error. Declare smaller position, velocity or clock errors; "
-        "autofocus does not help.",
+        "The displacement may be at most requirements.location_error. Declare smaller position, velocity or clock "
+        "errors; autofocus does not help.",
     ),
     "autofocus_pull_in": (
         "All errors together within what autofocus corrects",
