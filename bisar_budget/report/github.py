@@ -97,7 +97,8 @@ def step_summary(report: Report, style: Style) -> str:
         row, use = worst_first(mission.rows)[0], ""
         if row.utilization is not None and row.allowable is not None:
             use = percent(row.utilization)
-        lines.append(f"| {WORDS[mission.status]} | {file} | {markdown_text(row.id)} | {use} |")
+        status = WORDS[mission.status] + ("; each error alone" if mission.combine == "each" else "")
+        lines.append(f"| {status} | {file} | {markdown_text(row.id)} | {use} |")
     broken = [
         f"- {markdown_text(finding(row))}"
         for mission in report.missions
