@@ -23,6 +23,7 @@ from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState
 # 1e-6 of themselves; beyond the last, 16 nodes are right to 1e-3 at 1.25.
 _NODES = ((0.1, 6), (0.5, 10), (math.inf, 16))
 _ITERATIONS = 40
+_SHRINKS = 0.5  # square of each step of the search over that of the one before; else it does not settle
 _EPSILON = 2e-15  # of a range sum: what rounding of a few operations leaves
 _UNSEEN_RAD = 3e-5  # what the last step of the search may change a phase by beyond the part counted linearly
 
@@ -198,8 +199,8 @@ class ExactRanges:
     ) -> ExactPhases | None:
         """Find where errors of given sizes move a point at the centre, and what defocuses there.
 
-        The search starts `near` [m]. None where it finds no ground point with the recorded history, or one beyond a
-        line on which range and Doppler gradients are parallel: no error leads there from nothing.
+        The search starts `near` [m], and has to settle from there at once: `point_path` follows a point. None where it
+        does not, or beyond a line on which range and Doppler gradients are parallel: no error leads there from nothing.
         """
         measured = dict(self.tracks)
         recorded = self.recorded
@@ -293,6 +294,7 @@ class ExactRanges:
         """Newton's method for the point."""
         east, north = near
         value, slope, quadratic, cubic = self.fit
+        before = math.inf
         for _ in range(_ITERATIONS):
             left, by_east, by_north, nearest = [], [], [], math.inf
             for whole, (x, y, z), (u, v, w) in zip(recorded, transmitter, receiver, strict=True):
@@ -333,8 +335,9 @@ class ExactRanges:
                 left_quadratic, left_cubic = (phase if abs(phase) > self.rounding else 0.0 for phase in phases)
                 turn = determinant / (self.plane.determinant * self.half)
                 return ExactPhases((east, north), left_quadratic, left_cubic, turn)
-            if not step < 1e30:
+            if not step < _SHRINKS * before:
                 return None
+            before = step
         return None
 
 
