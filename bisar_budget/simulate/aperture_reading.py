@@ -34,9 +34,9 @@ class ApertureReading(NamedTuple):
     """Phases at the aperture edge, signed like the range error [rad].
 
     `across_pixels` is how far the response lies from the middle along y′, by the linear part of the phase.
-    `walked_pixels` is what the other parts put the centre of gravity nearer along x′: at a frequency of y′ it is where
-    the range error less its slope times slow time puts it. `coverage` is the part of the aperture that the patch
-    holds: 1 unless a smear leaves it.
+    `walked_pixels` is what the other parts put the centre of gravity nearer along x′: at a frequency of y′ it lies
+    where the range error less its slope times slow time puts it. `coverage` is what the patch holds of the aperture,
+    1 unless a smear leaves it.
     """
 
     quadratic: float

@@ -99,7 +99,7 @@ class Chip(NamedTuple):
 class PointCollection:
     """A mission's collection, for images of a single point.
 
-    `resolution` and `spacing` (2,) [m] are those of cells and of a chip's pixels at the scene centre, along x′ and y′.
+    `resolution` and `spacing` (2,) [m] are those of cells and of a chip's pixels at the scene centre, x′ first.
     """
 
     def __init__(self, mission: Mission, geometry: BistaticGeometry) -> None:

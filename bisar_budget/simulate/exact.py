@@ -48,5 +48,5 @@ def exact_effect(
 def _projection(place: Floats) -> Floats:
     """Weights (4, samples) that project on P₀ … P₃ the polynomial through samples anywhere in -1 … 1."""
     legendre = np.polynomial.legendre.legvander(place, min(_ORDER, max(3, place.size // 4)))
-    weights: Floats = np.linalg.pinv(legendre)[:4]
+    weights: Floats = np.asarray(np.linalg.pinv(legendre)[:4], dtype=float)
     return weights

@@ -51,11 +51,11 @@ class SimulationError(Exception):
 class PointImages(NamedTuple):
     """Images of a point scatterer at the scene centre, and what explains them.
 
-    `in_scene` is on a grid along (x, y), of as much of the patch as a quarter of a million pixels hold; the others are on `grid`,
-    (nx, ny, 3) [m], whose lines are lines of equal range, along y′. All are complex and centred where the errors move
-    the point; `scene_spacing` and `spacing`, (2,) [m], are those of their pixels there. `range_error` is its quadratic
-    and higher part over `slow_time`; `segments` are the slopes and `points` the ground points of (26)-(29), relative
-    to the displaced point. `outside` says which declared echoes lie beyond the patch.
+    `in_scene` is on a grid along (x, y), of as much of the patch as a quarter of a million pixels hold; the others
+    are on `grid`, (nx, ny, 3) [m], whose lines are lines of equal range, along y′. All are complex and centred where
+    the errors move the point; `scene_spacing` and `spacing`, (2,) [m], are those of their pixels there. `range_error`
+    is its quadratic and higher part over `slow_time`; `segments` are the slopes and `points` the ground points of
+    (26)-(29), relative to the displaced point. `outside` says which declared echoes lie beyond the patch.
     """
 
     slow_time: Floats
@@ -251,7 +251,9 @@ def _plan(
     time = cell_centres(T, left.size)
     walk = float(np.abs(left - slope * time).max()) * radar.bandwidth / SPEED_OF_LIGHT
     echoes = sorted(line.frequency * T for name in PLATFORMS for line in lines_of(mission, name) if line.amplitude)
-    shown = [cycles for cycles in echoes if cycles <= _ECHO_CELLS]
+    given = mission.collection.pulses
+    room = _ECHO_CELLS if given is None else min(_ECHO_CELLS, given / 4 - reach - _MARGIN_CELLS - 1)
+    shown = [cycles for cycles in echoes if cycles <= room]
     outside = "" if len(shown) == len(echoes) else (
         f"echoes {', '.join(f'{cycles:.4g}' for cycles in echoes[len(shown) :])} resolution cells from the peak lie "
         "outside the patch"

@@ -1,9 +1,9 @@
 """Ground pixels along lines of equal range: a patch in the coordinates in which a response is a product.
 
 A straight grid leaves a response where a platform is near: its ridge follows an ellipse, and its sidelobes in range
-follow lines of equal Doppler. Here the pixels of a line have one range sum at the aperture midpoint, those of a column
-one change of the range sum over the aperture. Lines are followed from the middle outwards, so a patch may bend around
-a platform.
+follow lines of equal Doppler. Here the pixels of a line have one range sum at the aperture midpoint, those of a
+column one change of the range sum over the aperture. Lines are followed from the middle outwards, so a patch may bend
+around a platform.
 """
 
 from collections.abc import Callable

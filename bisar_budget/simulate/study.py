@@ -195,7 +195,10 @@ class Study:
         return self.collection.pair(errors, effect.displacement, cells, range_cells + self._walk(effect))
 
     def _walk(self, effect: ExactEffect) -> int:
-        """Range cells that a smear walks, both ways: at its place along y′, the error less its slope times slow time."""
+        """Range cells that a smear walks, both ways.
+
+        A part of it lies where the range error less its slope times slow time puts it.
+        """
         wavelengths = (4 / 3 * abs(effect.quadratic) + 2 * abs(effect.cubic)) / (2 * math.pi)
         return 2 * math.ceil(min(wavelengths * self.collection.relative_bandwidth - 0.25, 64))
 

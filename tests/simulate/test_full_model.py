@@ -5,14 +5,11 @@ import math
 
 import numpy as np
 import pytest
-from bisar_budget.budget.validity import FLOOR_M, FLOOR_RAD, SHARE, FirstOrder
 
+from bisar_budget.budget.analysis import Analysis
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.effects import full_ground
-from bisar_budget.budget.sources import error_sources
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.errors import MissionError
-from bisar_budget.geometry import norm
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.simulate.exact import exact_effect
 from bisar_budget.simulate.phase_history import cell_centres, path
@@ -20,9 +17,6 @@ from bisar_budget.simulate.verify import Study, verify_mission
 from tests.conftest import ROOT, TODAY, findings, mission_text
 from tests.conftest import row as row_of
 from tests.simulate.conftest import collection, platform
-
-NEAR_M = 10.0  # of displacement; farther the next order but one begins to show
-LONG_RAD = 0.3  # half turn of a line of sight
 
 
 def random_missions(count: int, seed: int, climbing: bool = True):
@@ -50,65 +44,6 @@ def random_missions(count: int, seed: int, climbing: bool = True):
             yield mission
 
 
-def test_shift_and_phase_of_every_row_inside_first_order_are_those_of_exact_ranges() -> None:
-    """500 collections: within 2 % or 0.02 rad of phase, 2 % or 10 cm of shift.
-
-    Each error is as large as its limit, or moves the image by 10 m. Outside are rows whose second order is above
-    these, gradients whose |sin| is below 0.2, and lines of sight that turn by over ±0.3 rad.
-    """
-    inside = outside = 0
-    worst = (0.0, "")
-    for number, mission in enumerate(random_missions(500, seed=11)):
-        study, geometry = Study(mission), mission.geometry
-        ground = full_ground(mission, geometry)
-        first_order = FirstOrder(mission, geometry, ground)
-        turn = max(norm(p.look_rate) * 2 for p in (geometry.transmitter, geometry.receiver))
-        is_strained = turn > LONG_RAD or math.sin(geometry.gradient_angle) < 0.2
-        for source in study.sources:
-            per_unit = ground.plane.displacement(source.full, 1.0)
-            moves = math.hypot(*per_unit)
-            sizes = [math.pi / 8 / abs(source.full.qpe)] if source.full.qpe else []
-            size = min([*sizes, *([0.99 * NEAR_M / moves] if moves else [])], default=0.0)
-            second = first_order.second.effect(source, size)
-            first = source.full.qpe * size
-            goes_beyond = abs(second.qpe) > max(FLOOR_RAD, SHARE * abs(first)) or (
-                math.hypot(*ground.plane.displacement(second, 1.0)) > max(FLOOR_M, SHARE * moves * size)
-            )
-            if not size or is_strained or goes_beyond:
-                outside += 1
-                continue
-            inside += 1
-            effect = study.collection.effect(study.errors(source, size))
-            off = abs(effect.quadratic - first)
-            worst = max(worst, (off, f"{number} {source.id}"))
-            assert off <= max(FLOOR_RAD, 0.02 * abs(effect.quadratic)), (number, source.id)
-            shift = [size * component for component in per_unit]
-            assert math.dist(effect.displacement, shift) <= max(FLOOR_M, 0.02 * moves * size), (number, source.id)
-    print(f"{inside} rows inside first order, {outside} outside; largest difference {worst[0]:.4f} rad, {worst[1]}")
-    assert inside > 10 * outside
-
-
-def test_the_second_order_is_what_is_missing_beyond_the_first() -> None:
-    """Where the second order adds 0.1 to 0.5 rad it explains the difference to exact ranges to a quarter."""
-    explained = 0
-    for mission in random_missions(300, seed=3):
-        study, geometry = Study(mission), mission.geometry
-        if math.sin(geometry.gradient_angle) < 0.3:
-            continue
-        ground = full_ground(mission, geometry)
-        first_order = FirstOrder(mission, geometry, ground)
-        for source in study.sources:
-            size = math.pi / 8 / abs(source.full.qpe) if source.full.qpe else 0.0
-            second = first_order.second.effect(source, size).qpe
-            if not 0.1 < abs(second) < 0.5 or math.hypot(*ground.plane.displacement(source.full, size)) > 100:
-                continue
-            effect = study.collection.effect(study.errors(source, size))
-            missing = effect.quadratic - source.full.qpe * size
-            assert missing == pytest.approx(second, rel=0.25, abs=0.02), source.id
-            explained += 1
-    assert explained > 15
-
-
 @pytest.mark.parametrize("squint", [0, 15, 30, 45, 60])
 def test_images_at_the_full_limits_show_their_budgets(squint: float) -> None:
     """Each axis of velocity and acceleration, both platforms, each error at its full limit: within 5 %."""
@@ -121,10 +56,8 @@ def test_images_at_the_full_limits_show_their_budgets(squint: float) -> None:
     seen = 0
     for only in ("*.velocity.*", "*.acceleration.*"):
         for row in verify_mission(mission, only).rows:
-            assert row.full_qpe_rad == pytest.approx(row.budget_rad)
-            if row.verdict == "not_evaluated":
-                assert "second order" in row.reason
-                continue
+            assert row.predicted_qpe_rad == pytest.approx(row.budget_rad, rel=1e-3)
+            assert row.measured_qpe_rad == pytest.approx(row.predicted_qpe_rad, rel=1e-3)
             seen += 1
             assert row.verdict == "confirmed", row
     assert seen >= 8
@@ -133,8 +66,8 @@ def test_images_at_the_full_limits_show_their_budgets(squint: float) -> None:
 def test_a_horizontal_error_common_to_both_platforms_only_moves_the_image() -> None:
     """The whole collection is elsewhere: by first order the effects of both cancel, whatever the geometry."""
     for mission in random_missions(20, seed=8):
-        sources = {s.id: s for s in error_sources(mission, mission.geometry)}
-        plane = full_ground(mission, mission.geometry).plane
+        analysis = Analysis(mission)
+        sources, plane = {s.id: s for s in analysis.sources}, analysis.exact.plane
         for axis, moved in (("x", (1.0, 0.0)), ("y", (0.0, 1.0))):
             t, r = (sources[f"{name}.position.{axis}"].full for name in ("transmitter", "receiver"))
             assert t.qpe == pytest.approx(-r.qpe, rel=1e-9)
@@ -160,9 +93,11 @@ def test_phases_at_four_times_the_published_limit(squint, platform, axis, taylor
         for name in ("transmitter", "receiver")
     }
     mission = parse_mission(mission_text(platforms=platforms))
-    source = next(s for s in error_sources(mission, geometry) if s.id == f"{platform}.velocity.{axis}")
+    analysis = Analysis(mission)
+    source = next(s for s in analysis.sources if s.id == f"{platform}.velocity.{axis}")
     size = math.pi / 2 / abs(source.effect.qpe)
-    moved = full_ground(mission, geometry).moved(source.full)
+    by_constant, by_linear = analysis.exact.phases_per_term[0]
+    moved = by_constant * source.full.constant + by_linear * source.full.linear
     assert abs(source.full.qpe - moved) * size == pytest.approx(taylor, rel=0.005, abs=0.001)
     assert abs(source.full.qpe) * size == pytest.approx(full, rel=0.005)
 
@@ -179,17 +114,17 @@ def test_curved_and_climbing_paths(seed: int) -> None:
             "position": [4e3, 7e3, 2e3], "velocity": [-45, 35, -3], "acceleration": rng.uniform(-3, 3, 3).tolist(),
         },
     }  # fmt: skip
-    mission = parse_mission(mission_text(platforms=platforms, collection={"aperture_time": 4}))
+    mission = parse_mission(
+        mission_text(platforms=platforms, collection={"aperture_time": 4}, allocation__model="full")
+    )
     study = Study(mission)
-    first_order = FirstOrder(mission, mission.geometry, study.ground)
     seen = 0
     for source in study.sources:
-        size = math.pi / 8 / abs(source.full.qpe) if source.full.qpe else 0.0
-        if not size or abs(first_order.second.effect(source, size).qpe) > FLOOR_RAD:
+        size = study.boundary(source, math.pi / 8)
+        if size is None:
             continue
-        effect = study.collection.effect(study.errors(source, size))
-        assert effect.quadratic == pytest.approx(source.full.qpe * size, rel=0.02, abs=0.02), source.id
-        assert effect.cubic == pytest.approx(source.full.cubic * size, rel=0.02, abs=0.02), source.id
+        phases = [abs(study.effect([(source, sign * size)]).quadratic) for sign in (1, -1)]
+        assert max(phases) == pytest.approx(math.pi / 8, rel=1e-3), source.id
         seen += 1
     assert seen > 10
 
@@ -235,7 +170,9 @@ def test_a_height_error_defocuses_a_bistatic_image(separation: float, squint: fl
     by_full = row_of(
         check_mission(mission._replace(allocation=mission.allocation._replace(model="full")), TODAY), terrain.id
     )
-    assert math.dist(by_full.displacement_m, effect.displacement) < 0.02  # second order of 10 m
+    assert (
+        math.dist(by_full.displacement_m, effect.displacement) < 0.05
+    )  # the platforms 10 m higher: 10 m · 10 m over 8.5 km, magnified
 
 
 def test_a_height_error_warns_where_the_full_model_fails_it_and_is_imaged() -> None:
