@@ -104,17 +104,20 @@ def read_aperture(
     inner = np.abs(place) < _INNER
     present = strength > _PRESENT * np.median(strength[inner])
     centre_pulse, count = place.size // 2, place.size
-    if not np.isfinite(strength).all() or not present[centre_pulse]:
+    if not np.isfinite(strength).all() or (expected is None and not present[centre_pulse]):
         raise ValueError("the response is not in the image")
-    gaps = np.nonzero(~(present & inner))[0]
-    first = int(gaps[gaps < centre_pulse].max(initial=-1)) + 1
-    last = int(gaps[gaps > centre_pulse].min(initial=count))
-    kept = slice(first, last)
-    covered = float(place[last - 1] - place[first]) / (2 * _INNER)
-    order = next(order for part, order in _ORDERS if covered > part)
-    phase = np.unwrap(np.angle(product[kept]))
-    fit = np.zeros(max(4, order + 1))
-    fit[: order + 1] = np.polynomial.legendre.legfit(place[kept], phase, order, w=np.abs(clean[kept]))
+    fit: Floats = np.zeros(4)
+    covered = 0.0
+    if present[centre_pulse]:
+        gaps = np.nonzero(~(present & inner))[0]
+        first = int(gaps[gaps < centre_pulse].max(initial=-1)) + 1
+        last = int(gaps[gaps > centre_pulse].min(initial=count))
+        kept = slice(first, last)
+        covered = float(place[last - 1] - place[first]) / (2 * _INNER)
+        order = next(order for part, order in _ORDERS if covered > part)
+        phase = np.unwrap(np.angle(product[kept]))
+        fit = np.zeros(max(4, order + 1))
+        fit[: order + 1] = np.polynomial.legendre.legfit(place[kept], phase, order, w=np.abs(clean[kept]))
     # Of a large patch some pixels are enough for a polynomial.
     some = slice(None, None, -(-pixels.shape[0] * slow_time.size // _HELD))
     seen_there, clean_there = (one.reshape(-1)[some] for one in images)
@@ -124,8 +127,8 @@ def read_aperture(
     if expected is not None:
         starts.append(np.array([0.0, 0.0, -expected.quadratic / 1.5, -expected.cubic / 2.5, 0.0, 0.0, 0.0]))
     best = _Refined(fit, math.inf)
-    for start in starts:
-        found = _Refined(start, math.inf)
+    for first_fit in starts:
+        found = _Refined(first_fit, math.inf)
         for _ in range(_WALKS if walk_cells else 1):
             # What is left of the range error takes a pulse to other range cells too.
             phase = np.polynomial.legendre.legval(place, [0.0, *found.fit[1:]])
@@ -137,6 +140,8 @@ def read_aperture(
             break
     if best.misfit < _REPRODUCED:
         fit, covered = best.fit, 1.0
+    elif not covered:
+        raise ValueError("the response is not in the image")
     # A pixel along y′ changes the range sum over the aperture by λ / OVERSAMPLING, twice its P₁ part.
     turn = 1 if collection.flown(errors).turns_left(centre) else -1
     across = -turn * OVERSAMPLING / math.pi * float(fit[1])

@@ -6,7 +6,7 @@ model's limits both in phase fill it.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -121,7 +121,7 @@ def _near(
 def _echo(
     collection: PointCollection,
     blank: Verdict,
-    sinusoids: dict[str, tuple[Sinusoid, ...]],
+    sinusoids: Mapping[str, tuple[Sinusoid, ...]],
     who: str,
     assumed: str = "",
 ) -> Verdict:
