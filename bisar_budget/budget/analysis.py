@@ -19,9 +19,14 @@ Model = PublishedModel | FullModel
 
 @dataclass(frozen=True, eq=False)
 class Analysis:
-    """One mission, analysed once."""
+    """One mission, analysed once.
+
+    `is_brief` leaves out what a terminal does not show: allowables of errors that nobody declared, and of the model
+    that does not gate. Nothing is judged by them.
+    """
 
     mission: Mission
+    is_brief: bool = False
 
     @cached_property
     def geometry(self) -> BistaticGeometry:
@@ -62,15 +67,20 @@ class Analysis:
         """The model that gates, `published` or `full`, and the other one."""
         return (self.full, self.published) if gating == "full" else (self.published, self.full)
 
-    def declared(self, model: Model) -> dict[str, Declared]:
-        """What each declared error does by a model, by row id."""
-        if model.name not in self._declared:
-            self._declared[model.name] = {s.id: model.declared(s) for s in self.sources if s.declared is not None}
-        return self._declared[model.name]
+    def does(self, model: Model, source: ErrorSource) -> Declared:
+        """What a declared error does by a model."""
+        key = (model.name, source.id)
+        if key not in self._does:
+            self._does[key] = model.declared(source)
+        return self._does[key]
 
     @cached_property
-    def _declared(self) -> dict[str, dict[str, Declared]]:
+    def _does(self) -> dict[tuple[str, str], Declared]:
         return {}
+
+    def declared(self, model: Model) -> dict[str, Declared]:
+        """What each declared error does by a model, by row id, along the axes that the file states it in."""
+        return {source.id: self.does(model, source) for source in self.stated}
 
     @cached_property
     def allocation(self) -> Allocation:

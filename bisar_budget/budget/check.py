@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from bisar_budget.budget.scene import SceneEdge
 
 
-def check_mission(mission: Mission, today: date) -> MissionFindings:
+def check_mission(mission: Mission, today: date, *, is_brief: bool = False) -> MissionFindings:
     """Check one mission.
 
     Parameters
@@ -35,13 +35,16 @@ def check_mission(mission: Mission, today: date) -> MissionFindings:
         As loaded.
     today : date
         Day on which waivers are judged, UTC.
+    is_brief : bool
+        Leave out what a terminal does not show: allowables of errors that nobody declared, and of the model that does
+        not gate. Statuses are the same.
 
     Returns
     -------
     MissionFindings
         Rows in the order of the contract, declared or not.
     """
-    analysis = Analysis(mission)
+    analysis = Analysis(mission, is_brief)
     gating = mission.allocation.model
     if gating == "strictest":
         checked = stricter(_checked(analysis, "published"), _checked(analysis, "full"))

@@ -27,6 +27,9 @@ class Allowed(NamedTuple):
     binding: str | None
 
 
+NOT_ASKED = Allowed(None, None, None)
+
+
 def error_rows(analysis: Analysis, model: Model, other: Model, allocation: Allocation) -> Iterator[Row]:
     """Rows of every error, declared or not, in the order of the contract.
 
@@ -42,22 +45,26 @@ def error_rows(analysis: Analysis, model: Model, other: Model, allocation: Alloc
     mission = analysis.mission
     combine, gain = mission.allocation.combine, allocation.autofocus_gain
     limits = {owner: allocation.qpe_limit(owner) * gain for owner in ("transmitter", "receiver", "clock", "mission")}
-    found, found_other = analysis.declared(model), analysis.declared(other)
+    # A terminal shows allowables of undeclared errors only where nothing else is there to show.
+    is_brief = analysis.is_brief and bool(analysis.stated)
     for source in analysis.sources:
         limit = limits[source.owner]
-        allowed = allowed_by(analysis, model, source, limit)
-        allowed_other = allowed_by(analysis, other, source, limit)
-        published, full = (allowed, allowed_other) if model.name == "published" else (allowed_other, allowed)
         declared = None if source.declared is None else abs(source.declared)
+        if is_brief and (declared is None or not source.is_independent):
+            yield _unseen(analysis, model, source, declared)
+            continue
+        allowed = allowed_by(analysis, model, source, limit)
+        allowed_other = NOT_ASKED if is_brief else allowed_by(analysis, other, source, limit)
+        published, full = (allowed, allowed_other) if model.name == "published" else (allowed_other, allowed)
         info = over = doubt = ""
         notes = source.notes
         qpe_published = qpe_full = cubic = displacement = None
+        qpe = 0.0
         if declared is not None:
-            mine, theirs = found[source.id], found_other[source.id]
+            mine, theirs = analysis.does(model, source), analysis.does(other, source)
             by_published, by_full = (mine, theirs) if model.name == "published" else (theirs, mine)
-            qpe_published, qpe_full = abs(by_published.qpe), by_full.qpe
-            if not math.isfinite(qpe_full):
-                qpe_full = None
+            qpe, qpe_published = abs(mine.qpe), abs(by_published.qpe)
+            qpe_full = by_full.qpe if math.isfinite(by_full.qpe) else None
             cubic = abs(mine.cubic) if math.isfinite(mine.cubic) else None
             displacement = mine.displacement
             if displacement is None and source.is_motion and model.plane.degeneracy:
@@ -69,7 +76,7 @@ def error_rows(analysis: Analysis, model: Model, other: Model, allocation: Alloc
             else:
                 if allowed.smallest is not None and declared > allowed.smallest:
                     over = _over(analysis, model, source, mine, allowed, limit, allocation)
-                doubt = _doubt(analysis, model, other, source, theirs, allowed_other, declared, limit)
+                doubt = _doubt(analysis, other, source, theirs, limit)
         no_limit = model.no_limit(source) if allowed.smallest is None else ""
         utilization, margin, status, reason, notes = judgement(
             mission.allocation.warn_above, declared, allowed.smallest, 1.0, over, doubt, no_limit, "", info, True,
@@ -77,7 +84,7 @@ def error_rows(analysis: Analysis, model: Model, other: Model, allocation: Alloc
         )  # fmt: skip
         if status in ("pass", "warn") and not doubt and declared is not None and gain > 1:
             # Over the limit without the gain: the phase says so, the size would not where it is no longer linear.
-            without = abs(found[source.id].qpe) / (limit / gain)
+            without = qpe / (limit / gain)
             if without > 1 + UTILIZATION_TOLERANCE:
                 status, reason = "pass_with_autofocus", f"{without:.3g} times the limit without autofocus"
                 if utilization is not None and utilization > mission.allocation.warn_above:
@@ -163,29 +170,58 @@ def _phase(phase: float) -> str:
     )
 
 
-def _doubt(
-    analysis: Analysis,
-    model: Model,
-    other: Model,
-    source: ErrorSource,
-    theirs: Declared,
-    allowed: Allowed,
-    declared: float,
-    limit: float,
-) -> str:
-    """Say that the model that does not gate fails the error, and why it thinks otherwise; else nothing."""
-    if allowed.smallest is None or declared <= allowed.smallest * (1 + UTILIZATION_TOLERANCE):
-        return ""
+def _doubt(analysis: Analysis, other: Model, source: ErrorSource, theirs: Declared, limit: float) -> str:
+    """Say that the model that does not gate fails the declared error, and why it thinks otherwise; else nothing."""
     requirements = analysis.mission.requirements
+    moved = 0.0 if theirs.farthest is None else math.hypot(*theirs.farthest)
+    held = [(abs(theirs.qpe), limit, QUADRATIC)]
+    if source.is_motion:
+        held += [
+            (size, required, name)
+            for size, required, name in (
+                (abs(theirs.cubic), requirements.cubic_phase_error, CUBIC),
+                (moved, requirements.location_error, LOCATION),
+            )
+            if required is not None
+        ]
+    size, allowed, binding = max(held, key=lambda one: one[0] / one[1])
+    if size <= allowed * (1 + UTILIZATION_TOLERANCE):
+        return ""
     says = f"the {other.name} model says fail"
-    if allowed.binding == CUBIC and requirements.cubic_phase_error is not None:
-        allows = format_limit(requirements.cubic_phase_error, "rad")
-        return f"{says}: cubic phase {_phase(theirs.cubic)}, {allows} allowed"
-    if allowed.binding == LOCATION and requirements.location_error is not None:
-        moved = "out of sight" if theirs.farthest is None else format_quantity(math.hypot(*theirs.farthest), "m")
-        return f"{says}: displacement {moved}, {format_limit(requirements.location_error, 'm')} allowed"
-    text = f"{says}: QPE {_phase(theirs.qpe)}, {format_limit(limit, 'rad')} allowed"
+    if binding == LOCATION:
+        return f"{says}: displacement {format_quantity(moved, 'm')}, {format_limit(allowed, 'm')} allowed"
+    what = "cubic phase" if binding == CUBIC else "QPE"
+    text = f"{says}: {what} {_phase(size)}, {format_limit(allowed, 'rad')} allowed"
+    if binding == CUBIC:
+        return text
     return f"{text}; {_cause(source)}" if other.name == "full" else f"{text} ({source.equation})"
+
+
+def _unseen(analysis: Analysis, model: Model, source: ErrorSource, declared: float | None) -> Row:
+    """Row of an error that a terminal counts and does not show."""
+    return Row(
+        id=source.id,
+        metric=QUADRATIC,
+        unit=source.unit,
+        declared=declared,
+        allowable=None,
+        allowable_published=None,
+        allowable_full=None,
+        qpe_published_rad=None,
+        qpe_full_rad=None,
+        displacement_m=None,
+        utilization=None,
+        margin=None,
+        status="not_declared" if declared is None else "info",
+        line=analysis.mission.line(source.path),
+        reason=None,
+        notes=(),
+        equation=model.equation(source),
+        requirement_id=analysis.mission.requirement_ids.get(source.id),
+        evidence=source.evidence,
+        is_independent=source.is_independent,
+        model=model.name,
+    )
 
 
 def _cause(source: ErrorSource) -> str:

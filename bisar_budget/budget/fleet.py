@@ -26,7 +26,9 @@ def without_mission(found: Found) -> Found:
     return found if isinstance(found, UnusableMission) else found._replace(mission=None)
 
 
-def check_files(files: Sequence[str], today: date, model: str | None, keep: Callable[[Found], Kept]) -> list[Kept]:
+def check_files(
+    files: Sequence[str], today: date, model: str | None, keep: Callable[[Found], Kept], *, is_brief: bool = False
+) -> list[Kept]:
     """Check files, in their order; many are shared out between the cores.
 
     Parameters
@@ -39,6 +41,8 @@ def check_files(files: Sequence[str], today: date, model: str | None, keep: Call
         Gating model in place of each file's own.
     keep : callable
         Makes of the findings about a file what is wanted of them, in the process that found them.
+    is_brief : bool
+        Leave out what a terminal does not show.
 
     Returns
     -------
@@ -47,27 +51,29 @@ def check_files(files: Sequence[str], today: date, model: str | None, keep: Call
     """
     count = cores()
     if len(files) < MANY or count == 1 or "-" in files:
-        return _checked(files, today, model, keep)
+        return _checked(files, today, model, keep, is_brief)
     from concurrent.futures import ProcessPoolExecutor
 
     size = -(-len(files) // count)
     own, *others = (files[start : start + size] for start in range(0, len(files), size))
     with ProcessPoolExecutor(len(others)) as pool:
-        waiting = [pool.submit(_checked, part, today, model, keep) for part in others]
-        kept = _checked(own, today, model, keep)
+        waiting = [pool.submit(_checked, part, today, model, keep, is_brief) for part in others]
+        kept = _checked(own, today, model, keep, is_brief)
         for part in waiting:
             kept += part.result()
     return kept
 
 
-def _checked(files: Sequence[str], today: date, model: str | None, keep: Callable[[Found], Kept]) -> list[Kept]:
+def _checked(
+    files: Sequence[str], today: date, model: str | None, keep: Callable[[Found], Kept], is_brief: bool
+) -> list[Kept]:
     # The findings of a thousand missions are 10⁵ tuples without a cycle: nothing to collect.
     gc.disable()
-    return [keep(_found(file, today, model)) for file in files]
+    return [keep(_found(file, today, model, is_brief)) for file in files]
 
 
-def _found(file: str, today: date, model: str | None) -> Found:
+def _found(file: str, today: date, model: str | None, is_brief: bool) -> Found:
     try:
-        return check_mission(load_mission(file, model), today)
+        return check_mission(load_mission(file, model), today, is_brief=is_brief)
     except MissionError as error:
         return UnusableMission(file=file, faults=error.faults, data=error.data)

@@ -27,7 +27,6 @@ Value = Callable[[ExactPhases], float]  # what is held to a limit, signed
 class _Known(NamedTuple):
     size: float  # magnitude
     phases: ExactPhases
-    way: GroundVector  # where the point goes from there [m/unit]
 
 
 class PointPath:
@@ -47,8 +46,8 @@ class PointPath:
 
     def __init__(self, exact: ExactRanges, source: ErrorSource, sign: float, per_unit: GroundVector) -> None:
         self.exact, self.source, self.sign = exact, source, sign
-        slope = (sign * per_unit[0], sign * per_unit[1])
-        self.known = [_Known(0.0, ExactPhases((0.0, 0.0), 0.0, 0.0, 1.0), slope)]
+        self.known = [_Known(0.0, ExactPhases((0.0, 0.0), 0.0, 0.0, 1.0))]
+        self._ways = {0.0: (sign * per_unit[0], sign * per_unit[1])}
         self.end = math.inf  # size from which there is no point
 
     def to(self, size: float) -> ExactPhases | None:
@@ -64,7 +63,7 @@ class PointPath:
             near = self._ahead(index, ahead)
             found = self.exact.phases([(self.source, self.sign * ahead)], near)
             if found is not None and _is_on_the_way(last.phases.displacement, found.displacement, near):
-                self.known.insert(index, self._reached(ahead, found))
+                self.known.insert(index, _Known(ahead, found))
                 step *= 2
                 continue
             step /= 2
@@ -72,18 +71,22 @@ class PointPath:
                 self.end = last.size + step
         return None
 
-    def _reached(self, size: float, found: ExactPhases) -> _Known:
-        east, north = self.exact.way(self.source, self.sign * size, found.displacement)
-        return _Known(size, found, (self.sign * east, self.sign * north))
+    def _way(self, known: _Known) -> GroundVector:
+        """Where the point goes from a known one. [m/unit]"""
+        if known.size not in self._ways:
+            east, north = self.exact.way(self.source, self.sign * known.size, known.phases.displacement)
+            self._ways[known.size] = (self.sign * east, self.sign * north)
+        return self._ways[known.size]
 
     def _ahead(self, index: int, size: float) -> GroundVector:
         """Where the known points before an index lead: along the way of the last, which bends as it did."""
         last = self.known[index - 1]
-        (x, y), (u, v), step = last.phases.displacement, last.way, size - last.size
+        (x, y), (u, v), step = last.phases.displacement, self._way(last), size - last.size
         if index > 1:
             before = self.known[index - 2]
             bend = step / (2 * (last.size - before.size))
-            u, v = u + bend * (u - before.way[0]), v + bend * (v - before.way[1])
+            p, q = self._way(before)
+            u, v = u + bend * (u - p), v + bend * (v - q)
         return (x + u * step, y + v * step)
 
     def first_reaching(
@@ -168,7 +171,7 @@ class PointPath:
             found = self.to(size)
             if found is None:
                 return low.size
-            middle = _Known(size, found, (0.0, 0.0))
+            middle = _Known(size, found)
             if abs(value(found)) >= limit * (1 - _CLOSE):
                 high = middle
             else:

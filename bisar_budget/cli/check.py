@@ -240,7 +240,9 @@ def check(
     if format_name in PIECEWISE and not (written or verifying or drawn):
         from bisar_budget.budget.fleet import check_files
 
-        pieces = check_files(files, day, model, partial(piece, format_name=format_name, style=style))
+        is_brief = format_name == "text" and verbosity <= 0 and not all_rows
+        keep = partial(piece, format_name=format_name, style=style)
+        pieces = check_files(files, day, model, keep, is_brief=is_brief)
         if says_faults:
             _say_faults(piece.unusable for piece in pieces)
         deliver(joined(format_name, pieces, __version__, style), output)
