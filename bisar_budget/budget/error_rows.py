@@ -123,16 +123,23 @@ def error_rows(analysis: Analysis, model: Model, other: Model, allocation: Alloc
 
 def allowed_by(analysis: Analysis, model: Model, source: ErrorSource, limit: float) -> Allowed:
     """How large an error may be by a model, its quadratic phase being held to a limit. [unit]"""
-    quadratic = model.allowable(source, QUADRATIC, limit)
-    smallest, binding = quadratic, None if quadratic is None else QUADRATIC
+    requirements = analysis.mission.requirements
+    held = [(QUADRATIC, limit)]
     if source.is_motion:
-        requirements = analysis.mission.requirements
-        for name, required in ((CUBIC, requirements.cubic_phase_error), (LOCATION, requirements.location_error)):
-            if required is not None:
-                size = model.allowable(source, name, required)
-                if size is not None and (smallest is None or size < smallest):
-                    smallest, binding = size, name
-    return Allowed(quadratic, smallest, binding)
+        others = ((CUBIC, requirements.cubic_phase_error), (LOCATION, requirements.location_error))
+        held += [(name, required) for name, required in others if required is not None]
+    if analysis.is_brief:  # the one that binds is likely to be found first, and nothing beyond it is searched
+        held.sort(key=lambda one: model.small(source, *one))
+    quadratic: float | None = None
+    smallest, binding = math.inf, None
+    for name, required in held:
+        is_whole = name == QUADRATIC and not analysis.is_brief
+        size = model.allowable(source, name, required, math.inf if is_whole else smallest)
+        if name == QUADRATIC:
+            quadratic = size
+        if size is not None and size < smallest:
+            smallest, binding = size, name
+    return Allowed(quadratic, None if binding is None else smallest, binding)
 
 
 def _over(

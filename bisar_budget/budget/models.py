@@ -17,8 +17,8 @@ QUADRATIC, CUBIC, LOCATION = "quadratic_phase_error", "cubic_phase_error", "loca
 
 # No navigation error: it takes the platform, within the aperture, farther than this part of its slant range.
 FARTHEST = 0.1
-_SHARE = 0.002  # what the second order may add, of a phase, a displacement or a limit; the aim is 1 %
-_FLOOR_RAD, _FLOOR_M = 5e-4, 1e-3  # and whatever the size
+_SHARE = 0.004  # what the second order may add, of a phase, a displacement or a limit; the aim is 1 %
+_FLOOR_RAD, _FLOOR_M = 1e-3, 2e-3  # and whatever the size
 
 _VALUES: dict[str, Value] = {
     QUADRATIC: lambda phases: phases.quadratic,
@@ -72,6 +72,11 @@ class PublishedModel:
         """Say why an error has no limit from its quadratic phase."""
         return source.no_limit
 
+    def small(self, source: ErrorSource, requirement: str, limit: float) -> float:
+        """Size at which an error would reach a limit, were its effects those of a small one; infinite: never."""
+        per_unit = _per_unit(source.effect, self.plane, requirement)
+        return limit / per_unit if per_unit else math.inf
+
     def declared(self, source: ErrorSource) -> Declared:
         """What the declared error does."""
         size = source.declared
@@ -80,9 +85,10 @@ class PublishedModel:
         moved = self.plane.displacement(source.effect, size) if source.is_motion else None
         return Declared(source.effect.qpe * size, source.effect.cubic * size, moved, _back(moved))
 
-    def allowable(self, source: ErrorSource, requirement: str, limit: float) -> float | None:
-        """Largest size of an error within a limit [rad], or [m] for the location; None: no limit."""
-        return quotient(limit, _per_unit(source.effect, self.plane, requirement))
+    def allowable(self, source: ErrorSource, requirement: str, limit: float, upto: float = math.inf) -> float | None:
+        """Largest size of an error within a limit [rad], or [m] for the location; None: no limit, or none `upto`."""
+        found = quotient(limit, _per_unit(source.effect, self.plane, requirement))
+        return found if found is not None and found <= upto else None
 
 
 class FullModel:
@@ -124,6 +130,11 @@ class FullModel:
             else "no quadratic phase"
         )
 
+    def small(self, source: ErrorSource, requirement: str, limit: float) -> float:
+        """Size at which an error would reach a limit, were its effects those of a small one; infinite: never."""
+        per_unit = _per_unit(source.full, self.plane, requirement)
+        return limit / per_unit if per_unit else math.inf
+
     def declared(self, source: ErrorSource) -> Declared:
         """What the declared error does."""
         size, full = source.declared, source.full
@@ -141,19 +152,19 @@ class FullModel:
         signs = math.copysign(qpe, full.qpe * size), math.copysign(cubic, full.cubic * size)
         return Declared(*signs, ahead.displacement, back.displacement)
 
-    def allowable(self, source: ErrorSource, requirement: str, limit: float) -> float | None:
+    def allowable(self, source: ErrorSource, requirement: str, limit: float, upto: float = math.inf) -> float | None:
         """Smallest size, of either sign, at which an error reaches a limit [rad], or [m] for the location.
 
-        None where none does that takes its platform no farther than a tenth of the slant range.
+        None where none does that takes its platform no farther than a tenth of the slant range, or `upto`.
         """
         per_unit = _per_unit(source.full, self.plane, requirement)
         linear = quotient(limit, per_unit)
         if not source.is_motion:
             return linear
-        farthest = self.farthest(source)
-        if self.is_linear_at(source, requirement, limit):
-            return None if linear is None or linear > farthest else linear
+        farthest = min(upto, self.farthest(source))
         first = farthest if linear is None else min(linear, farthest)
+        if self._adds(source, first, requirement) <= _SHARE * limit:
+            return None if linear is None or linear > farthest else linear
         signed = {QUADRATIC: source.full.qpe, CUBIC: source.full.cubic}.get(requirement)
         return self._smallest(source, requirement, limit, per_unit if signed is None else signed, first, farthest)
 
