@@ -64,7 +64,7 @@ def _read(file: str) -> Settings | None:
     try:
         document = tomllib.loads(data.decode("utf-8"))
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise SettingsError(f"{file}: is no TOML: {error}") from None
+        raise SettingsError(f"{file}: is not valid TOML: {error}") from None
     tools = document.get("tool")
     table = tools.get("bisar-budget") if isinstance(tools, dict) else None
     if table is None:

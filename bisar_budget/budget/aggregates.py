@@ -19,7 +19,7 @@ from bisar_budget.budget.findings import Row
 from bisar_budget.budget.judgement import judged
 from bisar_budget.budget.models import CUBIC, LOCATION, QUADRATIC, Declared
 from bisar_budget.budget.pull_in import caps, needed_sentence
-from bisar_budget.budget.vibration import slow_phases
+from bisar_budget.budget.slow_vibration import slow_phases
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.model import Mission
@@ -203,7 +203,7 @@ def _location_row(analysis: Analysis, mine: Together, theirs: Together) -> Row:
     if combine == "each" and moves is not None:
         doubt = _of_all("displacement", combined_displacement(moves, "rss", groups), limit, "m") or doubt
     is_published = mine.model.name == "published"
-    no_image = "a declared error leaves no ground point with its range history: the image has no place for it"
+    no_image = "with a declared error no ground point has the recorded range history: there is no image"
     return judged(
         mission,
         id="mission.location_error",
@@ -245,8 +245,8 @@ def _pull_in_row(analysis: Analysis, mine: Together, theirs: Together, pull_in: 
         equation="Section VI",
         never_fails=True,
         over=_exceeded("QPE", total, pull_in, "rad", lambda: phases)
-        + "; autofocus corrects one total, not each error its own",
-        doubt=_doubt(theirs.model, by_other, pull_in, "rad"),
+        + "; autofocus corrects one total, not each error separately",
+        doubt=_doubt(theirs.model, by_other, pull_in, "rad", "beyond it: QPE"),
     )
 
 
@@ -261,11 +261,11 @@ def _judged(mission: Mission, *, declared: float | None, **of_row: Any) -> Row:
     return row._replace(status="fail", reason="a declared error leaves no ground point with its range history")
 
 
-def _doubt(other: Model, size: float | None, limit: float | None, unit: str) -> str:
+def _doubt(other: Model, size: float | None, limit: float | None, unit: str, what: str = "fail:") -> str:
     """Say that the model that does not gate fails an aggregate; else nothing."""
     if size is None or limit is None or size <= limit * (1 + UTILIZATION_TOLERANCE):
         return ""
-    return f"the {other.name} model says fail: {_said(size, unit)}, {format_limit(limit, unit)} allowed"
+    return f"the {other.name} model says {what} {_said(size, unit)}, {format_limit(limit, unit)} allowed"
 
 
 def _of_all(what: str, size: float, limit: float | None, unit: str) -> str:

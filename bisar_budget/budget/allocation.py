@@ -2,11 +2,14 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from bisar_budget.budget.correlation import combined_phase, correlated_errors
 from bisar_budget.budget.effects import ErrorSource
 from bisar_budget.mission.model import MetricSplits, Mission, Shares
+
+if TYPE_CHECKING:
+    from bisar_budget.budget.slow_vibration import SlowPhase
 
 BALANCED_RANGE = (0.05, 0.95)  # neither platform is left without a budget
 
@@ -59,7 +62,9 @@ class Allocation(NamedTuple):
         return math.ceil(exact * 100 * (1 - 1e-12)) / 100
 
 
-def allocate(mission: Mission, stated: Sequence[ErrorSource], phases: Mapping[str, float]) -> Allocation:
+def allocate(
+    mission: Mission, stated: Sequence[ErrorSource], phases: Mapping[str, float], slow: Sequence["SlowPhase"] = ()
+) -> Allocation:
     """Divide the budgets of a mission as its `allocation.split` says.
 
     Parameters
@@ -70,12 +75,14 @@ def allocate(mission: Mission, stated: Sequence[ErrorSource], phases: Mapping[st
         Declared errors, along the axes that the file states them in.
     phases : mapping of str to float
         Quadratic phase of each by the gating model, by row id: `balanced` weighs them. [rad]
+    slow : sequence of SlowPhase
+        Vibrations below one cycle per aperture, which it weighs too.
     """
     split = mission.allocation.split
     metrics = split if isinstance(split, MetricSplits) else None
     return Allocation(
         qpe_total=mission.requirements.quadratic_phase_error,
-        qpe=_divide(metrics.quadratic_phase_error if metrics else split, mission, stated, phases),
+        qpe=_divide(metrics.quadratic_phase_error if metrics else split, mission, stated, phases, slow),
         pslr=_divide_power(metrics.pslr if metrics else split),
         islr=_divide_power(metrics.islr if metrics else split),
         n_pull=mission.autofocus.n_pull,
@@ -86,7 +93,13 @@ def _divide_power(split: object) -> Split:
     return _split(split) if isinstance(split, Shares) else EQUAL  # `balanced` weighs phase, not power
 
 
-def _divide(split: object, mission: Mission, stated: Sequence[ErrorSource], phases: Mapping[str, float]) -> Split:
+def _divide(
+    split: object,
+    mission: Mission,
+    stated: Sequence[ErrorSource],
+    phases: Mapping[str, float],
+    slow: Sequence["SlowPhase"],
+) -> Split:
     if isinstance(split, Shares):
         return _split(split)
     if split != "balanced":
@@ -95,6 +108,7 @@ def _divide(split: object, mission: Mission, stated: Sequence[ErrorSource], phas
     for platform in ("transmitter", "receiver"):
         rule = mission.allocation.combine
         members = [(s.id, phases[s.id]) for s in stated if EQUAL.includes(s.owner, platform)]
+        members += [(one.row_id, one.qpe_rad) for one in slow if one.owner == platform]
         weight[platform] = combined_phase(members, rule, correlated_errors(mission))
     # An error that leaves no image has no finite phase: it takes all that it may.
     weight = {name: min(size, 1e300) for name, size in weight.items()}

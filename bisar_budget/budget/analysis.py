@@ -9,6 +9,7 @@ from bisar_budget.budget.correlation import Correlated, correlated_errors
 from bisar_budget.budget.effects import ErrorSource
 from bisar_budget.budget.exact_ranges import ExactRanges
 from bisar_budget.budget.models import Declared, FullModel, PublishedModel
+from bisar_budget.budget.slow_vibration import slow_phases
 from bisar_budget.budget.sources import error_sources
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission
@@ -81,4 +82,4 @@ class Analysis:
             source.id: max((self.declared(model)[source.id].qpe for model in models), key=abs)
             for source in self.stated
         }
-        return allocate(self.mission, self.stated, phases)
+        return allocate(self.mission, self.stated, phases, slow_phases(self.mission))

@@ -47,7 +47,7 @@ def common_sources(mission: Mission, sources: Sequence[ErrorSource]) -> Iterator
                 equation=f"{legs[0].equation}, both platforms",
                 no_limit=_no_limit(kind, letter),
                 evidence=error.source,
-                notes=("held to the total budget: it belongs to no one platform",),
+                notes=("held to the total budget: it belongs to both platforms",),
             )
 
 

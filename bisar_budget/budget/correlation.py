@@ -101,8 +101,7 @@ def correlation_notes(rule: str, groups: Sequence[Correlated]) -> tuple[str, ...
     if rule == "rss":
         return tuple(f"the errors of {group.id} count as one, the root of gᵀCg" for group in groups)
     return tuple(
-        f"the errors of {group.id} count with their marginal sigmas at their worst together: correlations have no "
-        "part in a sum"
+        f"a sum uses no correlations: each error of {group.id} counts with its own sigma, all at their worst"
         for group in groups
     )
 
@@ -114,7 +113,7 @@ def unused_correlations(mission: Mission) -> Iterator[tuple[Place | None, str]]:
     for name in PLATFORMS:
         error: MotionError = getattr(mission.platforms, name).motion_error
         if error.covariance is not None and error.covariance.has_correlations():
-            message = "correlations have no part where each error stands alone; combine: rss counts them"
+            message = "correlations are not used where each error is judged alone; combine: rss uses them"
             line = mission.line(("platforms", name, "motion_error", "covariance"))
             yield line, f"platforms.{name}.motion_error.covariance: {message}"
 

@@ -50,6 +50,7 @@ def error_rows(analysis: Analysis, model: Model, other: Model, allocation: Alloc
         published, full = (allowed, allowed_other) if model.name == "published" else (allowed_other, allowed)
         declared = None if source.declared is None else abs(source.declared)
         info = over = doubt = ""
+        notes = source.notes
         qpe_published = qpe_full = cubic = displacement = None
         if declared is not None:
             mine, theirs = found[source.id], found_other[source.id]
@@ -59,6 +60,8 @@ def error_rows(analysis: Analysis, model: Model, other: Model, allocation: Alloc
                 qpe_full = None
             cubic = abs(mine.cubic) if math.isfinite(mine.cubic) else None
             displacement = mine.displacement
+            if displacement is None and source.is_motion and model.plane.degeneracy:
+                notes = (*notes, model.plane.degeneracy)
             if not source.is_independent:
                 info = _stated_elsewhere(analysis, source)
             elif combine != "each":
@@ -70,7 +73,7 @@ def error_rows(analysis: Analysis, model: Model, other: Model, allocation: Alloc
         no_limit = model.no_limit(source) if allowed.smallest is None else ""
         utilization, margin, status, reason, notes = judgement(
             mission.allocation.warn_above, declared, allowed.smallest, 1.0, over, doubt, no_limit, "", info, True,
-            False, source.notes,
+            False, notes,
         )  # fmt: skip
         if status in ("pass", "warn") and not doubt and declared is not None and gain > 1:
             # Over the limit without the gain: the phase says so, the size would not where it is no longer linear.
@@ -143,7 +146,7 @@ def _over(
         )
     if allowed.binding == LOCATION and requirements.location_error is not None:
         moved = "out of sight" if mine.farthest is None else f"by {format_quantity(math.hypot(*mine.farthest), 'm')}"
-        by = "(25)" if model.name == "published" else "full model"
+        by = "equation (25)" if model.name == "published" else "full model"
         return f"moves the image {moved}, {format_limit(requirements.location_error, 'm')} allowed ({by})"
     qpe = abs(mine.qpe)
     text = f"QPE {_phase(qpe)}, {format_limit(limit, 'rad')} allowed ({model.equation(source)})"
@@ -199,4 +202,4 @@ def _cause(source: ErrorSource) -> str:
 def _stated_elsewhere(analysis: Analysis, source: ErrorSource) -> str:
     frame = getattr(analysis.mission.platforms, source.owner).motion_error.frame
     axes = ", ".join(axis.replace("_", " ") for axis in FRAME_AXES[frame])
-    return f"stated along other axes ({axes}): the rows along those decide"
+    return f"the file states this error along other axes ({axes}): those rows decide"

@@ -321,6 +321,6 @@ def _notes(mission: Mission, declared: Sequence[ErrorSource], is_exact: bool) ->
         yield f"{', '.join(bounds)}: drawn as plus or minus the declared value, which has no distribution"
     vibrations = [getattr(mission.platforms, name).motion_error.vibration for name in PLATFORMS]
     if any(one.sinusoidal or one.wideband for one in vibrations):
-        yield "vibration is not drawn: its limits are those of echoes; what a slow one adds in phase is not in here"
+        yield "vibration is not drawn; the phase of a slow vibration is not included"
     if mission.allocation.coverage_factor != 1:
         yield "the coverage factor is in sum and rss, not in the draws"

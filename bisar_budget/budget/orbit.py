@@ -35,7 +35,7 @@ def orbital_acceleration(position: Vector) -> Vector:
 
 
 def straight_orbits(mission: Mission) -> Iterator[FileWarning]:
-    """Doubt each platform that is as fast as a satellite and has no `acceleration`, and say what its orbit would have.
+    """Doubt each platform that is as fast as a satellite and has no `acceleration`; say what its orbit would have.
 
     A file that writes an acceleration has decided, zero included.
     """

@@ -7,8 +7,8 @@ from bisar_budget.budget.findings import Row
 from bisar_budget.mission.model import Mission
 
 
-def missing_declarations(mission: Mission) -> Iterator[tuple[str, str, str]]:
-    """Say what is asked for and missing: the start of its rows' ids, its word in the list, its key in the file.
+def missing_declarations(mission: Mission) -> Iterator[tuple[str, str]]:
+    """Say what is asked for and missing: the start of its rows' ids, and its key in the file.
 
     A covariance declares position and velocity. The clock is declared by any term of its error. An error that is
     common to both platforms says nothing of their own.
@@ -16,11 +16,11 @@ def missing_declarations(mission: Mission) -> Iterator[tuple[str, str, str]]:
     for kind in mission.requirements.declare:
         if kind == "timing":
             if all(term is None for term in mission.timing_error):
-                yield "timing.", kind, "timing_error"
+                yield "timing.", "timing_error"
             continue
         for name in PLATFORMS:
             if getattr(mission.platforms, name).motion_error.stated(kind) is None:
-                yield f"{name}.{kind}.", kind, f"platforms.{name}.motion_error.{kind}"
+                yield f"{name}.{kind}.", f"platforms.{name}.motion_error.{kind}"
 
 
 def with_required(rows: Sequence[Row], mission: Mission) -> list[Row]:
@@ -31,10 +31,10 @@ def with_required(rows: Sequence[Row], mission: Mission) -> list[Row]:
     return [_required(row, missing) for row in rows]
 
 
-def _required(row: Row, missing: Sequence[tuple[str, str, str]]) -> Row:
+def _required(row: Row, missing: Sequence[tuple[str, str]]) -> Row:
     if row.status == "not_declared":
-        for start, kind, key in missing:
+        for start, key in missing:
             if row.id.startswith(start):
-                reason = f"requirements.declare asks for {kind}, and the file has no {key}"
+                reason = f"the file has no {key}, which requirements.declare asks for"
                 return row._replace(status="not_evaluated", reason=reason)
     return row

@@ -10,8 +10,8 @@ power set; where the motions are noise, which is independent from platform to pl
 divided. The paper's rule, φ² ≤ PSLR·share and σ² ≤ ISLR·share, stays 3 dB inside the first at equal shares and equals
 the second where σ² is small; the same noise on both platforms would add 3 dB.
 
-Slower than one cycle per aperture a vibration makes no echoes: it is a quadratic and a cubic phase of unknown sign and
-size up to its worst phase, and is judged as one. Between one and three cycles it is both, and counts as echoes.
+Between one and three cycles per aperture a vibration is a quadratic phase as well, and counts as echoes; slower ones
+make none, see `slow_vibration`.
 """
 
 import math
@@ -25,11 +25,10 @@ from bisar_budget.budget.echoes import NEAR_CYCLES, SLOWEST, near_lines, worst_p
 from bisar_budget.budget.effects import PLATFORMS
 from bisar_budget.budget.findings import Row
 from bisar_budget.budget.judgement import judged
-from bisar_budget.budget.models import CUBIC, QUADRATIC
-from bisar_budget.budget.pull_in import caps, needed_sentence
+from bisar_budget.budget.slow_vibration import cubic_part, quadratic_part, slow_row
+from bisar_budget.budget.vibration_lines import Line, along_line_of_sight, lines_of, projected
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.errors import KeyPath
-from bisar_budget.geometry import FRAME_AXES, PlatformState, Vector, dot, without_rounding
 from bisar_budget.mission.model import Mission, MotionError
 from bisar_budget.units import format_limit, format_quantity
 
@@ -57,9 +56,9 @@ class VibrationLimits(NamedTuple):
 class VibrationCase(NamedTuple):
     """One row to be judged: a line, lines near each other, or the noise of a platform.
 
-    `declared` and the limits are along the line of sight [m]; `qpe` and `cubic` are the worst-phase quadratic and cubic
-    phases [rad], where the motion is slow enough to have them; `islr_db` is what noise adds [dB]. The texts are those
-    of a row.
+    `declared` and the limits are along the line of sight [m]; `qpe` and `cubic` are the worst-phase quadratic and
+    cubic phases [rad], where the motion is slow enough to have them; `islr_db` is what noise adds [dB]. The texts are
+    those of a row.
     """
 
     id: str
@@ -77,29 +76,6 @@ class VibrationCase(NamedTuple):
     qpe: float | None = None
     cubic: float | None = None
     islr_db: float | None = None
-
-
-class SlowPhase(NamedTuple):
-    """A vibration below one cycle per aperture: row id, platform, worst-phase QPE and cubic phase. [rad]"""
-
-    row_id: str
-    owner: str
-    qpe_rad: float
-    cubic_rad: float
-
-
-def along_line_of_sight(value: float | Vector, error: MotionError, state: PlatformState, metric: str) -> float:
-    """Amplitude (`pslr`) or rms (`islr`) along the line of sight at the aperture midpoint. [m]
-
-    A single value is along it. Of a vector, amplitudes along the axes of the error's frame, projections add: the
-    axes may vibrate in any phase. Rms values are taken for independent and add as squares.
-    """
-    if not isinstance(value, tuple):
-        return value
-    u, v, w = (dot(axis, state.look) for axis in state.frame(error.frame))
-    u, v, w = without_rounding((u, v, w))
-    parts = (value[0] * u, value[1] * v, value[2] * w)
-    return math.fsum(map(abs, parts)) if metric == "pslr" else math.hypot(*parts)
 
 
 def echo_level(phase: float) -> float:
@@ -124,25 +100,6 @@ def echo_phase(level: float) -> float:
 def spread_phase(ratio: float) -> float:
     """Rms phase of noise that spreads so much power, over the response's: exp(σ²) - 1. [rad]"""
     return math.sqrt(math.log1p(ratio))
-
-
-def quadratic_part(cycles: float) -> float:
-    """Worst quadratic phase at the aperture edge of a sinusoid, over its peak phase: 7.5·j₂(π·cycles).
-
-    The least-squares quadratic of cos(πnx) over the aperture; half of it is a Taylor term where n is small.
-    """
-    k = math.pi * cycles
-    if k < 0.5:
-        return 7.5 * k**2 / 15 * (1 - k**2 / 14 + k**4 / 504)
-    return 7.5 * abs((3 / k**2 - 1) * math.sin(k) - 3 * math.cos(k) / k) / k
-
-
-def cubic_part(cycles: float) -> float:
-    """Worst cubic phase likewise: 17.5·j₃(π·cycles), of the least-squares cubic of sin(πnx)."""
-    k = math.pi * cycles
-    if k < 0.5:
-        return 17.5 * k**3 / 105 * (1 - k**2 / 18 + k**4 / 792)
-    return 17.5 * abs((15 / k**3 - 6 / k) * math.sin(k) - (15 / k**2 - 1) * math.cos(k)) / k
 
 
 def vibration_limits(mission: Mission, allocation: Allocation, metric: str) -> dict[str, VibrationLimits]:
@@ -176,7 +133,7 @@ def power_share(split: Split, name: str) -> float:
 
 
 def vibration_rows(mission: Mission, allocation: Allocation, model: str) -> Iterator[Row]:
-    """Every row about vibration, declared or not, in the order of the contract, by the `published` or `full` model."""
+    """Every row about vibration, declared or not, in the order of the contract, by one of the two models."""
     mission = mission._replace(allocation=mission.allocation._replace(model=model))
     sinusoidal, wideband = (vibration_limits(mission, allocation, metric) for metric in ("pslr", "islr"))
     T = mission.collection.aperture_time
@@ -186,7 +143,7 @@ def vibration_rows(mission: Mission, allocation: Allocation, model: str) -> Iter
         error: MotionError = getattr(mission.platforms, name).motion_error
         for index, line in enumerate(lines[name] or (None,)):
             if line is not None and line.frequency * T < SLOWEST:
-                yield _slow_row(mission, allocation, name, index, line)
+                yield slow_row(mission, allocation, name, index, line)
             else:
                 both = joint.get((name, index), _Together())
                 yield _row(mission, _line(mission, allocation, sinusoidal.get(name), name, index, line, both), model)
@@ -221,107 +178,6 @@ def _row(mission: Mission, case: VibrationCase, model: str) -> Row:
     if case.cubic is None and case.islr_db is None:
         return row
     return row._replace(cubic_rad=case.cubic, islr_db=case.islr_db)
-
-
-def slow_phases(mission: Mission) -> list[SlowPhase]:
-    """Phases of the declared vibrations below one cycle per aperture, which count with those of other errors."""
-    T = mission.collection.aperture_time
-    found = []
-    for name in PLATFORMS:
-        for index, line in enumerate(lines_of(mission, name)):
-            cycles = line.frequency * T
-            if cycles < SLOWEST:
-                phase = 2 * math.pi * line.amplitude / mission.radar.wavelength
-                row_id = f"{name}.vibration.sinusoidal.{index}"
-                found.append(SlowPhase(row_id, name, phase * quadratic_part(cycles), phase * cubic_part(cycles)))
-    return found
-
-
-class SlowLimits(NamedTuple):
-    """Amplitudes at which a slow vibration reaches a platform's quadratic and the required cubic phase. [m]"""
-
-    quadratic: float
-    cubic: float | None
-
-    @property
-    def smallest(self) -> float:
-        """The one that gates."""
-        return self.quadratic if self.cubic is None else min(self.quadratic, self.cubic)
-
-    @property
-    def binding(self) -> str:
-        """The requirement that sets it."""
-        return CUBIC if self.smallest < self.quadratic else QUADRATIC
-
-
-def slow_limits(mission: Mission, allocation: Allocation, name: str, cycles: float) -> SlowLimits:
-    """Largest amplitude of a vibration below one cycle per aperture, in its worst phase.
-
-    The quadratic phase is held to the platform's share, autofocus gain included; the cubic phase, where it is
-    required, to the whole requirement without gain.
-    """
-    wavenumber = 2 * math.pi / mission.radar.wavelength
-    quadratic = allocation.qpe_limit(name) * allocation.autofocus_gain / (wavenumber * quadratic_part(cycles))
-    required = mission.requirements.cubic_phase_error
-    return SlowLimits(quadratic, None if required is None else required / (wavenumber * cubic_part(cycles)))
-
-
-def _slow_row(mission: Mission, allocation: Allocation, name: str, index: int, line: "Line") -> Row:
-    """Judge a vibration below one cycle per aperture as the quadratic and cubic phase that it is."""
-    error: MotionError = getattr(mission.platforms, name).motion_error
-    combine, gain = mission.allocation.combine, allocation.autofocus_gain
-    cycles = line.frequency * mission.collection.aperture_time
-    phase = 2 * math.pi * line.amplitude / mission.radar.wavelength
-    qpe, cubic = phase * quadratic_part(cycles), phase * cubic_part(cycles)
-    limits = slow_limits(mission, allocation, name, cycles)
-    limit = allocation.qpe_limit(name) * gain
-    if limits.binding == CUBIC:
-        allowed = format_limit(mission.requirements.cubic_phase_error or 0.0, "rad")
-        over = f"cubic phase {cubic:.3g} rad in the worst phase, {allowed} allowed; autofocus gain does not apply"
-    else:
-        needed = needed_sentence(allocation.n_pull_needed(qpe, name), caps(mission)) if qpe > limit else ""
-        over = f"QPE {qpe:.3g} rad in the worst phase, {format_limit(limit, 'rad')} allowed; {needed}"
-    use = line.amplitude / limits.smallest
-    row = judged(
-        mission,
-        id=f"{name}.vibration.sinusoidal.{index}",
-        metric=QUADRATIC,
-        unit="m",
-        declared=line.amplitude,
-        allowable=limits.smallest,
-        path=("platforms", name, "motion_error", "vibration", "sinusoidal", index, "amplitude"),
-        equation="first principles",
-        gain=qpe / (limit / gain) / use if use else 1.0,  # a cubic phase has none
-        over=over,
-        info="" if combine == "each" else f"combine is {combine}: the aggregate decides",
-        limits=(limits.quadratic, limits.quadratic),
-        qpe=qpe,
-        qpe_full=qpe,
-        evidence=error.source,
-        notes=(
-            *_projected(error.vibration.sinusoidal[index].amplitude, error, line.amplitude),
-            f"{cycles:.2g} cycles per aperture: below one a vibration makes no echoes but, in its worst phase, a "
-            f"quadratic phase of {qpe:.3g} rad or a cubic phase of {cubic:.3g} rad",
-        ),
-    )
-    return row._replace(binding_requirement=limits.binding, cubic_rad=cubic)
-
-
-class Line(NamedTuple):
-    """One sinusoid: amplitude along the line of sight, 0 to peak [m], and frequency [Hz]."""
-
-    amplitude: float
-    frequency: float
-
-
-def lines_of(mission: Mission, name: str) -> list[Line]:
-    """Sinusoids of one platform, along the line of sight."""
-    platform = getattr(mission.platforms, name)
-    error: MotionError = platform.motion_error
-    return [
-        Line(along_line_of_sight(line.amplitude, error, platform.state, "pslr"), line.frequency)
-        for line in error.vibration.sinusoidal
-    ]
 
 
 def _case(
@@ -374,7 +230,7 @@ def _line(
     if line is None:
         return case
     case = _with_doubt(case._replace(declared=line.amplitude), mission.allocation.model)
-    notes = [*_projected(error.vibration.sinusoidal[index].amplitude, error, line.amplitude), *case.notes]
+    notes = [*projected(error.vibration.sinusoidal[index].amplitude, error, line.amplitude), *case.notes]
     cycles = line.frequency * mission.collection.aperture_time
     phase = 2 * math.pi * line.amplitude / mission.radar.wavelength
     if cycles >= ECHO_CYCLES:
@@ -387,7 +243,8 @@ def _line(
     if allowed_cubic is not None:
         or_cubic += f", {format_limit(allowed_cubic, 'rad')} allowed"
     notes.append(
-        f"{cycles:.3g} cycles per aperture: below three it also is {worst}, {or_cubic}; the same motion, in no sum"
+        f"{cycles:.3g} cycles per aperture: below three it also is {worst}, {or_cubic}; "
+        "it is the same motion, so no sum counts it"
     )
     breaks_cubic = allowed_cubic is not None and cubic > allowed_cubic * (1 + UTILIZATION_TOLERANCE)
     doubt = f"also {worst}, {or_cubic}" if breaks_cubic or qpe > limit * (1 + UTILIZATION_TOLERANCE) else ""
@@ -425,7 +282,7 @@ def _noise(mission: Mission, allowed: VibrationLimits | None, name: str, error: 
     if wideband is None:
         return case
     rms = along_line_of_sight(wideband.rms, error, getattr(mission.platforms, name).state, "islr")
-    notes = (*_projected(wideband.rms, error, rms), *case.notes)
+    notes = (*projected(wideband.rms, error, rms), *case.notes)
     variance = (2 * math.pi * rms / mission.radar.wavelength) ** 2
     case = case._replace(declared=rms, notes=notes, islr_db=islr_db(variance))
     return _with_doubt(case, mission.allocation.model)
@@ -446,15 +303,6 @@ def _margin(allowed: VibrationLimits | None) -> tuple[str, ...]:
         return ("the published rule is that of first principles, to 0.01 dB",)
     side = "inside" if allowed.margin_db >= 0 else "beyond"
     return (f"the published rule is {abs(allowed.margin_db):.2f} dB {side} first principles",)
-
-
-def _projected(value: float | Vector, error: MotionError, along: float) -> tuple[str, ...]:
-    if not isinstance(value, tuple):
-        return ()
-    axes = ", ".join(
-        f"{axis} {format_quantity(part, 'm')}" for axis, part in zip(FRAME_AXES[error.frame], value, strict=True)
-    )
-    return (f"{axes}: {format_quantity(along, 'm')} of it along the line of sight",)
 
 
 def _with_doubt(case: VibrationCase, model: str) -> VibrationCase:
@@ -493,8 +341,8 @@ def _of_both_platforms(mission: Mission, lines: dict[str, list[Line]]) -> dict[t
         for (name, index), _ in members:
             (other,) = (platform for platform in PLATFORMS if platform != name)
             text = (
-                f"the {other} vibrates at most {NEAR_CYCLES:g} cycles per aperture from this frequency too: in the worst "
-                f"phases echoes of both together are {'above ' if phase > _LARGEST else ''}{level:.1f} dB, "
+                f"the {other} vibrates at most {NEAR_CYCLES:g} cycles per aperture from this frequency too: in the "
+                f"worst phases echoes of both together are {'above ' if phase > _LARGEST else ''}{level:.1f} dB, "
                 f"{requirement:g} dB required"
             )
             found[name, index] = _Together((text,), text if level > requirement + 1e-6 else "")

@@ -124,7 +124,7 @@ class _Draws(click.ParamType[int]):
     type=click.Choice(["summary", "full"]),
     default="summary",
     show_default=True,
-    help="Of html and markdown: the summary alone, or with an annex of formulas, remarks and undeclared rows.",
+    help="For html and markdown: only the summary, or also an annex with formulas, remarks and undeclared rows.",
 )
 @click.option(
     "--strict/--no-strict",
@@ -140,16 +140,16 @@ class _Draws(click.ParamType[int]):
     "--model",
     envvar="BISAR_BUDGET_MODEL",
     type=click.Choice(["published", "full", "strictest"]),
-    help="Model that gates, over the mission file's.",
+    help="Model that decides, instead of the mission file's.",
 )
 @click.option(
     "--date",
     "today",
     type=click.DateTime(["%Y-%m-%d"]),
-    help="Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC). Only a day that is given "
-    "stands in a compliance report.",
+    help="Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC). A compliance report shows "
+    "it only if it is given.",
 )
-@click.option("--verify", "verifying", is_flag=True, help="Form images at the limits too and add what they show.")
+@click.option("--verify", "verifying", is_flag=True, help="Also form images at the limits and add their verdicts.")
 @click.option(
     "--monte-carlo",
     "draws",
@@ -176,8 +176,8 @@ class _Draws(click.ParamType[int]):
 @click.option(
     "--explain",
     metavar="ID",
-    help="Instead of the report, show how the row ID comes to its status: from the line of the file through "
-    "the equations, with the numbers put in, to the verdict. Exits with 0.",
+    help="Explain the row ID instead of writing the report: its line of the file, its equations with the numbers put "
+    "in, its verdict. Exits with 0.",
 )
 @click.option(
     "--color",
@@ -222,10 +222,12 @@ def check(
     spare(files, [output, *reports])
     given = click.get_current_context().get_parameter_source
     if seed is not None and draws is None and given("seed") is ParameterSource.COMMANDLINE:
-        raise click.UsageError("--seed is that of --monte-carlo N: give both.")
+        raise click.UsageError("--seed needs --monte-carlo N.")
     if explain is not None:
         if any(given(name) is ParameterSource.COMMANDLINE for name in ("format_name", "reports", "draws")):
-            raise click.UsageError("--explain writes text: it excludes --format, --report and --monte-carlo.")
+            raise click.UsageError(
+                "--explain writes text; it cannot be combined with --format, --report or --monte-carlo."
+            )
         _explain(files, explain, today.date() if today else day_of_run(), model, output)
         return
     illustrated = any(name in ILLUSTRATED for name in (format_name, *(name for _, name in written)))
@@ -291,7 +293,7 @@ def _options(judged_on: date | None) -> "Iterator[Option]":
             if value is None and judged_on is not None:
                 by_environment = os.environ.get("SOURCE_DATE_EPOCH")
                 origin = "environment, SOURCE_DATE_EPOCH" if by_environment else "the day of the run"
-            unrecorded = "the day of the run, which decides nothing and is not recorded"
+            unrecorded = "the day of the run (not recorded: no waiver depends on it)"
             yield Option("--date", judged_on.isoformat() if judged_on else unrecorded, origin)
         elif name == "draws":
             yield Option("--monte-carlo", "no" if value is None else f"{value:,} draws", origin)

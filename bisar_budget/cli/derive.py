@@ -32,7 +32,7 @@ def derive(table: str, format_name: str, check_only: bool, write: bool) -> None:
     Equation and table numbers are the paper's.
     """
     if check_only and write:
-        raise click.UsageError("--check and --write exclude each other.")
+        raise click.UsageError("--check and --write cannot be combined.")
     if check_only or write:
         _generated(write)
         return

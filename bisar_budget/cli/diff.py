@@ -48,7 +48,8 @@ class _Part(click.ParamType[float]):
     "tolerated",
     type=_Part(),
     metavar="PERCENT",
-    help="Exit with 1 if a row fails that did not, or uses up more than this part of what was left of its limit.",
+    help="Exit with 1 if a row newly fails, or if the change uses up more than this part of what was left of "
+    "its limit.",
 )
 @click.option(
     "--format",
@@ -58,7 +59,7 @@ class _Part(click.ParamType[float]):
     show_default=True,
     help="Format of the comparison.",
 )
-@click.option("--all", "all_rows", is_flag=True, help="Show rows that moved by less than 1 % too.")
+@click.option("--all", "all_rows", is_flag=True, help="Also show rows that moved by less than 1 %.")
 @click.option("-o", "--output", type=FILE, metavar="FILE", help="Write to FILE instead of standard output.")
 @click.option(
     "--date",

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     "--jobs",
     type=click.IntRange(min=1),
     metavar="N",
-    help="Processes to use; default: the cores, or 1 with the extra `fast`, which uses them itself.",
+    help="Processes to use; default: the number of cores, or 1 with the extra `fast`, which uses all cores itself.",
 )
 def verify(missions: Sequence[str], only: str, format_name: str, output: str | None, jobs: int | None) -> None:
     """Form images at the limits and measure whether they are true.
@@ -79,7 +79,7 @@ def verify_all(missions: "Sequence[Mission]", only: str, jobs: int | None) -> "l
 
     total = sum(len(rows_to_verify(mission, only)) for mission in missions)
     if not total and only != "*":
-        raise click.UsageError(f"--only {printable(only)}: no row with a limit has such an id, nothing was verified.")
+        raise click.UsageError(f"--only {printable(only)}: no row with a limit matches; nothing was verified.")
     jobs = jobs or (1 if is_compiled() else cores())
     with progress_bar(total) as bar:
         return [verify_mission(mission, only, jobs, lambda row_id: bar.update(1)) for mission in missions]

@@ -43,7 +43,7 @@ def load_mission(path: str, model: str | None = None) -> Mission:
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         reason = getattr(error, "strerror", None) or str(error)
         is_pattern = isinstance(error, FileNotFoundError) and any(char in path for char in "*?[")
-        problem = "is no file, and as a pattern matches none" if is_pattern else f"cannot be read: {reason}"
+        problem = "not found, and no file matches the pattern" if is_pattern else f"cannot be read: {reason}"
         raise MissionError(path, (_file_fault(problem),)) from None
     try:
         return parse_mission(data, path, model)

@@ -200,7 +200,7 @@ class Words(Reader):
         words = tuple([_read(self.word, word, (*path, index), report) for index, word in enumerate(value)])
         for index, word in enumerate(words):
             if word is not INVALID and word in words[:index]:
-                report((*path, index), Problem("stands in the list twice"))
+                report((*path, index), Problem("is in the list twice"))
                 return INVALID
         return INVALID if INVALID in words else words
 

@@ -22,7 +22,7 @@ def file_at(path: str, revision: str) -> bytes:
     if not os.path.isdir(folder):
         raise RevisionError(f"{path}: there is no folder {folder}")
     if not _git(folder, "rev-parse", "--git-dir")[0]:
-        raise RevisionError(f"{path} is in no git repository")
+        raise RevisionError(f"{path} is not in a git repository")
     # What starts with a dash would be an option to git.
     is_known, commit = (
         (False, b"")

@@ -25,7 +25,6 @@ from bisar_budget.report.compliance_view import (
     Compliance,
     Contribution,
     Derivation,
-    Document,
     Driver,
     Evidence,
     General,
@@ -89,20 +88,24 @@ _DISTRIBUTIONS = {
 }
 _VALIDITY = {
     "published": (
-        "Rigling & Moses, Tables I and II: first order in the errors, the slant ranges held constant over the "
-        "aperture. True near broadside; at a squint its velocity rows can be a third too generous or several times "
-        "too strict. A row that the full model fails is a warning."
+        "Rigling & Moses, Tables I and II. It is of first order in the errors and holds the slant ranges constant "
+        "over the aperture. It is accurate near broadside. At a squint, a look off broadside, limits of velocity "
+        "errors can be a third too generous or several times too strict. A row that fails by the full model is a "
+        "warning."
     ),
     "full": (
-        "Exact ranges, for errors of any size: lines of sight turn over the aperture, and the displaced response has "
+        "Exact ranges, for errors of any size. Lines of sight turn over the aperture, and the displaced response has "
         "a phase of its own. A row that the published model fails is a warning."
     ),
-    "strictest": "Of the published model (Rigling & Moses, Tables I and II) and the full one the stricter, by row.",
+    "strictest": (
+        "Two complete checks, by the published model (Rigling & Moses, Tables I and II) and by the full model "
+        "(exact ranges). Each row is that of the stricter verdict."
+    ),
 }
 _RULES = {
     "each": "each error alone is held to its share of the budget",
-    "sum": "the errors of a platform are added at their worst and held to its share",
-    "rss": "the errors of a platform are taken for independent, and their root-sum-square is held to its share",
+    "sum": "the worst-case sum of a platform's errors is held to its share",
+    "rss": "the errors of a platform are taken as independent; their root-sum-square is held to its share",
 }
 
 
@@ -208,7 +211,7 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
         anchor=anchor,
         file=file,
         sha256=_digest(mission.data),
-        document=_document(mission),
+        document=found.document,
         alone=_ALONE if judged and found.combine == "each" else "",
         narrow=narrow_gradients(found.geometry),
         status=found.status,
@@ -331,7 +334,7 @@ def _draws_remarks(drawn: "MonteCarlo | None") -> Iterator[str]:
     yield from drawn.warnings
     yield from drawn.notes
     if drawn.probability is None:
-        yield "nothing is declared that a requirement here is about"
+        yield "no declared error has a requirement to hold"
 
 
 def _digest(data: bytes | None) -> str:
@@ -430,9 +433,6 @@ def _requirement(mission: Mission, found: MissionFindings, row: Row, source: Err
 def _method(found: MissionFindings, row: Row, verdict: str | None) -> str:
     """Say how the row is verified: by analysis, and by the image where one was formed."""
     analysis = f"analysis: {row.equation}"
-    is_error = row.metric == "quadratic_phase_error" and row.unit != "rad"
-    if found.model == "strictest" and is_error and row.equation != "full model":
-        analysis += " and full model"
     return analysis if verdict is None else f"{analysis}; simulation: {STATUS_WORDS.get(verdict, verdict)}"
 
 
@@ -498,17 +498,6 @@ def _moves(found: MissionFindings, stated: Iterable[ErrorSource]) -> tuple[Move,
     )
 
 
-def _document(mission: Mission) -> Document:
-    document = getattr(mission, "document", None)
-    return Document(*(getattr(document, key, None) or "" for key in Document._fields))
-
-
-def document_words(document: Document) -> str:
-    """Number and issue of a document; empty where the file gives neither."""
-    issue = f"issue {document.issue}" if document.issue else ""
-    return ", ".join(text for text in (document.number, issue) if text)
-
-
 def _kind(source: ErrorSource) -> tuple[str, str, str]:
     """Owner, kind and axis of an error."""
     first, kind, axis = (*source.id.split(".", 2), "", "")[:3]
@@ -538,7 +527,7 @@ def _validity(mission: Mission, found: MissionFindings) -> Iterator[tuple[str, s
     common = mission.common_motion_error
     if common is not None:
         said = _DISTRIBUTIONS[common.distribution]
-        yield "Errors of both platforms alike", f"along the axes of the scene; {said}"
+        yield "Errors of both platforms", f"along the axes of the scene; {said}"
     yield (
         "Autofocus",
         _gain(found.allocation) + ("" if found.allocation.n_pull is None else f" ({mission.autofocus.algorithm})"),

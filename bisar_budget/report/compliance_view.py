@@ -4,6 +4,7 @@ from datetime import date
 from typing import NamedTuple
 
 from bisar_budget.budget.findings import Option
+from bisar_budget.mission.model import Document
 from bisar_budget.report.formulas import Step
 
 STATUS_WORDS = {
@@ -105,14 +106,6 @@ class Move(NamedTuple):
     axis: str
     size: str
     part: float
-
-
-class Document(NamedTuple):
-    """What a mission file says of itself as a document; empty where it says nothing."""
-
-    number: str = ""
-    issue: str = ""
-    author: str = ""
 
 
 class Input(NamedTuple):

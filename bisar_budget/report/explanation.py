@@ -12,14 +12,9 @@ from bisar_budget.budget.effects import ErrorSource, image_plane
 from bisar_budget.budget.findings import MissionFindings, Row
 from bisar_budget.budget.models import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.budget.scene import ScenePhases, at
-from bisar_budget.budget.vibration import (
-    amplitude_share,
-    cubic_part,
-    echo_phase,
-    lines_of,
-    quadratic_part,
-    slow_limits,
-)
+from bisar_budget.budget.slow_vibration import cubic_part, quadratic_part, slow_limits
+from bisar_budget.budget.vibration import amplitude_share, echo_phase
+from bisar_budget.budget.vibration_lines import lines_of
 from bisar_budget.constants import ROUNDING
 from bisar_budget.errors import KeyPath, printable
 from bisar_budget.geometry import dot, without_rounding
@@ -197,6 +192,8 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[S
             "q": quadratic_part(line.frequency * mission.collection.aperture_time),
         }
         lines = equation("QPE_full", "2*π*A*q/λ", values, row.qpe_full_rad, "rad")
+        if row.metric == QUADRATIC:  # the same by both models
+            yield from step("By either model", *equation("QPE", "2*π*A*q/λ", values, row.qpe_full_rad, "rad"))
         yield from step("Quadratic phase in the worst phase, q = 7.5·j₂(π·f·T)", *lines)
         if row.metric == QUADRATIC:
             yield from _slow_vibration(mission, allocation, row, line.frequency * mission.collection.aperture_time)
@@ -260,13 +257,14 @@ def _slow_vibration(mission: Mission, allocation: Allocation, row: Row, cycles: 
     values = {"limit": limit, "λ": wavelength, "q": quadratic_part(cycles)}
     lines = equation("by_QPE", "limit*λ/(2*π*q)", values, limits.quadratic, "m")
     yield from step("Allowable by the quadratic phase", *lines)
-    if required is None or limits.cubic is None:
-        return
-    values = {"required": required, "λ": wavelength, "c": cubic_part(cycles)}
-    lines = equation("by_cubic", "required*λ/(2*π*c)", values, limits.cubic, "m")
-    yield from step("Allowable by requirements.cubic_phase_error", *lines)
-    sizes = {"by_QPE": limits.quadratic, "by_cubic": limits.cubic}
-    yield from step("Allowable", *equation("allowable", "min(by_QPE, by_cubic)", sizes, limits.smallest, "m"))
+    sizes = {"by_QPE": limits.quadratic}
+    if required is not None and limits.cubic is not None:
+        values = {"required": required, "λ": wavelength, "c": cubic_part(cycles)}
+        lines = equation("by_cubic", "required*λ/(2*π*c)", values, limits.cubic, "m")
+        yield from step("Allowable by requirements.cubic_phase_error", *lines)
+        sizes["by_cubic"] = limits.cubic
+    smallest = "by_cubic" if limits.binding == CUBIC else "by_QPE"
+    yield from step("Allowable, the smallest", *equation("allowable", smallest, sizes, limits.smallest, "m"))
 
 
 def _line_of_sight(

@@ -36,7 +36,7 @@ def render(report: Report, style: Style) -> str:
     """Write one command per finding; a run without findings says so in a line that is no command."""
     annotations = sorted(_annotations(report, style), key=lambda found: _ORDER.index(found.command))
     lines = [_command(annotation) for annotation in annotations]
-    return "\n".join(lines or [f"bisar-budget: {_counted(report)}, nothing to remark"]) + "\n"
+    return "\n".join(lines or [f"bisar-budget: {_counted(report)}, no findings"]) + "\n"
 
 
 def _annotations(report: Report, style: Style) -> Iterator[_Annotation]:
@@ -97,7 +97,8 @@ def step_summary(report: Report, style: Style) -> str:
         row, use = worst_first(mission.rows)[0], ""
         if row.utilization is not None and row.allowable is not None:
             use = percent(row.utilization)
-        lines.append(f"| {WORDS[mission.status]} | {file} | {markdown_text(row.id)} | {use} |")
+        status = WORDS[mission.status] + ("; each error alone" if mission.combine == "each" else "")
+        lines.append(f"| {status} | {file} | {markdown_text(row.id)} | {use} |")
     broken = [
         f"- {markdown_text(finding(row))}"
         for mission in report.missions

@@ -9,9 +9,10 @@ from markupsafe import Markup, escape
 from bisar_budget.budget.findings import Report
 from bisar_budget.errors import printable
 from bisar_budget.report import Style, typeset
-from bisar_budget.report.compliance import compliance, document_words
+from bisar_budget.report.compliance import compliance
 from bisar_budget.report.compliance_view import STATUS_WORDS
 from bisar_budget.report.formulas import Equation, Sum
+from bisar_budget.report.text_table import document_words
 from bisar_budget.resources import resource
 
 _AFTER = re.compile(r"([._/])(?=\w)")  # where a long name may break

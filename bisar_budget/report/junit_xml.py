@@ -58,6 +58,8 @@ def _mission(mission: MissionFindings, style: Style, counts: Counter[str]) -> It
     yield _property("file", source_path(mission.file, style.root))
     yield _property("model", mission.model)
     yield _property("combine", mission.combine)
+    said = mission.document._asdict().items()
+    yield from [_property(f"document_{name}", value) for name, value in said if value is not None]
     yield "    </properties>"
     class_name, file = _class_name(mission.file, style), xml_text(source_path(mission.file, style.root))
     for row in mission.rows:

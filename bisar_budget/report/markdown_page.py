@@ -10,10 +10,11 @@ from markupsafe import Markup
 from bisar_budget.budget.findings import MissionFindings, Report
 from bisar_budget.errors import printable
 from bisar_budget.report import Style, typeset
-from bisar_budget.report.compliance import compliance, document_words, drawings, illustrations
+from bisar_budget.report.compliance import compliance, drawings, illustrations
 from bisar_budget.report.compliance_view import STATUS_WORDS, Chip, Compliance
 from bisar_budget.report.escapes import markdown_text, uri
 from bisar_budget.report.formulas import Equation, Sum
+from bisar_budget.report.text_table import document_words
 from bisar_budget.resources import resource
 
 _BAR = 20  # characters

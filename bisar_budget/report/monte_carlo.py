@@ -18,7 +18,7 @@ def probabilities(drawn: MonteCarlo) -> list[str]:
         "",
     ]
     if drawn.probability is None or drawn.probability_low is None or drawn.probability_high is None:
-        return [*lines, "  nothing is declared that a requirement here is about"]
+        return [*lines, "  no declared error has a requirement to hold"]
     lines.append(_cells("requirement", "limit", "sum", "rss", "sigma"))
     for requirement in drawn.requirements:
         lines += _requirement(requirement)

@@ -48,17 +48,18 @@ RULES = {
     ),
     "cubic_phase_error": (
         "Cubic phase error within its requirement",
-        "An acceleration or clock error may add at most requirements.cubic_phase_error at the aperture edge "
-        "(Rigling & Moses, Table I, cubic column). Declare a smaller error or shorten the aperture.",
+        "The cubic phase error at the aperture edge may be at most requirements.cubic_phase_error (Rigling & Moses, "
+        "Table I, cubic column). Declare smaller errors or shorten the aperture; autofocus gain does not apply.",
     ),
     "location_error": (
         "Displacement of the image within its requirement",
-        "Errors move the image on the ground by (25) of Rigling & Moses, at most by requirements.location_error. "
-        "Declare smaller position, velocity or clock errors; autofocus does not help.",
+        "Errors displace the image on the ground, by equation (25) of Rigling & Moses or by exact ranges. "
+        "The displacement may be at most requirements.location_error. Declare smaller position, velocity or clock "
+        "errors; autofocus does not help.",
     ),
     "autofocus_pull_in": (
         "All errors together within what autofocus corrects",
-        "Autofocus corrects one total of n_pull·π radians, not each error its own (Rigling & Moses, Section VI). "
+        "Autofocus corrects one total of n_pull·π radians, not each error separately (Rigling & Moses, Section VI). "
         "Raise autofocus.n_pull if the algorithm allows, or declare smaller errors.",
     ),
     "other": (
@@ -66,9 +67,9 @@ RULES = {
         "A declared value is held to a limit; the message says to which and from where.",
     ),
     "mission_file": (
-        "Mission file without idle entries",
-        "A waiver or a requirement id that names no row, or a file that declares no error, judges nothing: "
-        "mend the name or remove the entry.",
+        "Warnings about the mission file itself",
+        "An entry of the mission file has no effect or is in doubt: a waiver or a requirement id that names no row, "
+        "a file that declares no error, an n_pull beyond range walk. Correct the entry or remove it.",
     ),
 }
 _RULE_INDEX = {rule: index for index, rule in enumerate(RULES)}

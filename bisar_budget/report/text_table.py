@@ -5,11 +5,11 @@ import re
 from collections.abc import Iterator, Sequence
 from functools import cache
 
-from bisar_budget.budget.findings import MissionFindings, Row, UnusableMission, worst, worst_first
-from bisar_budget.budget.verdicts import image_notes
+from bisar_budget.budget.findings import MissionFindings, Row, UnusableMission, image_notes, worst, worst_first
 from bisar_budget.budget.waivers import waiver_notes
 from bisar_budget.errors import printable
 from bisar_budget.geometry import BistaticGeometry, PlatformState
+from bisar_budget.mission.model import Document
 from bisar_budget.report import Piece, Style
 from bisar_budget.report.layout import WIDTH, wrapped, wrapped_counts
 from bisar_budget.units import format_quantity
@@ -82,7 +82,9 @@ def _mission(mission: MissionFindings, style: Style) -> list[str]:
         return [_lead(_summary(mission) + warned, mission.status, style)]
     alone = "; each error alone" if mission.combine == "each" else ""
     first, *rest = wrapped_counts(_summary(mission) + alone)
-    lines = [_lead(first, mission.status, style), *rest, *wrapped(mission.name, "  ")]
+    document = ", ".join(filter(None, (document_words(mission.document), mission.document.author)))
+    name = f"{mission.name} ({document})" if document else mission.name
+    lines = [_lead(first, mission.status, style), *rest, *wrapped(name, "  ")]
     if sentence := narrow_gradients(mission.geometry):
         lines += wrapped(sentence, "  ")
     lines += ["", *(line for key, text in head(mission) for line in wrapped(f"{key:<12} {text}", " " * 13))]
@@ -99,6 +101,11 @@ def _mission(mission: MissionFindings, style: Style) -> list[str]:
 
         lines += ["", "Images with each error at its limit", "", *evidence(mission.verdicts, style)]
     return lines
+
+
+def document_words(document: Document) -> str:
+    """Number and issue of a document; empty where the file gives neither."""
+    return ", ".join(filter(None, (document.number, document.issue and f"issue {document.issue}")))
 
 
 def narrow_gradients(geometry: BistaticGeometry) -> str:
@@ -210,7 +217,7 @@ def _table_key(rows: Sequence[Row], hidden: Sequence[Row]) -> str:
     """Say what the columns are, and what is not in the table."""
     key = "use: declared / allowable"
     if any(row.binding_requirement not in (None, "quadratic_phase_error") for row in rows):
-        key += "; by: what limits, QPE where it names a table, equation or model"
+        key += "; by: what sets the allowable; a table, an equation or a model stands for QPE"
     counts = [
         (sum(row.status == "not_declared" for row in hidden), "not declared"),
         (sum(row.status != "not_declared" for row in hidden), "that limit nothing"),

@@ -9,11 +9,14 @@ from bisar_budget.budget.effects import ErrorSource
 from bisar_budget.budget.images import Verdict
 from bisar_budget.budget.models import CUBIC
 from bisar_budget.budget.pull_in import ROOM
+from bisar_budget.budget.slow_vibration import slow_limits
+from bisar_budget.budget.vibration_lines import Line
 from bisar_budget.geometry import GroundVector
 from bisar_budget.simulate.aperture_reading import READ_CELLS, ApertureReading
 from bisar_budget.simulate.collection import MAX_CELLS, Chip, Errors
 from bisar_budget.simulate.exact import ExactEffect
 from bisar_budget.simulate.impulse_response import impulse_response, impulse_response_2d
+from bisar_budget.simulate.phase_history import MotionError, Sinusoid
 from bisar_budget.simulate.shift import measured_shift
 from bisar_budget.simulate.study import Sizes, Study
 from bisar_budget.units import format_limit, format_quantity
@@ -37,6 +40,33 @@ def quadratic(study: Study, source: ErrorSource) -> Verdict:
     if farther is None:
         return verdict
     return verdict._replace(boundary_autofocus=farther, **refocused(study, [(source, farther)], budget))
+
+
+def slow_vibration(study: Study, row_id: str, name: str, line: Line) -> Verdict:
+    """Limit of a vibration below one cycle per aperture, in its worst phase: its turning point at mid-aperture."""
+    allocation, budget = study.allocation, study.allocation.qpe_limit(name)
+    limits = slow_limits(study.mission, allocation, name, line.frequency * study.collection.aperture_time)
+    size = limits.quadratic / allocation.autofocus_gain
+    blank = Verdict(id=row_id, model=study.model, boundary_error=size, unit="m", budget_rad=budget)
+    try:
+        both = [
+            Errors().of(name, MotionError(sinusoids=(Sinusoid(size, line.frequency, phase),)))
+            for phase in (math.pi / 2, -math.pi / 2)
+        ]
+        effects = [study.collection.effect(errors) for errors in both]
+        errors, effect = max(zip(both, effects, strict=True), key=lambda one: abs(one[1].quadratic))
+        chip, reference = study.chips(errors, effect)
+        reading = study.read(errors, effect, chip, reference)
+    except (ValueError, np.linalg.LinAlgError) as error:
+        return blank._replace(reason=f"no image: {error}")
+    measured = abs(reading.quadratic)
+    return blank._replace(
+        **predicted(effect),
+        **_of_response(chip, reference, effect, reading),
+        measured_qpe_rad=measured,
+        verdict=compare(measured / budget - 1, TOLERANCE),
+        reason="in the worst phase of the vibration",
+    )
 
 
 def _bound_elsewhere(study: Study, source: ErrorSource) -> Verdict:

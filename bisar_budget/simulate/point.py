@@ -10,7 +10,7 @@ from bisar_budget.budget.analysis import Analysis
 from bisar_budget.budget.correlation import correlated_errors, likely_error
 from bisar_budget.budget.effects import PLATFORMS
 from bisar_budget.budget.exact_arrays import aperture_nodes
-from bisar_budget.budget.vibration import along_line_of_sight, lines_of
+from bisar_budget.budget.vibration_lines import along_line_of_sight, lines_of
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vector
 from bisar_budget.mission.model import Mission, Simulation

@@ -7,8 +7,11 @@ from functools import partial
 from multiprocessing import get_context
 
 from bisar_budget.budget.aggregates import aggregate_rows
+from bisar_budget.budget.echoes import SLOWEST
+from bisar_budget.budget.effects import PLATFORMS
 from bisar_budget.budget.findings import Row
 from bisar_budget.budget.images import Verdict, VerifiedMission
+from bisar_budget.budget.vibration_lines import lines_of
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.simulate import phase_cases, vibration
 from bisar_budget.simulate.location_case import location
@@ -94,6 +97,11 @@ def _cases(study: Study) -> Iterator[tuple[str, Case]]:
             yield source.id, partial(phase_cases.other, study, source)
         elif study.allowed(source).smallest is not None:
             yield source.id, partial(phase_cases.quadratic, study, source)
+    for name in PLATFORMS:
+        for index, line in enumerate(lines_of(mission, name)):
+            if line.frequency * study.collection.aperture_time < SLOWEST:
+                row_id = f"{name}.vibration.sinusoidal.{index}"
+                yield row_id, partial(phase_cases.slow_vibration, study, row_id, name, line)
     yield from vibration.cases(mission, allocation, study.collection)
     requirements = mission.requirements
     if mission.allocation.combine == "each":

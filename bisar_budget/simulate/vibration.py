@@ -12,10 +12,11 @@ from functools import partial
 import numpy as np
 
 from bisar_budget.budget.allocation import Allocation
-from bisar_budget.budget.echoes import near_lines, sinc, worst_phases
+from bisar_budget.budget.echoes import SLOWEST, near_lines, sinc, worst_phases
 from bisar_budget.budget.effects import PLATFORMS
 from bisar_budget.budget.images import Verdict
-from bisar_budget.budget.vibration import Line, lines_of, vibration_limits
+from bisar_budget.budget.vibration import vibration_limits
+from bisar_budget.budget.vibration_lines import Line, lines_of
 from bisar_budget.mission.model import Mission
 from bisar_budget.simulate.collection import CELLS, Errors, PointCollection
 from bisar_budget.simulate.impulse_response import upsampled
@@ -54,6 +55,8 @@ def cases(mission: Mission, allocation: Allocation, collection: PointCollection)
         if pslr is not None:
             echo = partial(_sinusoidal, collection, model, pslr, {name: amplitude[name]})
             for index, frequency in enumerate([line.frequency for line in lines[name]] or [None]):
+                if frequency is not None and frequency * T < SLOWEST:
+                    continue  # a phase, which `phase_cases` looks at
                 row_id = f"{name}.vibration.sinusoidal.{index}"
                 yield row_id, partial(echo, row_id, frequency)
             for index, members in enumerate(near_lines([line.frequency * T for line in lines[name]])):

@@ -38,6 +38,36 @@ def test_lines_that_share_a_frequency_are_verified_as_one() -> None:
     assert verdict.measured_db == pytest.approx(-36.02, abs=0.3)
 
 
+@pytest.mark.parametrize("apart", [0.7, 1.4, 2.3])
+def test_lines_near_each_other_fill_the_requirement_in_their_worst_phases(apart: float) -> None:
+    """Of one platform alone, 6 dB inside as one line is; a line at either frequency alone has less."""
+    near = {
+        "vibration": {
+            "sinusoidal": [
+                {"amplitude": "2 um", "frequency": 10.3 / 6},
+                {"amplitude": "3 um", "frequency": (10.3 + apart) / 6},
+            ]
+        }
+    }
+    (verdict,) = verdicts("receiver.vibration.sinusoidal.sum.0", platforms__receiver__motion_error=near).values()
+    assert verdict.measured_db == pytest.approx(-36.02, abs=0.5)
+
+
+@pytest.mark.parametrize(("cycles", "model"), [(0.3, "full"), (0.9, "full"), (0.6, "published")])
+def test_the_limit_of_a_slow_vibration_is_the_phase_of_its_image(cycles: float, model: str) -> None:
+    slow = lines("1 mm", cycles=cycles)
+    changes = {
+        "requirements": {"pslr": -30},
+        "allocation__model": model,
+        "platforms__transmitter__motion_error": slow,
+    }
+    (verdict,) = verdicts("transmitter.vibration.sinusoidal.0", **changes).values()
+    assert verdict.verdict == "confirmed"
+    assert verdict.measured_qpe_rad == pytest.approx(math.pi / 8, rel=0.05)
+    assert verdict.predicted_qpe_rad == pytest.approx(math.pi / 8, rel=0.01)
+    assert verdict.boundary_error == row(findings(**changes), "transmitter.vibration.sinusoidal.0").allowable
+
+
 def test_a_vector_is_in_the_data_as_its_part_along_the_line_of_sight() -> None:
     vector = {"frame": "track", **lines(["3 mm", "2 mm", "1 mm"])}
     projected = row(findings(platforms__receiver__motion_error=vector), "receiver.vibration.sinusoidal.0").declared

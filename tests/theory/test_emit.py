@@ -60,6 +60,10 @@ print(zlib.crc32(emit.source().encode()), zlib.crc32(emit_catalogue.source().enc
 def test_evaluators_are_pure_arithmetic_without_imports() -> None:
     module = ast.parse(inspect.getsource(evaluators))
     for node in module.body:
+        if isinstance(node, ast.AnnAssign):  # a table of numbers
+            assert node.value is not None
+            assert ast.literal_eval(node.value)
+            continue
         assert isinstance(node, ast.FunctionDef) or isinstance(getattr(node, "value", None), ast.Constant)
         if isinstance(node, ast.FunctionDef):
             for statement in node.body:

@@ -127,7 +127,7 @@ def test_globs_are_expanded_and_files_named_once(run, good, failing) -> None:
 def test_a_glob_without_a_match_is_an_error(run, tmp_path) -> None:
     result = run("check", tmp_path / "*.yml")
     assert result.exit_code == 2
-    assert "as a pattern matches none" in result.stderr
+    assert "no file matches the pattern" in result.stderr
 
 
 def test_output_file_is_written_whole_and_keeps_the_exit_code(run, failing, tmp_path) -> None:

@@ -185,7 +185,7 @@ class TestAggregates:
         found = findings(**{ERROR: {"covariance": sigmas(pairs)}, "allocation__combine": "sum"})
         aggregate = row(found, "receiver.quadratic_phase_error")
         assert aggregate.declared == pytest.approx(2 * PER_UNIT * 5e-3)
-        assert "marginal" in aggregate.notes[0]
+        assert "uses no correlations" in aggregate.notes[0]
 
     def test_each_warns_that_correlations_have_no_part(self) -> None:
         text = {ERROR: {"covariance": sigmas({"velocity.x-velocity.y": -1})}}

@@ -22,10 +22,11 @@ SECTION_V = {
 }  # fmt: skip
 
 
-def brute_force(mission, errors, clock=lambda tau: 0 * tau):
+def brute_force(mission, errors):
     """Displaced point, quadratic and cubic phase: 600 pulses, a Legendre fit of tenth order, Newton by differences.
 
-    `errors` gives both platforms' position errors (pulses, 3) over slow time; P₀ and P₁ of what is left vanish.
+    `errors` gives both platforms' position errors (pulses, 3) over slow time; P₀ and P₁ of what is left vanish. The
+    point is followed from no error on.
     """
     T, wavelength = mission.collection.aperture_time, mission.radar.wavelength
     x = (np.arange(600) + 0.5) / 300 - 1
@@ -34,18 +35,19 @@ def brute_force(mission, errors, clock=lambda tau: 0 * tau):
     for state in (mission.geometry.transmitter, mission.geometry.receiver):
         p, v, a = (np.array(part) for part in (state.position, state.velocity, state.acceleration))
         tracks.append(p + v * tau[:, None] + a * tau[:, None] ** 2 / 2)
-    recorded = sum(np.linalg.norm(track, axis=1) for track in tracks) + C * clock(tau)
-    measured = [track + error(tau[:, None]) for track, error in zip(tracks, errors, strict=True)]
+    recorded = sum(np.linalg.norm(track, axis=1) for track in tracks)
 
-    def parts(point):
+    def parts(point, share):
+        measured = [track + share * error(tau[:, None]) for track, error in zip(tracks, errors, strict=True)]
         left = recorded - sum(np.linalg.norm(m - [*point, 0.0], axis=1) for m in measured)
         return np.polynomial.legendre.legfit(x, left, 10)
 
     point = np.zeros(2)
-    for _ in range(12):
-        slope = [(parts(point + d)[:2] - parts(point - d)[:2]) / 2 for d in np.eye(2)]
-        point = point - np.linalg.solve(np.transpose(slope), parts(point)[:2])
-    _, _, second, third = 2 * math.pi / wavelength * parts(point)[:4]
+    for share in (0.2, 0.4, 0.6, 0.8, 1.0):
+        for _ in range(6):
+            slope = [(parts(point + d, share)[:2] - parts(point - d, share)[:2]) / 2 for d in np.eye(2)]
+            point = point - np.linalg.solve(np.transpose(slope), parts(point, share)[:2])
+    _, _, second, third = 2 * math.pi / wavelength * parts(point, 1.0)[:4]
     return point, 1.5 * second, 2.5 * third
 
 
@@ -71,7 +73,7 @@ def phases(analysis, row_id, size):
 @pytest.mark.parametrize("row_id", ["receiver.velocity.z", "receiver.velocity.x", "transmitter.velocity.z",
                                     "receiver.position.y", "transmitter.acceleration.x"])  # fmt: skip
 def test_at_the_allowable_the_worse_sign_is_at_the_limit(row_id: str) -> None:
-    """On both sides of it: an image of 1 % less is inside, of 1 % more outside. First order was up to twice too large."""
+    """An error of 1 % less is inside, of 1 % more outside. First order was up to twice too generous."""
     analysis = Analysis(parse_mission(mission_text(**SECTION_V)))
     source = next(s for s in analysis.sources if s.id == row_id)
     allowable = analysis.full.allowable(source, QUADRATIC, math.pi / 8)
@@ -154,14 +156,14 @@ class TestBinding:
         error = {"position": ["12 m", 0, 0]}
         for model in ("published", "full"):
             found = findings(
-                platforms__receiver__motion_error=error, requirements__location_error="10 m",
+                platforms__receiver__motion_error=error, requirements__location_error="5 m",
                 allocation__model=model,
             )  # fmt: skip
             one = row(found, "receiver.position.x")
             assert one.status == "fail"
             assert one.binding_requirement == LOCATION
             assert row(found, "mission.location_error").status == "fail"
-            assert one.allowable == pytest.approx(10 / math.hypot(*one.displacement_m) * 12, rel=0.01)
+            assert one.allowable == pytest.approx(5 / math.hypot(*one.displacement_m) * 12, rel=0.01)
 
     @pytest.mark.parametrize("model", ["published", "full"])
     @pytest.mark.parametrize("factor", [0.999, 1.001])
@@ -201,10 +203,10 @@ class TestEach:
     def test_all_together_warn_where_their_root_sum_square_exceeds_the_location(self) -> None:
         """The starter file with 8 m on both platforms complied with 10 m, and held in 63 % of flights."""
         errors = {f"platforms__{name}__motion_error": {"position": "8 m"} for name in ("transmitter", "receiver")}
-        found = findings(**errors, requirements__location_error="10 m", allocation__combine="each")
+        found = findings(**errors, requirements__location_error="8 m", allocation__combine="each")
         one = row(found, "mission.location_error")
         together = math.hypot(*(math.hypot(*r.displacement_m) for r in found.rows if r.displacement_m))
-        assert one.declared < 10 < together
+        assert one.declared < 8 < together
         assert one.status == "warn"
         assert "each error alone" in one.reason
         assert f"{together:.3g} m" in one.reason
@@ -232,7 +234,7 @@ def test_rows_along_other_axes_than_those_stated_decide_nothing() -> None:
     for axis in "xyz":
         one = row(found, f"receiver.acceleration.{axis}")
         assert one.status == "info"
-        assert "stated along other axes" in one.reason
+        assert "states this error along other axes" in one.reason
     assert row(found, "receiver.acceleration.cross").status == "pass"
 
 

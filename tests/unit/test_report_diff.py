@@ -118,7 +118,7 @@ class TestInputs:
         assert self.moved(before, after) == {
             "radar.bandwidth": ("300 MHz", "600 MHz"),
             "other_errors[0].name": ("a", None),
-            "other_errors[0].quadratic_phase_error": ("0.1", None),
+            "other_errors[0].quadratic_phase_error": ("0.1 rad", None),
             "scene.radius": (None, "250 m"),
         }
 
@@ -233,7 +233,7 @@ class TestCommand:
             text = mission_text(other_errors=[{"name": name, "quadratic_phase_error": size}])
             (tmp_path / file).write_text(text)
         text = run("diff", tmp_path / "old.yaml", tmp_path / "new.yaml", "--format", "markdown").stdout
-        assert r"- input other_errors\[0\].quadratic_phase_error: 0.1 → 0.2" in text.splitlines()
+        assert r"- input other_errors\[0\].quadratic_phase_error: 0.1 rad → 0.2 rad" in text.splitlines()
         rows = [line for line in text.splitlines() if line.startswith("|")]
         assert len(rows) == 3
         assert {line.count("|") for line in rows} == {8}
@@ -268,7 +268,7 @@ class TestCommand:
         (tmp_path / "m.yaml").write_text(mission_text())
         result = run("diff", tmp_path / "m.yaml", "--base", "HEAD", env={"GIT_CEILING_DIRECTORIES": str(tmp_path)})
         assert result.exit_code == 2
-        assert "no git repository" in result.stderr
+        assert "not in a git repository" in result.stderr
 
     def test_no_git(self, run, repository) -> None:
         result = run("diff", repository, "--base", "HEAD", env={"PATH": ""})

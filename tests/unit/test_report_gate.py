@@ -372,7 +372,7 @@ class TestGithub:
 
     def test_nothing_to_say_is_no_command(self) -> None:
         passing = findings(timing_error__constant=0)
-        assert render("github", report(passing), Style()) == "bisar-budget: 1 mission, nothing to remark\n"
+        assert render("github", report(passing), Style()) == "bisar-budget: 1 mission, no findings\n"
 
     def test_standard_input_is_no_place_in_the_repository(self) -> None:
         for _, properties, message in self.commands(findings(**STATUSES)._replace(file="-")):
@@ -571,3 +571,23 @@ def test_json_and_csv_have_the_line_as_a_plain_number() -> None:
     assert all(row["line"] is None or type(row["line"]) is int for row in mission["rows"])
     assert yaml.safe_load(repr(found.rows[0].line)) == found.rows[0].line
     assert (ROOT / "bisar_budget").is_dir()
+
+
+@pytest.mark.parametrize("name", ["junit", "sarif", "github", "needs"])
+def test_a_requirement_that_binds_in_place_of_the_phase_is_named(name: str) -> None:
+    """A row of a phase may fail by location: who reads the annotation alone must know which."""
+    found = findings(platforms__receiver__motion_error__velocity="0.5 m/s", requirements__location_error=5)
+    (row,) = [row for row in found.rows if row.id == "receiver.velocity.z"]
+    assert (row.status, row.binding_requirement) == ("fail", "location_error")
+    text = render(name, report(found), Style())
+    assert "limited by the location error" in text
+    free = findings(platforms__receiver__motion_error__velocity="0.5 m/s")
+    assert "limited by" not in render(name, report(free), Style())
+    if name in ("junit", "sarif"):
+        assert '"binding_requirement"' in text
+
+
+def test_the_step_summary_says_that_errors_are_judged_alone() -> None:
+    alone, together = (findings(timing_error__quadratic=1e-14, allocation__combine=rule) for rule in ("each", "rss"))
+    text = step_summary(report(alone, together), Style())
+    assert text.count("each error alone") == 1

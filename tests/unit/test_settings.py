@@ -46,7 +46,7 @@ class TestPrecedence:
         assert run("check", "m.yaml").stdout.startswith("{")
         assert run("check", "m.yaml", env={"BISAR_BUDGET_FORMAT": "csv"}).stdout.startswith("file,")
         assert run("check", "m.yaml", "--format", "text", env={"BISAR_BUDGET_FORMAT": "csv"}).stdout.startswith(
-            "base"
+            "WARN m.yaml"
         )
 
     def test_color_model_and_exit_zero(self, run, project) -> None:
@@ -108,8 +108,8 @@ def test_a_nearer_file_without_the_table_does_not_hide_it(run, project, tmp_path
         ('report = "a.xml"', "tool.bisar-budget.report: must be a list of file names"),
         ("report = [1]", "must be a list of file names"),
         ('report = ["a.docx"]', "tool.bisar-budget.report: --report"),
-        ("strict = ", "is no TOML"),
-        ("\x00", "is no TOML"),
+        ("strict = ", "is not valid TOML"),
+        ("\x00", "is not valid TOML"),
     ],
 )
 def test_a_wrong_table_is_2_and_names_file_and_key(run, project, tmp_path, text: str, message: str) -> None:

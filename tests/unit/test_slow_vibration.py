@@ -7,11 +7,12 @@ import pytest
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.budget.findings import Report
-from bisar_budget.budget.vibration import slow_phases
+from bisar_budget.budget.slow_vibration import slow_phases
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.report import FORMATS, Style, render
 from bisar_budget.report.explanation import explain
 from tests.conftest import TODAY, findings, mission_text, row
+from tests.unit.test_report_explanation import evaluated, sums
 
 LAMBDA = 299_792_458 / 10e9
 T = 6.0
@@ -58,7 +59,7 @@ def test_the_limit_is_where_the_worst_quadratic_phase_takes_the_share(cycles: fl
 
 def test_twenty_millimetres_at_nine_tenths_of_a_cycle_are_nearly_nine_radians() -> None:
     """They were said, not judged, and needed a requirement of PSLR to be said at all."""
-    found = row(swaying((20e-3, 0.9)), ROW)
+    found = row(swaying((20e-3, 0.9), radar={"center_frequency": "9.6 GHz", "bandwidth": "300 MHz"}), ROW)
     assert found.qpe_full_rad == pytest.approx(8.7, abs=0.05)
     assert found.status == "fail"
     assert "no autofocus corrects this" not in found.reason
@@ -140,6 +141,16 @@ class TestTogether:
         assert pull_in.declared == pytest.approx(7.0, rel=1e-3)
         assert pull_in.status == "warn"
 
+    def test_a_balanced_split_weighs_it(self) -> None:
+        """0.1 rad of one platform against 0.3 rad of the other: a quarter and three quarters."""
+        lines = {
+            ERROR.format(name): {"sinusoidal": [{"amplitude": of_phase(phase, 0.5, 2), "frequency": 0.5 / T}]}
+            for name, phase in (("transmitter", 0.1), ("receiver", 0.3))
+        }
+        for combine in ("each", "rss"):
+            found = findings(allocation={"split": "balanced", "combine": combine}, **lines)
+            assert found.allocation.qpe.transmitter == pytest.approx(0.25, abs=1e-6)
+
     def test_the_phases_are_those_of_the_rows(self) -> None:
         text = mission_text(**{ERROR.format("receiver"): {"sinusoidal": [{"amplitude": 1e-4, "frequency": 0.1}]}})
         (slow,) = slow_phases(parse_mission(text))
@@ -166,12 +177,30 @@ def test_every_format_has_it(format_name: str) -> None:
     assert ROW in text
 
 
-def test_its_explanation_gives_its_numbers() -> None:
-    found = swaying((1e-4, 0.5), requirements={"cubic_phase_error": 0.3})
-    text = explain(found.mission, found, ROW)
+@pytest.mark.parametrize("cubic", [None, 0.3])
+def test_its_explanation_gives_its_numbers(cubic: float | None) -> None:
+    """And that of lines near each other: each sum repeated from the six digits that stand in it."""
+    requirements = {"pslr": -30} | ({} if cubic is None else {"cubic_phase_error": cubic})
+    lines = ((1e-4, 0.5), (1e-5, 20.3), (2e-5, 21.4))
+    mission = parse_mission(
+        mission_text(
+            **{ERROR.format("transmitter"): {"sinusoidal": [{"amplitude": a, "frequency": n / T} for a, n in lines]}},
+            requirements=requirements,
+        )
+    )
+    found = check_mission(mission, TODAY)
+    for row_id in (ROW, "transmitter.vibration.sinusoidal.sum.0"):
+        judged, results = row(found, row_id), {}
+        for symbol, numbers, value in sums(explain(mission, found, row_id)):
+            assert evaluated(numbers) == pytest.approx(value, rel=2e-5), symbol
+            results[symbol] = value
+        assert results["allowable"] == pytest.approx(judged.allowable, rel=1e-5)
+        assert results["utilization"] == pytest.approx(judged.utilization, rel=1e-5)
+    assert results["declared"] == pytest.approx(judged.declared, rel=1e-5)
     judged = row(found, ROW)
-    for number in (judged.qpe_full_rad, judged.cubic_rad, judged.allowable):
-        assert f"{number:.4g}"[:5] in text
+    results = {symbol: value for symbol, _, value in sums(explain(mission, found, ROW))}
+    assert results["QPE"] == results["QPE_full"] == pytest.approx(judged.qpe_full_rad, rel=1e-5)
+    assert results["cubic"] == pytest.approx(judged.cubic_rad, rel=1e-5)
 
 
 class TestNoise:

@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 from bisar_budget.budget import vibration
 from bisar_budget.budget.allocation import Split
 from bisar_budget.budget.check import check_mission
+from bisar_budget.budget.slow_vibration import cubic_part, quadratic_part
+from bisar_budget.budget.vibration_lines import along_line_of_sight
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import MotionError
@@ -121,12 +123,12 @@ class TestSlow:
     @pytest.mark.parametrize("cycles", CYCLES)
     def test_worst_phase_is_that_of_a_fit(self, cycles: float) -> None:
         """Phases are a degree apart: within (π/360)²/2 of the worst."""
-        assert vibration.quadratic_part(cycles) == pytest.approx(self.worst(cycles, 2), rel=1e-4, abs=1e-5)
-        assert vibration.cubic_part(cycles) == pytest.approx(self.worst(cycles, 3), rel=1e-4, abs=1e-5)
+        assert quadratic_part(cycles) == pytest.approx(self.worst(cycles, 2), rel=1e-4, abs=1e-5)
+        assert cubic_part(cycles) == pytest.approx(self.worst(cycles, 3), rel=1e-4, abs=1e-5)
 
     @pytest.mark.parametrize(("cycles", "factor"), [(1, 2.3), (1.5, 1.4), (2, 0.6), (3, 0.25)])
     def test_known_factors(self, cycles: float, factor: float) -> None:
-        assert vibration.quadratic_part(cycles) == pytest.approx(factor, rel=0.06)
+        assert quadratic_part(cycles) == pytest.approx(factor, rel=0.06)
 
     def test_the_row_carries_it_up_to_three_cycles(self) -> None:
         for cycles, has_it in ((1.0, True), (2.99, True), (3.01, False)):
@@ -243,12 +245,12 @@ class TestVector:
         axes = np.array([first, cross, np.cross(first, cross)])
         value, error = (3e-5, 1e-5, 2e-5), MotionError(frame=frame)
         sizes = np.abs(axes @ u) * value
-        assert vibration.along_line_of_sight(value, error, state, "pslr") == pytest.approx(sizes.sum())
-        assert vibration.along_line_of_sight(value, error, state, "islr") == pytest.approx(np.linalg.norm(sizes))
+        assert along_line_of_sight(value, error, state, "pslr") == pytest.approx(sizes.sum())
+        assert along_line_of_sight(value, error, state, "islr") == pytest.approx(np.linalg.norm(sizes))
 
     def test_a_single_value_is_along_the_line_of_sight_whatever_the_frame(self) -> None:
         state = PlatformState(position=(6e3, 6e3, 2e3), velocity=(-40.0, 40.0, 3.0))
-        assert vibration.along_line_of_sight(3e-5, MotionError(frame="track"), state, "pslr") == 3e-5
+        assert along_line_of_sight(3e-5, MotionError(frame="track"), state, "pslr") == 3e-5
 
     def test_a_vibration_across_the_line_of_sight_is_none(self) -> None:
         error = {"frame": "look", "vibration": {"sinusoidal": [{"amplitude": [0, "1 m", "1 m"], "frequency": 15}]}}
