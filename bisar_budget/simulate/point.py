@@ -41,6 +41,7 @@ _ECHO_CELLS = 256  # from the peak; paired echoes farther away are said, not sho
 _SCENE_PIXELS = 1 << 18  # of the image in (x, y)
 _BYTES_PER_PIXEL = 16 * 4  # image, grid and what forming a block of them holds
 _BYTES_PER_SAMPLE = 16 * 5  # of the phase history; it is a product of terms of its own size
+_BYTES_HELD = 40e6  # profiles of a block of pulses, and copies of a block of pixels
 _BLOCK = 1 << 18  # pixels formed between two words on the progress
 
 
@@ -108,7 +109,7 @@ class Plan(NamedTuple):
     def memory(self) -> float:
         """At the peak. [B]"""
         images = _BYTES_PER_PIXEL * (self.in_scene.pixels + 3 * self.rotated.pixels)
-        return images + _BYTES_PER_SAMPLE * self.pulses * self.frequencies
+        return images + _BYTES_PER_SAMPLE * self.pulses * self.frequencies + _BYTES_HELD
 
     @property
     def work(self) -> int:
