@@ -37,10 +37,10 @@ class Requirement(NamedTuple):
     """How often one requirement holds.
 
     `sum` and `rss` are what these rules of `allocation.combine` would hold to the limit, by the full model with the
-    coverage factor; None where a declared error leaves no image. `sigma_rss` is the standard uncertainty by root-sum-square, `sigma` that of the draws
-    that have an image, None where none has; of displacements, rms lengths. `probability` is of the draws, with the ends of its Wilson interval;
-    `probability_normal` is that of a normal distribution with `sigma_rss`. `dominant` is the error with the
-    largest share of the variance.
+    coverage factor; None where a declared error leaves no image. `sigma_rss` is the standard uncertainty by
+    root-sum-square, `sigma` that of the draws that have an image, None where none has; of displacements, rms lengths.
+    `probability` is of the draws, with the ends of its Wilson interval; `probability_normal` is that of a normal
+    distribution with `sigma_rss`. `dominant` is the error with the largest share of the variance.
     """
 
     id: str
