@@ -246,7 +246,7 @@ def _pull_in_row(analysis: Analysis, mine: Together, theirs: Together, pull_in: 
         never_fails=True,
         over=_exceeded("QPE", total, pull_in, "rad", lambda: phases)
         + "; autofocus corrects one total, not each error separately",
-        doubt=_doubt(theirs.model, by_other, pull_in, "rad"),
+        doubt=_doubt(theirs.model, by_other, pull_in, "rad", "beyond it: QPE"),
     )
 
 
@@ -261,11 +261,11 @@ def _judged(mission: Mission, *, declared: float | None, **of_row: Any) -> Row:
     return row._replace(status="fail", reason="a declared error leaves no ground point with its range history")
 
 
-def _doubt(other: Model, size: float | None, limit: float | None, unit: str) -> str:
+def _doubt(other: Model, size: float | None, limit: float | None, unit: str, what: str = "fail:") -> str:
     """Say that the model that does not gate fails an aggregate; else nothing."""
     if size is None or limit is None or size <= limit * (1 + UTILIZATION_TOLERANCE):
         return ""
-    return f"the {other.name} model says fail: {_said(size, unit)}, {format_limit(limit, unit)} allowed"
+    return f"the {other.name} model says {what} {_said(size, unit)}, {format_limit(limit, unit)} allowed"
 
 
 def _of_all(what: str, size: float, limit: float | None, unit: str) -> str:

@@ -179,4 +179,4 @@ def _unused_keys(mission: Mission) -> Iterator[str]:
     }
     given = [key for key, is_given in keys.items() if is_given]
     if given:
-        yield f"{', '.join(given)}: not used by this check"
+        yield f"not used by this check: {', '.join(given)}"

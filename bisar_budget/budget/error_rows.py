@@ -50,6 +50,7 @@ def error_rows(analysis: Analysis, model: Model, other: Model, allocation: Alloc
         published, full = (allowed, allowed_other) if model.name == "published" else (allowed_other, allowed)
         declared = None if source.declared is None else abs(source.declared)
         info = over = doubt = ""
+        notes = source.notes
         qpe_published = qpe_full = cubic = displacement = None
         if declared is not None:
             mine, theirs = found[source.id], found_other[source.id]
@@ -59,6 +60,8 @@ def error_rows(analysis: Analysis, model: Model, other: Model, allocation: Alloc
                 qpe_full = None
             cubic = abs(mine.cubic) if math.isfinite(mine.cubic) else None
             displacement = mine.displacement
+            if displacement is None and source.is_motion and model.plane.degeneracy:
+                notes = (*notes, model.plane.degeneracy)
             if not source.is_independent:
                 info = _stated_elsewhere(analysis, source)
             elif combine != "each":
@@ -70,7 +73,7 @@ def error_rows(analysis: Analysis, model: Model, other: Model, allocation: Alloc
         no_limit = model.no_limit(source) if allowed.smallest is None else ""
         utilization, margin, status, reason, notes = judgement(
             mission.allocation.warn_above, declared, allowed.smallest, 1.0, over, doubt, no_limit, "", info, True,
-            False, source.notes,
+            False, notes,
         )  # fmt: skip
         if status in ("pass", "warn") and not doubt and declared is not None and gain > 1:
             # Over the limit without the gain: the phase says so, the size would not where it is no longer linear.

@@ -23,8 +23,9 @@ from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState
 # 1e-6 of themselves; beyond the last, 16 nodes are right to 1e-3 at 1.25.
 _NODES = ((0.1, 6), (0.5, 10), (math.inf, 16))
 _ITERATIONS = 40
+_SHRINKS = 0.5  # square of each step of the search over that of the one before; else it does not settle
 _EPSILON = 2e-15  # of a range sum: what rounding of a few operations leaves
-_UNSEEN_RAD = 1e-5  # what the last step of the search may change a phase by beyond the part counted linearly
+_UNSEEN_RAD = 3e-5  # what the last step of the search may change a phase by beyond the part counted linearly
 
 _CLOCK_POWERS = {unit: power for power, unit in enumerate(CLOCK_UNITS.values())}
 
@@ -33,11 +34,15 @@ Track = list[tuple[float, float, float]]  # positions at the nodes
 
 
 class ExactPhases(NamedTuple):
-    """Displacement east, north [m]; quadratic and cubic phase at the aperture edge, signed like β̃. [rad]"""
+    """Displacement east, north [m]; quadratic and cubic phase at the aperture edge, signed like β̃. [rad]
+
+    `turn` is what range and Doppler gradients span there, over what they span at the centre.
+    """
 
     displacement: GroundVector
     quadratic: float
     cubic: float
+    turn: float = 1.0
 
 
 def nodes_for(geometry: BistaticGeometry, aperture_time_s: float) -> int:
@@ -202,8 +207,8 @@ class ExactRanges:
     ) -> ExactPhases | None:
         """Find where errors of given sizes move a point at the centre, and what defocuses there.
 
-        The search starts `near` [m]. None where it finds no ground point with the recorded history, or one beyond a
-        line on which range and Doppler gradients are parallel: no error leads there from nothing.
+        The search starts `near` [m], and has to settle from there at once: `point_path` follows a point. None where it
+        does not, or beyond a line on which range and Doppler gradients are parallel: no error leads there from nothing.
         """
         measured = dict(self.tracks)
         recorded = self.recorded
@@ -255,6 +260,30 @@ class ExactRanges:
             for metres, (x, y) in zip(self.range_error(source), gradient, strict=True)
         ]
 
+    def way(self, source: ErrorSource, size: float, place: GroundVector) -> GroundVector:
+        """Where the point goes with a larger error, at the place that an error of a size moves it to. [m/unit]"""
+        east, north = place
+        by_size = None if source.is_position else self.shape(source)
+        by_east, by_north = [0.0] * len(self.times), [0.0] * len(self.times)
+        change = list(by_size) if by_size else [0.0] * len(self.times)
+        x, y, z = source.direction
+        for name in PLATFORMS:
+            moves = by_size is None and source.moves(name)
+            powers = self.powers[source.unit] if moves else ()
+            for j, (a, b, c) in enumerate(self.tracks[name]):
+                p = powers[j] if moves else 0.0
+                a, b, c = a + size * p * x - east, b + size * p * y - north, c + size * p * z
+                R = sqrt(a * a + b * b + c * c)
+                by_east[j] += a / R
+                by_north[j] += b / R
+                if moves:
+                    change[j] -= p * (a * x + b * y + c * z) / R
+        value, slope = self.fit[0], self.fit[1]
+        a, b, c, d = _sum(value, by_east), _sum(value, by_north), _sum(slope, by_east), _sum(slope, by_north)
+        constant, linear = _sum(value, change), _sum(slope, change)
+        determinant = a * d - b * c
+        return ((b * linear - d * constant) / determinant, (c * constant - a * linear) / determinant)
+
     @cached_property
     def powers(self) -> dict[str, list[float]]:
         """Position error at each node of a unit of an error: 1, τ or τ²/2 of (22)."""
@@ -273,6 +302,7 @@ class ExactRanges:
         """Newton's method for the point."""
         east, north = near
         value, slope, quadratic, cubic = self.fit
+        before = math.inf
         for _ in range(_ITERATIONS):
             left, by_east, by_north, nearest = [], [], [], math.inf
             for whole, (x, y, z), (u, v, w) in zip(recorded, transmitter, receiver, strict=True):
@@ -310,9 +340,12 @@ class ExactRanges:
                     )
                     for weights in (quadratic, cubic)
                 )
-                return ExactPhases((east, north), *(phase if abs(phase) > self.rounding else 0.0 for phase in phases))
-            if not step < 1e30:
+                left_quadratic, left_cubic = (phase if abs(phase) > self.rounding else 0.0 for phase in phases)
+                turn = determinant / (self.plane.determinant * self.half)
+                return ExactPhases((east, north), left_quadratic, left_cubic, turn)
+            if not step < _SHRINKS * before:
                 return None
+            before = step
         return None
 
 

@@ -19,6 +19,7 @@ GATING = ("error", "fail", "not_evaluated", "warn", "pass_with_autofocus", "pass
 STATUSES = (*GATING, "waived", "info", "not_declared")
 # For reading. What is waived breaks its requirement: it stands before all that meets one.
 READING = ("error", "fail", "not_evaluated", "warn", "waived", "pass_with_autofocus", "pass", "info", "not_declared")
+OPTIMISTIC = "optimistic limit"  # how a note begins by which an image refutes a limit
 _RANK = {status: index for index, status in enumerate(READING)}
 
 
@@ -164,6 +165,11 @@ class Report(NamedTuple):
     def status(self) -> str:
         """Worst status of the missions."""
         return worst(mission.status for mission in self.missions)
+
+
+def image_notes(row: Row) -> tuple[str, ...]:
+    """Those of the notes of a row by which an image refutes its limit."""
+    return tuple(note for note in row.notes if note.startswith(OPTIMISTIC))
 
 
 def exit_code(statuses: Container[str], strict: bool) -> int:

@@ -6,11 +6,11 @@ has two signs and a bound covers both, so that phases and allowables are those o
 """
 
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 from bisar_budget.budget.effects import PLATFORMS, Effect, ErrorSource, ImagePlane, image_plane
 from bisar_budget.budget.exact_ranges import ExactPhases, ExactRanges
+from bisar_budget.budget.point_path import PointPath, Value
 from bisar_budget.geometry import BistaticGeometry, GroundVector
 
 QUADRATIC, CUBIC, LOCATION = "quadratic_phase_error", "cubic_phase_error", "location_error"
@@ -19,12 +19,12 @@ QUADRATIC, CUBIC, LOCATION = "quadratic_phase_error", "cubic_phase_error", "loca
 FARTHEST = 0.1
 _SHARE = 0.002  # what the second order may add, of a phase, a displacement or a limit; the aim is 1 %
 _FLOOR_RAD, _FLOOR_M = 5e-4, 1e-3  # and whatever the size
-_CLOSE = 2e-4  # of a limit: near enough to go on in a straight line
-_STEPS = 60
-_AS_LINEAR = 0.2  # of a displacement; farther from where the linear model has it, a point is followed
-_FIRST_STEPS, _LEAST_STEP = 8, 1e-5  # of the way from no error on
-_STRAY = 0.3  # of a step; farther from where it led, a point is not the one that was followed
-_INNER = (0.5, 0.25)  # of a size, where a phase that bends back may have been larger
+
+_VALUES: dict[str, Value] = {
+    QUADRATIC: lambda phases: phases.quadratic,
+    CUBIC: lambda phases: phases.cubic,
+    LOCATION: lambda phases: math.hypot(*phases.displacement),
+}
 
 
 class Declared(NamedTuple):
@@ -106,7 +106,7 @@ class FullModel:
         self._metres = math.hypot(a, c) + 1.5 / half * math.hypot(b, d)
         self._radians = 2.5 * exact.k + abs(q_0) + 1.5 / half * abs(q_1)
         self._cubic_radians = 4 * exact.k + abs(c_0) + 1.5 / half * abs(c_1)
-        self._known: dict[tuple[str, float], ExactPhases | None] = {}
+        self._paths: dict[tuple[str, float], PointPath] = {}
 
     def effect(self, source: ErrorSource) -> Effect:
         """Effect of a unit of an error too small for a second order."""
@@ -154,7 +154,8 @@ class FullModel:
         if self.is_linear_at(source, requirement, limit):
             return None if linear is None or linear > farthest else linear
         first = farthest if linear is None else min(linear, farthest)
-        return self._smallest(source, requirement, limit, per_unit, first, farthest)
+        signed = {QUADRATIC: source.full.qpe, CUBIC: source.full.cubic}.get(requirement)
+        return self._smallest(source, requirement, limit, per_unit if signed is None else signed, first, farthest)
 
     def is_linear_at(self, source: ErrorSource, requirement: str, limit: float) -> bool:
         """Whether effects of an error are proportional to its size up to a limit."""
@@ -188,127 +189,33 @@ class FullModel:
 
     def at(self, source: ErrorSource, size: float) -> ExactPhases | None:
         """Phases and displacement of an error of a size, with its sign, by exact ranges; None: no ground point."""
-        key = (source.id, size)
-        if key not in self._known:
-            self._known[key] = self._found(source, size)
-        return self._known[key]
+        return self._path(source, math.copysign(1.0, size)).to(abs(size))
 
-    def _found(self, source: ErrorSource, size: float) -> ExactPhases | None:
-        near = self.plane.displacement(source.full, size) or (0.0, 0.0)
-        found = self.exact.phases([(source, size)], near)
-        if found is not None and math.dist(found.displacement, near) <= _AS_LINEAR * math.hypot(*near) + _FLOOR_M:
-            return found
-        return self._followed(source, size)
-
-    def _followed(self, source: ErrorSource, size: float) -> ExactPhases | None:
-        """Follow the point from no error on, where it is not near to where the linear model has it.
-
-        Where the way bends back no larger error has an image of the point: that is no step away, however small.
-        """
-        done, place, slope = 0.0, (0.0, 0.0), self.plane.displacement(source.full, 1.0) or (0.0, 0.0)
-        step, is_tangent = size / _FIRST_STEPS, True
-        found: ExactPhases | None = None
-        while done != size:
-            ahead = size if abs(size - done) < 1.5 * abs(step) else done + step
-            way = (slope[0] * (ahead - done), slope[1] * (ahead - done))
-            found = self.exact.phases([(source, ahead)], (place[0] + way[0], place[1] + way[1]))
-            made = None if found is None else (found.displacement[0] - place[0], found.displacement[1] - place[1])
-            if made is not None and math.dist(made, way) <= _STRAY * math.hypot(*way) + _FLOOR_M:
-                slope = (made[0] / (ahead - done), made[1] / (ahead - done))
-                place, done, step, is_tangent = (place[0] + made[0], place[1] + made[1]), ahead, 2 * step, False
-            elif is_tangent:
-                step /= 2
-                if abs(step) < _LEAST_STEP * abs(size):
-                    return None
-            else:  # a chord leads astray where the way turns: look which way it goes
-                probe = _LEAST_STEP * size
-                near = self.exact.phases([(source, done + probe)], place)
-                if near is None:
-                    return None
-                slope = ((near.displacement[0] - place[0]) / probe, (near.displacement[1] - place[1]) / probe)
-                step, is_tangent = step / 2, True
-        return found
+    def _path(self, source: ErrorSource, sign: float) -> PointPath:
+        key = (source.id, sign)
+        if key not in self._paths:
+            per_unit = self.plane.displacement(source.full, 1.0) or (0.0, 0.0)
+            self._paths[key] = PointPath(self.exact, source, sign, per_unit)
+        return self._paths[key]
 
     def worst(self, source: ErrorSource, size: float, requirement: str) -> float:
         """Phase [rad] or displacement [m] of the worse sign; infinite without a ground point."""
+        value = _VALUES[requirement]
         both = self.at(source, size), self.at(source, -size)
-        if both[0] is None or both[1] is None:
-            return math.inf
-        if requirement == QUADRATIC:
-            return max(abs(one.quadratic) for one in both if one)
-        if requirement == CUBIC:
-            return max(abs(one.cubic) for one in both if one)
-        return max(math.hypot(*one.displacement) for one in both if one)
+        return max(math.inf if one is None else abs(value(one)) for one in both)
 
     def _smallest(
-        self,
-        source: ErrorSource,
-        requirement: str,
-        limit: float,
-        per_unit: float,
-        first: float,
-        farthest: float,
+        self, source: ErrorSource, requirement: str, limit: float, per_unit: float, first: float, farthest: float
     ) -> float | None:
-        """Search for the size from a first guess.
-
-        Of the worse sign, first and second order only add up: what they give grows with the size, and the first size
-        that is found is the smallest. Third orders may bend it back, so smaller sizes are looked at too.
-        """
-
-        def value_at(size: float) -> float:
-            return self.worst(source, size, requirement)
-
-        size, value = first, value_at(first)
-        low, below = 0.0, 0.0
-        while value < limit:
-            if size >= farthest:
-                size = next(
-                    (part * size for part in _INNER if part * size > low and value_at(part * size) >= limit), 0.0
-                )
-                if not size:
-                    return None
-                value = value_at(size)
-                break
-            low, below = size, value
-            size = min(farthest, size * min(1.5, 1.02 * limit / value if value else 1.5))
-            value = value_at(size)
-        found = _crossing(value_at, limit, per_unit, (low, below), (size, value))
-        for part in _INNER:
-            inner_size = part * found
-            if inner_size > low and value > 1.5 * limit and (inner := value_at(inner_size)) >= limit * (1 + _CLOSE):
-                return _crossing(value_at, limit, per_unit, (0.0, 0.0), (inner_size, inner))
-        return found
-
-
-def _crossing(
-    value_at: Callable[[float], float],
-    limit: float,
-    per_unit: float,
-    inside: tuple[float, float],
-    outside: tuple[float, float],
-) -> float:
-    """Size between two at which a value reaches a limit: that of a parabola through zero, drawn nearer."""
-    (low, below), (high, above) = inside, outside
-    for step in range(_STEPS):
-        if abs(above - limit) <= _CLOSE * limit:
-            return high * (1 - (above - limit) / (above + max(0.0, above - per_unit * high)))
-        if high - low <= _CLOSE * high:
-            return low
-        size = math.nan
-        if math.isfinite(above):
-            bend = (above - per_unit * high) / high**2
-            if step < 3 and bend > 0:
-                size = 2 * limit / (per_unit + math.sqrt(per_unit**2 + 4 * bend * limit))
-            elif step % 3:
-                size = low + (high - low) * (limit - below) / (above - below)
-        if not low < size < high:
-            size = math.sqrt(low * high) if low > 0.1 * high else (low + high) / 2 if low else high / 8
-        value = value_at(size)
-        if value >= limit or abs(value - limit) <= _CLOSE * limit:
-            high, above = size, value
-        else:
-            low, below = size, value
-    return low
+        """Search for the size from a first guess, by both signs."""
+        smallest = None
+        for sign in (1.0, -1.0):
+            found = self._path(source, sign).first_reaching(
+                _VALUES[requirement], limit, sign * per_unit, first, farthest
+            )
+            if found is not None:
+                smallest, farthest, first = found, found, min(first, found)
+        return smallest
 
 
 def _still(plane: ImagePlane) -> Declared:

@@ -20,6 +20,7 @@ from bisar_budget.budget.analysis import Analysis
 from bisar_budget.budget.combine import combine_phases
 from bisar_budget.budget.correlation import phase_parts
 from bisar_budget.budget.exact_ranges import ExactRanges, nodes_for
+from bisar_budget.budget.point_path import PointPath
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT, UTILIZATION_TOLERANCE
 from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState
 from bisar_budget.units import format_limit, format_quantity
@@ -141,8 +142,9 @@ class ScenePhases:
         for i in self.large:
             source, of_both = self.members[i], []
             for size in (self.sizes[i], -self.sizes[i]):
-                near = there.plane.displacement(there.effect_of(source), size) or (0.0, 0.0)
-                here, away = self.full.at(source, size), there.phases([(source, size)], near)
+                per_unit = there.plane.displacement(there.effect_of(source), 1.0) or (0.0, 0.0)
+                path = PointPath(there, source, math.copysign(1.0, size), per_unit)
+                here, away = self.full.at(source, size), path.to(abs(size))
                 of_both.append(math.inf if here is None or away is None else away.quadratic - here.quadratic)
             found[i] = math.copysign(max(map(abs, of_both)), found[i])
         return found

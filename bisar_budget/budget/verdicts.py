@@ -1,12 +1,11 @@
 """What follows from images for the rows of a check, and which of the images are worth showing."""
 
-from bisar_budget.budget.findings import READING, FileWarning, MissionFindings, Row
+from bisar_budget.budget.findings import OPTIMISTIC, READING, FileWarning, MissionFindings, Row
 from bisar_budget.budget.images import Verdict, VerifiedMission
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.units import format_limit
 
 _SHOWN = 4  # rows of a mission
-_OPTIMISTIC = "optimistic limit"
 _RANK = {status: index for index, status in enumerate(READING)}
 
 
@@ -22,7 +21,7 @@ def with_verdicts(findings: MissionFindings, verified: VerifiedMission) -> Missi
     judged = tuple(_with_verdict(row, by_id[row.id]) if row.id in by_id else row for row in findings.rows)
     known = {row.id for row in findings.rows}
     warnings = tuple(
-        FileWarning(line=None, message=f"{verdict.id}: {_OPTIMISTIC}: {_shown(verdict)}")
+        FileWarning(line=None, message=f"{verdict.id}: {OPTIMISTIC}: {_shown(verdict)}")
         for verdict in rows
         if verdict.id not in known and verdict.verdict == "optimistic"
     )
@@ -37,17 +36,12 @@ def with_verdicts(findings: MissionFindings, verified: VerifiedMission) -> Missi
     )
 
 
-def image_notes(row: Row) -> tuple[str, ...]:
-    """Those of the notes of a row by which an image refutes its limit."""
-    return tuple(note for note in row.notes if note.startswith(_OPTIMISTIC))
-
-
 def _with_verdict(row: Row, verdict: Verdict) -> Row:
     notes = row.notes
     if verdict.verdict == "optimistic":
-        notes = (*notes, f"{_OPTIMISTIC}: {_shown(verdict)}")
+        notes = (*notes, f"{OPTIMISTIC}: {_shown(verdict)}")
     if verdict.verdict_autofocus == "optimistic":
-        notes = (*notes, f"{_OPTIMISTIC} with autofocus: {verdict.reason_autofocus}")
+        notes = (*notes, f"{OPTIMISTIC} with autofocus: {verdict.reason_autofocus}")
         if row.status == "pass_with_autofocus":
             reason = "passes only with autofocus, and the image at that limit shows that autofocus fails"
             return row._replace(status="warn", reason=reason, notes=notes)

@@ -243,7 +243,8 @@ def _line(
     if allowed_cubic is not None:
         or_cubic += f", {format_limit(allowed_cubic, 'rad')} allowed"
     notes.append(
-        f"{cycles:.3g} cycles per aperture: below three it also is {worst}, {or_cubic}; it is the same motion, so no sum counts it"
+        f"{cycles:.3g} cycles per aperture: below three it also is {worst}, {or_cubic}; "
+        "it is the same motion, so no sum counts it"
     )
     breaks_cubic = allowed_cubic is not None and cubic > allowed_cubic * (1 + UTILIZATION_TOLERANCE)
     doubt = f"also {worst}, {or_cubic}" if breaks_cubic or qpe > limit * (1 + UTILIZATION_TOLERANCE) else ""

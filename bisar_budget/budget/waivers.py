@@ -52,10 +52,12 @@ def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> tuple[l
             warnings.append(FileWarning(line=line, message=f"waiver {waiver.id}: matches no row"))
         elif len(named) == len(rows):
             warnings.append(
-                FileWarning(line=line, message=f"waiver {waiver.id}: names every row, so it would hide any new failure")
+                FileWarning(line=line, message=f"waiver {waiver.id}: names every row and would hide any new failure")
             )
         elif not failing:
-            warnings.append(FileWarning(line=line, message=f"waiver {waiver.id}: not used: no row that it names fails"))
+            warnings.append(
+                FileWarning(line=line, message=f"waiver {waiver.id}: not used: no row that it names fails")
+            )
     return result, warnings
 
 

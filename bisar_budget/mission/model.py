@@ -179,9 +179,7 @@ class MotionError(NamedTuple):
 
         both = [kind for kind in ("position", "velocity") if values.get(kind) is not None]
         if both:
-            yield Problem(
-                f"replaces position and velocity, but there is also a {both[0]}", at=("covariance",)
-            )
+            yield Problem(f"replaces position and velocity, but there is also a {both[0]}", at=("covariance",))
         if values.get("distribution", "normal") != "normal":
             yield Problem("a covariance is that of a normal distribution", "accepted: normal", at=("distribution",))
         if "frame" in values:

@@ -170,7 +170,7 @@ def _image(panel: Any, level: Floats, places: Floats, title: str, labels: tuple[
         vmin=_FLOOR_DB,
         vmax=0,
         cmap="magma",
-        shading="nearest",
+        shading="gouraud",
         rasterized=True,
     )
     panel.set(title=title, xlabel=labels[0], ylabel=labels[1])

@@ -5,8 +5,7 @@ import re
 from collections.abc import Iterator, Sequence
 from functools import cache
 
-from bisar_budget.budget.findings import MissionFindings, Row, UnusableMission, worst, worst_first
-from bisar_budget.budget.verdicts import image_notes
+from bisar_budget.budget.findings import MissionFindings, Row, UnusableMission, image_notes, worst, worst_first
 from bisar_budget.budget.waivers import waiver_notes
 from bisar_budget.errors import printable
 from bisar_budget.geometry import BistaticGeometry, PlatformState

@@ -134,10 +134,10 @@ def numbers(row: Verdict) -> tuple[str, str, str, str, str]:
     """Budget, what Table II, the full model and exact ranges predict, what the image shows; phases in rad."""
     if row.requirement_db is not None:
         return f"{row.requirement_db:g} dB", "-", "-", "-", _decibel(row.measured_db)
-    if row.unit == "m" and row.budget_rad is None:
+    if row.budget_rad is None and row.measured_displacement_m is not None:  # held to the location
         moves = (row.displacement_m, row.measured_displacement_m)
         exact, image = ("-" if move is None else format_quantity(math.hypot(*move), "m") for move in moves)
-        return limit(row), "-", "-", exact, image
+        return limit(row) if row.id == "mission.location_error" else "-", "-", "-", exact, image
     if row.measured_cubic_rad is not None:
         cubic = (_phase(row.predicted_cubic_rad), _phase(row.measured_cubic_rad))
         return _budget(row), "-", "-", *cubic

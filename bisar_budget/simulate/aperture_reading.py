@@ -15,6 +15,7 @@ import numpy as np
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import GroundVector
 from bisar_budget.simulate.collection import CELLS, OVERSAMPLING, Chip, Errors, PointCollection, pulses_for
+from bisar_budget.simulate.exact import ExactEffect
 from bisar_budget.simulate.image_formation import taylor_window
 from bisar_budget.simulate.phase_history import Complexes, Floats, cell_centres
 
@@ -25,7 +26,12 @@ _INNER = 0.95  # of the aperture, in the correlation; its edges ring in a patch 
 # are worth nothing.
 _ORDERS = ((0.9, 6), (0.6, 3), (-1.0, 2))
 _PRESENT = 0.25  # of the median strength over the aperture; less is smeared out of the patch
-_REFINEMENTS, _SETTLED_RAD = 8, 1e-6
+_WALKS = 2  # fits, the range walk being that of the fit before
+_REFINEMENTS, _HALVINGS, _SETTLED_RAD = 20, 6, 1e-5
+_REPRODUCED, _EXACT = (
+    0.05,
+    2e-3,
+)  # of an image's norm: less left over, and the polynomial is the image's; is it for sure
 _HELD = 1 << 21  # contributions held at once
 _KERNEL = np.linspace(0, 64, 4097)  # range cells, of a tapered range response
 
@@ -53,6 +59,7 @@ def read_aperture(
     chip: Chip,
     reference: Chip,
     walk_cells: float = 0.0,
+    expected: ExactEffect | None = None,
 ) -> ApertureReading:
     """Read quadratic and cubic phase of a response.
 
@@ -68,6 +75,9 @@ def read_aperture(
         With and without error, on the same pixels.
     walk_cells : float
         Range cells that the response walks, both ways: so many lines are read.
+    expected : ExactEffect, optional
+        Where the fit may start too, if what the pulses say does not lead to a polynomial that reproduces the pixels:
+        close to a platform a long smear overlaps itself.
 
     Raises
     ------
@@ -94,22 +104,44 @@ def read_aperture(
     inner = np.abs(place) < _INNER
     present = strength > _PRESENT * np.median(strength[inner])
     centre_pulse, count = place.size // 2, place.size
-    if not np.isfinite(strength).all() or not present[centre_pulse]:
+    if not np.isfinite(strength).all() or (expected is None and not present[centre_pulse]):
         raise ValueError("the response is not in the image")
-    gaps = np.nonzero(~(present & inner))[0]
-    first = int(gaps[gaps < centre_pulse].max(initial=-1)) + 1
-    last = int(gaps[gaps > centre_pulse].min(initial=count))
-    kept = slice(first, last)
-    covered = float(place[last - 1] - place[first]) / (2 * _INNER)
-    order = next(order for part, order in _ORDERS if covered > part)
-    phase = np.unwrap(np.angle(product[kept]))
-    fit = np.zeros(max(4, order + 1))
-    fit[: order + 1] = np.polynomial.legendre.legfit(place[kept], phase, order, w=np.abs(clean[kept]))
-    if covered > _ORDERS[0][0]:
-        # Of a large patch some pixels are enough for a polynomial.
-        some = slice(None, None, -(-pixels.shape[0] * slow_time.size // _HELD))
-        contribution = _contributions(collection, errors, centre, slow_time, pixels[some])
-        fit = _refined(fit, place, contribution, *(one.reshape(-1)[some] for one in images))
+    fit: Floats = np.zeros(4)
+    covered = 0.0
+    if present[centre_pulse]:
+        gaps = np.nonzero(~(present & inner))[0]
+        first = int(gaps[gaps < centre_pulse].max(initial=-1)) + 1
+        last = int(gaps[gaps > centre_pulse].min(initial=count))
+        kept = slice(first, last)
+        covered = float(place[last - 1] - place[first]) / (2 * _INNER)
+        order = next(order for part, order in _ORDERS if covered > part)
+        phase = np.unwrap(np.angle(product[kept]))
+        fit = np.zeros(max(4, order + 1))
+        fit[: order + 1] = np.polynomial.legendre.legfit(place[kept], phase, order, w=np.abs(clean[kept]))
+    # Of a large patch some pixels are enough for a polynomial.
+    some = slice(None, None, -(-pixels.shape[0] * slow_time.size // _HELD))
+    seen_there, clean_there = (one.reshape(-1)[some] for one in images)
+    at_rest = _contributions(collection, errors, centre, slow_time, pixels[some]).sum(axis=0)
+    gain = complex(np.vdot(at_rest, clean_there) / np.vdot(at_rest, at_rest))
+    starts = [np.pad(fit, (0, _ORDERS[0][1] + 1 - fit.size))]
+    if expected is not None:
+        starts.append(np.array([0.0, 0.0, -expected.quadratic / 1.5, -expected.cubic / 2.5, 0.0, 0.0, 0.0]))
+    best = _Refined(fit, math.inf)
+    for first_fit in starts:
+        found = _Refined(first_fit, math.inf)
+        for _ in range(_WALKS if walk_cells else 1):
+            # What is left of the range error takes a pulse to other range cells too.
+            phase = np.polynomial.legendre.legval(place, [0.0, *found.fit[1:]])
+            left = -collection.wavelength / (2 * math.pi) * phase
+            contribution = _contributions(collection, errors, centre, slow_time, pixels[some], left)
+            found = _refined(found.fit, place, contribution, seen_there, gain)
+        best = min(best, found, key=lambda one: one.misfit)
+        if best.misfit < _EXACT:
+            break
+    if best.misfit < _REPRODUCED:
+        fit, covered = best.fit, 1.0
+    elif not covered:
+        raise ValueError("the response is not in the image")
     # A pixel along y′ changes the range sum over the aperture by λ / OVERSAMPLING, twice its P₁ part.
     turn = 1 if collection.flown(errors).turns_left(centre) else -1
     across = -turn * OVERSAMPLING / math.pi * float(fit[1])
@@ -120,27 +152,45 @@ def read_aperture(
     return ApertureReading(float(-1.5 * fit[2]), float(-2.5 * fit[3]), across, -walked, min(1.0, covered * 1.02))
 
 
-def _refined(fit: Floats, place: Floats, contribution: Complexes, seen: Complexes, clean: Complexes) -> Floats:
-    """Fit the phase's polynomial to the pixels, by Gauss and Newton; what does not settle is left as it was."""
+class _Refined(NamedTuple):
+    """Polynomial of the phase, and what of the image it leaves over, of its norm."""
+
+    fit: Floats
+    misfit: float
+
+
+def _refined(fit: Floats, place: Floats, contribution: Complexes, seen: Complexes, gain: complex) -> _Refined:
+    """Fit the phase's polynomial to the pixels, by Gauss and Newton; a step that makes it worse is shortened."""
     legendre = np.polynomial.legendre.legvander(place, fit.size - 1)
-    gain = np.vdot(contribution.sum(axis=0), clean) / np.vdot(contribution.sum(axis=0), contribution.sum(axis=0))
-    found, before = fit.copy(), math.inf
-    for _ in range(_REFINEMENTS):
-        pulses = gain * np.exp(1j * (legendre @ found))
+    norm = float(np.linalg.norm(seen))
+
+    def left_by(coefficients: Floats) -> tuple[Complexes, float, Complexes]:
+        pulses = gain * np.exp(1j * (legendre @ coefficients))
         model = pulses @ contribution
-        amplitude = float(np.real(np.vdot(model, seen)) / np.real(np.vdot(model, model)))
+        # The constant phase is free: what it takes is known at once.
+        turn = np.angle(np.vdot(model, seen))
+        pulses, model = pulses * np.exp(1j * turn), model * np.exp(1j * turn)
+        amplitude = float(abs(np.vdot(model, seen)) / np.real(np.vdot(model, model)))
+        return seen - amplitude * model, amplitude, pulses
+
+    found = fit.copy()
+    left, amplitude, pulses = left_by(found)
+    for _ in range(_REFINEMENTS):
         columns = contribution.T @ (1j * amplitude * pulses[:, None] * legendre)
-        left = seen - amplitude * model
-        misfit = float(np.linalg.norm(left))
-        if not misfit <= before * (1 + 1e-9):
-            return fit
-        before = misfit
         both = np.concatenate((columns.real, columns.imag))
         step = np.linalg.lstsq(both, np.concatenate((left.real, left.imag)), rcond=1e-6)[0]
-        found = found + step
-        if np.abs(step).max() < _SETTLED_RAD:
+        for _ in range(_HALVINGS):
+            ahead = left_by(found + step)
+            if np.linalg.norm(ahead[0]) <= np.linalg.norm(left):
+                break
+            step = step / 2
+        else:
             break
-    return found
+        found = found + step
+        left, amplitude, pulses = ahead
+        if np.abs(step[1:]).max() < _SETTLED_RAD:
+            break
+    return _Refined(found, float(np.linalg.norm(left)) / norm)
 
 
 def _taper(columns: int) -> Floats:
@@ -153,9 +203,17 @@ def _taper(columns: int) -> Floats:
 
 
 def _contributions(
-    collection: PointCollection, errors: Errors, centre: GroundVector, slow_time: Floats, pixels: Floats
+    collection: PointCollection,
+    errors: Errors,
+    centre: GroundVector,
+    slow_time: Floats,
+    pixels: Floats,
+    left: Floats | None = None,
 ) -> Complexes:
-    """What each pulse adds to the image of a point at a place, (pulses, pixels), at baseband."""
+    """What each pulse adds to the image of a point at a place, (pulses, pixels), at baseband.
+
+    `left` (pulses,) is a range error that displaces its range response, and has no part in the phase. [m]
+    """
     flown = collection.flown(errors)
     k = 2 * math.pi / collection.wavelength
     at_middle = flown.range_sum(pixels) - flown.range_sum(np.asarray(centre, dtype=float))
@@ -163,8 +221,10 @@ def _contributions(
     farther = np.zeros((slow_time.size, pixels.shape[0]))
     for one in collection.paths(errors.smooth(), slow_time):
         farther += _distance(one.measured, pixels) - _distance(one.measured, point)
-    cells = farther * (collection.radar.bandwidth / SPEED_OF_LIGHT)
     contribution: Complexes = np.exp(1j * k * (farther - at_middle))
+    if left is not None:
+        farther -= left[:, None]
+    cells = farther * (collection.radar.bandwidth / SPEED_OF_LIGHT)
     if not collection.is_tapered:
         return contribution * np.sinc(cells)
     weights = taylor_window(257)

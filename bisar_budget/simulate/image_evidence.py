@@ -41,19 +41,21 @@ def form_image_evidence(mission: Mission, findings: MissionFindings) -> tuple[Im
 
 
 def _evidence(study: Study, file: str, verdict: Verdict) -> ImageEvidence:
-    chip, reference, _, effect = study.images(verdict.id, verdict.boundary_error)
+    chip, reference, errors, effect = study.images(verdict.id, verdict.boundary_error)
     found = ImageEvidence(
         file=file,
         verdict=verdict,
         look_azimuth_rad=study.geometry.look_azimuth,
-        at_limit=_point_image(chip, reference, study.smear(effect)),
+        at_limit=_point_image(chip, reference, study.spread(errors, effect).smear),
     )
     if verdict.boundary_autofocus is None or verdict.measured_residual_qpe_rad is None:
         return found
     chip, reference, errors, effect = study.images(verdict.id, verdict.boundary_autofocus, max(ROOM.values()))
     return found._replace(
-        before_autofocus=_point_image(chip, reference, study.smear(effect)),
-        after_autofocus=_point_image(study.focused(errors, effect, chip), reference, study.smear(effect)),
+        before_autofocus=_point_image(chip, reference, study.spread(errors, effect).smear),
+        after_autofocus=_point_image(
+            study.focused(errors, effect, chip), reference, study.spread(errors, effect).smear
+        ),
     )
 
 

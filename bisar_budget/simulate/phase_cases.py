@@ -192,14 +192,13 @@ def refocused(study: Study, sizes: Sizes, budget: float) -> dict[str, Any]:
         errors = study.together(sizes, study.worse_sign(sizes, 1.0))
         effect = study.collection.effect(errors)
         room = max(ROOM.values())
-        if room * study.smear(effect) > MAX_CELLS:
-            reason = (
-                f"autofocus needs a patch of {room * study.smear(effect):.0f} cells, at most {MAX_CELLS} are formed"
-            )
+        smear = study.spread(errors, effect).smear
+        if room * smear > MAX_CELLS:
+            reason = f"autofocus needs a patch of {room * smear:.0f} cells, at most {MAX_CELLS} are formed"
             return {"verdict_autofocus": "not_evaluated", "reason_autofocus": reason}
         chip, reference = study.chips(errors, effect, room=room)
         focused = study.focused(errors, effect, chip)
-        residual = abs(study.read(errors, effect, focused, reference).quadratic)
+        residual = abs(study.read(errors, effect, focused, reference, is_focused=True).quadratic)
         peaks = [impulse_response_2d(one.image, one.spacing).peak for one in (reference, focused)]
         loss = 20 * math.log10(peaks[0] / peaks[1])
     except (ValueError, np.linalg.LinAlgError) as error:
@@ -258,7 +257,7 @@ def _judged(study: Study, blank: Verdict, sizes: Sizes) -> Verdict:
     except (ValueError, np.linalg.LinAlgError) as error:
         return blank._replace(reason=f"no image: {error}")
     measured = abs(reading.quadratic)
-    is_small = study.smear(effect) <= _BESIDE_CELLS
+    is_small = study.spread(errors, effect).smear <= _BESIDE_CELLS
     beside = [_phase(study, sizes, factor * scale) if is_small else None for factor in (INSIDE, BEYOND)]
     return blank._replace(
         **predicted(effect),
@@ -318,9 +317,15 @@ def _remark(study: Study, errors: Errors, effect: ExactEffect, coverage: float) 
 
 def _scale_of_cubic(study: Study, sizes: Sizes, scale: float, requirement: float) -> float:
     """Scale at which exact ranges give the cubic phase, from a first guess."""
-    for _ in range(12):
-        found = abs(study.effect(sizes, scale).cubic)
+    largest = math.inf  # beyond, no ground point has the range history
+    for _ in range(40):
+        try:
+            found = abs(study.effect(sizes, scale).cubic)
+        except ValueError:
+            largest, scale = scale, scale / 2
+            continue
         if not found or abs(found / requirement - 1) < 1e-4:
             break
-        scale *= min(4.0, max(0.25, requirement / found))
+        ahead = scale * min(4.0, max(0.25, requirement / found))
+        scale = ahead if ahead < largest else (scale + largest) / 2
     return scale

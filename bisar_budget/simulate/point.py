@@ -251,7 +251,9 @@ def _plan(
     time = cell_centres(T, left.size)
     walk = float(np.abs(left - slope * time).max()) * radar.bandwidth / SPEED_OF_LIGHT
     echoes = sorted(line.frequency * T for name in PLATFORMS for line in lines_of(mission, name) if line.amplitude)
-    shown = [cycles for cycles in echoes if cycles <= _ECHO_CELLS]
+    given = mission.collection.pulses
+    room = _ECHO_CELLS if given is None else min(_ECHO_CELLS, given / 4 - reach - _MARGIN_CELLS - 1)
+    shown = [cycles for cycles in echoes if cycles <= room]
     outside = "" if len(shown) == len(echoes) else (
         f"echoes {', '.join(f'{cycles:.4g}' for cycles in echoes[len(shown) :])} resolution cells from the peak lie "
         "outside the patch"

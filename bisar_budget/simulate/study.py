@@ -2,11 +2,15 @@
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
 
 from bisar_budget.budget.analysis import Analysis, Model
 from bisar_budget.budget.effects import ErrorSource
 from bisar_budget.budget.error_rows import Allowed, allowed_by
 from bisar_budget.budget.models import QUADRATIC
+from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.mission.model import Mission
 from bisar_budget.simulate.aperture_reading import READ_CELLS, ApertureReading, read_aperture
 from bisar_budget.simulate.autofocus import ALGORITHMS
@@ -21,14 +25,21 @@ from bisar_budget.simulate.collection import (
     superposed,
 )
 from bisar_budget.simulate.exact import ExactEffect
-from bisar_budget.simulate.phase_history import MotionError
+from bisar_budget.simulate.phase_history import Floats, MotionError
 from bisar_budget.simulate.refocus import refocused
 
 Sizes = Sequence[tuple[ErrorSource, float]]  # errors and how large each is, signed
 _CLOCK_TERMS = ("constant", "linear", "quadratic", "cubic")
 _SHARED_RAD = 0.5  # of phase by which lines on which one phase is estimated may differ
 _SCALED, _SCALINGS = 1e-4, 40  # of a budget; steps at most
-_SMEAR_SHARE = 2.4  # of a cubic without its linear part: its slope at the aperture edge
+_SLOWEST = 0.02  # of the fastest turn of Doppler: slower, a part of the aperture is not followed
+
+
+class Spread(NamedTuple):
+    """Resolution cells over which a response is smeared along its line, and over which it walks in range."""
+
+    smear: int
+    walk: int
 
 
 class Study:
@@ -173,15 +184,39 @@ class Study:
         algorithm = ALGORITHMS[self.mission.autofocus.algorithm]
         per_line = abs(self.analysis.exact.phases_per_term[0][0]) * self.collection.range_cell / OVERSAMPLING
         shared = int(min(_SHARED_RAD / per_line if per_line else 1e6, 1e6))
-        walked = round(self._walk(effect) * OVERSAMPLING / 2)
+        walked = round(self.spread(errors, effect).walk * OVERSAMPLING / 2)
         lines = chip.image.shape[0]
         half = min(lines // 2, lines - 1 - lines // 2, max(shared, walked))
         return refocused(self.collection, errors, effect.displacement, chip, algorithm, half)
 
-    def smear(self, effect: ExactEffect) -> int:
-        """Cells of cross range that a response is smeared over."""
-        slope = 2 * abs(effect.quadratic) + _SMEAR_SHARE * abs(effect.cubic)  # at the aperture edge
-        return 2 * math.ceil(min(slope / math.pi, 1e6))
+    def spread(self, errors: Errors, effect: ExactEffect) -> Spread:
+        """Where an error puts the parts of a response, by the range error that it leaves over the aperture.
+
+        A part lies along the line of equal range where the Doppler that is left is that of the place. Where Doppler
+        turns slowly, in part of a long aperture or with nearly parallel gradients, a small slope is a long way.
+        """
+        half = self.collection.aperture_time / 2
+        time = np.linspace(-half, half, 257)
+        point = np.array([*effect.displacement, 0.0])
+        left: Floats = SPEED_OF_LIGHT * self.collection.clock(errors, time)
+        slopes: Floats = np.zeros((time.size, 2))
+        for one in self.collection.paths(errors.smooth(), time):
+            sight = one.measured - point
+            distance = np.linalg.norm(sight, axis=1)
+            left = left + np.linalg.norm(one.actual, axis=1) - distance
+            slopes = slopes - sight[:, :2] / distance[:, None]
+        flown = self.collection.flown(errors)
+        cells = flown.cells(effect.displacement, self.mission.radar.bandwidth, self.collection.wavelength)
+        by_range = slopes[time.size // 2]
+        doppler = slopes @ (np.array([by_range[1], -by_range[0]]) / np.hypot(*by_range))
+        rate = np.gradient(doppler, time)
+        least = _SLOWEST * np.abs(rate).max()
+        places = np.gradient(left, time) / np.where(np.abs(rate) < least, np.copysign(least, rate), rate)
+        walk = left - places * (doppler - doppler[time.size // 2])
+        return Spread(
+            2 * math.ceil(min(float(np.abs(places).max()) / cells[1], 1e6)),
+            2 * math.ceil(min(float(np.abs(walk).max()) / self.collection.range_cell - 0.25, 64)),
+        )
 
     def chips(
         self, errors: Errors, effect: ExactEffect, range_cells: int = RANGE_CELLS, room: float = 1.0
@@ -190,21 +225,21 @@ class Study:
 
         `room` is how often the smear must fit: autofocus gives out in less than it needs.
         """
-        smear = self.smear(effect)
+        smear, walk = self.spread(errors, effect)
         cells = min(MAX_CELLS, max(CELLS + smear, math.ceil(room * smear)))
-        return self.collection.pair(errors, effect.displacement, cells, range_cells + self._walk(effect))
+        return self.collection.pair(errors, effect.displacement, cells, range_cells + walk)
 
-    def _walk(self, effect: ExactEffect) -> int:
-        """Range cells that a smear walks, both ways.
-
-        A part of it lies where the range error less its slope times slow time puts it.
-        """
-        wavelengths = (4 / 3 * abs(effect.quadratic) + 2 * abs(effect.cubic)) / (2 * math.pi)
-        return 2 * math.ceil(min(wavelengths * self.collection.relative_bandwidth - 0.25, 64))
-
-    def read(self, errors: Errors, effect: ExactEffect, chip: Chip, reference: Chip) -> ApertureReading:
+    def read(
+        self, errors: Errors, effect: ExactEffect, chip: Chip, reference: Chip, *, is_focused: bool = False
+    ) -> ApertureReading:
         """Quadratic and cubic phase of a response, measured."""
-        walk = self._walk(effect)
+        walk = self.spread(errors, effect).walk
         return read_aperture(
-            self.collection, errors, effect.displacement, chip, reference, walk and walk + READ_CELLS
+            self.collection,
+            errors,
+            effect.displacement,
+            chip,
+            reference,
+            walk and walk + READ_CELLS,
+            None if is_focused else effect,
         )

@@ -170,7 +170,7 @@ def test_a_height_error_defocuses_a_bistatic_image(separation: float, squint: fl
     by_full = row_of(
         check_mission(mission._replace(allocation=mission.allocation._replace(model="full")), TODAY), terrain.id
     )
-    assert math.dist(by_full.displacement_m, effect.displacement) < 0.05  # the platforms 10 m higher: 10 m · 10 m over 8.5 km, magnified
+    assert math.dist(by_full.displacement_m, effect.displacement) < 0.05  # the platforms are 10 m higher
 
 
 def test_a_height_error_warns_where_the_full_model_fails_it_and_is_imaged() -> None:

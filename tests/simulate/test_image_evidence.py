@@ -14,7 +14,7 @@ from bisar_budget.budget.verdicts import rows_worth_showing
 from bisar_budget.cli.check import check_all
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.report import Style, render
-from bisar_budget.simulate.collection import RANGE_CELLS, Chip, Errors
+from bisar_budget.simulate.collection import RANGE_CELLS, Errors
 from bisar_budget.simulate.image_evidence import _point_image, form_image_evidence
 from bisar_budget.simulate.verify import Study, verify_mission
 from tests.conftest import ROOT, TODAY, findings, mission_text
@@ -149,7 +149,7 @@ class TestChips:
         image = np.zeros_like(reference.image)
         nx, ny = image.shape
         image[nx // 2 + 3, ny // 2 + 5] = abs(reference.image).max()
-        shown = _point_image(study, Chip(image, reference.grid), reference, 0.0)
+        shown = _point_image(reference._replace(image=image), reference, 0.0)
         grey = np.frombuffer(shown.chip, np.uint8).reshape(shown.rows, shown.columns)
         row, column = np.unravel_index(int(grey.argmax()), grey.shape)
         assert column == nx // 2 + 3
@@ -161,12 +161,12 @@ class TestChips:
         reference = study.collection.chip((0.0, 0.0), Errors(), cells=220, range_cells=RANGE_CELLS)
         image = np.zeros_like(reference.image)
         image[5, image.shape[1] // 2 + 101] = abs(reference.image).max()
-        shown = _point_image(study, Chip(image, reference.grid), reference, 40 * math.pi)
+        shown = _point_image(reference._replace(image=image), reference, 160)
         assert shown.rows <= 96
         assert 255 in shown.chip
-        stride = round(shown.pixel_m[1] / study.collection.spacing[1])
+        stride = round(shown.pixel_m[1] / reference.spacing[1])
         assert stride == shown.thinned > 1
-        assert shown.extent_m[1] == pytest.approx(shown.rows * stride * study.collection.spacing[1])
+        assert shown.extent_m[1] == pytest.approx(shown.rows * stride * reference.spacing[1])
         assert len(shown.cut_db) == 4 * shown.rows * stride + 1
 
 

@@ -215,7 +215,7 @@ def test_notes_that_decide_nothing_stand_in_the_verbose_text_only() -> None:
     short, long = (render("text", Report("1", (noted,)), Style(verbosity=verbosity)) for verbosity in (0, 1))
     assert "note: " not in short
     assert "by a hair" not in short
-    assert "note: collection.pulses: not used by this check" in " ".join(long.split())
+    assert "note: not used by this check: collection.pulses" in " ".join(long.split())
     assert long.count("holds by a hair") == len(noted.rows)
 
 

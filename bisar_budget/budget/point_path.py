@@ -1,0 +1,180 @@
+"""Where one error takes the image of a point as it grows, and the first size at which it reaches a limit.
+
+The point is followed from no error on. Where range and Doppler gradients become parallel there its way ends: no larger
+error has an image of the point, which counts as a limit reached.
+"""
+
+import math
+from bisect import bisect
+from collections.abc import Callable
+from typing import NamedTuple
+
+from bisar_budget.budget.effects import ErrorSource
+from bisar_budget.budget.exact_ranges import ExactPhases, ExactRanges
+from bisar_budget.geometry import GroundVector
+
+_STRAY = 0.15  # of a step; farther from where it led, a point is not the one that was followed
+_FLOOR_M = 1e-3
+_LEAST_STEP = 1e-3  # of the size: allowables are right to 1 %
+_FINEST_STEP = 1e-6  # where the gradients stay apart, the way only turns
+_PARALLEL = 0.02  # of the sine between the gradients at the centre, over their lengths there
+_CLOSE = 1e-3  # of a limit, where a search ends
+_STEPS = 40
+
+Value = Callable[[ExactPhases], float]  # what is held to a limit, signed
+
+
+class _Known(NamedTuple):
+    size: float  # magnitude
+    phases: ExactPhases
+    way: GroundVector  # where the point goes from there [m/unit]
+
+
+class PointPath:
+    """The way of the point by one error with one sign.
+
+    Parameters
+    ----------
+    exact : ExactRanges
+        Of the collection.
+    source : ErrorSource
+        The error.
+    sign : float
+        ±1.
+    per_unit : (2,)
+        Displacement by a small unit of the error, without the sign. [m/unit]
+    """
+
+    def __init__(self, exact: ExactRanges, source: ErrorSource, sign: float, per_unit: GroundVector) -> None:
+        self.exact, self.source, self.sign = exact, source, sign
+        slope = (sign * per_unit[0], sign * per_unit[1])
+        self.known = [_Known(0.0, ExactPhases((0.0, 0.0), 0.0, 0.0, 1.0), slope)]
+        self.end = math.inf  # size from which there is no point
+
+    def to(self, size: float) -> ExactPhases | None:
+        """What an error of a size does; None where its way has ended. [unit]"""
+        step = math.inf
+        while size < self.end:
+            index = bisect(self.known, size, key=lambda one: one.size)
+            last = self.known[index - 1]
+            if last.size == size:
+                return last.phases
+            step = min(step, size - last.size)
+            ahead = size if size - last.size < 1.2 * step else last.size + step
+            near = self._ahead(index, ahead)
+            found = self.exact.phases([(self.source, self.sign * ahead)], near)
+            if found is not None and _is_on_the_way(last.phases.displacement, found.displacement, near):
+                self.known.insert(index, self._reached(ahead, found))
+                step *= 2
+                continue
+            step /= 2
+            if step < _LEAST_STEP * ahead and (abs(last.phases.turn) < _PARALLEL or step < _FINEST_STEP * ahead):
+                self.end = last.size + step
+        return None
+
+    def _reached(self, size: float, found: ExactPhases) -> _Known:
+        east, north = self.exact.way(self.source, self.sign * size, found.displacement)
+        return _Known(size, found, (self.sign * east, self.sign * north))
+
+    def _ahead(self, index: int, size: float) -> GroundVector:
+        """Where the known points before an index lead: along the way of the last, which bends as it did."""
+        last = self.known[index - 1]
+        (x, y), (u, v), step = last.phases.displacement, last.way, size - last.size
+        if index > 1:
+            before = self.known[index - 2]
+            bend = step / (2 * (last.size - before.size))
+            u, v = u + bend * (u - before.way[0]), v + bend * (v - before.way[1])
+        return (x + u * step, y + v * step)
+
+    def first_reaching(
+        self, value: Value, limit: float, per_unit: float, first: float, farthest: float
+    ) -> float | None:
+        """First size at which a value reaches a limit; None where it does not up to the farthest.
+
+        Parameters
+        ----------
+        value : callable
+            Of the phases: what is held to the limit, signed.
+        limit : float
+            [rad] or [m]
+        per_unit : float
+            Value of a small unit of the error, with the sign of the path.
+        first, farthest : float
+            Size to look at first, and the largest. [unit]
+        """
+        size = first
+        for _ in range(_STEPS):
+            self.to(size)
+            crossed = self._crossed(value, limit, per_unit, min(size, self.end))
+            if crossed is not None:
+                return crossed
+            if self.end <= size:
+                return self.end
+            if size >= farthest:
+                return None
+            reached = abs(value(self.known[bisect(self.known, size, key=lambda one: one.size) - 1].phases))
+            size = min(farthest, size * min(1.5, max(1.01, 1.02 * limit / reached) if reached else 1.5))
+        return size
+
+    def _crossed(self, value: Value, limit: float, per_unit: float, upto: float) -> float | None:
+        """First size among the known ones, or between them, at which the value reaches the limit."""
+        index = 1
+        while index < len(self.known) and self.known[index].size <= upto:
+            low, high = self.known[index - 1], self.known[index]
+            if abs(value(high.phases)) >= limit * (1 - _CLOSE):
+                return self._between(value, limit, low, high, per_unit)
+            top = self._top(index, value, limit, per_unit)
+            if top is not None and self.to(top) is None:
+                return None
+            index += top is None
+        return None
+
+    def _top(self, index: int, value: Value, limit: float, per_unit: float) -> float | None:
+        """Size within an interval at which a parabola stands above the limit, where both ends are below."""
+        low, high = self.known[index - 1], self.known[index]
+        a, b, width = value(low.phases), value(high.phases), high.size - low.size
+        chord = (b - a) / width
+        if index == 1:
+            slope = per_unit
+        else:
+            before = self.known[index - 2]
+            earlier = (a - value(before.phases)) / (low.size - before.size)
+            slope = (chord * (low.size - before.size) + earlier * width) / (high.size - before.size)
+        bend = (chord - slope) / width
+        way = -slope / (2 * bend) if bend else 0.0
+        if not 0.02 * width < way < 0.98 * width or abs(a + slope * way / 2) < limit:
+            return None
+        return low.size + way
+
+    def _between(self, value: Value, limit: float, low: _Known, high: _Known, per_unit: float) -> float:
+        """Size between two at which the magnitude reaches the limit."""
+        for step in range(_STEPS):
+            a, b = abs(value(low.phases)), abs(value(high.phases))
+            if abs(b - limit) <= _CLOSE * limit:
+                slope = (b - a) / (high.size - low.size)
+                return high.size - (b - limit) / slope if slope > 0 and b > limit else high.size
+            if high.size - low.size <= _CLOSE * high.size:
+                return low.size
+            size = low.size + (high.size - low.size) * (limit - a) / (b - a)
+            if low.size == 0:  # a parabola through zero
+                slope = abs(per_unit)
+                bend = (b / high.size - slope) / high.size
+                if bend > 0:
+                    size = 2 * limit / (slope + math.sqrt(slope * slope + 4 * bend * limit))
+            elif step % 3 == 2:
+                size = (low.size + high.size) / 2
+            inside = 0.01 * (high.size - low.size)
+            size = min(max(size, low.size + inside), high.size - inside)
+            found = self.to(size)
+            if found is None:
+                return low.size
+            middle = _Known(size, found, (0.0, 0.0))
+            if abs(value(found)) >= limit * (1 - _CLOSE):
+                high = middle
+            else:
+                low = middle
+        return low.size
+
+
+def _is_on_the_way(last: GroundVector, found: GroundVector, near: GroundVector) -> bool:
+    return math.dist(found, near) <= _STRAY * max(math.dist(found, last), math.dist(near, last)) + _FLOOR_M
