@@ -76,6 +76,9 @@ class ExactRanges:
         for name, state in zip(PLATFORMS, (geometry.transmitter, geometry.receiver), strict=True):
             self.tracks[name] = track = _track(state, self.times, east, north)
             self.ranges[name] = [sqrt(x * x + y * y + z * z) for x, y, z in track]
+        self._middle = min(
+            math.dist(s.position, (east, north, 0.0)) for s in (geometry.transmitter, geometry.receiver)
+        )
         self.recorded = [t + r for t, r in zip(*self.ranges.values(), strict=True)]
 
         # Ranges in double precision hold no phase that is smaller.
@@ -111,6 +114,11 @@ class ExactRanges:
         """Sine of the angle from range to Doppler gradient on the ground, signed, both fitted. [-]"""
         (s_x, rate_x, *_), (s_y, rate_y, *_) = self._gradient
         return (s_x * rate_y - s_y * rate_x) / (math.hypot(s_x, s_y) * math.hypot(rate_x, rate_y))
+
+    @property
+    def nearest(self) -> float:
+        """Least range at the nodes and, where they leave it out, at the middle of the aperture. [m]"""
+        return min(self._middle, *(min(ranges) for ranges in self.ranges.values()))
 
     @property
     def range_gradient(self) -> float:

@@ -37,19 +37,19 @@ class Requirement(NamedTuple):
     """How often one requirement holds.
 
     `sum` and `rss` are what these rules of `allocation.combine` would hold to the limit, by the full model with the
-    coverage factor. `sigma_rss` is the standard uncertainty by root-sum-square, `sigma` that of the draws; of
-    displacements, rms lengths. `probability` is of the draws, with the ends of its Wilson interval;
-    `probability_normal` is that of a normal distribution with `sigma_rss`. `dominant` is the error with the
-    largest share of the variance.
+    coverage factor; None where a declared error leaves no image. `sigma_rss` is the standard uncertainty by
+    root-sum-square, `sigma` that of the draws that have an image, None where none has; of displacements, rms lengths.
+    `probability` is of the draws, with the ends of its Wilson interval; `probability_normal` is that of a normal
+    distribution with `sigma_rss`. `dominant` is the error with the largest share of the variance.
     """
 
     id: str
     unit: str
     limit: float
-    sum: float
-    rss: float
+    sum: float | None
+    rss: float | None
     sigma_rss: float
-    sigma: float
+    sigma: float | None
     probability: float
     probability_low: float
     probability_high: float
@@ -74,7 +74,6 @@ class MonteCarlo(NamedTuple):
     probability_low: float | None
     probability_high: float | None
     is_exact: bool
-    warnings: tuple[str, ...]
     notes: tuple[str, ...]
 
 
@@ -119,7 +118,6 @@ def monte_carlo(mission: Mission, draws: int, seed: int | None = None) -> MonteC
         probability_low=low,
         probability_high=high,
         is_exact=counted.is_exact,
-        warnings=(),
         notes=tuple(_notes(mission, analysis.stated, counted.is_exact)),
     )
 
@@ -195,15 +193,18 @@ class _Predictions:
     def __init__(self, analysis: Analysis, variables: Sequence[Variable]) -> None:
         self.together, self.variables = Together(analysis, analysis.full), variables
 
-    def combined(self, judged: Judged, rule: str) -> float:
-        """What a rule of `allocation.combine` holds to the limit, coverage factor included."""
+    def combined(self, judged: Judged, rule: str) -> float | None:
+        """What a rule of `allocation.combine` holds to the limit, coverage factor included; None: no image."""
         together = self.together
         if judged.columns == (0,):
             members = [source for source in together.stated if source.owner in judged.owners]
-            return combined_phase(together.phases(members), rule, together.groups)
-        if judged.columns == (1,):
-            return combined_phase(together.cubics(), rule, together.groups)
-        return combined_displacement(together.moves(rule) or [], rule, together.groups)
+            phase = combined_phase(together.phases(members), rule, together.groups)
+        elif judged.columns == (1,):
+            phase = combined_phase(together.cubics(), rule, together.groups)
+        else:
+            moves = together.moves(rule)
+            return None if moves is None else combined_displacement(moves, rule, together.groups)
+        return phase if math.isfinite(phase) else None
 
     def variances(self, judged: Judged) -> dict[str, float]:
         """Variance that each error, or each covariance, brings."""
@@ -278,7 +279,7 @@ def _requirement(
         sum=predictions.combined(judged, "sum"),
         rss=predictions.combined(judged, "rss"),
         sigma_rss=math.sqrt(variance),
-        sigma=float(f"{math.sqrt(mean_square):.{_DIGITS}g}"),
+        sigma=float(f"{math.sqrt(mean_square):.{_DIGITS}g}") if math.isfinite(mean_square) else None,
         probability=holds / draws,
         probability_low=low,
         probability_high=high,

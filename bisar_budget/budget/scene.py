@@ -119,7 +119,7 @@ class ScenePhases:
     def place(self, radius: float, azimuth: float) -> "Place":
         """What there is at a point of the ground."""
         there = self.ranges_at(radius, azimuth)
-        if min(min(ranges) for ranges in there.ranges.values()) < _NEAREST_M:
+        if there.nearest < _NEAREST_M:
             return self.nowhere
         try:
             sine = there.gradient_sine

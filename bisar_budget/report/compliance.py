@@ -320,7 +320,7 @@ def _probabilities(drawn: "MonteCarlo | None") -> Iterator[Probability]:
 
     for one in drawn.requirements:
         limit = _limit(one.limit, one.unit)
-        sizes = (format_quantity(size, one.unit) for size in (one.sum, one.rss, one.sigma))
+        sizes = (_quantity(size, one.unit) for size in (one.sum, one.rss, one.sigma))
         yield Probability(one.id, (limit, *sizes), held(one.probability, one.probability_low, one.probability_high))
     if drawn.probability is not None and len(drawn.requirements) > 1:
         ends = (drawn.probability_low or 0.0, drawn.probability_high or 1.0)
@@ -331,7 +331,6 @@ def _draws_remarks(drawn: "MonteCarlo | None") -> Iterator[str]:
     if drawn is None:
         return
     yield from (f"{one.id}: {text}" for one in drawn.requirements for text in one.warnings)
-    yield from drawn.warnings
     yield from drawn.notes
     if drawn.probability is None:
         yield "no declared error has a requirement to hold"

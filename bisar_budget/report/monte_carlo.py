@@ -25,19 +25,22 @@ def probabilities(drawn: MonteCarlo) -> list[str]:
     if len(drawn.requirements) > 1:
         lines += ["all at once", f"  {held(drawn.probability, drawn.probability_low, drawn.probability_high)}"]
     texts = [f"warning: {one.id}: {text}" for one in drawn.requirements for text in one.warnings]
-    texts += [f"warning: {text}" for text in drawn.warnings]
     texts += [f"note: {text}" for text in drawn.notes]
     return [*lines, *[line for text in texts for line in wrapped(f"  {text}", "    ")]]
 
 
 def _requirement(one: Requirement) -> Iterator[str]:
     limit = format_quantity(one.limit, one.unit, 3, "down")
-    yield _cells(one.id, limit, *(format_quantity(size, one.unit) for size in (one.sum, one.rss, one.sigma)))
+    yield _cells(one.id, limit, *(_size(size, one.unit) for size in (one.sum, one.rss, one.sigma)))
     decimals = _decimals(one.probability_low, one.probability_high)
     yield (
         f"  {held(one.probability, one.probability_low, one.probability_high)}, "
         f"normal with sigma {format_quantity(one.sigma_rss, one.unit)}: {_percent(one.probability_normal, decimals)}"
     )
+
+
+def _size(size: float | None, unit: str) -> str:
+    return "no image" if size is None else format_quantity(size, unit)
 
 
 def _cells(name: str, *cells: str) -> str:

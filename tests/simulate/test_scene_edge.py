@@ -4,16 +4,17 @@ import math
 
 import numpy as np
 import pytest
-from bisar_budget.budget.validity import FirstOrder
 
+from bisar_budget.budget.analysis import Analysis
 from bisar_budget.budget.check import check_mission
+from bisar_budget.budget.models import QUADRATIC
 from bisar_budget.budget.scene import ScenePhases, _where, at
 from bisar_budget.errors import MissionError
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.simulate.collection import Errors
+from bisar_budget.simulate.aperture_reading import read_aperture
+from bisar_budget.simulate.collection import RANGE_CELLS
 from bisar_budget.simulate.exact import exact_effect
-from bisar_budget.simulate.impulse_response import quadratic_phase_error
 from bisar_budget.simulate.phase_history import cell_centres, path
 from bisar_budget.simulate.verify import Study
 from tests.conftest import TODAY, findings, mission_text, row
@@ -30,6 +31,13 @@ def squinted(squint: float):
     return parse_mission(mission_text(platforms=platforms, allocation__model="full"))
 
 
+def edge_of(mission, members) -> ScenePhases:
+    """The scene with these declared errors alone."""
+    analysis = Analysis(mission)
+    vars(analysis)["stated"] = members
+    return ScenePhases(analysis)
+
+
 def exact_at(mission, source, size: float, point):
     """Effect of one error at a point of the scene, by exact ranges from there."""
     slow_time = cell_centres(6.0, 256)
@@ -43,49 +51,56 @@ def exact_at(mission, source, size: float, point):
     return exact_effect(slow_time, *flown, clock, mission.radar.wavelength, 6.0)
 
 
-@pytest.mark.parametrize(("radius", "tolerance"), [(250.0, 0.002), (1000.0, 0.006)])
+@pytest.mark.parametrize("radius", [250.0, 1000.0])
 @pytest.mark.parametrize("squint", [0, 30, 45])
-def test_phases_at_the_edge_are_those_of_exact_ranges(squint: float, radius: float, tolerance: float) -> None:
-    """Every error at its limit of π/8 that is inside first order, at eight places of the rim."""
+def test_phases_at_the_edge_are_those_of_exact_ranges(squint: float, radius: float) -> None:
+    """Every error at its limit of π/8, at eight places of the rim, of the sign that differs more.
+
+    Small errors may leave out a second order of 0.2 % of the phase or 0.5 mrad, at the edge and at the centre.
+    """
     mission = squinted(squint)
-    study = Study(mission)
-    first_order = FirstOrder(mission, mission.geometry, study.ground)
+    analysis = Analysis(mission)
     largest, seen = 0.0, 0
-    for source in study.sources:
-        size = math.pi / 8 / abs(source.full.qpe) if source.full.qpe else 0.0
-        if not size or abs(first_order.second.effect(source, size).qpe) > 0.002:
+    for source in analysis.sources:
+        size = analysis.full.allowable(source, QUADRATIC, math.pi / 8) if source.is_motion else None
+        if size is None:
             continue
-        edge = ScenePhases(mission, mission.geometry, [source._replace(declared=size)])
-        centre = exact_at(mission, source, size, (0.0, 0.0)).quadratic
+        edge = edge_of(mission, [source._replace(declared=size)])
+        centre = [exact_at(mission, source, signed, (0.0, 0.0)).quadratic for signed in (size, -size)]
         for azimuth in np.arange(8) * math.pi / 4:
             point = at(radius, azimuth)
             (difference,) = edge.differences(radius, azimuth)
-            exact = exact_at(mission, source, size, point).quadratic - centre
-            assert difference == pytest.approx(exact, abs=tolerance, rel=0.02), (source.id, azimuth)
-            largest, seen = max(largest, abs(exact)), seen + 1
-    assert seen >= 40
+            there = [exact_at(mission, source, signed, point).quadratic for signed in (size, -size)]
+            exact = max(abs(a - b) for a, b in zip(there, centre, strict=True))
+            assert abs(difference) == pytest.approx(exact, abs=2 * 0.002 * math.pi / 8), (source.id, azimuth)
+            largest, seen = max(largest, exact), seen + 1
+    assert seen >= 100
     assert largest > 0.01
 
 
 @pytest.mark.parametrize(("radius", "azimuth"), [(250.0, 1.0), (1000.0, 1.0), (1000.0, 4.2)])
 @pytest.mark.parametrize("row_id", ["receiver.velocity.x", "transmitter.velocity.y", "receiver.acceleration.y"])
 def test_images_at_the_edge_show_them(row_id: str, radius: float, azimuth: float) -> None:
-    """Backprojection, with the collection's own geometry, of a point on the rim; 0.01 rad is what a cut resolves."""
+    """Backprojection, with the collection's own geometry, of a point on the rim; 5 mrad is what an image resolves."""
     mission = squinted(30)
     study = Study(mission)
     source = next(s for s in study.sources if s.id == row_id)
-    size = math.pi / 8 / abs(source.full.qpe)
-    edge = ScenePhases(mission, mission.geometry, [source._replace(declared=size)])
+    size = study.analysis.full.allowable(source, QUADRATIC, math.pi / 8)
+    edge = edge_of(mission, [source._replace(declared=size)])
     measured = []
-    for point in ((0.0, 0.0), at(radius, azimuth)):
-        moved = exact_at(mission, source, size, point).displacement
-        there = (point[0] + moved[0], point[1] + moved[1])
-        chip = study.collection.chip(there, study.errors(source, size), scatterer=point)
-        reference = study.collection.chip(there, Errors(), scatterer=there)
-        history = study.collection.spatial_frequency(reference)
-        measured.append(quadratic_phase_error(chip.cut, reference.cut, study.collection.spacing[1], *history)[0])
+    for signed in (size, -size):
+        errors, phases = study.errors(source, signed), []
+        for point in ((0.0, 0.0), at(radius, azimuth)):
+            moved = exact_at(mission, source, signed, point).displacement
+            there = (point[0] + moved[0], point[1] + moved[1])
+            chip = study.collection.chip(there, errors, scatterer=point, range_cells=RANGE_CELLS)
+            reference = study.collection.chip(
+                there, errors, scatterer=there, range_cells=RANGE_CELLS, is_reference=True
+            )
+            phases.append(read_aperture(study.collection, errors, there, chip, reference).quadratic)
+        measured.append(phases[1] - phases[0])
     (difference,) = edge.differences(radius, azimuth)
-    assert measured[1] - measured[0] == pytest.approx(difference, abs=0.01)
+    assert max(map(abs, measured)) == pytest.approx(abs(difference), abs=0.005)
 
 
 class TestRow:
@@ -123,8 +138,8 @@ class TestRow:
         mission = parse_mission(mission_text(scene={"radius": 500}, allocation__model="full", **self.VELOCITY))
         found = check_mission(mission, TODAY)
         source = next(s for s in Study(mission).sources if s.id == "receiver.velocity.y")
-        edge = ScenePhases(mission, mission.geometry, [source])
-        worst = max(edge.place(500, math.radians(degrees / 2)).size for degrees in range(720))
+        edge = edge_of(mission, [source])
+        worst = max(edge.together(edge.differences(500, math.radians(degrees / 2))) for degrees in range(720))
         assert row(found, "mission.spatial_variance").declared == pytest.approx(worst, rel=1e-3)
 
     @pytest.mark.parametrize("rule", ["each", "sum", "rss"])
@@ -133,7 +148,7 @@ class TestRow:
         found = self.found(300, allocation__combine=rule, **errors)
         mission = parse_mission(mission_text(**errors))
         members = [s for s in Study(mission).sources if s.declared]
-        edge = ScenePhases(mission, mission.geometry, members)
+        edge = edge_of(mission, members)
         join = {"each": lambda d: np.abs(d).max(), "sum": lambda d: np.abs(d).sum(), "rss": np.linalg.norm}[rule]
         worst = max(join(edge.differences(300, math.radians(degrees))) for degrees in range(360))
         variance = row(found, "mission.spatial_variance")
@@ -152,7 +167,7 @@ class TestRow:
         sources = {s.id: s for s in Study(mission).sources}
         names = [f"receiver.{kind}.{axis}" for kind in ("position", "velocity") for axis in "xyz"]
         members = [sources[name]._replace(declared=size) for name, size in zip(names, sigmas, strict=True)]
-        edge = ScenePhases(mission, mission.geometry, members)
+        edge = edge_of(mission, members)
         differences = np.array([edge.differences(500, math.radians(degrees)) for degrees in range(360)])
         worst = math.sqrt(max(np.einsum("ki,ij,kj->k", differences, correlation, differences)))
         assert variance.declared == pytest.approx(worst, rel=1e-3)
@@ -200,7 +215,7 @@ class TestRow:
         found = findings(platforms=platforms, scene={"radius": 500})
         mission = parse_mission(mission_text(platforms=platforms))
         members = [s for s in Study(mission).sources if s.declared]
-        edge = ScenePhases(mission, mission.geometry, members)
+        edge = edge_of(mission, members)
         assert found.scene.autofocus_radius is not None
         circle = [edge.place(found.scene.autofocus_radius, math.radians(degrees)) for degrees in range(360)]
         assert all(place.has_image for place in circle)
@@ -225,7 +240,7 @@ class TestRow:
         assert "no image at the scene's edge" in found.reason
 
     def test_a_narrow_arc_without_an_image_is_not_hidden_by_a_short_range_gradient(self) -> None:
-        """14° around azimuth 125° with gradients parallel to 1°; beside it the range gradient is nearer to 0.02."""
+        """14° around azimuth 126° with gradients parallel to 1°; beside it the range gradient is nearer to 0.02."""
         velocities = ([223.48, 165.06, 8.766], [40.53, 24.197, 1.0026])
         positions = ([-903.7, 453.007, 4911.339], [-96.108, -46.558, 4249.289])
         platforms = {
@@ -234,7 +249,7 @@ class TestRow:
         }
         found = row(findings(platforms=platforms, scene={"radius": 422.9}), "mission.spatial_variance")
         assert found.status == "not_evaluated"
-        assert "azimuth 125 deg" in found.reason
+        assert "azimuth 126 deg" in found.reason
 
     def test_clock_and_terrain_vary_over_the_scene(self) -> None:
         """A constant clock error moves the image, and so bends it differently at the edge: exact ranges agree."""
@@ -287,22 +302,28 @@ def random_scenes(count: int, seed: int):
 def test_edge_and_radius_are_those_of_a_circle_of_720_places() -> None:
     """To 0.2 %: the largest difference, the radius that one correction serves, and whether there is an image."""
     seen = {"image": 0, "none": 0, "served": 0}
-    for mission in random_scenes(60, seed=1):
+    for mission in random_scenes(30, seed=1):
         members = [s for s in Study(mission).sources if s.declared]
         if mission.allocation.combine != "each":
             members = [s for s in members if s.is_independent]
-        edge = ScenePhases(mission, mission.geometry, members)
+        edge = edge_of(mission, members)
 
         def circle(radius: float, edge=edge):
             return [edge.place(radius, math.pi * k / 360) for k in range(720)]
 
         scene = check_mission(mission, TODAY).scene
-        has_image = all(place.has_image for place in circle(scene.radius))
+        # Of large errors at fewer places: each is searched for by exact ranges. 1 % is what lies between two of them.
+        places = 90 if edge.large else 0
+        of_large = [edge.together(edge.differences(scene.radius, 2 * math.pi * k / 90)) for k in range(places)]
+        has_image = all(place.has_image for place in circle(scene.radius)) and all(map(math.isfinite, of_large))
         assert has_image == (not scene.degeneracy), mission
         seen["image" if has_image else "none"] += 1
         if not has_image:
             continue
-        assert scene.difference == pytest.approx(max(p.size for p in circle(scene.radius)), rel=2e-3, abs=1e-9)
+        if edge.large:
+            assert max(of_large) * (1 - 2e-3) <= scene.difference <= max(of_large) * 1.01
+        else:
+            assert scene.difference == pytest.approx(max(p.size for p in circle(scene.radius)), rel=2e-3, abs=1e-9)
         served = scene.autofocus_radius or scene.searched
         assert all(place.has_image and place.size <= math.pi / 4 for place in circle(0.998 * served))
         if scene.autofocus_radius is not None:

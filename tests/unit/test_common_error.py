@@ -7,6 +7,7 @@ import pytest
 from bisar_budget.budget.correlation import correlated_errors, likely_error
 from bisar_budget.budget.sources import error_sources
 from bisar_budget.mission.load import parse_mission
+from tests import reference
 from tests.conftest import findings, mission_text, row
 
 T, WAVELENGTH = 6.0, 299_792_458.0 / 10e9
@@ -49,7 +50,9 @@ def test_with_both_platforms_in_one_place_it_is_the_two_way_rule() -> None:
     for axis in "xyz":
         one = row(found, f"receiver.velocity.{axis}")
         both = row(found, f"common.velocity.{axis}")
-        assert both.allowable_full == (None if one.allowable_full is None else pytest.approx(one.allowable_full))
+        # Of small errors: along z the second order binds, and of a common error that is another one.
+        if axis == "y":
+            assert both.allowable_full == pytest.approx(one.allowable_full)
     # The platform has half of the total: the common error, twice as strong, has all of it.
     assert row(found, "common.velocity.y").qpe_published_rad == pytest.approx(
         2 * math.pi * T**2 * 100 * 1e-3 / (2 * WAVELENGTH * math.hypot(20e3, 6e3))
@@ -67,14 +70,12 @@ def test_legs_that_cancel_leave_no_limit() -> None:
     assert one.allowable is None
     assert one.qpe_published_rad == 0
     assert "cancel" in one.reason
-    # What is left is the quartic term of two platforms that do not fly as mirror images: -ü/4 of each, 6/7 of it.
-    left = 0.0
-    for state in (found.geometry.transmitter, found.geometry.receiver):
-        u, h = state.look, 0.1
-        ahead, behind = (state.at(tau)[0] for tau in (h, -h))
-        left += (ahead[0] / math.hypot(*ahead) - 2 * u[0] + behind[0] / math.hypot(*behind)) / h**2
-    quartic = -left / 4 * one.declared * 6 / 7 * (6 / 2) ** 4
-    assert one.qpe_full_rad == pytest.approx(2 * math.pi / found.wavelength * quartic, rel=1e-3)
+    # What is left, of platforms that do not fly as mirror images, is that of the reference's exact ranges.
+    mission = parse_mission(mission_text(platforms=platforms, common_motion_error={"acceleration": "1 ug"}))
+    (error,) = [one for one in reference.errors_of(mission) if one.id == "common.acceleration.x"]
+    ahead, back = reference.at_declared(mission, [error._replace(declared=1e4 * one.declared)]).qpe[:, 0]
+    assert one.qpe_full_rad == pytest.approx((ahead - back) / 2e4, rel=1e-3)
+    assert one.qpe_full_rad != 0
 
 
 def test_it_is_held_to_the_total_and_counts_for_the_mission_alone() -> None:
@@ -84,7 +85,7 @@ def test_it_is_held_to_the_total_and_counts_for_the_mission_alone() -> None:
     common = row(found, "common.velocity.y").qpe_published_rad
     assert row(found, "receiver.quadratic_phase_error").declared == pytest.approx(own)
     assert row(found, "mission.quadratic_phase_error").declared == pytest.approx(math.hypot(own, common))
-    assert "no one platform" in row(found, "common.velocity.y").notes[0]
+    assert "both platforms" in row(found, "common.velocity.y").notes[0]
     worst = findings(
         **{**text, "allocation__combine": "sum"}, platforms__receiver__motion_error={"velocity": "3 mm/s"}
     )

@@ -164,7 +164,8 @@ class TestAggregates:
         """The same covariance stated in three frames, turned by NumPy, has one root-sum-square."""
         geometry = parse_mission(mission_text()).geometry
         rng = np.random.default_rng(1)
-        factor = np.diag([1, 2, 3, 2e-3, 3e-3, 4e-3]) @ rng.standard_normal((6, 6))
+        # So small that all effects are proportional to them.
+        factor = 1e-3 * np.diag([1, 2, 3, 2e-3, 3e-3, 4e-3]) @ rng.standard_normal((6, 6))
         c = factor @ factor.T
         got = []
         for frame in FRAME_AXES:
@@ -201,15 +202,16 @@ class TestAggregates:
         for name in ("receiver.velocity.x", "receiver.quadratic_phase_error", "mission.location_error"):
             assert row(three, name).declared == pytest.approx(3 * row(one, name).declared)
 
-    def test_strictest_takes_the_larger_of_both_models(self) -> None:
+    def test_strictest_has_the_row_of_the_stricter_model(self) -> None:
         text = {
             ERROR: {"covariance": sigmas({"velocity.x-velocity.y": 0.8, "position.x-velocity.x": 0.3})},
             "allocation__combine": "rss",
+            "requirements": {"location_error": "2 m", "cubic_phase_error": 0.1},
         }
         by = {model: findings(**text, allocation__model=model) for model in ("published", "full", "strictest")}
         for name in ("receiver.quadratic_phase_error", "mission.cubic_phase_error", "mission.location_error"):
-            one, two, most = (row(by[model], name).declared for model in ("published", "full", "strictest"))
-            assert most >= max(one, two) * (1 - 1e-12)
+            one, two, most = (row(by[model], name).utilization for model in ("published", "full", "strictest"))
+            assert most == max(one, two)
 
     def test_balanced_shares_weigh_with_the_correlation(self) -> None:
         """One sigma of the receiver's phase is 0 with ρ = 1 and the velocities alone: it gets the least share."""
