@@ -95,10 +95,13 @@ def _bound_elsewhere(study: Study, source: ErrorSource) -> Verdict:
     required = requirements.location_error or 0.0
     pixel = min(chips[0].spacing)
     excess = math.hypot(*measured) - required
+    verdict = "confirmed" if abs(excess) <= pixel / 2 else compare(excess, 0.0)
     return blank._replace(
         measured_displacement_m=measured,
-        verdict="confirmed" if abs(excess) <= pixel / 2 else compare(excess, 0.0),
-        reason=f"bound by the location: the image moves by {format_quantity(math.hypot(*measured), 'm', 4)}, "
+        verdict=verdict,
+        reason=None
+        if verdict == "confirmed"
+        else f"bound by the location: the image moves by {format_quantity(math.hypot(*measured), 'm', 4)}, "
         f"{format_quantity(required, 'm', 4)} allowed",
     )
 

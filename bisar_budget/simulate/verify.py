@@ -90,6 +90,12 @@ def _conditions(mission: Mission) -> Iterator[str]:
     yield "pulses as needed" + (f" (the {given} of collection.pulses must not alias)" if given else "")
 
 
+def _order(row_id: str) -> tuple[bool, int, int]:
+    """Of a platform's vibrations as `check` has it: lines, lines together, noise."""
+    parts = row_id.split(".")
+    return (parts[2] != "sinusoidal", len(parts), int(parts[-1]) if parts[-1].isdigit() else 0)
+
+
 def _cases(study: Study) -> Iterator[tuple[str, Case]]:
     mission, allocation = study.mission, study.allocation
     for source in study.sources:
@@ -97,12 +103,16 @@ def _cases(study: Study) -> Iterator[tuple[str, Case]]:
             yield source.id, partial(phase_cases.other, study, source)
         elif study.allowed(source).smallest is not None:
             yield source.id, partial(phase_cases.quadratic, study, source)
+    slow: dict[str, Case] = {}
     for name in PLATFORMS:
         for index, line in enumerate(lines_of(mission, name)):
             if line.frequency * study.collection.aperture_time < SLOWEST:
                 row_id = f"{name}.vibration.sinusoidal.{index}"
-                yield row_id, partial(phase_cases.slow_vibration, study, row_id, name, line)
-    yield from vibration.cases(mission, allocation, study.collection)
+                slow[row_id] = partial(phase_cases.slow_vibration, study, row_id, name, line)
+    swaying = slow | dict(vibration.cases(mission, allocation, study.collection))
+    for owner in (*PLATFORMS, "mission"):
+        for row_id in sorted((one for one in swaying if one.startswith(f"{owner}.")), key=_order):
+            yield row_id, swaying[row_id]
     requirements = mission.requirements
     if mission.allocation.combine == "each":
         # The row exists only where it warns.
