@@ -50,7 +50,7 @@ def test_with_both_platforms_in_one_place_it_is_the_two_way_rule() -> None:
     for axis in "xyz":
         one = row(found, f"receiver.velocity.{axis}")
         both = row(found, f"common.velocity.{axis}")
-        # Of small errors: along z the second order binds, and of a common error that is another one.
+        # Along x and z exact ranges bind by their second order, which of a common error is another one.
         if axis == "y":
             assert both.allowable_full == pytest.approx(one.allowable_full)
     # The platform has half of the total: the common error, twice as strong, has all of it.
