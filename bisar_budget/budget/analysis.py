@@ -89,7 +89,6 @@ class Analysis:
         both: tuple[Model, ...] = (self.published, self.full)
         models = [model for model in both if gating in (model.name, "strictest")]
         phases = {
-            source.id: max((self.does(model, source).qpe for model in models), key=abs)
-            for source in self.stated
+            source.id: max((self.does(model, source).qpe for model in models), key=abs) for source in self.stated
         }
         return allocate(self.mission, self.stated, phases, slow_phases(self.mission))

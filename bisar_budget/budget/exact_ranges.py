@@ -207,8 +207,9 @@ class ExactRanges:
     ) -> ExactPhases | None:
         """Find where errors of given sizes move a point at the centre, and what defocuses there.
 
-        The search starts `near` [m], and has to settle from there at once: `point_path` follows a point. None where it
-        does not, or beyond a line on which range and Doppler gradients are parallel: no error leads there from nothing.
+        The search starts `near` [m] and has to settle from there at once: `point_path` follows a point. None where it
+        does not, and beyond a line on which range and Doppler gradients are parallel: no error leads there from
+        nothing.
         """
         measured = dict(self.tracks)
         recorded = self.recorded

@@ -1,7 +1,7 @@
 """Where one error takes the image of a point as it grows, and the first size at which it reaches a limit.
 
-The point is followed from no error on. Where range and Doppler gradients become parallel there its way ends: no larger
-error has an image of the point, which counts as a limit reached.
+The point is followed from no error on. Where range and Doppler gradients become parallel there, its way ends: no
+larger error has an image of the point, which counts as a limit reached.
 """
 
 import math

@@ -131,7 +131,7 @@ def test_every_row_can_be_repeated_by_hand(path, model: str) -> None:
             assert results["QPE"] == pytest.approx(row.qpe_published_rad, rel=1e-5), row.id
         if row.qpe_full_rad and row.unit != "rad":
             # Double precision holds the ranges of a satellite to 1e-10 m.
-                assert abs(results["QPE_full"]) == pytest.approx(abs(row.qpe_full_rad), rel=1e-5, abs=2e-7), row.id
+            assert abs(results["QPE_full"]) == pytest.approx(abs(row.qpe_full_rad), rel=1e-5, abs=2e-7), row.id
         if row.utilization is not None and row.allowable is not None:
             assert results["utilization"] == pytest.approx(row.utilization, rel=1e-5, abs=1e-12), row.id
         if row.allowable is not None and row.unit not in ("rad",) and row.metric != "location_error":
