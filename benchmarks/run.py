@@ -267,11 +267,9 @@ def montecarlo(runs: int) -> None:
     """Every motion and clock error of both platforms, 22 normal variables; judged are phases, cubic and location."""
     import numpy as np
 
+    from bisar_budget.budget.analysis import Analysis
     from bisar_budget.budget.draws import _stream
-    from bisar_budget.budget.effects import full_ground
     from bisar_budget.budget.monte_carlo import _variables, monte_carlo
-    from bisar_budget.budget.sources import error_sources
-    from bisar_budget.constants import SPEED_OF_LIGHT
     from bisar_budget.mission.load import parse_mission
 
     motion = "{position: 1 m, velocity: 5 mm/s, acceleration: 20 ug}"
@@ -282,50 +280,35 @@ def montecarlo(runs: int) -> None:
     timing_error: {{constant: 5 ns, linear: 1e-11, quadratic: 1e-13, cubic: 1e-13}},
     requirements: {{cubic_phase_error: 1e-2, location_error: 3 m}}}}"""
     mission = parse_mission(text)
-    geometry, n, seed = mission.geometry, 1_000_000, 1
-    wavelength, T = mission.radar.wavelength, mission.collection.aperture_time
-    ground = full_ground(mission, geometry)
-    declared = [s for s in error_sources(mission, geometry, ground) if s.declared is not None]
-    variables = list(_variables(mission, declared, (), ground))
+    n, seed = 1_000_000, 1
+    analysis = Analysis(mission)
+    declared = analysis.stated
+    variables = list(_variables(analysis))
     sizes = [abs(s.declared) for s in declared]
 
     def draw() -> list[np.ndarray]:
         return [_stream(v, seed)(n) * size for v, size in zip(variables, sizes, strict=True)]
 
-    s = np.array(ground.looks).sum(axis=0)[:, :2]
-    inverse = np.linalg.inv(-s[:2])
-    phase = 2 * np.pi / wavelength * (T / 2) ** np.arange(5)
+    plane = analysis.full.plane
+    of_transmitter = [s.owner == "transmitter" for s in declared]
+    moves = [plane.displacement(s.full, 1.0) for s in declared]
 
-    def left(b: list) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
-        """Quadratic and cubic phase at the displaced point, and where that is."""
-        x, y = (row[0] * b[0] + row[1] * b[1] for row in inverse)
-        quadratic = phase[2] * (b[2] + (s[2, 0] * x + s[2, 1] * y) / 2)
-        quadratic += 6 / 7 * phase[4] * (b[4] + (s[4, 0] * x + s[4, 1] * y) / 24)
-        cubic = phase[3] * (b[3] + (s[3, 0] * x + s[3, 1] * y) / 6)
-        return quadratic, cubic, [x, y]
+    def total(e: list[np.ndarray], factors: list[float]) -> np.ndarray:
+        return sum(factor * one for factor, one in zip(factors, e, strict=True))
 
     def formulas(e: list[np.ndarray]) -> list[float]:
-        """The full model as docs/full-model.md has it, over whole arrays, and the probabilities."""
-        clock = [*(SPEED_OF_LIGHT * t for t in e[18:]), 0.0]
-        parts = []
-        for k, (u, u1, u2, u3, u4) in enumerate(ground.looks):
-            p, v, a = e[9 * k : 9 * k + 3], e[9 * k + 3 : 9 * k + 6], e[9 * k + 6 : 9 * k + 9]
-            b = [
-                -sum(u[i] * p[i] for i in range(3)),
-                -sum(u1[i] * p[i] + u[i] * v[i] for i in range(3)),
-                -sum(u2[i] / 2 * p[i] + u1[i] * v[i] + u[i] / 2 * a[i] for i in range(3)),
-                -sum(u3[i] / 6 * p[i] + u2[i] / 2 * v[i] + u1[i] / 2 * a[i] for i in range(3)),
-                -sum(u4[i] / 24 * p[i] + u3[i] / 6 * v[i] + u2[i] / 4 * a[i] for i in range(3)),
-            ]
-            parts.append(left([x + c for x, c in zip(b, clock, strict=True)] if k else b))
-        (qt, ct, mt), (qr, cr, mr) = parts
+        """The effects of small errors as docs/full-model.md has them, over whole arrays, and the probabilities."""
+        qt = total(e, [s.full.qpe * mine for s, mine in zip(declared, of_transmitter, strict=True)])
+        qr = total(e, [s.full.qpe * (not mine) for s, mine in zip(declared, of_transmitter, strict=True)])
+        cubic = total(e, [s.full.cubic for s in declared])
+        x, y = (total(e, [move[axis] for move in moves]) for axis in (0, 1))
         limit = np.pi / 8
         return [
             float(np.mean(np.abs(qt) <= limit)),
             float(np.mean(np.abs(qr) <= limit)),
             float(np.mean(np.abs(qt + qr) <= 2 * limit)),
-            float(np.mean(np.abs(ct + cr) <= 1e-2)),
-            float(np.mean(np.hypot(mt[0] + mr[0], mt[1] + mr[1]) <= 3)),
+            float(np.mean(np.abs(cubic) <= 1e-2)),
+            float(np.mean(np.hypot(x, y) <= 3)),
         ]
 
     drawn = draw()
