@@ -10,11 +10,12 @@ from collections.abc import Iterator, Sequence
 from bisar_budget.budget.analysis import Analysis
 from bisar_budget.budget.effects import ErrorSource
 from bisar_budget.budget.exact_ranges import ExactRanges
+from bisar_budget.budget.models import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.geometry import GroundVector
 from bisar_budget.report.formulas import Step, Sum, number, step, with_unit
 
 RATES = ("m", "m/s", "m/s²", "m/s³")  # units of the range error's coefficients
-_VALUE, _SLOPE, _QUADRATIC, _CUBIC = range(4)
+_, _, _QUADRATIC, _CUBIC = range(4)  # rows of a fit
 
 
 class Left:
@@ -105,15 +106,23 @@ def for_comparison(analysis: Analysis, source: ErrorSource, size: float, each: s
     )
 
 
-def at_the_allowable(analysis: Analysis, source: ErrorSource, allowable: float) -> Iterator[Step]:
+def at_the_allowable(
+    analysis: Analysis, source: ErrorSource, allowable: float, requirement: str = QUADRATIC
+) -> Iterator[Step]:
     """Show that an allowable that was searched for is at its limit."""
-    left = worse(analysis, source, allowable)
-    if left.ranges:
-        yield from step(
-            f"At {number(left.size)} {source.unit.replace('^2', '²')}, the smallest size of either sign that reaches "
-            "the limit, exact ranges leave",
-            left.sum("QPE_there", _QUADRATIC),
-        )
+    sizes = [Left(analysis, source, signed) for signed in (allowable, -allowable)]
+    if not all(left.ranges for left in sizes):
+        return
+    if requirement == LOCATION:
+        left = max(sizes, key=lambda one: math.hypot(*(one.place or (0.0, 0.0))))
+        x, y = left.place or (0.0, 0.0)
+        moved = Sum(f"moved = sqrt({number(x)}^2 + {number(y)}^2) = {with_unit(math.hypot(x, y), 'm')}")
+    else:
+        which, symbol = (_CUBIC, "cubic_there") if requirement == CUBIC else (_QUADRATIC, "QPE_there")
+        left = max(sizes, key=lambda one: abs(one.phase(which)))
+        moved = left.sum(symbol, which)
+    size = f"{number(left.size)} {source.unit.replace('^2', '²')}"
+    yield from step(f"At {size}, the smallest size of either sign that reaches the limit, exact ranges give", moved)
 
 
 def _placed(left: Left) -> Sequence[str]:

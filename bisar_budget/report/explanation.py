@@ -125,16 +125,22 @@ def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]
                 "Allowable by the quadratic phase",
                 *equation("by_QPE", "limit/(QPE/unit)", values, by_quadratic, row.unit),
             )
-    others = ((CUBIC, requirements.cubic_phase_error, "rad"), (LOCATION, requirements.location_error, "m"))
-    for name, required, unit in others if source.is_motion else ():
+    others = (
+        (CUBIC, "by_cubic", requirements.cubic_phase_error, "rad"),
+        (LOCATION, "by_location", requirements.location_error, "m"),
+    )
+    for name, symbol, required, unit in others if source.is_motion else ():
         size = None if required is None else model.allowable(source, name, required)
-        if required is not None and size is not None:
-            symbol = "by_cubic" if name == CUBIC else "by_location"
-            sizes[symbol] = size
-            yield from step(
-                f"Allowable by requirements.{name}, {with_unit(required, unit)}, without share and gain",
-                f"{symbol} = {with_unit(size, row.unit)}",
-            )
+        if required is None or size is None:
+            continue
+        sizes[symbol] = size
+        title = f"Allowable by requirements.{name}, {with_unit(required, unit)}, without share and gain"
+        if row.model == "full" and not analysis.full.is_linear_at(source, name, required):
+            yield from step(title, f"{symbol} = {with_unit(size, row.unit)}")
+            yield from at_the_allowable(analysis, source, size, name)
+        else:
+            values = {"limit": required, "effect/unit": required / model.small(source, name, required)}
+            yield from step(title, *equation(symbol, "limit/(effect/unit)", values, size, row.unit))
     if row.allowable is None:
         yield from step("Allowable: no limit", printable(row.reason or "no requirement limits this error"))
         return

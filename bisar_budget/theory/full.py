@@ -5,8 +5,8 @@ does: with u(τ) the unit vector to a platform, a position error r̃(τ) changes
 order. Constant and linear terms move the response to x̂, where a point has a history of its own; what defocuses is
 the rest. Derived here; nothing of it is in the paper.
 
-Numbers come from `range_error_at` at the nodes of `legendre_fit`, whatever the length of the aperture. The series about
-its middle is what a reader compares with Table I: over a short aperture both are the same.
+Numbers come from `range_error_at` at the nodes of `legendre_fit`, whatever the length of the aperture. The series
+about its middle is what a reader compares with Table I: over a short aperture both are the same.
 """
 
 from collections.abc import Sequence
@@ -188,7 +188,7 @@ def table() -> Table:
         rows=tuple(rows),
         notes=(
             "Derived here. u and its derivatives are those of the unit vector to the platform at τ = 0.",
-            "A check does not stop at a power of τ: it fits exact ranges over the whole aperture (docs/full-model.md).",
+            "A check does not stop at a power of τ: it fits exact ranges over the aperture (docs/full-model.md).",
         ),
     )
 
