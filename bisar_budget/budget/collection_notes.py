@@ -7,7 +7,7 @@ from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import STRAIGHT, norm
 
 _TURNING_RAD = 0.1  # half the turn of a line of sight; the quartic term is 1 % of the quadratic there
-_COARSE_CELL_RAD = 1.0  # of phase between points a range cell apart; beyond, a response spreads over cells
+COARSE_CELL_RAD = 1.0  # of phase between points a range cell apart; beyond, a response spreads over cells
 _ABSORBED_RAD = 6.1  # of the same, where the image shows half; measured, uniform window, 8 to 300 MHz
 
 
@@ -23,12 +23,16 @@ def collection_notes(analysis: Analysis) -> Iterator[str]:
                 f"the {name}'s line of sight turns by ±{turn:.2g} rad: the published model takes the phase for a "
                 "quadratic, the full model does not"
             )
-    # A range cell as a constant term displaces by a cell, and so has a phase.
-    (by_constant, _), _ = analysis.exact.phases_per_term
-    cell = abs(by_constant) * SPEED_OF_LIGHT / mission.radar.bandwidth
-    if cell > _COARSE_CELL_RAD:
+    cell = phase_across_a_cell(analysis)
+    if cell > COARSE_CELL_RAD:
         shown = 100 / (1 + (cell / _ABSORBED_RAD) ** 2)
         yield (
             f"points a range cell apart differ by {cell:.3g} rad of quadratic phase: a defocused response spreads "
             f"over range cells instead. An image shows about {shown:.2g} % of the phase: the limits are conservative"
         )
+
+
+def phase_across_a_cell(analysis: Analysis) -> float:
+    """Quadratic phase between points of the ground a range cell c/B apart. [rad]"""
+    (by_constant, _), _ = analysis.exact.phases_per_term
+    return abs(by_constant) * SPEED_OF_LIGHT / analysis.mission.radar.bandwidth

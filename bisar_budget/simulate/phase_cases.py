@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from bisar_budget.budget.collection_notes import COARSE_CELL_RAD, phase_across_a_cell
 from bisar_budget.budget.effects import ErrorSource
 from bisar_budget.budget.images import Verdict
 from bisar_budget.budget.models import CUBIC
@@ -25,7 +26,6 @@ TOLERANCE = 0.05  # of the budget: nearer than this a limit is confirmed
 INSIDE, BEYOND = 0.9, 1.1  # of the limit: the phase on both sides shows that the limit is the limit
 HALF_CELL = 0.5  # of range walk; beyond, one-dimensional autofocus leaves a loss (0.34 dB there, uniform)
 _BESIDE_CELLS = 64  # of smear; beyond, no images are formed on both sides of a limit
-_COARSE_CELL_RAD = 1.0  # of phase between points a range cell apart; beyond, a response moves along range instead
 
 
 def quadratic(study: Study, source: ErrorSource) -> Verdict:
@@ -274,7 +274,7 @@ def _judged(study: Study, blank: Verdict, sizes: Sizes) -> Verdict:
         displacement_full_m=effect.displacement,
         smear_azimuth_published_rad=(study.geometry.look_azimuth + math.pi / 2) % math.pi,
         verdict=compare(measured / budget - 1, TOLERANCE),
-        reason=_remark(study, errors, effect, reading.coverage),
+        reason=_remark(study, reading.coverage),
     )
 
 
@@ -311,10 +311,16 @@ def _phase(study: Study, sizes: Sizes, scale: float) -> float | None:
         return None
 
 
-def _remark(study: Study, errors: Errors, effect: ExactEffect, coverage: float) -> str | None:
+def _remark(study: Study, coverage: float) -> str | None:
     """Say what of the image is unusual: a smear beyond the patch, or range cells that absorb phase."""
     if coverage < 0.9:
         return f"the smear leaves the patch, which holds {100 * coverage:.0f} % of the aperture"
+    cell = phase_across_a_cell(study.analysis)
+    if cell > COARSE_CELL_RAD:
+        return (
+            f"range cells are coarse: points a cell apart differ by {cell:.3g} rad, so that the response also moves "
+            "along range. The phase is that at the displaced point"
+        )
     return None
 
 
