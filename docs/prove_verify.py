@@ -4,7 +4,7 @@
     python docs/prove_verify.py --missions 12 --family jets
 
 A limit is to have its image. Its verdict is to be that of exact ranges, and its measured phase within 5 % of theirs
-or 0.02 rad. No limit of the full model is to be optimistic. Every miss is printed; the exit code is 1 if there is one.
+or 0.02 rad. No limit of the full model is to be optimistic. Every miss is printed, and then the exit code is 1.
 """
 
 import argparse

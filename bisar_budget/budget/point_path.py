@@ -18,7 +18,7 @@ _FLOOR_M = 1e-3
 _LEAST_STEP = 1e-3  # of the size: allowables are right to 1 %
 _FINEST_STEP = 1e-6  # where the gradients stay apart, the way only turns
 _PARALLEL = 0.02  # of the sine between the gradients at the centre, over their lengths there
-_CLOSE = 1e-3  # of a limit, where a search ends
+_CLOSE = 1e-5  # of a limit, where a search ends
 _STEPS = 40
 
 Value = Callable[[ExactPhases], float]  # what is held to a limit, signed
