@@ -189,6 +189,9 @@ def impulse_response_2d(
         tuple(_CHIP_UPSAMPLING * (place + sign * cut.mask_m / spacing) for sign in (-1, 1))
         for place, cut, spacing in zip((row, column), pair, spacing_m, strict=True)
     ]
+    for size, (lower, upper) in zip(magnitude.shape, edges, strict=True):
+        if lower < 0 or upper > size - 2:
+            raise ValueError("the mainlobe reaches beyond the chip: take a larger one")
     weights = [_inside(size, *ends) for size, ends in zip(magnitude.shape, edges, strict=True)]
     energy = float(np.sum(magnitude**2))
     mainlobe = float(weights[0] @ magnitude**2 @ weights[1])
@@ -205,6 +208,11 @@ def impulse_response_2d(
         pslr_db=20 * math.log10(highest / peak),
         islr_db=10 * math.log10((energy - mainlobe) / mainlobe),
     )
+
+
+def highest(chip: Complexes) -> float:
+    """Largest magnitude of the interpolation of a chip (nx, ny)."""
+    return float(np.abs(upsampled(upsampled(chip, _CHIP_UPSAMPLING).T, _CHIP_UPSAMPLING)).max())
 
 
 def _check(samples: Complexes) -> None:

@@ -16,7 +16,7 @@ from bisar_budget.geometry import GroundVector
 from bisar_budget.simulate.aperture_reading import READ_CELLS, ApertureReading
 from bisar_budget.simulate.collection import MAX_CELLS, Chip, Errors
 from bisar_budget.simulate.exact import ExactEffect
-from bisar_budget.simulate.impulse_response import impulse_response, impulse_response_2d
+from bisar_budget.simulate.impulse_response import highest, impulse_response
 from bisar_budget.simulate.phase_history import MotionError, Sinusoid
 from bisar_budget.simulate.shift import measured_shift
 from bisar_budget.simulate.study import Sizes, Study
@@ -202,7 +202,7 @@ def refocused(study: Study, sizes: Sizes, budget: float) -> dict[str, Any]:
         chip, reference = study.chips(errors, effect, room=room)
         focused = study.focused(errors, effect, chip)
         residual = abs(study.read(errors, effect, focused, reference, is_focused=True).quadratic)
-        peaks = [impulse_response_2d(one.image, one.spacing).peak for one in (reference, focused)]
+        peaks = [highest(one.image) for one in (reference, focused)]
         loss = 20 * math.log10(peaks[0] / peaks[1])
     except (ValueError, np.linalg.LinAlgError) as error:
         return {"verdict_autofocus": "not_evaluated", "reason_autofocus": f"no image: {error}"}

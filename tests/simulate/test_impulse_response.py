@@ -297,3 +297,12 @@ class TestAgainstPerseo:
         near, far = (impulse_response(cut, spacing, reach_m=n * 0.88589) for n in (5, 10))
         assert (pslr, islr) == pytest.approx((-13.26, -10.21), abs=0.02)
         assert (near.pslr_db, far.islr_db) == pytest.approx((pslr, islr), abs=0.02)
+
+
+def test_a_mainlobe_beyond_the_chip_is_an_error_not_a_crash() -> None:
+    """A smear of a jet's refocused chip had its mainlobe's edge at pixel 997 of 992."""
+    x = np.arange(-32, 32) / 3
+    sharp, wide = np.sinc(x), np.exp(-((x / 12) ** 2))
+    chip = np.outer(sharp, wide).astype(complex)
+    with pytest.raises(ValueError, match=r"beyond the chip|mainlobe|null"):
+        impulse_response_2d(chip, (1.0, 1.0), (3.0, 60.0))
