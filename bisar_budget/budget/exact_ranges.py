@@ -11,13 +11,13 @@ import math
 from collections.abc import Iterable, Sequence
 from functools import cached_property
 from math import sqrt
-from operator import mul
+from operator import add, mul
 from typing import NamedTuple
 
 from bisar_budget.budget.effects import CLOCK_UNITS, PLATFORMS, Effect, ErrorSource, ImagePlane
 from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
 from bisar_budget.evaluators import LEGENDRE_FITS, full_motion
-from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState
+from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vector
 
 # Way of a platform in half an aperture, over its slant range, up to which so many nodes change phases by less than
 # 1e-6 of themselves; beyond the last, 16 nodes are right to 1e-3 at 1.25.
@@ -171,17 +171,34 @@ class ExactRanges:
         """Range error at the nodes of a small unit of any error, before it displaces anything. [m/unit]"""
         if not source.is_position:
             return self.shape(source)
-        x, y, z = source.direction
-        total = [0.0] * len(self.times)
-        for name in PLATFORMS:
-            if source.moves(name):
-                total = [
-                    whole - (a * x + b * y + c * z) / R * p
-                    for whole, (a, b, c), R, p in zip(
-                        total, self.tracks[name], self.ranges[name], self.powers[source.unit], strict=True
-                    )
-                ]
-        return total
+        moved = [self._along(name, source.direction) for name in PLATFORMS if source.moves(name)]
+        along = moved[0] if len(moved) == 1 else list(map(add, *moved))
+        return along if source.unit == "m" else list(map(mul, along, self.powers[source.unit]))
+
+    def _along(self, name: str, direction: Vector) -> list[float]:
+        """What a metre along a direction does to the range of a platform at the nodes, −u·d."""
+        key = (name, direction)
+        if key not in self._known_along:
+            x, y, z = direction
+            self._known_along[key] = [
+                -(a * x + b * y + c * z) / R
+                for (a, b, c), R in zip(self.tracks[name], self.ranges[name], strict=True)
+            ]
+        return self._known_along[key]
+
+    @cached_property
+    def _known_along(self) -> dict[tuple[str, Vector], list[float]]:
+        return {}
+
+    def quadratic_of(self, source: ErrorSource) -> float:
+        """Quadratic phase of a small unit of any error, that of `effect_of`. [rad/unit]"""
+        samples = self.range_error(source)
+        value, slope, quadratic, _ = self.fit
+        (by_value, by_slope), _ = self.phases_per_term
+        own = self.k * sum(map(mul, quadratic, samples))
+        moved = by_value * sum(map(mul, value, samples)) + by_slope * sum(map(mul, slope, samples)) / self.half
+        total = own + moved
+        return total if abs(total) > ROUNDING * (self.k * max(map(abs, samples)) + abs(moved)) else 0.0
 
     def effect(self, range_error: Samples) -> Effect:
         """Effect of a range error sampled at the nodes [m/unit], that of the displacement included."""

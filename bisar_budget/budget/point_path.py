@@ -19,6 +19,7 @@ _LEAST_STEP = 1e-3  # of the size: allowables are right to 1 %
 _FINEST_STEP = 1e-6  # where the gradients stay apart, the way only turns
 _PARALLEL = 0.02  # of the sine between the gradients at the centre, over their lengths there
 _CLOSE = 1e-5  # of a limit, where a search ends
+_ALMOST = 0.01  # of a limit, from where a parabola leads to it
 _STEPS = 40
 
 Value = Callable[[ExactPhases], float]  # what is held to a limit, signed
@@ -164,6 +165,8 @@ class PointPath:
                 bend = (b / high.size - slope) / high.size
                 if bend > 0:
                     size = 2 * limit / (slope + math.sqrt(slope * slope + 4 * bend * limit))
+                    if abs(b - limit) < _ALMOST * limit:
+                        return size  # what a third order changes is the square of that
             elif step % 3 == 2:
                 size = (low.size + high.size) / 2
             inside = 0.01 * (high.size - low.size)

@@ -124,7 +124,7 @@ class ScenePhases:
         try:
             sine = there.gradient_sine
             phases = [
-                there.effect_of(source).qpe * size if size else 0.0
+                there.quadratic_of(source) * size if size else 0.0
                 for source, size in zip(self.members, self.sizes, strict=True)
             ]
         except ZeroDivisionError:  # a gradient vanishes, or both are parallel to the last digit
