@@ -23,6 +23,8 @@ from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState,
 # 1e-6 of themselves; beyond the last, 16 nodes are right to 1e-3 at 1.25.
 _NODES = ((0.1, 6), (0.5, 10), (math.inf, 16))
 _ITERATIONS = 40
+_NEAR = 0.003  # of the nearest slant range; a point so near to the centre has slopes that differ by no more
+_FEW = 4
 _SHRINKS = 0.5  # square of each step of the search over that of the one before; else it does not settle
 _EPSILON = 2e-15  # of a range sum: what rounding of a few operations leaves
 _UNSEEN_RAD = 3e-5  # what the last step of the search may change a phase by beyond the part counted linearly
@@ -115,7 +117,7 @@ class ExactRanges:
         (s_x, rate_x, *_), (s_y, rate_y, *_) = self._gradient
         return (s_x * rate_y - s_y * rate_x) / (math.hypot(s_x, s_y) * math.hypot(rate_x, rate_y))
 
-    @property
+    @cached_property
     def nearest(self) -> float:
         """Least range at the nodes and, where they leave it out, at the middle of the aperture. [m]"""
         return min(self._middle, *(min(ranges) for ranges in self.ranges.values()))
@@ -317,8 +319,12 @@ class ExactRanges:
     def _settled(
         self, recorded: Samples, transmitter: Track, receiver: Track, near: GroundVector
     ) -> ExactPhases | None:
-        """Newton's method for the point."""
+        """Newton's method for the point; with the slopes of the centre where the point stays near it."""
         east, north = near
+        if math.hypot(east, north) < _NEAR * self.nearest:
+            found = self._settled_near(recorded, transmitter, receiver, east, north)
+            if found is not None:
+                return found
         value, slope, quadratic, cubic = self.fit
         before = math.inf
         for _ in range(_ITERATIONS):
@@ -364,6 +370,33 @@ class ExactRanges:
             if not step < _SHRINKS * before:
                 return None
             before = step
+        return None
+
+    def _settled_near(
+        self, recorded: Samples, transmitter: Track, receiver: Track, east: float, north: float
+    ) -> ExactPhases | None:
+        """Search with the slopes of the centre: a third of the work. None where it does not settle in a few steps."""
+        (a, c, quadratic_east, cubic_east), (b, d, quadratic_north, cubic_north) = self._gradient
+        value, slope, quadratic, cubic = self.fit
+        determinant = a * d - b * c
+        for _ in range(_FEW):
+            left = []
+            for whole, (x, y, z), (u, v, w) in zip(recorded, transmitter, receiver, strict=True):
+                x, y, u, v = x - east, y - north, u - east, v - north
+                left.append(whole - sqrt(x * x + y * y + z * z) - sqrt(u * u + v * v + w * w))
+            constant, linear = sum(map(mul, value, left)), sum(map(mul, slope, left))
+            step_east = (b * linear - d * constant) / determinant
+            step_north = (c * constant - a * linear) / determinant
+            east, north = east + step_east, north + step_north
+            if self.k * (abs(step_east) + abs(step_north)) < _UNSEEN_RAD / _NEAR:
+                left_quadratic, left_cubic = (
+                    phase if abs(phase := self.k * of_range) > self.rounding else 0.0
+                    for of_range in (
+                        sum(map(mul, quadratic, left)) + quadratic_east * step_east + quadratic_north * step_north,
+                        sum(map(mul, cubic, left)) + cubic_east * step_east + cubic_north * step_north,
+                    )
+                )
+                return ExactPhases((east, north), left_quadratic, left_cubic)
         return None
 
 

@@ -14,6 +14,7 @@ from bisar_budget.budget.exact_ranges import ExactPhases, ExactRanges
 from bisar_budget.geometry import GroundVector
 
 _STRAY = 0.15  # of a step; farther from where it led, a point is not the one that was followed
+_STRAIGHT = 0.1  # of a displacement, by which it may be off a straight way
 _FLOOR_M = 1e-3
 _LEAST_STEP = 1e-3  # of the size: allowables are right to 1 %
 _FINEST_STEP = 1e-6  # where the gradients stay apart, the way only turns
@@ -53,7 +54,7 @@ class PointPath:
 
     def to(self, size: float) -> ExactPhases | None:
         """What an error of a size does; None where its way has ended. [unit]"""
-        step = math.inf
+        step, is_first_try = math.inf, True
         while size < self.end:
             index = bisect(self.known, size, key=lambda one: one.size)
             last = self.known[index - 1]
@@ -61,11 +62,14 @@ class PointPath:
                 return last.phases
             step = min(step, size - last.size)
             ahead = size if size - last.size < 1.2 * step else last.size + step
-            near = self._ahead(index, ahead)
+            near = self._guess(index, ahead) if is_first_try else self._ahead(index, ahead)
             found = self.exact.phases([(self.source, self.sign * ahead)], near)
             if found is not None and _is_on_the_way(last.phases.displacement, found.displacement, near):
                 self.known.insert(index, _Known(ahead, found))
-                step *= 2
+                step, is_first_try = 2 * step, True
+                continue
+            if is_first_try:
+                is_first_try = False
                 continue
             step /= 2
             if step < _LEAST_STEP * ahead and (abs(last.phases.turn) < _PARALLEL or step < _FINEST_STEP * ahead):
@@ -78,6 +82,17 @@ class PointPath:
             east, north = self.exact.way(self.source, self.sign * known.size, known.phases.displacement)
             self._ways[known.size] = (self.sign * east, self.sign * north)
         return self._ways[known.size]
+
+    def _guess(self, index: int, size: float) -> GroundVector:
+        """Where the last known point before an index leads, if so far the way was nearly straight."""
+        last = self.known[index - 1]
+        x, y = last.phases.displacement
+        u, v = self._ways[0.0]
+        bent = (x - u * last.size, y - v * last.size)
+        if math.hypot(*bent) > _STRAIGHT * math.hypot(x, y):
+            return self._ahead(index, size)
+        part = (size / last.size) ** 2 if last.size else 0.0  # a parabola from no error on
+        return (u * size + bent[0] * part, v * size + bent[1] * part)
 
     def _ahead(self, index: int, size: float) -> GroundVector:
         """Where the known points before an index lead: along the way of the last, which bends as it did."""
