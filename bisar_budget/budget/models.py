@@ -209,12 +209,6 @@ class FullModel:
             self._paths[key] = PointPath(self.exact, source, sign, per_unit)
         return self._paths[key]
 
-    def worst(self, source: ErrorSource, size: float, requirement: str) -> float:
-        """Phase [rad] or displacement [m] of the worse sign; infinite without a ground point."""
-        value = _VALUES[requirement]
-        both = self.at(source, size), self.at(source, -size)
-        return max(math.inf if one is None else abs(value(one)) for one in both)
-
     def _smallest(
         self, source: ErrorSource, requirement: str, limit: float, per_unit: float, first: float, farthest: float
     ) -> float | None:
