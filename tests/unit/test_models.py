@@ -79,7 +79,7 @@ def test_at_the_allowable_the_worse_sign_is_at_the_limit(row_id: str) -> None:
     allowable = analysis.full.allowable(source, QUADRATIC, math.pi / 8)
     worst = [max(abs(q) for _, q, _ in phases(analysis, row_id, part * allowable)) for part in (0.99, 1.0, 1.01)]
     assert worst[0] < math.pi / 8 < worst[2]
-    assert worst[1] == pytest.approx(math.pi / 8, rel=3e-3)  # the second order that counts as none is 0.4 %
+    assert worst[1] == pytest.approx(math.pi / 8, rel=3e-3)  # counts as none: a second order bounded by 0.4 %
 
 
 def test_the_two_signs_of_section_v_are_those_of_the_physics() -> None:
