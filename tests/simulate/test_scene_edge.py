@@ -56,7 +56,7 @@ def exact_at(mission, source, size: float, point):
 def test_phases_at_the_edge_are_those_of_exact_ranges(squint: float, radius: float) -> None:
     """Every error at its limit of π/8, at eight places of the rim, of the sign that differs more.
 
-    Small errors may leave out a second order bounded by 0.4 % of the phase or 1 mrad. Here it is held to half of that,
+    Small errors may leave out a second order bounded by 0.4 % of the phase or 1 mrad. Half of that is allowed here,
     at the edge and at the centre.
     """
     mission = squinted(squint)
