@@ -18,6 +18,8 @@ _STRAIGHT = 0.1  # of a displacement, by which it may be off a straight way
 _FLOOR_M = 1e-3
 _LEAST_STEP = 1e-3  # of the size: allowables are right to 1 %
 _FINEST_STEP = 1e-6  # where the gradients stay apart, the way only turns
+_OF_FOLD = 0.8  # of the way to where the gradients seem to become parallel, that one step makes
+_SHORT = 0.1  # of the last step, below which that step says little of the way left
 _PARALLEL = 0.02  # of the sine between the gradients at the centre, over their lengths there
 _CLOSE = 1e-5  # of a limit, where a search ends
 _ALMOST = 0.01  # of a limit, from where a parabola leads to it
@@ -52,29 +54,46 @@ class PointPath:
         self._ways = {0.0: (sign * per_unit[0], sign * per_unit[1])}
         self.end = math.inf  # size from which there is no point
 
-    def to(self, size: float) -> ExactPhases | None:
-        """What an error of a size does; None where its way has ended. [unit]"""
+    def to(self, size: float, until: Callable[[ExactPhases], bool] | None = None) -> ExactPhases | None:
+        """What an error of a size does, or of the first size met that is enough; None where its way has ended. [unit]"""
         step, is_first_try = math.inf, True
         while size < self.end:
             index = bisect(self.known, size, key=lambda one: one.size)
             last = self.known[index - 1]
             if last.size == size:
                 return last.phases
-            step = min(step, size - last.size)
+            fold = self._to_fold(index)
+            step = min(step, size - last.size, _OF_FOLD * fold if fold > _LEAST_STEP * last.size else math.inf)
             ahead = size if size - last.size < 1.2 * step else last.size + step
-            near = self._guess(index, ahead) if is_first_try else self._ahead(index, ahead)
+            near, is_straight = self._guess(index, ahead) if is_first_try else (self._ahead(index, ahead), False)
             found = self.exact.phases([(self.source, self.sign * ahead)], near)
             if found is not None and _is_on_the_way(last.phases.displacement, found.displacement, near):
                 self.known.insert(index, _Known(ahead, found))
+                if until is not None and until(found):
+                    return found
                 step, is_first_try = 2 * step, True
                 continue
-            if is_first_try:
+            if is_straight:
                 is_first_try = False
                 continue
-            step /= 2
-            if step < _LEAST_STEP * ahead and (abs(last.phases.turn) < _PARALLEL or step < _FINEST_STEP * ahead):
-                self.end = last.size + step
+            is_beyond = fold < min(ahead - last.size, _LEAST_STEP * ahead)
+            step, is_first_try = step / 2, True
+            is_parallel = step < _LEAST_STEP * ahead and abs(last.phases.turn) < _PARALLEL
+            if is_beyond or is_parallel or step < _FINEST_STEP * ahead:
+                self.end = last.size + min(step, fold)
         return None
+
+    def _to_fold(self, index: int) -> float:
+        """How much larger the error may become before the gradients are parallel; infinite: nothing points to it.
+
+        There the square of what they span goes through zero like a straight line, as far as the last step was short.
+        """
+        if index < 2:
+            return math.inf
+        last, before = self.known[index - 1], self.known[index - 2]
+        square, earlier, step = last.phases.turn**2, before.phases.turn**2, last.size - before.size
+        fold = square * step / (earlier - square) if square < earlier else math.inf
+        return fold if fold > _SHORT * step else math.inf
 
     def _way(self, known: _Known) -> GroundVector:
         """Where the point goes from a known one. [m/unit]"""
@@ -83,16 +102,16 @@ class PointPath:
             self._ways[known.size] = (self.sign * east, self.sign * north)
         return self._ways[known.size]
 
-    def _guess(self, index: int, size: float) -> GroundVector:
-        """Where the last known point before an index leads, if so far the way was nearly straight."""
+    def _guess(self, index: int, size: float) -> tuple[GroundVector, bool]:
+        """Where the last known point before an index leads, and whether that is the short way: it was nearly straight."""
         last = self.known[index - 1]
         x, y = last.phases.displacement
         u, v = self._ways[0.0]
         bent = (x - u * last.size, y - v * last.size)
         if math.hypot(*bent) > _STRAIGHT * math.hypot(x, y):
-            return self._ahead(index, size)
+            return self._ahead(index, size), False
         part = (size / last.size) ** 2 if last.size else 0.0  # a parabola from no error on
-        return (u * size + bent[0] * part, v * size + bent[1] * part)
+        return (u * size + bent[0] * part, v * size + bent[1] * part), True
 
     def _ahead(self, index: int, size: float) -> GroundVector:
         """Where the known points before an index lead: along the way of the last, which bends as it did."""
@@ -121,19 +140,42 @@ class PointPath:
         first, farthest : float
             Size to look at first, and the largest. [unit]
         """
-        size = first
+        index = bisect(self.known, first, key=lambda one: one.size)
+        is_met = index < len(self.known) and self.known[index].size <= (1 + _ALMOST) * first
+        size = self.known[index].size if is_met else first
+
+        def is_enough(phases: ExactPhases) -> bool:
+            return abs(value(phases)) >= limit * (1 - _CLOSE)
+
         for _ in range(_STEPS):
-            self.to(size)
+            self.to(size, is_enough)
             crossed = self._crossed(value, limit, per_unit, min(size, self.end))
             if crossed is not None:
-                return crossed
+                return crossed if crossed <= farthest else None
             if self.end <= size:
-                return self.end
+                return self.end if self.end <= farthest else None
             if size >= farthest:
                 return None
-            reached = abs(value(self.known[bisect(self.known, size, key=lambda one: one.size) - 1].phases))
+            index = bisect(self.known, size, key=lambda one: one.size) - 1
+            reached = abs(value(self.known[index].phases))
+            if reached > (1 - _ALMOST) * limit:
+                ahead = self._just_ahead(index, value, limit, per_unit)
+                if ahead is not None:
+                    return ahead if ahead <= farthest else None
             size = min(farthest, size * min(1.5, max(1.01, 1.02 * limit / reached) if reached else 1.5))
         return size
+
+    def _just_ahead(self, index: int, value: Value, limit: float, per_unit: float) -> float | None:
+        """Size at which a value that almost reaches the limit at a known point does; None where its course is unsure."""
+        last, before = self.known[index], self.known[index - 1]
+        reached = abs(value(last.phases))
+        if index == 1:
+            ahead = _on_parabola(abs(per_unit), last.size, reached, limit)
+        else:
+            slope = (reached - abs(value(before.phases))) / (last.size - before.size)
+            ahead = last.size + (limit - reached) / slope if slope > 0 else None
+        is_sure = ahead is not None and last.size <= ahead < (1 + 1.5 * _ALMOST) * last.size and last.phases.turn > 0.5
+        return ahead if is_sure else None
 
     def _crossed(self, value: Value, limit: float, per_unit: float, upto: float) -> float | None:
         """First size among the known ones, or between them, at which the value reaches the limit."""
@@ -141,7 +183,7 @@ class PointPath:
         while index < len(self.known) and self.known[index].size <= upto:
             low, high = self.known[index - 1], self.known[index]
             if abs(value(high.phases)) >= limit * (1 - _CLOSE):
-                return self._between(value, limit, low, high, per_unit)
+                return self._between(value, limit, index, per_unit)
             top = self._top(index, value, limit, per_unit)
             if top is not None and self.to(top) is None:
                 return None
@@ -165,25 +207,21 @@ class PointPath:
             return None
         return low.size + way
 
-    def _between(self, value: Value, limit: float, low: _Known, high: _Known, per_unit: float) -> float:
-        """Size between two at which the magnitude reaches the limit."""
+    def _between(self, value: Value, limit: float, index: int, per_unit: float) -> float:
+        """Size at which the magnitude reaches the limit, in the interval that ends at a known point."""
+        low, high = self.known[index - 1], self.known[index]
         for step in range(_STEPS):
             a, b = abs(value(low.phases)), abs(value(high.phases))
-            if abs(b - limit) <= _CLOSE * limit:
-                slope = (b - a) / (high.size - low.size)
-                return high.size - (b - limit) / slope if slope > 0 and b > limit else high.size
             if high.size - low.size <= _CLOSE * high.size:
                 return low.size
             size = low.size + (high.size - low.size) * (limit - a) / (b - a)
-            if low.size == 0:  # a parabola through zero
-                slope = abs(per_unit)
-                bend = (b / high.size - slope) / high.size
-                if bend > 0:
-                    size = 2 * limit / (slope + math.sqrt(slope * slope + 4 * bend * limit))
-                    if abs(b - limit) < _ALMOST * limit:
-                        return size  # what a third order changes is the square of that
+            if low.size == 0:
+                bent = _on_parabola(abs(per_unit), high.size, b, limit)
+                size = size if bent is None else bent
             elif step % 3 == 2:
                 size = (low.size + high.size) / 2
+            if b - limit < _ALMOST * limit and high.size - size < 2 * _ALMOST * high.size:
+                return size
             inside = 0.01 * (high.size - low.size)
             size = min(max(size, low.size + inside), high.size - inside)
             found = self.to(size)
@@ -195,6 +233,13 @@ class PointPath:
             else:
                 low = middle
         return low.size
+
+
+def _on_parabola(slope: float, size: float, value: float, limit: float) -> float | None:
+    """Size at which a parabola from zero, with a slope there and a value at a size, reaches a limit; None: it does not."""
+    bend = (value / size - slope) / size
+    root = slope * slope + 4 * bend * limit
+    return 2 * limit / (slope + math.sqrt(root)) if root >= 0 and slope + root > 0 else None
 
 
 def _is_on_the_way(last: GroundVector, found: GroundVector, near: GroundVector) -> bool:
