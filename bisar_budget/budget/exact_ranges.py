@@ -192,15 +192,47 @@ class ExactRanges:
     def _known_along(self) -> dict[tuple[str, Vector], list[float]]:
         return {}
 
-    def quadratic_of(self, source: ErrorSource) -> float:
-        """Quadratic phase of a small unit of any error, that of `effect_of`. [rad/unit]"""
-        samples = self.range_error(source)
+    def quadratics_of(self, sources: Sequence[ErrorSource]) -> list[float]:
+        """Quadratic phase of a small unit of each error, that of `effect_of`, in a tenth of its time. [rad/unit]"""
+        of_axes, found = self._quadratics_of_axes, []
+        for source in sources:
+            if source.is_position:
+                (a, b, c), whole = of_axes[source.owner, source.unit]
+                x, y, z = source.direction
+                phase = a * x + b * y + c * z
+            else:
+                parts = list(map(mul, self._quadratic_weights, self.shape(source)))
+                phase, whole = sum(parts), sum(map(abs, parts))
+            found.append(phase if abs(phase) > ROUNDING * whole else 0.0)
+        return found
+
+    @cached_property
+    def _quadratic_weights(self) -> list[float]:
+        """What a metre at each node adds to the quadratic phase, that of the displacement included. [rad/m]"""
         value, slope, quadratic, _ = self.fit
         (by_value, by_slope), _ = self.phases_per_term
-        own = self.k * sum(map(mul, quadratic, samples))
-        moved = by_value * sum(map(mul, value, samples)) + by_slope * sum(map(mul, slope, samples)) / self.half
-        total = own + moved
-        return total if abs(total) > ROUNDING * (self.k * max(map(abs, samples)) + abs(moved)) else 0.0
+        by_slope /= self.half
+        return [self.k * q + by_value * v + by_slope * s for q, v, s in zip(quadratic, value, slope, strict=True)]
+
+    @cached_property
+    def _quadratics_of_axes(self) -> dict[tuple[str, str], tuple[Vector, float]]:
+        """Quadratic phase of a unit along x, y, z, by owner and unit, and what adds up to it without its signs."""
+        found: dict[tuple[str, str], tuple[Vector, float]] = {}
+        whole = sum(map(abs, self._quadratic_weights))
+        axes = [tuple(zip(*self.tracks[name], strict=True)) for name in PLATFORMS]
+        metres = [
+            [-weight / R for weight, R in zip(self._quadratic_weights, self.ranges[name], strict=True)]
+            for name in PLATFORMS
+        ]
+        for unit, powers in self.powers.items():
+            (a, b, c), (u, v, w) = (
+                [sum(map(mul, of_unit, along)) for along in of_axes]
+                for of_unit, of_axes in zip((list(map(mul, powers, one)) for one in metres), axes, strict=True)
+            )
+            most = whole * powers[-1]
+            found["transmitter", unit], found["receiver", unit] = ((a, b, c), most), ((u, v, w), most)
+            found["mission", unit] = ((a + u, b + v, c + w), 2 * most)
+        return found
 
     def effect(self, range_error: Samples) -> Effect:
         """Effect of a range error sampled at the nodes [m/unit], that of the displacement included."""

@@ -174,7 +174,9 @@ class PointPath:
         else:
             slope = (reached - abs(value(before.phases))) / (last.size - before.size)
             ahead = last.size + (limit - reached) / slope if slope > 0 else None
-        is_sure = ahead is not None and last.size <= ahead < (1 + 1.5 * _ALMOST) * last.size and last.phases.turn > 0.5
+        is_sure = (
+            ahead is not None and last.size <= ahead < (1 + 1.5 * _ALMOST) * last.size and last.phases.turn > 0.5
+        )
         return ahead if is_sure else None
 
     def _crossed(self, value: Value, limit: float, per_unit: float, upto: float) -> float | None:

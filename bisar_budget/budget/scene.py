@@ -12,7 +12,8 @@ and with a correction that has its own bound, an edge whose phase itself exceeds
 
 import math
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import cached_property, partial
+from operator import add, mul
 from typing import NamedTuple
 
 from bisar_budget.budget.allocation import Allocation
@@ -35,7 +36,10 @@ _MIN_SINE = math.sin(math.radians(MIN_GRADIENT_ANGLE_DEG))
 _NEAREST_M = 1.0  # of a platform to a place; nearer, no image
 _FARTHEST = 0.5  # of the nearest slant range: the search for a radius ends there
 _PRECISION = 1e-3  # of the radius
+_ALIKE = 5e-3  # of the total: so near to it, large errors need no search of their own
 _TURNS = 2  # of the azimuth along which it is searched; then it is the whole circle's
+_PROBES = 3
+_FLOOR_RAD, _SHARE = 1e-4, 3e-4  # of the largest difference: what one error may differ by and be taken as small
 _FINEST = 1e-3  # rad, of the azimuth of a largest difference: a cosine loses half its square
 
 
@@ -118,36 +122,48 @@ class ScenePhases:
 
     def place(self, radius: float, azimuth: float) -> "Place":
         """What there is at a point of the ground."""
-        there = self.ranges_at(radius, azimuth)
+        return self.place_of(self.ranges_at(radius, azimuth))
+
+    def place_of(self, there: ExactRanges) -> "Place":
+        """What there is where exact ranges are taken."""
         if there.nearest < _NEAREST_M:
             return self.nowhere
         try:
             sine = there.gradient_sine
-            phases = [
-                there.quadratic_of(source) * size if size else 0.0
-                for source, size in zip(self.members, self.sizes, strict=True)
-            ]
+            phases = list(map(mul, there.quadratics_of(self.members), self.sizes))
         except ZeroDivisionError:  # a gradient vanishes, or both are parallel to the last digit
             return self.nowhere
         clearances = (self.turn * sine / _MIN_SINE, there.range_gradient / MIN_GROUND_GRADIENT)
         return Place(phases, self.combined(phases), clearances)
 
-    def differences(self, radius: float, azimuth: float) -> list[float]:
-        """Of each error, its phase there less that at the centre, by the worse sign where it is large. [rad]"""
-        phases = self.place(radius, azimuth).phases
-        found = [there - centre for there, centre in zip(phases, self.centre, strict=True)]
-        if not self.large:
-            return found
+    def differences(self, radius: float, azimuth: float, exact: Sequence[int] | None = None) -> list[float]:
+        """Of each error, its phase there less that at the centre; by the worse sign of those taken exactly. [rad]
+
+        Exactly taken are all large ones, or some of the members, by their indices.
+        """
         there = self.ranges_at(radius, azimuth)
-        for i in self.large:
+        phases = self.place_of(there).phases
+        found = [away - centre for away, centre in zip(phases, self.centre, strict=True)]
+        for i in self.large if exact is None else exact:
             source, of_both = self.members[i], []
+            per_unit = there.plane.displacement(there.effect_of(source), 1.0) or (0.0, 0.0)
             for size in (self.sizes[i], -self.sizes[i]):
-                per_unit = there.plane.displacement(there.effect_of(source), 1.0) or (0.0, 0.0)
                 path = PointPath(there, source, math.copysign(1.0, size), per_unit)
                 here, away = self.full.at(source, size), path.to(abs(size))
                 of_both.append(math.inf if here is None or away is None else away.quadratic - here.quadratic)
             found[i] = math.copysign(max(map(abs, of_both)), found[i])
         return found
+
+    def exactly(self, phases: Sequence[float]) -> list[float]:
+        """Phases with what large errors have more at the centre than small ones, by the worse sign. [rad]"""
+        return list(map(add, phases, self._more))
+
+    @cached_property
+    def _more(self) -> list[float]:
+        more = [0.0] * len(self.members)
+        for i in self.large:
+            more[i] = self.full.declared(self.members[i]).qpe - self.centre[i]
+        return more
 
     def largest(self, rim: "Rim", radius: float) -> tuple[float, float]:
         """Largest difference on a circle, errors of any size counted, and its azimuth. [rad], [rad]
@@ -156,9 +172,15 @@ class ScenePhases:
         """
         if not self.large:
             return rim.difference, rim.azimuth
+        bent = self._bent(rim, radius)
+        azimuth = self._climbed(rim, radius, bent) if bent else rim.azimuth
+        return self.together(self.differences(radius, azimuth)), azimuth
+
+    def _climbed(self, rim: "Rim", radius: float, bent: list[int]) -> float:
+        """Azimuth of the largest difference, some errors taken exactly. [rad]"""
 
         def size_at(azimuth: float) -> float:
-            return self.together(self.differences(radius, azimuth))
+            return self.together(self.differences(radius, azimuth, bent))
 
         arc = math.pi / RIM_POINTS
         places = [rim.azimuth, *(2 * arc * place for place in range(RIM_POINTS))]
@@ -169,7 +191,17 @@ class ScenePhases:
                 size, azimuth = max(sides)
             else:
                 arc /= 4
-        return size, azimuth % (2 * math.pi)
+        return azimuth % (2 * math.pi)
+
+    def _bent(self, rim: "Rim", radius: float) -> list[int]:
+        """Which of the large errors differ otherwise than small ones do: seen at three places, two harmonics show."""
+        found = set[int]()
+        floor = max(_FLOOR_RAD, _SHARE * rim.difference)
+        for third in range(_PROBES):
+            azimuth = rim.azimuth + 2 * math.pi * third / _PROBES
+            small, exact = (self.differences(radius, azimuth, which) for which in ((), self.large))
+            found |= {i for i in self.large if not abs(exact[i] - small[i]) <= floor}
+        return sorted(found)
 
     def combined(self, phases: Sequence[float]) -> float:
         """Differences of phases to the centre's, combined: the largest, their sum or root-sum-square. [rad]"""
@@ -344,7 +376,27 @@ def _degeneracy(there: BistaticGeometry) -> str:
 
 
 def _autofocus_radius(edge: ScenePhases, radius: float, rim: Rim, total: float, searched: float) -> float | None:
-    """Radius at which the largest difference reaches the total, to a thousandth; None if it does not by `searched`.
+    """Radius at which the largest difference reaches the total, to a thousandth; None if it does not by `searched`."""
+    found = _radius_of_small(edge, radius, rim, total, searched)
+    if not edge.large:
+        return found
+
+    def size_at(radius: float) -> float:
+        around = edge.rim(radius)
+        return around.difference if math.isinf(around.difference) else edge.largest(around, radius)[0]
+
+    high = searched if found is None else found
+    low, below, size = 0.0, 0.0, size_at(high)
+    if abs(size - total) <= _ALIKE * total:
+        return found
+    while size <= total and high < searched:
+        low, below, high = high, size, min(searched, high * max(1.05, min(4.0, 1.05 * total / size)))
+        size = size_at(high)
+    return None if size <= total else _where(size_at, total, (low, below), (high, size))[0]
+
+
+def _radius_of_small(edge: ScenePhases, radius: float, rim: Rim, total: float, searched: float) -> float | None:
+    """The same, were effects of all errors proportional to them.
 
     Along the worst azimuth, and again where the rim at the radius found has a worse one.
     """
@@ -402,6 +454,7 @@ def _where(
 def _over_at_the_edge(edge: ScenePhases, allocation: Allocation, rim: Rim) -> str:
     """Say which error is inside its limit at the centre and over it at the edge; else nothing."""
     gain, rule = allocation.autofocus_gain, edge.combine
+    centre, *around, worst_place = (edge.exactly(phases) for phases in (edge.centre, *rim.phases, rim.worst))
     owners = ["transmitter", "receiver", "clock", "mission"]
     if rule == "each":
         groups = [(s.id, [i], allocation.qpe_limit(s.owner) * gain) for i, s in enumerate(edge.members)]
@@ -420,12 +473,12 @@ def _over_at_the_edge(edge: ScenePhases, allocation: Allocation, rim: Rim) -> st
         ]
     worst = ("", 0.0, 0.0)
     for name, indices, limit in groups:
-        if edge.together(edge.centre, indices) > limit * (1 + UTILIZATION_TOLERANCE):
+        if edge.together(centre, indices) > limit * (1 + UTILIZATION_TOLERANCE):
             continue  # its own row says so
-        around = [edge.together(there, indices) for there in rim.phases]
-        top, count = max(range(len(around)), key=around.__getitem__), len(around)
-        _, crest = _crest(around[top - 1], around[(top + 1) % count], around[top], 2 * math.pi / count)
-        phase = max(crest, edge.together(rim.worst, indices))
+        sizes = [edge.together(there, indices) for there in around]
+        top, count = max(range(len(sizes)), key=sizes.__getitem__), len(sizes)
+        _, crest = _crest(sizes[top - 1], sizes[(top + 1) % count], sizes[top], 2 * math.pi / count)
+        phase = max(crest, edge.together(worst_place, indices))
         if phase > limit * (1 + UTILIZATION_TOLERANCE) and phase > worst[1]:
             worst = (name, phase, limit)
     name, phase, limit = worst

@@ -326,9 +326,17 @@ def test_edge_and_radius_are_those_of_a_circle_of_720_places() -> None:
         else:
             assert scene.difference == pytest.approx(max(p.size for p in circle(scene.radius)), rel=2e-3, abs=1e-9)
         served = scene.autofocus_radius or scene.searched
-        assert all(place.has_image and place.size <= math.pi / 4 for place in circle(0.998 * served))
+
+        def is_served(radius: float, edge=edge, places=places) -> bool:
+            if not places:
+                return all(place.has_image and place.size <= math.pi / 4 for place in circle(radius))
+            around = (edge.differences(radius, 2 * math.pi * k / places) for k in range(places))
+            return all(edge.together(differences) <= math.pi / 4 for differences in around)
+
+        # Of large errors it is right to 0.5 % of the total, and so is what 90 places can miss.
+        assert is_served((0.998 if not places else 0.985) * served)
         if scene.autofocus_radius is not None:
-            assert any(not place.has_image or place.size > math.pi / 4 for place in circle(1.01 * served))
+            assert not is_served(1.01 * served)
             seen["served"] += 1
     assert min(seen.values()) >= 3, seen
 
