@@ -22,7 +22,8 @@ _OF_FOLD = 0.8  # of the way to where the gradients seem to become parallel, tha
 _SHORT = 0.1  # of the last step, below which that step says little of the way left
 _PARALLEL = 0.02  # of the sine between the gradients at the centre, over their lengths there
 _CLOSE = 1e-5  # of a limit, where a search ends
-_ALMOST = 0.01  # of a limit, from where a parabola leads to it
+_ALMOST = 0.002  # of a limit, from where a parabola leads to it
+_NOT_FOLDED = 0.5  # of what the gradients span at the centre
 _STEPS = 40
 
 Value = Callable[[ExactPhases], float]  # what is held to a limit, signed
@@ -55,7 +56,7 @@ class PointPath:
         self.end = math.inf  # size from which there is no point
 
     def to(self, size: float, until: Callable[[ExactPhases], bool] | None = None) -> ExactPhases | None:
-        """What an error of a size does, or of the first size met that is enough; None where its way has ended. [unit]"""
+        """What an error of a size does, or of the first one met that is enough; None where its way has ended. [unit]"""
         step, is_first_try = math.inf, True
         while size < self.end:
             index = bisect(self.known, size, key=lambda one: one.size)
@@ -103,7 +104,7 @@ class PointPath:
         return self._ways[known.size]
 
     def _guess(self, index: int, size: float) -> tuple[GroundVector, bool]:
-        """Where the last known point before an index leads, and whether that is the short way: it was nearly straight."""
+        """Where the last known point before an index leads, and whether the way so far was nearly straight."""
         last = self.known[index - 1]
         x, y = last.phases.displacement
         u, v = self._ways[0.0]
@@ -166,7 +167,7 @@ class PointPath:
         return size
 
     def _just_ahead(self, index: int, value: Value, limit: float, per_unit: float) -> float | None:
-        """Size at which a value that almost reaches the limit at a known point does; None where its course is unsure."""
+        """Size at which a value does that almost reaches the limit at a known point; None where nobody can tell."""
         last, before = self.known[index], self.known[index - 1]
         reached = abs(value(last.phases))
         if index == 1:
@@ -183,8 +184,7 @@ class PointPath:
         """First size among the known ones, or between them, at which the value reaches the limit."""
         index = 1
         while index < len(self.known) and self.known[index].size <= upto:
-            low, high = self.known[index - 1], self.known[index]
-            if abs(value(high.phases)) >= limit * (1 - _CLOSE):
+            if abs(value(self.known[index].phases)) >= limit * (1 - _CLOSE):
                 return self._between(value, limit, index, per_unit)
             top = self._top(index, value, limit, per_unit)
             if top is not None and self.to(top) is None:
@@ -216,14 +216,19 @@ class PointPath:
             a, b = abs(value(low.phases)), abs(value(high.phases))
             if high.size - low.size <= _CLOSE * high.size:
                 return low.size
-            size = low.size + (high.size - low.size) * (limit - a) / (b - a)
-            if low.size == 0:
-                bent = _on_parabola(abs(per_unit), high.size, b, limit)
-                size = size if bent is None else bent
+            chord = (b - a) / (high.size - low.size)
+            size = low.size + (limit - a) / chord
+            bent = _on_parabola(abs(per_unit), high.size, b, limit) if low.size == 0 else None
+            if bent is not None:
+                size = bent
             elif step % 3 == 2:
                 size = (low.size + high.size) / 2
-            if b - limit < _ALMOST * limit and high.size - size < 2 * _ALMOST * high.size:
-                return size
+            if b - limit < _ALMOST * limit:
+                if low.size:  # the slope there of a parabola from no error through both
+                    chord += (chord - a / low.size) * (high.size - low.size) / high.size
+                    size = high.size - (b - limit) / chord if chord > 0 else 0.0
+                if high.size - size < 2 * _ALMOST * high.size:
+                    return size
             inside = 0.01 * (high.size - low.size)
             size = min(max(size, low.size + inside), high.size - inside)
             found = self.to(size)
@@ -238,7 +243,7 @@ class PointPath:
 
 
 def _on_parabola(slope: float, size: float, value: float, limit: float) -> float | None:
-    """Size at which a parabola from zero, with a slope there and a value at a size, reaches a limit; None: it does not."""
+    """Size at which a parabola from zero, of a slope there and a value at a size, reaches a limit; None: nowhere."""
     bend = (value / size - slope) / size
     root = slope * slope + 4 * bend * limit
     return 2 * limit / (slope + math.sqrt(root)) if root >= 0 and slope + root > 0 else None

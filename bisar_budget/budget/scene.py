@@ -376,7 +376,7 @@ def _degeneracy(there: BistaticGeometry) -> str:
 
 
 def _autofocus_radius(edge: ScenePhases, radius: float, rim: Rim, total: float, searched: float) -> float | None:
-    """Radius at which the largest difference reaches the total, to a thousandth; None if it does not by `searched`."""
+    """Radius at which the largest difference reaches the total; None if it does not by `searched`. [m]"""
     found = _radius_of_small(edge, radius, rim, total, searched)
     if not edge.large:
         return found
