@@ -83,7 +83,7 @@ def _allowables(
     """At the allowable the worse sign is at a limit, at no smaller size above one; none, where none is reached."""
     required = mission.requirements
     is_full = mission.allocation.model == "full"
-    limits = _limits(mission, found, rows, errors)
+    limits = _limits(found, errors)
     caps = np.array([error.cap for error in errors])
     of_phase = np.array([_number(rows[error.id].allowable_full) for error in errors])
     of_all = np.array([_number(rows[error.id].allowable) if is_full else math.nan for error in errors])
@@ -104,23 +104,10 @@ def _allowables(
         yield _allowable("allowable", error, rows[error.id].allowable, grid[index], over[index])
 
 
-def _limits(mission: Mission, found: MissionFindings, rows: dict[str, Row], errors: Sequence[Error]) -> Array:
-    """QPE limit of each error, gain included (L,). [rad]
-
-    The strictest are two checks, each balanced by its own model: where a row is not that of the first it has to be
-    that of the second.
-    """
-    allocations = [found.allocation]
-    if mission.allocation.model == "strictest":
-        models = ("published", "full")
-        single = [mission._replace(allocation=mission.allocation._replace(model=model)) for model in models]
-        allocations = [check_mission(one, DAY).allocation for one in single]
-    choices = np.array([[a.qpe_limit(e.owner) * a.autofocus_gain for a in allocations] for e in errors])
-    if len(allocations) == 1 or np.ptp(choices, axis=1).max() == 0:
-        return choices[:, 0]
-    first = {row.id: row for row in check_mission(single[0], DAY).rows}
-    is_first = [rows[e.id].allowable_full == first[e.id].allowable_full for e in errors]
-    return np.where(is_first, choices[:, 0], choices[:, 1])
+def _limits(found: MissionFindings, errors: Sequence[Error]) -> Array:
+    """QPE limit of each error, gain included (L,). [rad]"""
+    allocation = found.allocation
+    return np.array([allocation.qpe_limit(error.owner) * allocation.autofocus_gain for error in errors])
 
 
 def _number(value: float | None) -> float:

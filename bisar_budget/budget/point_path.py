@@ -56,7 +56,7 @@ class PointPath:
         self.end = math.inf  # size from which there is no point
 
     def to(self, size: float, until: Callable[[ExactPhases], bool] | None = None) -> ExactPhases | None:
-        """What an error of a size does, or of the first one met that is enough; None where its way has ended. [unit]"""
+        """What an error of a size does, or the first size met that is enough; None where its way has ended. [unit]"""
         step, is_first_try = math.inf, True
         while size < self.end:
             index = bisect(self.known, size, key=lambda one: one.size)

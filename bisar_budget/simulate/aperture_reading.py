@@ -11,6 +11,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import GroundVector
@@ -133,8 +134,8 @@ def read_aperture(
             # What is left of the range error takes a pulse to other range cells too.
             phase = np.polynomial.legendre.legval(place, [0.0, *found.fit[1:]])
             left = -collection.wavelength / (2 * math.pi) * phase
-            contribution = _contributions(collection, errors, centre, slow_time, pixels[some], left)
-            found = _refined(found.fit, place, contribution, seen_there, gain)
+            single = _contributions(collection, errors, centre, slow_time, pixels[some], left)
+            found = _refined(found.fit, place, single.astype(np.complex128), seen_there, gain)
         best = min(best, found, key=lambda one: one.misfit)
         if best.misfit < _EXACT:
             break
@@ -209,30 +210,37 @@ def _contributions(
     slow_time: Floats,
     pixels: Floats,
     left: Floats | None = None,
-) -> Complexes:
+) -> NDArray[np.complex64]:
     """What each pulse adds to the image of a point at a place, (pulses, pixels), at baseband.
 
     `left` (pulses,) is a range error that displaces its range response, and has no part in the phase. [m]
     """
     flown = collection.flown(errors)
-    k = 2 * math.pi / collection.wavelength
     at_middle = flown.range_sum(pixels) - flown.range_sum(np.asarray(centre, dtype=float))
     point = np.array([[*centre, 0.0]])
     farther = np.zeros((slow_time.size, pixels.shape[0]))
     for one in collection.paths(errors.smooth(), slow_time):
-        farther += _distance(one.measured, pixels) - _distance(one.measured, point)
-    contribution: Complexes = np.exp(1j * k * (farther - at_middle))
+        farther += _distance(one.measured, pixels)
+        farther -= _distance(one.measured, point)
+    # Whole cycles are taken off in double precision; of what is left single precision holds 1e-6 rad, in a quarter
+    # of the time.
+    cycles = (farther - at_middle) / collection.wavelength
+    cycles -= np.rint(cycles)
+    turned = (2 * math.pi * cycles).astype(np.float32)
+    contribution = np.empty(turned.shape, dtype=np.complex64)
     if left is not None:
         farther -= left[:, None]
-    cells = farther * (collection.radar.bandwidth / SPEED_OF_LIGHT)
-    if not collection.is_tapered:
-        return contribution * np.sinc(cells)
-    weights = taylor_window(257)
-    frequency = cell_centres(1.0, 257)
-    kernel = np.cos(2 * math.pi * np.outer(_KERNEL, frequency)) @ weights / 257
-    return (
-        contribution * np.interp(np.abs(cells), _KERNEL, kernel, right=0.0) * _weights(collection, slow_time)[:, None]
-    )
+    cells = (farther * (collection.radar.bandwidth / SPEED_OF_LIGHT)).astype(np.float32)
+    if collection.is_tapered:
+        weights = taylor_window(257)
+        frequency = cell_centres(1.0, 257)
+        kernel = np.cos(2 * math.pi * np.outer(_KERNEL, frequency)) @ weights / 257
+        strength = np.interp(np.abs(cells), _KERNEL, kernel, right=0.0) * _weights(collection, slow_time)[:, None]
+    else:
+        strength = np.sinc(cells)
+    np.multiply(np.cos(turned), strength, out=contribution.real)
+    np.multiply(np.sin(turned), strength, out=contribution.imag)
+    return contribution
 
 
 def _weights(collection: PointCollection, slow_time: Floats) -> Floats:
@@ -243,9 +251,8 @@ def _weights(collection: PointCollection, slow_time: Floats) -> Floats:
 
 
 def _distance(positions: Floats, points: Floats) -> Floats:
-    """From positions (m, 3) to points (n, 3), (m, n). [m]"""
-    square = np.zeros((positions.shape[0], points.shape[0]))
-    for axis in range(3):
-        square += (positions[:, axis, None] - points[:, axis]) ** 2
-    distance: Floats = np.sqrt(square)
-    return distance
+    """From positions (m, 3) to points (n, 3), (m, n): to 1e-8 m from a geostationary orbit. [m]"""
+    square: Floats = positions @ (-2 * points.T)
+    square += np.einsum("ij,ij->i", positions, positions)[:, None]
+    square += np.einsum("ij,ij->i", points, points)
+    return np.sqrt(square, out=square)

@@ -95,6 +95,15 @@ class Chip(NamedTuple):
         middle: Complexes = self.image[self.image.shape[0] // 2]
         return middle
 
+    def within(self, cells: int) -> "Chip":
+        """The middle of the chip, so many resolution cells of y′ at most."""
+        columns = 2 * round(cells * OVERSAMPLING / 2)
+        start = self.image.shape[1] // 2 - columns // 2
+        if start <= 0:
+            return self
+        part = slice(start, start + columns)
+        return Chip(self.image[:, part], self.grid[:, part], self.spacing)
+
 
 class PointCollection:
     """A mission's collection, for images of a single point.

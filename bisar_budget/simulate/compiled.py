@@ -30,6 +30,7 @@ from bisar_budget.simulate.range_profile import (
 Spline = Literal["linear", "cubic"]
 
 _LINE = 32  # pixels of one expansion; two or four vectors of a processor
+_TILE = 512  # pixels anywhere that are taken together: what they need of a pulse stays in that cache too
 _ROWS = 16  # lines of one tile; what it needs of a pulse stays in a processor's first cache
 _OVERSAMPLING = 2  # of profiles from the FFT
 _TAPS = 8  # of the kernel that refines them: -140 dB at this oversampling
@@ -135,9 +136,10 @@ def backproject(history: PhaseHistory, points: Floats, spline: Spline) -> Comple
         image = np.ascontiguousarray(image if shape == points.shape[:-1] else image.T)
     else:
         flat = np.ascontiguousarray(points.reshape(-1, 3))
-        nearest, farthest = _reach(history.transmitter, history.receiver, flat)
+        axes = np.ascontiguousarray(flat.T)
+        nearest, farthest = _reach(history.transmitter, history.receiver, axes)
         for block in _profile_blocks(history, nearest, farthest, spline):
-            _add_points(*block, flat, spline == "cubic", image.reshape(-1))
+            _add_points(*block, axes, spline == "cubic", image.reshape(-1))
     image /= history.samples.size
     return image
 
@@ -406,52 +408,92 @@ def _add_lattice(
                 image[top + i, left + j] += complex(real[i, j], imag[i, j])
 
 
+@_compiled
+def _sums(points, transmitter, receiver, reference, sums):
+    """Range sum of each pixel less a pulse's reference."""
+    tx, ty, tz = transmitter[0], transmitter[1], transmitter[2]
+    rx, ry, rz = receiver[0], receiver[1], receiver[2]
+    for i in range(sums.shape[0]):
+        x, y, z = points[0, i] - tx, points[1, i] - ty, points[2, i] - tz
+        u, v, w = points[0, i] - rx, points[1, i] - ry, points[2, i] - rz
+        sums[i] = math.sqrt(x * x + y * y + z * z) + math.sqrt(u * u + v * v + w * w) - reference
+
+
 @_parallel
 def _reach(transmitter, receiver, points):
-    """Smallest and largest range sum of points at each pulse."""
+    """Smallest and largest range sum at each pulse of points (3, n)."""
     nearest, farthest = np.empty(transmitter.shape[0]), np.empty(transmitter.shape[0])
     for pulse in prange(transmitter.shape[0]):
-        low, high = np.inf, 0.0
-        for n in range(points.shape[0]):
-            far = 0.0
-            for leg in range(2):
-                platform = transmitter if leg == 0 else receiver
-                x, y, z = (
-                    points[n, 0] - platform[pulse, 0],
-                    points[n, 1] - platform[pulse, 1],
-                    points[n, 2] - platform[pulse, 2],
-                )
-                far += math.sqrt(x * x + y * y + z * z)
-            low, high = min(low, far), max(high, far)
-        nearest[pulse], farthest[pulse] = low, high
+        sums = np.empty(points.shape[1])
+        _sums(points, transmitter[pulse], receiver[pulse], 0.0, sums)
+        nearest[pulse], farthest[pulse] = sums.min(), sums.max()
     return nearest, farthest
+
+
+@_compiled
+def _split_points(sums, per_metre, first, cycles, index, between, turn):
+    """Sample before each pixel, how far beyond it the pixel is, and what is left of its cycles."""
+    for i in range(sums.shape[0]):
+        cell = sums[i] * per_metre - first
+        before = np.floor(cell)
+        index[i], between[i] = _I(before), _F(cell - before)
+        cycle = sums[i] * cycles
+        turn[i] = _F(cycle - np.rint(cycle))
+
+
+@_compiled
+def _fetch_points(profile, index, cubic, fetched):
+    """Taps of each pixel, two or four."""
+    if cubic:
+        for i in range(index.shape[0]):
+            n = np.uint64(np.uint32(index[i] - _I(1)))
+            s0, s1 = profile[n], profile[n + np.uint64(1)]
+            s2, s3 = profile[n + np.uint64(2)], profile[n + np.uint64(3)]
+            fetched[4 * i], fetched[4 * i + 1], fetched[4 * i + 2], fetched[4 * i + 3] = s0, s1, s2, s3
+    else:
+        for i in range(index.shape[0]):
+            n = np.uint64(np.uint32(index[i]))
+            s0, s1 = profile[n], profile[n + np.uint64(1)]
+            fetched[2 * i], fetched[2 * i + 1] = s0, s1
+
+
+@_compiled
+def _add_taps(taps, between, turn, cubic, real, imag):
+    """B-spline times the carrier."""
+    if cubic:
+        for i in range(real.shape[0]):
+            cosine, sine = _phasor(turn[i])
+            w0, w1, w2, w3 = _cubic(between[i])
+            re = w0 * taps[8 * i] + w1 * taps[8 * i + 2] + w2 * taps[8 * i + 4] + w3 * taps[8 * i + 6]
+            im = w0 * taps[8 * i + 1] + w1 * taps[8 * i + 3] + w2 * taps[8 * i + 5] + w3 * taps[8 * i + 7]
+            real[i] += re * cosine - im * sine
+            imag[i] += re * sine + im * cosine
+    else:
+        for i in range(real.shape[0]):
+            cosine, sine = _phasor(turn[i])
+            v = between[i]
+            re = taps[4 * i] + v * (taps[4 * i + 2] - taps[4 * i])
+            im = taps[4 * i + 1] + v * (taps[4 * i + 3] - taps[4 * i + 1])
+            real[i] += re * cosine - im * sine
+            imag[i] += re * sine + im * cosine
 
 
 @_parallel
 def _add_points(profiles, first, transmitter, receiver, reference, per_metre, cycles, points, cubic, image):
-    """Add some pulses to pixels anywhere, each at its own exact range."""
-    for n in prange(points.shape[0]):
-        total = 0j
+    """Add some pulses to pixels anywhere, (3, n), each at its own exact range."""
+    for tile in prange((image.shape[0] + _TILE - 1) // _TILE):
+        start = tile * _TILE
+        count = min(_TILE, image.shape[0] - start)
+        some = points[:, start : start + count].copy()
+        sums, index = np.empty(count), np.empty(count, np.int32)
+        between, turn = np.empty(count, np.float32), np.empty(count, np.float32)
+        fetched = np.empty((4 if cubic else 2) * count, np.int64)
+        taps = fetched.view(np.float32)
+        real, imag = np.zeros(count, np.float32), np.zeros(count, np.float32)
         for pulse in range(profiles.shape[0]):
-            far = -reference[pulse]
-            for leg in range(2):
-                platform = transmitter if leg == 0 else receiver
-                x, y, z = (
-                    points[n, 0] - platform[pulse, 0],
-                    points[n, 1] - platform[pulse, 1],
-                    points[n, 2] - platform[pulse, 2],
-                )
-                far += math.sqrt(x * x + y * y + z * z)
-            cell = far * per_metre - first[pulse]
-            before = np.int64(np.floor(cell))
-            v = _F(cell - np.floor(cell))
-            taps = profiles[pulse].view(np.complex64)
-            if cubic:
-                w0, w1, w2, w3 = _cubic(v)
-                value = w0 * taps[before - 1] + w1 * taps[before] + w2 * taps[before + 1] + w3 * taps[before + 2]
-            else:
-                value = (_F(1) - v) * taps[before] + v * taps[before + 1]
-            turn = far * cycles
-            cosine, sine = _phasor(_F(turn - np.rint(turn)))
-            total += value * complex(cosine, sine)
-        image[n] += total
+            _sums(some, transmitter[pulse], receiver[pulse], reference[pulse], sums)
+            _split_points(sums, per_metre, first[pulse], cycles, index, between, turn)
+            _fetch_points(profiles[pulse], index, cubic, fetched)
+            _add_taps(taps, between, turn, cubic, real, imag)
+        for i in range(count):
+            image[start + i] += complex(real[i], imag[i])

@@ -11,6 +11,10 @@ from bisar_budget.simulate.phase_history import Floats, Path
 _ORDER = 12  # of the fit to samples anywhere else
 
 
+class NoGroundPointError(ValueError):
+    """No ground point has the recorded range history: the point has no image."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class ExactEffect:
     """Displacement (east, north) [m]; phases at the aperture edge, signed like the range error [rad]."""
@@ -32,7 +36,7 @@ def exact_effect(
 
     Raises
     ------
-    ValueError
+    NoGroundPointError
         No ground point has the recorded range history.
     """
     weights = _projection(slow_time / (aperture_time_s / 2))
@@ -40,7 +44,7 @@ def exact_effect(
     clock_range = SPEED_OF_LIGHT * np.asarray(clock_error, dtype=float)
     found = located(measured, actual, clock_range, weights, wavelength_m)
     if not found.found:
-        raise ValueError("no ground point has the recorded range history")
+        raise NoGroundPointError("no ground point has the recorded range history")
     east, north = (float(part) for part in found.displacement)
     return ExactEffect(displacement=(east, north), quadratic=float(found.quadratic), cubic=float(found.cubic))
 

@@ -50,7 +50,9 @@ def _evidence(study: Study, file: str, verdict: Verdict) -> ImageEvidence:
     )
     if verdict.boundary_autofocus is None or verdict.measured_residual_qpe_rad is None:
         return found
-    chip, reference, errors, effect = study.images(verdict.id, verdict.boundary_autofocus, max(ROOM.values()))
+    chip, reference, errors, effect = study.images(
+        verdict.id, verdict.boundary_autofocus, ROOM[study.mission.autofocus.algorithm]
+    )
     return found._replace(
         before_autofocus=_point_image(chip, reference, study.spread(errors, effect).smear),
         after_autofocus=_point_image(

@@ -14,8 +14,8 @@ from bisar_budget.budget.slow_vibration import slow_limits
 from bisar_budget.budget.vibration_lines import Line
 from bisar_budget.geometry import GroundVector
 from bisar_budget.simulate.aperture_reading import READ_CELLS, ApertureReading
-from bisar_budget.simulate.collection import MAX_CELLS, Chip, Errors
-from bisar_budget.simulate.exact import ExactEffect
+from bisar_budget.simulate.collection import CELLS, MAX_CELLS, OVERSAMPLING, RANGE_CELLS, Chip, Errors
+from bisar_budget.simulate.exact import ExactEffect, NoGroundPointError
 from bisar_budget.simulate.impulse_response import highest, impulse_response
 from bisar_budget.simulate.phase_history import MotionError, Sinusoid
 from bisar_budget.simulate.shift import measured_shift
@@ -25,6 +25,8 @@ from bisar_budget.units import format_limit, format_quantity
 TOLERANCE = 0.05  # of the budget: nearer than this a limit is confirmed
 INSIDE, BEYOND = 0.9, 1.1  # of the limit: the phase on both sides shows that the limit is the limit
 HALF_CELL = 0.5  # of range walk; beyond, one-dimensional autofocus leaves a loss (0.34 dB there, uniform)
+FOCUSED_CELLS, FOCUSED_RAD = 2 * CELLS, 12.0  # a phase up to which a response is read in so many cells
+_PEAK_CELLS = 3  # of range around the lines that autofocus reads: the peak is between two lines
 _BESIDE_CELLS = 64  # of smear; beyond, no images are formed on both sides of a limit
 
 
@@ -58,7 +60,7 @@ def slow_vibration(study: Study, row_id: str, name: str, line: Line) -> Verdict:
         chip, reference = study.chips(errors, effect)
         reading = study.read(errors, effect, chip, reference)
     except (ValueError, np.linalg.LinAlgError) as error:
-        return blank._replace(reason=f"no image: {error}")
+        return _without_image(study, blank, error)
     measured = abs(reading.quadratic)
     return blank._replace(
         **predicted(effect),
@@ -81,7 +83,7 @@ def _bound_elsewhere(study: Study, source: ErrorSource) -> Verdict:
         chips = study.chips(errors, effect)
         reading = study.read(errors, effect, *chips)
     except (ValueError, np.linalg.LinAlgError) as error:
-        return blank._replace(reason=f"no image: {error}")
+        return _without_image(study, blank, error)
     blank = blank._replace(**predicted(effect), measured_qpe_rad=abs(reading.quadratic))
     if allowed.binding == CUBIC and requirements.cubic_phase_error is not None:
         return blank._replace(
@@ -163,7 +165,7 @@ def cubic(study: Study, requirement: float) -> Verdict:
         effect = study.collection.effect(errors)
         reading = study.read(errors, effect, *study.chips(errors, effect, READ_CELLS))
     except (ValueError, np.linalg.LinAlgError) as error:
-        return blank._replace(reason=f"no image: {error}")
+        return _without_image(study, blank, error)
     measured = abs(reading.cubic)
     return blank._replace(
         **predicted(effect), measured_cubic_rad=measured, verdict=compare(measured / requirement - 1, TOLERANCE)
@@ -194,14 +196,15 @@ def refocused(study: Study, sizes: Sizes, budget: float) -> dict[str, Any]:
     try:
         errors = study.together(sizes, study.worse_sign(sizes, 1.0))
         effect = study.collection.effect(errors)
-        room = max(ROOM.values())
+        room = ROOM[study.mission.autofocus.algorithm]
         smear = study.spread(errors, effect).smear
         if room * smear > MAX_CELLS:
             reason = f"autofocus needs a patch of {room * smear:.0f} cells, at most {MAX_CELLS} are formed"
             return {"verdict_autofocus": "not_evaluated", "reason_autofocus": reason}
-        chip, reference = study.chips(errors, effect, room=room)
+        across = math.ceil(2 * study.shared_lines(errors, effect) / OVERSAMPLING) + _PEAK_CELLS
+        chip, reference = study.chips(errors, effect, min(RANGE_CELLS, across), room)
         focused = study.focused(errors, effect, chip)
-        residual = abs(study.read(errors, effect, focused, reference, is_focused=True).quadratic)
+        residual = abs(_read_focused(study, errors, effect, focused, reference).quadratic)
         peaks = [highest(one.image) for one in (reference, focused)]
         loss = 20 * math.log10(peaks[0] / peaks[1])
     except (ValueError, np.linalg.LinAlgError) as error:
@@ -217,6 +220,20 @@ def refocused(study: Study, sizes: Sizes, budget: float) -> dict[str, Any]:
     }
 
 
+def _read_focused(
+    study: Study, errors: Errors, effect: ExactEffect, focused: Chip, reference: Chip
+) -> ApertureReading:
+    """Phase that autofocus left: where little, it is read from the middle of a large patch, else from all of it."""
+    small, large = ([chip.within(cells) for chip in (focused, reference)] for cells in (FOCUSED_CELLS, MAX_CELLS))
+    try:
+        reading = study.read(errors, effect, small[0], small[1], is_focused=True)
+        if abs(reading.quadratic) < FOCUSED_RAD:
+            return reading
+    except (ValueError, np.linalg.LinAlgError):
+        pass
+    return study.read(errors, effect, large[0], large[1], is_focused=True)
+
+
 def predicted(effect: ExactEffect) -> dict[str, Any]:
     """Fields of a verdict that exact ranges fill."""
     return {
@@ -224,6 +241,16 @@ def predicted(effect: ExactEffect) -> dict[str, Any]:
         "predicted_cubic_rad": abs(effect.cubic),
         "displacement_m": effect.displacement,
     }
+
+
+def _without_image(study: Study, blank: Verdict, error: ValueError | np.linalg.LinAlgError) -> Verdict:
+    """Say why a limit has no image; one of the published model that leaves no point of the ground is no limit."""
+    if isinstance(error, NoGroundPointError) and not study.is_full:
+        return blank._replace(
+            verdict="optimistic",
+            reason="at the limit no ground point has the recorded range history: the point has no image",
+        )
+    return blank._replace(reason=f"no image: {error}")
 
 
 def moved(place: GroundVector, by: GroundVector) -> GroundVector:
@@ -258,7 +285,7 @@ def _judged(study: Study, blank: Verdict, sizes: Sizes) -> Verdict:
         chip, reference = study.chips(errors, effect)
         reading = study.read(errors, effect, chip, reference)
     except (ValueError, np.linalg.LinAlgError) as error:
-        return blank._replace(reason=f"no image: {error}")
+        return _without_image(study, blank, error)
     measured = abs(reading.quadratic)
     is_small = study.spread(errors, effect).smear <= _BESIDE_CELLS
     beside = [_phase(study, sizes, factor * scale) if is_small else None for factor in (INSIDE, BEYOND)]

@@ -182,12 +182,15 @@ class Study:
         Where range cells are long, lines beside the response show it with a quadratic phase of their own.
         """
         algorithm = ALGORITHMS[self.mission.autofocus.algorithm]
+        lines = chip.image.shape[0]
+        half = min(lines // 2, lines - 1 - lines // 2, self.shared_lines(errors, effect))
+        return refocused(self.collection, errors, effect.displacement, chip, algorithm, half)
+
+    def shared_lines(self, errors: Errors, effect: ExactEffect) -> int:
+        """Lines on either side of the middle one that share its quadratic phase, or that the response walks over."""
         per_line = abs(self.analysis.exact.phases_per_term[0][0]) * self.collection.range_cell / OVERSAMPLING
         shared = int(min(_SHARED_RAD / per_line if per_line else 1e6, 1e6))
-        walked = round(self.spread(errors, effect).walk * OVERSAMPLING / 2)
-        lines = chip.image.shape[0]
-        half = min(lines // 2, lines - 1 - lines // 2, max(shared, walked))
-        return refocused(self.collection, errors, effect.displacement, chip, algorithm, half)
+        return max(shared, round(self.spread(errors, effect).walk * OVERSAMPLING / 2))
 
     def spread(self, errors: Errors, effect: ExactEffect) -> Spread:
         """Where an error puts the parts of a response, by the range error that it leaves over the aperture.

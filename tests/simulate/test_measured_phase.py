@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.simulate.aperture_fit import edge_phases
-from bisar_budget.simulate.aperture_reading import read_aperture
+from bisar_budget.simulate.aperture_reading import _distance, read_aperture
 from bisar_budget.simulate.collection import Errors, PointCollection, superposed
 from bisar_budget.simulate.phase_history import MotionError, cell_centres
 from bisar_budget.simulate.shift import measured_shift
@@ -277,3 +277,29 @@ class TestRoom:
     def test_a_patch_of_a_thousand_cells_is_the_largest(self) -> None:
         with pytest.raises(ValueError, match="at most 1024 are formed"):
             point_collection(0).chip((0.0, 0.0), Errors(), cells=1025)
+
+
+def test_the_middle_of_a_chip_keeps_its_centre() -> None:
+    """Refocused responses are read from the middle of a large patch alone."""
+    mission = parse_mission(mission_text())
+    whole = PointCollection(mission, mission.geometry).chip(
+        (3.0, -2.0), Errors(), scatterer=(3.0, -2.0), cells=96, range_cells=4
+    )
+    part = whole.within(48)
+    assert part.image.shape == (whole.image.shape[0], 120)
+    for chip in (whole, part):
+        middle = chip.grid[chip.image.shape[0] // 2, chip.image.shape[1] // 2]
+        assert middle[:2] == pytest.approx((3.0, -2.0), abs=1e-9)
+        assert abs(chip.cut[chip.cut.size // 2]) == np.abs(chip.image).max()
+    assert whole.within(200) is whole
+
+
+@pytest.mark.parametrize("slant_range", [3e2, 7e5, 3.7e7])
+def test_distances_are_right_to_a_hundredth_of_a_degree_of_phase(slant_range: float) -> None:
+    """They come from a product of matrices, whose squares cancel; 1e-8 m are 0.004° at Ku-band."""
+    random = np.random.default_rng(1)
+    positions = random.normal(size=(20, 3))
+    positions *= slant_range / np.linalg.norm(positions, axis=1)[:, None]
+    points = np.column_stack((random.uniform(-100, 100, (30, 2)), np.zeros(30)))
+    exact = np.linalg.norm(positions[:, None] - points, axis=2)
+    assert np.abs(_distance(positions, points) - exact).max() < 2e-8

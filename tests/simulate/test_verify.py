@@ -15,8 +15,11 @@ from bisar_budget.budget.images import Verdict, VerifiedMission
 from bisar_budget.budget.verdicts import with_verdicts
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.simulate import collection as collection_module
+from bisar_budget.simulate.exact import NoGroundPointError
 from bisar_budget.simulate.image_formation import backprojection
+from bisar_budget.simulate.study import Study
 from bisar_budget.simulate.verify import rows_to_verify, verify_mission
+from tests import families
 from tests.conftest import ROOT, findings, mission_text
 from tests.conftest import row as row_of
 
@@ -211,6 +214,21 @@ def test_a_published_limit_beyond_first_order_is_imaged_and_optimistic() -> None
     assert row.verdict == "optimistic"
     assert row.measured_qpe_rad > 1.05 * row.budget_rad
     assert row.measured_qpe_rad == pytest.approx(row.predicted_qpe_rad, rel=0.01)
+
+
+def test_a_published_limit_that_leaves_no_ground_point_is_optimistic() -> None:
+    """The table allows 20 m/s at a satellite over a fixed receiver; by exact ranges the point has no image then."""
+    mission = parse_mission(families.mission_text("satellite_fixed", 3))
+    (row,) = verify_mission(mission, "transmitter.velocity.z").rows
+    assert mission.allocation.model == "published"
+    assert row.verdict == "optimistic"
+    assert row.measured_qpe_rad is None
+    assert "no ground point has the recorded range history" in row.reason
+    study = Study(mission)
+    source = next(s for s in study.sources if s.id == row.id)
+    for size in (row.boundary_error, -row.boundary_error):
+        with pytest.raises(NoGroundPointError):
+            study.effect([(source, size)])
 
 
 ERRORS = {
