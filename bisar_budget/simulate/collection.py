@@ -255,17 +255,6 @@ class PointCollection:
         cells = 2 * farthest * self.radar.bandwidth / SPEED_OF_LIGHT
         return max(_FREQUENCIES, 16 * math.ceil((cells + _FREQUENCIES / 2) / 16))
 
-    def spatial_frequency(self, chip: Chip) -> tuple[Floats, Floats]:
-        """Slow time over the aperture, -1 to 1, and the frequency at the middle of a chip's cut then. [cycles/m]"""
-        slow_time = cell_centres(self.aperture_time, 257)
-        cut = chip.grid[chip.grid.shape[0] // 2]
-        middle = cut.shape[0] // 2
-        slope = np.zeros_like(slow_time)
-        for one in self.paths(Errors(), slow_time):
-            for pixel, sign in ((cut[middle + 1], 1), (cut[middle - 1], -1)):
-                slope += sign * np.linalg.norm(pixel - one.actual, axis=1) / (2 * chip.spacing[1])
-        return slow_time / (self.aperture_time / 2), (slope - slope[slope.size // 2]) / self.wavelength
-
     def _require_room(self, cells: int, range_cells: int) -> None:
         """Refuse a patch that aliases or is too large. More pulses than it takes would change nothing."""
         if cells > MAX_CELLS:

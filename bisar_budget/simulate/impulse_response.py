@@ -12,13 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bisar_budget.simulate.aperture_fit import EdgePhases, edge_phases
 from bisar_budget.simulate.phase_history import Complexes, Floats
 
 _UPSAMPLING = 32
 _CHIP_UPSAMPLING = 8
-_ORDER = 4  # of the phase over the aperture; higher ones follow the ripple
-_INNER_BAND = 0.9  # of the aperture; its edges ring in an image of finite extent
 _ASCENTS = 50  # at most, along x′ and y′ in turn
 _SETTLED = 1e-4  # samples
 
@@ -275,43 +272,3 @@ def _vertex(values: Floats, top: int) -> float:
     before, at, after = values[top - 1 : top + 2]
     bend = before - 2 * at + after
     return float((before - after) / (2 * bend)) if bend else 0.0
-
-
-def quadratic_phase_error(
-    cut: Complexes, reference: Complexes, spacing_m: float, slow_time: Floats, spatial_frequency: Floats
-) -> EdgePhases:
-    """Measure quadratic and cubic phase of a response against an error-free one at the same place.
-
-    Both cuts go back to the aperture by FFT, tapered to their ends, where a finite image cuts sidelobes off.
-    The phase of their product is fitted over the inner 90 % of the aperture: the reference takes out the
-    ripple of the band's edges and the curvature that a displaced point has of its own.
-
-    Parameters
-    ----------
-    cut, reference : (samples,) ndarray
-        The same line of the image with and without error, the range at the aperture midpoint taken out.
-    spacing_m : float
-        Between samples.
-    slow_time : (times,) ndarray
-        -1 to 1, the ends of the aperture.
-    spatial_frequency : (times,) ndarray
-        Along the cut, at those times; monotonic, as it is where an image can be formed. [cycles/m]
-
-    Returns
-    -------
-    quadratic, cubic : float
-        Phase at the aperture edge, signed like the range error: of the best fit over the whole aperture,
-        `aperture_fit`, to which the fit over its inner part is continued. [rad]
-    """
-    count = cut.size
-    taper = np.cos(math.pi * (np.arange(count) - count // 2) / count) ** 2
-    product = np.fft.fft(cut * taper) * np.conj(np.fft.fft(reference * taper))
-    frequency = np.fft.fftfreq(count, spacing_m)
-    order = np.argsort(spatial_frequency)
-    place = np.interp(frequency, spatial_frequency[order], slow_time[order], left=np.inf, right=np.inf)
-    inner = np.nonzero(np.abs(place) < _INNER_BAND)[0]
-    inner = inner[np.argsort(place[inner])]
-    phase = np.unwrap(np.angle(product[inner]))
-    weights = np.sqrt(np.abs(product[inner]))
-    fit = np.polynomial.polynomial.polyfit(place[inner], phase, _ORDER, w=weights)
-    return edge_phases(-fit)  # the image's phase is −2π/λ times the range error

@@ -8,8 +8,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.evaluators import LEGENDRE_FITS
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.simulate.aperture_fit import edge_phases
 from bisar_budget.simulate.aperture_reading import _distance, read_aperture
 from bisar_budget.simulate.collection import Errors, PointCollection, superposed
 from bisar_budget.simulate.phase_history import MotionError, cell_centres
@@ -175,14 +175,16 @@ def test_the_best_quadratic_takes_up_its_share_of_higher_powers() -> None:
     """6/7 of a fourth and 5/7 of a sixth power; a fit of second and of third order give the same."""
     place = np.linspace(-1, 1, 20001)
     coefficients = np.array([0.3, -1.0, 0.4, 0.7, -0.2, 0.5, 0.1])
-    want = edge_phases(coefficients)
-    assert want.quadratic == pytest.approx(0.4 - 0.2 * 6 / 7 + 0.1 * 5 / 7, rel=1e-12)
-    assert want.cubic == pytest.approx(0.7 + 0.5 * 10 / 9, rel=1e-12)
+    quadratic, cubic = 0.4 - 0.2 * 6 / 7 + 0.1 * 5 / 7, 0.7 + 0.5 * 10 / 9
+    for nodes, *fit in LEGENDRE_FITS.values():
+        there = np.polynomial.polynomial.polyval(np.array(nodes), coefficients)
+        assert there @ fit[2] == pytest.approx(quadratic, rel=1e-12)
+        assert there @ fit[3] == pytest.approx(cubic, rel=1e-12)
+        assert np.ones(len(nodes)) @ fit[2] == pytest.approx(0, abs=1e-12)  # a constant alone
     phase = np.polynomial.polynomial.polyval(place, coefficients)
     for order in (2, 3):
         fit = np.polynomial.polynomial.polyfit(place, phase, order)
-        assert fit[2] == pytest.approx(want.quadratic, abs=1e-3)  # samples to the very edge
-    assert edge_phases(np.array([1.0])) == (0.0, 0.0)  # a constant alone
+        assert fit[2] == pytest.approx(quadratic, abs=1e-3)  # samples to the very edge
 
 
 @pytest.mark.parametrize("order", [0, 1, 2, 3])
