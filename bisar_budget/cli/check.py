@@ -21,7 +21,6 @@ from bisar_budget.cli.streams import (
     expand,
     is_terminal,
     load_all,
-    print_text,
     spare,
     wants_color,
     write_file,
@@ -245,7 +244,7 @@ def check(
         pieces = check_files(files, day, model, keep, is_brief=is_brief)
         if says_faults:
             _say_faults(piece.unusable for piece in pieces)
-        deliver(joined(format_name, pieces, __version__, style), output)
+        deliver(joined(format_name, pieces, __version__, style), output, format_name)
         statuses = {piece.status for piece in pieces}
     else:
         report = check_all(files, day, model, verifying, illustrated, drawn)
@@ -256,7 +255,7 @@ def check(
         for path, its_format in written:
             _write_report(path, its_format, report, style._replace(color=False, verbosity=max(style.verbosity, 0)))
         if output is None:
-            print_text(render(format_name, report, style))
+            deliver(render(format_name, report, style), None, format_name)
         else:
             _write_report(output, format_name, report, style)
         if format_name == "github":

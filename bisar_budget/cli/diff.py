@@ -114,6 +114,6 @@ def diff(
     else:
         write = difference.as_text if format_name == "text" else difference.as_markdown
         text = write(changes, tolerated, all_rows)
-    deliver(text, output)
+    deliver(text, output, format_name)
     is_refused = tolerated is not None and any(change.broken(tolerated) for change in changes)
     sys.exit(EXIT_BROKEN if is_refused else 0)
