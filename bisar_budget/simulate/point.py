@@ -61,13 +61,14 @@ class Response(NamedTuple):
     """What the images show of one target.
 
     `effect` is what the errors do to it by exact ranges, its displacement counted from the target; `shown` is where
-    the image former puts it (east, north) [m]. `clean`, `smeared` and `focused` are its cross-range cuts, None where
+    the image former puts it in the rotated images, `shown_in_scene` in the one along (x, y) (east, north). [m] `clean`, `smeared` and `focused` are its cross-range cuts, None where
     it cannot be measured for what stands beside it.
     """
 
     target: Target
     effect: ExactEffect
     shown: GroundVector
+    shown_in_scene: GroundVector
     clean: ImpulseResponse | None
     smeared: ImpulseResponse | None
     focused: ImpulseResponse | None
@@ -81,8 +82,8 @@ class PointImages(NamedTuple):
     `in_scene` is on `scene_grid`, (nx, ny, 3) along (x, y), of as much of the patch as a quarter of a million pixels
     hold; the others are on `grid`, (nx, ny, 3), along (x′, y′): by exact ranges along lines of equal range, by plane
     waves along the axes of (10). All are complex and lie where the errors move the targets; `scene_spacing` and
-    `spacing`, (2,) [m], are those of their pixels. `range_error` is what is quadratic and higher of the range error at
-    the scene centre over `slow_time`; `segments` (3, 2) are its value [m] and slope [m/s] at `segment_times`,
+    `spacing`, (2,) [m], are those of their pixels. `range_error` is what is quadratic and higher in the range error
+    of the scene centre over `slow_time`; `segments` (3, 2) are its value [m] and slope [m/s] at `segment_times`,
     `points` (3, 2) the ground points (29) of those pieces of the whole range error: the middle one is where (25) puts
     a point at the scene centre. `effect` is that of the scene centre, too. `responses` are one for each target, and
     `response`, `focused_response`, `clean_response` the cuts through the brightest pixels. `outside` says which
@@ -315,8 +316,8 @@ def simulate_point(
         focused_response=_measured(focused, across, clean.mask_m),
         clean_response=clean,
         responses=tuple(
-            Response(target, moved, place, *_cuts((error_free, rotated, focused), window, across))
-            for target, moved, place, window in zip(targets.points, effects, shown, windows, strict=True)
+            Response(*seen, *_cuts((error_free, rotated, focused), window, across))
+            for *seen, window in zip(targets.points, effects, shown, in_scene_shown, windows, strict=True)
         ),
         outside=plan.outside,
     )
@@ -534,10 +535,17 @@ def _indicated(
 
 
 def _measured(image: Complexes, spacing: float, mask_m: float | None) -> ImpulseResponse:
-    """Measure the cross-range cut through the brightest pixel, moved to the middle."""
+    """Measure the cross-range cut through the brightest pixel, moved to the middle.
+
+    A smear over most of the patch has its peak at one end, and would wrap around; it gets as much room again.
+    """
     row, column = np.unravel_index(np.argmax(np.abs(image)), image.shape)
-    cut = np.roll(image[row], image.shape[1] // 2 - int(column))
-    return impulse_response(cut, spacing, mask_m)
+    cut, count = image[row], image.shape[1]
+    try:
+        return impulse_response(np.roll(cut, count // 2 - int(column)), spacing, mask_m)
+    except ValueError:
+        wide = np.concatenate((cut, np.zeros(count, dtype=complex)))
+        return impulse_response(np.roll(wide, count - int(column)), spacing, mask_m)
 
 
 def _clutter(level_db: float | None, grid: Floats, seed: int) -> tuple[Floats, Complexes]:
