@@ -61,8 +61,9 @@ class Response(NamedTuple):
     """What the images show of one target.
 
     `effect` is what the errors do to it by exact ranges, its displacement counted from the target; `shown` is where
-    the image former puts it in the rotated images, `shown_in_scene` in the one along (x, y) (east, north). [m] `clean`, `smeared` and `focused` are its cross-range cuts, None where
-    it cannot be measured for what stands beside it.
+    the image former puts it in the rotated images, `shown_in_scene` in the one along (x, y) (east, north). [m]
+    `clean`, `smeared` and `focused` are its cross-range cuts, None where it cannot be measured for what stands beside
+    it.
     """
 
     target: Target
@@ -316,8 +317,10 @@ def simulate_point(
         focused_response=_measured(focused, across, clean.mask_m),
         clean_response=clean,
         responses=tuple(
-            Response(*seen, *_cuts((error_free, rotated, focused), window, across))
-            for *seen, window in zip(targets.points, effects, shown, in_scene_shown, windows, strict=True)
+            Response(target, moved, place, at, *_cuts((error_free, rotated, focused), window, across))
+            for target, moved, place, at, window in zip(
+                targets.points, effects, shown, in_scene_shown, windows, strict=True
+            )
         ),
         outside=plan.outside,
     )
