@@ -41,6 +41,10 @@ _POINT = "bisar_budget/simulate/point.py"
 _PHASES = "bisar_budget/simulate/phase_cases.py"
 _VIBRATION = "bisar_budget/simulate/vibration.py"
 
+_PLOT = "bisar_budget/report/point_plot.py"
+_FIGURES = "bisar_budget/report/point_figures.py"
+
+_ARTISTS = "tests/simulate/test_plot_artists.py::"
 _BORDERS = "tests/simulate/test_verdict_borders.py::"
 _IMAGES = "tests/simulate/test_point_against_images.py::"
 _POINTS_OF_29 = f"{_IMAGES}test_points_of_29_are_where_each_third_of_the_aperture_puts_the_response"
@@ -137,8 +141,8 @@ MUTANTS = (
     Mutant(
         "(28): twice the slope",
         _POINT,
-        "bent_slope = slope - slope[fine.size // 2]",
-        "bent_slope = 2 * (slope - slope[fine.size // 2])",
+        "np.interp(times, fine, left), np.interp(times, fine, slope)",
+        "np.interp(times, fine, left), 2 * np.interp(times, fine, slope)",
         (_POINTS_OF_29,),
     ),
     Mutant(
@@ -154,6 +158,48 @@ MUTANTS = (
         "np.asarray(mission.allocation.coverage_factor * polynomial, dtype=float)",
         "np.asarray(polynomial, dtype=float)",
         (f"{_IMAGES}test_the_clock_of_a_simulated_image_has_the_coverage_factor",),
+    ),
+    Mutant(
+        "plot: segments of twice their length",
+        _FIGURES,
+        "half = (times[1] - times[0]) / 2",
+        "half = times[1] - times[0]",
+        (f"{_ARTISTS}test_figure_3_has_tangents_over_thirds_of_the_aperture",),
+    ),
+    Mutant(
+        "plot: images transposed",
+        _PLOT,
+        "        picture.corners[..., 0],\n        picture.corners[..., 1],\n",
+        "        picture.corners[..., 1],\n        picture.corners[..., 0],\n",
+        (f"{_ARTISTS}test_figure_5_lies_where_the_thirds_say",),
+    ),
+    Mutant(
+        "plot: images mirrored",
+        _PLOT,
+        "        picture.corners[..., 0],\n",
+        "        -picture.corners[..., 0],\n",
+        (f"{_ARTISTS}test_figure_5_lies_where_the_thirds_say",),
+    ),
+    Mutant(
+        "plot: turned the other way",
+        _FIGURES,
+        "turn = np.array([[cosine, -sine], [sine, cosine]])",
+        "turn = np.array([[cosine, sine], [-sine, cosine]])",
+        (f"{_ARTISTS}test_figures_6_and_7_are_turned_by_the_look_direction",),
+    ),
+    Mutant(
+        "plot: points mirrored about the middle one",
+        _PLOT,
+        'panel.plot(*drawn.points.T, "o-"',
+        'panel.plot(*(2 * drawn.points[1] - drawn.points).T, "o-"',
+        (f"{_ARTISTS}test_figure_4_has_the_points_where_thirds_of_the_aperture_put_the_response",),
+    ),
+    Mutant(
+        "plot: points with x for y",
+        _PLOT,
+        'panel.plot(*drawn.points.T, "o-"',
+        'panel.plot(*drawn.points.T[::-1], "o-"',
+        (f"{_ARTISTS}test_figure_4_has_the_points_where_thirds_of_the_aperture_put_the_response",),
     ),
     Mutant(
         "autofocus: a correction that amplifies by 1 %",
