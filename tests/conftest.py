@@ -1,11 +1,13 @@
 """Shared test helpers: missions built from a base by replacement, rows found by id."""
 
 import copy
+import math
 from collections.abc import Callable
 from datetime import date
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 from click.testing import CliRunner, Result
@@ -19,6 +21,30 @@ from bisar_budget.mission.load import parse_mission
 # Shared machines: how long an example takes says nothing.
 settings.register_profile("shared", deadline=None)
 settings.load_profile("shared")
+
+_approx = pytest.approx
+
+
+def approx(expected: Any, rel: float | None = None, abs: float | None = None, nan_ok: bool = False) -> Any:
+    """`pytest.approx` without its absolute tolerance of 1e-12 where all that is expected is smaller than 1e-6.
+
+    A clock error of 3e-13 would else equal any other: the share that it is held to could be another one's.
+    """
+    if abs is None:
+        values = list(expected.values()) if isinstance(expected, dict) else expected
+        try:
+            largest = np.abs(np.asarray(values, dtype=float)).max(initial=0.0)
+        except (TypeError, ValueError):
+            largest = math.inf  # not numbers alone
+        if 0 < largest < 1e-6:
+            rel, abs = (
+                1e-6 if rel is None else rel,
+                0.0,
+            )  # a relative one is looked at beside an absolute one if given
+    return _approx(expected, rel=rel, abs=abs, nan_ok=nan_ok)
+
+
+pytest.approx = approx
 
 ROOT = Path(__file__).resolve().parent.parent
 TODAY = date(2026, 11, 21)

@@ -6,6 +6,7 @@ import click
 
 from bisar_budget.cli.streams import FILE, fail, load_all, print_text, spare
 from bisar_budget.cli.verify import progress_bar
+from bisar_budget.errors import printable
 
 
 @click.command()
@@ -16,17 +17,37 @@ from bisar_budget.cli.verify import progress_bar
 @click.option(
     "-o", "--output", type=FILE, metavar="FILE.npz", help="Save the images and what explains them for NumPy."
 )
-def simulate(mission: str, plot: str | None, output: str | None) -> None:
-    """Form the image of a point with the declared errors.
+@click.option(
+    "--image-former",
+    type=click.Choice(["backprojection", "polar_format", "matched_filter", "far_field"]),
+    default="backprojection",
+    show_default=True,
+    help="Equation that forms the images: (4) fast or as it is printed, (14), or (12).",
+)
+@click.option(
+    "--targets",
+    metavar="LIST",
+    help="What stands in the scene, instead of one point at its centre: EAST, NORTH[, LEVEL]; ...; clutter LEVEL.",
+)
+def simulate(mission: str, plot: str | None, output: str | None, image_former: str, targets: str | None) -> None:
+    """Form the image of a point, or of a scene, with the declared errors.
 
     All errors of the file together, with its signs, are flown once: they may cancel, and the worst case is that
     of `check`. The data come from exact ranges; the image is formed where the errors move the point, in the scene's
-    axes and rotated so that the smear lies in cross range, before and after phase gradient autofocus.
+    axes and rotated so that the smear lies in cross range, before and after autofocus, and rotated back.
+    With --targets "0, 0; 40 m, -30 m, -6 dB; clutter -25 dB" there are two points in clutter, and one correction for
+    both; levels are those of a pixel over a point of 0 dB.
     """
     for name, suffixes in ((plot, (".png", ".svg", ".pdf")), (output, (".npz",))):
         if name is not None and os.path.splitext(name)[1].lower() not in suffixes:
             raise click.UsageError(f"{name}: the suffix must be one of {', '.join(suffixes)}")
     spare([mission], [plot, output])
+    from bisar_budget.simulate.targets import Targets, parse_targets
+
+    try:
+        standing = Targets() if targets is None else parse_targets(targets)
+    except ValueError as error:
+        raise click.UsageError(f"--targets: {printable(str(error))}.") from None
     (loaded,) = load_all([mission])
     from bisar_budget.report import point_plot
     from bisar_budget.simulate.point import SimulationError, simulate_point
@@ -38,7 +59,7 @@ def simulate(mission: str, plot: str | None, output: str | None) -> None:
                 bar.length = work
                 bar.update(done)
 
-            images = simulate_point(loaded, progress)
+            images = simulate_point(loaded, progress, image_former=image_former, targets=standing)
     except (SimulationError, ValueError) as error:
         fail(f"{mission}: {error}")
     try:

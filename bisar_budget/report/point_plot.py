@@ -1,5 +1,7 @@
-"""Figures 3 to 7 of Rigling & Moses for a mission of one's own: range error, points, images, autofocus."""
+"""Figures 3 to 7 of Rigling & Moses for a mission of one's own: drawn, saved, and said in a few lines."""
 
+import math
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -7,44 +9,75 @@ import numpy as np
 from bisar_budget.budget.effects import PLATFORMS
 from bisar_budget.mission.model import Mission
 from bisar_budget.report.layout import wrapped
-from bisar_budget.simulate.impulse_response import upsampled
-from bisar_budget.simulate.phase_history import Complexes, Floats
+from bisar_budget.report.point_figures import FLOOR_DB, Limits, Picture, Sheet, rotated_back, sheet
+from bisar_budget.simulate.impulse_response import ImpulseResponse
+from bisar_budget.simulate.phase_history import Floats
 from bisar_budget.simulate.point import PointImages
 
-_FLOOR_DB = -35.0
 _RESTORED_DB = 1.0  # below the error-free peak; a focused response is within a fraction of it
-_FINE, _FINE_CUT = 4, 8  # interpolation, so that a mainlobe has a shape
-_DRAWN_DB = -20.0  # what is above lies within the panels
-_BESIDE = 6  # samples around it, two cells
 _EQUAL = 8.0  # an image that is not longer for its width than this has equal scales
+_NOT_FORMED = "#3a3a3a"  # beside a patch that is narrower than the panel
+_ERROR, _TRUE, _AT = "#c1502e", "#5fd3f3", "#7CFC9A"
+_CUT_STYLES: tuple[Mapping[str, Any], ...] = (
+    {"color": "#888888", "lw": 3},
+    {"color": _ERROR},
+    {"color": "#1f5fa8", "ls": "--"},
+)
 
 
 def draw(images: PointImages, title: str, path: str) -> None:
-    """Draw the five figures on one sheet; the suffix of `path` says PNG, SVG or PDF."""
+    """Draw the figures on one sheet; the suffix of `path` says PNG, SVG or PDF."""
+    _save(figure(sheet(images), title), path)
+
+
+def figure(drawn: Sheet, title: str) -> Any:
+    """Lay all panels on one Matplotlib figure."""
+    plt = _pyplot()
+    page, panels = plt.subplots(2, 4, figsize=(16.5, 8), layout="constrained")
+    for name, panel in zip(("fig3", "fig4", "fig5", "cuts", "fig6", "fig7", "fig7_back"), panels.flat, strict=False):
+        artist = PANELS[name](panel, drawn)
+    key = panels[1, 3]
+    key.axis("off")
+    bar = page.colorbar(artist, ax=key, orientation="horizontal", location="bottom", fraction=0.5, pad=0.02)
+    bar.set_label("dB to the error-free peak")
+    marks = [
+        key.plot([], [], label=label, **style)[0]
+        for style, label in (
+            (_stands(_TRUE), "where the target stands"),
+            (_put(_AT), "where (25) puts it"),
+            ({"ls": "none", "marker": "o", "color": _ERROR, "ms": 5}, "points of (29)"),
+        )
+    ]
+    key.add_artist(key.legend(handles=panels[0, 3].lines, loc="upper center", fontsize=10, frameon=False))
+    key.legend(handles=marks, loc="lower center", facecolor=_NOT_FORMED, labelcolor="white", fontsize=10)
+    page.suptitle(title)
+    return page
+
+
+def draw_one(name: str, drawn: Sheet, path: str) -> None:
+    """Draw a single panel, small, for a page; `name` is one of `PANELS`."""
+    plt = _pyplot()
+    page, panel = plt.subplots(figsize=(4.4, 3.6), layout="constrained")
+    artist = PANELS[name](panel, drawn)
+    if name == "cuts":
+        panel.legend(fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.06), frameon=False)  # above the data
+    if artist is not None:
+        page.colorbar(artist, ax=panel, pad=0.02).set_label("dB to the error-free peak")
+    _save(page, path, dpi=80)
+
+
+def _pyplot() -> Any:
     import matplotlib
 
     matplotlib.use("agg")
     import matplotlib.pyplot as plt
 
-    figure, panels = plt.subplots(2, 3, figsize=(13, 8), layout="constrained")
-    peak = float(np.abs(images.error_free).max())
-    scene, turned = _places(images)
-    shown = _levels(images.rotated, peak), _levels(images.focused, peak)
-    along, across = _extent([*shown, _levels(images.error_free, peak)])
-    _range_error(panels[0, 0], images)
-    _points(panels[0, 1], images, scene[along, across])
-    _image(panels[0, 2], shown[0][along, across], scene[along, across], "Fig. 5: image in (x, y)", ("x [m]", "y [m]"))
-    for panel, level, name in (
-        (panels[1, 0], shown[0], "Fig. 6: rotated to (x′, y′)"),
-        (panels[1, 1], shown[1], "Fig. 7: after autofocus"),
-    ):
-        mesh = _image(panel, level[along, across], turned[along, across], name, ("x′ [m]", "y′ [m]"))
-    bar = figure.colorbar(mesh, ax=[panels[0, 2], panels[1, 1]], shrink=0.6, pad=0.01)
-    bar.set_label("dB to the error-free peak")
-    _cuts(panels[1, 2], images, across)
-    figure.suptitle(title)
-    figure.savefig(path, dpi=110, metadata={"Software": None} if path.lower().endswith("png") else None)
-    plt.close(figure)
+    return plt
+
+
+def _save(page: Any, path: str, dpi: int = 110) -> None:
+    page.savefig(path, dpi=dpi, metadata={"Software": None} if path.lower().endswith("png") else None)
+    _pyplot().close(page)
 
 
 def save(images: PointImages, path: str) -> None:
@@ -54,6 +87,7 @@ def save(images: PointImages, path: str) -> None:
         in_scene=images.in_scene,
         rotated=images.rotated,
         focused=images.focused,
+        rotated_back=rotated_back(images),
         error_free=images.error_free,
         spacing_m=images.spacing,
         scene_spacing_m=images.scene_spacing,
@@ -63,6 +97,11 @@ def save(images: PointImages, path: str) -> None:
         range_error_m=images.range_error,
         points_m=images.points,
         grid_m=images.grid,
+        scene_grid_m=images.scene_grid,
+        image_former=images.image_former,
+        targets_m=[[one.east, one.north] for one in images.targets.points],
+        targets_db=[one.level_db for one in images.targets.points],
+        shown_m=[one.shown for one in images.responses],
     )
 
 
@@ -78,26 +117,22 @@ def _flown(mission: Mission) -> str:
 
 
 def summary(images: PointImages, mission: Mission) -> str:
-    """Say in a few lines what the errors do to the point and what autofocus brings back."""
+    """Say in a few lines what the errors do to the targets and what autofocus brings back."""
     clean = images.clean_response
     east, north = (round(float(moved), 3) for moved in images.effect.displacement)
+    is_point = len(images.responses) == 1 and images.targets.clutter_db is None
     lines = [
         mission.name,
         "",
         *wrapped(f"errors         {_flown(mission)}", " " * 15),
         f"displacement   {east + 0.0:.3f} m east, {north + 0.0:.3f} m north",
         f"phase          quadratic {abs(images.effect.quadratic):.2f} rad, cubic {abs(images.effect.cubic):.2f} rad",
-        "",
-        f"{'':<14} {'peak':>9} {'width':>8} {'PSLR':>9} {'ISLR':>9}",
     ]
-    for label, response in (
-        ("without error", clean),
-        ("with errors", images.response),
-        ("autofocused", images.focused_response),
-    ):
-        peak = 20 * np.log10(response.peak / clean.peak)
-        ratios = f"{response.pslr_db:>6.1f} dB {response.islr_db:>6.1f} dB"
-        lines.append(f"{label:<14} {peak:>+6.2f} dB {response.irw_m:>6.3f} m {ratios}")
+    if images.image_former != "backprojection":
+        lines += wrapped(f"image former   {_formed_by(images)}", " " * 15)
+    if images.targets.clutter_db is not None:
+        lines.append(f"clutter        {images.targets.clutter_db:g} dB per pixel")
+    lines += ["", *(_of_the_point(images) if is_point else _of_targets(images))]
     if images.outside:
         lines += ["", *wrapped(images.outside, "")]
     left = 20 * np.log10(images.focused_response.peak / clean.peak)
@@ -109,96 +144,157 @@ def summary(images: PointImages, mission: Mission) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _places(images: PointImages) -> tuple[Floats, Floats]:
-    """Ground places of the interpolated pixels, from the displaced point, (nx, ny, 2): in (x, y) and (x′, y′). [m]"""
-    nx, ny = images.grid.shape[:2]
-    ground = images.grid[..., :2] - np.asarray(images.effect.displacement)
-    for axis, count in ((0, nx), (1, ny)):
-        fine = np.arange(count * _FINE) / _FINE
-        before = np.minimum(fine.astype(int), count - 2)
-        weight = (fine - before).reshape((-1, 1, 1) if axis == 0 else (1, -1, 1))
-        ground = np.take(ground, before, axis) * (1 - weight) + np.take(ground, before + 1, axis) * weight
-    cosine, sine = np.cos(images.look_azimuth), np.sin(images.look_azimuth)
-    turned = ground @ np.array([[cosine, -sine], [sine, cosine]])
-    return ground, turned
+def _formed_by(images: PointImages) -> str:
+    words = {
+        "polar_format": "polar format (14) in (x′, y′), backprojection in (x, y)",
+        "matched_filter": "matched filter (4)",
+        "far_field": "far-field filter (12)",
+    }[images.image_former]
+    response = images.responses[0]
+    exact = np.array([response.target.east, response.target.north]) + response.effect.displacement
+    off = float(np.hypot(*(np.asarray(response.shown) - exact)))
+    plane = f"; plane waves put the response {off:.2g} m from where exact ranges do" if off else ""
+    return words + plane
 
 
-def _levels(image: Complexes, peak: float) -> Floats:
-    """Interpolated image over the error-free peak. [dB]"""
-    fine = np.abs(upsampled(upsampled(image, _FINE).T, _FINE).T)
-    level: Floats = 20 * np.log10(np.maximum(fine / peak, 1e-6))
-    return level
+def _of_the_point(images: PointImages) -> list[str]:
+    lines = [f"{'':<14} {'peak':>9} {'width':>8} {'PSLR':>9} {'ISLR':>9}"]
+    for label, response in (
+        ("without error", images.clean_response),
+        ("with errors", images.response),
+        ("autofocused", images.focused_response),
+    ):
+        peak = 20 * math.log10(response.peak / images.clean_response.peak)
+        ratios = f"{response.pslr_db:>6.1f} dB {response.islr_db:>6.1f} dB"
+        lines.append(f"{label:<14} {peak:>+6.2f} dB {response.irw_m:>6.3f} m {ratios}")
+    return lines
 
 
-def _extent(levels: list[Floats]) -> tuple[slice, slice]:
-    """Part of the patch to draw: what any of the images has above a level, and its nearest sidelobes."""
-    bright = np.maximum.reduce(levels) > _DRAWN_DB
-    slices = []
-    for axis in (0, 1):
-        used = np.nonzero(bright.any(axis=1 - axis))[0]
-        size, beside = bright.shape[axis], _BESIDE * _FINE
-        slices.append(slice(max(0, int(used[0]) - beside), min(size, int(used[-1]) + beside + 1)))
-    return slices[0], slices[1]
+def _of_targets(images: PointImages) -> list[str]:
+    """One line for each target; peaks are over its own without error, and widths in its own cut."""
+    lines = [
+        f"{'target [m]':>17} {'level':>7} {'moved by [m]':>15} {'phase':>9} {'with errors':>14} {'autofocused':>14}",
+        f"{'east':>8} {'north':>8} {'[dB]':>7} {'east':>7} {'north':>7} {'[rad]':>9} "
+        f"{'[dB]':>7} {'[m]':>6} {'[dB]':>7} {'[m]':>6}",
+    ]
+    for one in images.responses:
+        moved = np.round(one.effect.displacement, 3) + 0.0
+        lines.append(
+            f"{one.target.east:>8.6g} {one.target.north:>8.6g} {one.target.level_db:>7.4g} "
+            f"{moved[0]:>7.3f} {moved[1]:>7.3f} {one.effect.quadratic:>+9.3f} "
+            f"{_peak_and_width(one.smeared, one.clean)} {_peak_and_width(one.focused, one.clean)}"
+        )
+    return lines
 
 
-def _range_error(panel: Any, images: PointImages) -> None:
-    panel.plot(images.slow_time, 1e3 * images.range_error, color="black", label="left at the displaced point")
-    third = (images.segment_times[-1] - images.segment_times[0]) / 4
-    for time, (value, slope) in zip(images.segment_times, images.segments, strict=True):
-        ends = np.array([time - third, time + third])
-        panel.plot(ends, 1e3 * (value + slope * (ends - time)), "--", color="#c1502e")
+def _peak_and_width(response: ImpulseResponse | None, clean: ImpulseResponse | None) -> str:
+    if response is None or clean is None:
+        return f"{'-':>7} {'-':>6}"
+    return f"{20 * math.log10(response.peak / clean.peak):>+7.2f} {response.irw_m:>6.3f}"
+
+
+def _range_error(panel: Any, drawn: Sheet) -> None:
+    panel.plot(drawn.slow_time, drawn.range_error_mm, color="black")
+    for segment in drawn.segments:
+        panel.plot(*segment.T, "--", color=_ERROR)
     panel.set(title="Fig. 3: range error, three segments", xlabel="slow time [s]", ylabel="range error [mm]")
     panel.grid(color="#dddddd", lw=0.5)
 
 
-def _points(panel: Any, images: PointImages, places: Floats) -> None:
-    panel.plot(*images.points.T, "o-", color="#c1502e")
+def _points(panel: Any, drawn: Sheet) -> None:
+    panel.plot(*drawn.points.T, "o-", color=_ERROR, zorder=3)
+    panel.plot(0, 0, **_stands("#1b7fa3"))
+    panel.plot(*drawn.points[1], **_put("#2a8f4f"))
     panel.set(title="Fig. 4: points of the segments, (29)", xlabel="x [m]", ylabel="y [m]")
-    half = max(
-        float(np.abs(images.points).max()) * 1.3, float(np.ptp(places[places.shape[0] // 2], axis=0).max()) / 2
-    )
-    panel.set(xlim=(-half, half), ylim=(-half, half), aspect="equal")
+    span = float(np.ptp(drawn.points, axis=0).max()) or 1.0
+    low, high = drawn.points.min(axis=0), drawn.points.max(axis=0)
+    if float(np.hypot(*drawn.points[1])) < 10 * span:  # else the three would be one
+        low, high = np.minimum(low, 0), np.maximum(high, 0)
+    else:
+        _point_to(panel, np.zeros(2), (low + high) / 2, "black")
+    half = 0.65 * max(float((high - low).max()), span)
+    (x, y) = (low + high) / 2
+    panel.set(xlim=(x - half, x + half), ylim=(y - half, y + half), aspect="equal")
     panel.grid(color="#dddddd", lw=0.5)
 
 
-def _image(panel: Any, level: Floats, places: Floats, title: str, labels: tuple[str, str]) -> Any:
-    """Draw levels where their pixels lie, which follow lines of equal range."""
+def _image(panel: Any, picture: Picture, *, with_points: bool = False) -> Any:
+    """Draw each pixel between its own corners, which follow lines of equal range."""
     mesh = panel.pcolormesh(
-        places[..., 0],
-        places[..., 1],
-        level,
-        vmin=_FLOOR_DB,
+        picture.corners[..., 0],
+        picture.corners[..., 1],
+        picture.level_db,
+        vmin=FLOOR_DB,
         vmax=0,
         cmap="magma",
-        shading="gouraud",
+        shading="flat",
         rasterized=True,
     )
-    panel.set(title=title, xlabel=labels[0], ylabel=labels[1])
-    low, high = places.min(axis=(0, 1)), places.max(axis=(0, 1))
-    if 1 / _EQUAL < (high - low)[0] / (high - low)[1] < _EQUAL:
-        middle, half = (low + high) / 2, (high - low).max() / 2
-        panel.set(
-            xlim=(middle[0] - half, middle[0] + half), ylim=(middle[1] - half, middle[1] + half), aspect="equal"
-        )
-    panel.set_facecolor("black")  # beside a patch that is narrower than the panel
+    panel.set(title=picture.title, xlabel=picture.axes[0], ylabel=picture.axes[1])
+    left, right, bottom, top = limits = picture.limits
+    if 1 / _EQUAL < (right - left) / (top - bottom) < _EQUAL:
+        x, y, half = (left + right) / 2, (bottom + top) / 2, max(right - left, top - bottom) / 2
+        left, right, bottom, top = limits = (x - half, x + half, y - half, y + half)
+        panel.set_aspect("equal")
+    panel.set(xlim=(left, right), ylim=(bottom, top), facecolor=_NOT_FORMED)
+    if with_points:
+        for three in picture.points:
+            panel.plot(*three.T, "o-", color=_ERROR, ms=4, lw=0.8)
+    panel.plot(*picture.shown_places.T, **_put(_AT))
+    panel.plot(*picture.true_places.T, **_stands(_TRUE))
+    for true in picture.true_places:
+        if not _is_within(true, limits):
+            _point_to(panel, true, np.array([(left + right) / 2, (bottom + top) / 2]), _TRUE)
+            break
     return mesh
 
 
-def _cuts(panel: Any, images: PointImages, across: slice) -> None:
-    peak = np.abs(images.error_free).max()
-    count = images.error_free.shape[1]
-    place = (np.arange(count * _FINE_CUT) / _FINE_CUT - count // 2) * images.spacing[1]
-    for image, label, style in (
-        (images.error_free, "without error", {"color": "#888888", "lw": 3}),
-        (images.rotated, "with the declared errors", {"color": "#c1502e"}),
-        (images.focused, "after autofocus", {"color": "#1f5fa8", "ls": "--"}),
-    ):
-        row = np.unravel_index(np.argmax(np.abs(image)), image.shape)[0]
-        level = 20 * np.log10(np.maximum(np.abs(upsampled(image[row], _FINE_CUT)) / peak, 1e-6))
-        panel.plot(place, level, label=label, **style)
+def _stands(color: str) -> dict[str, Any]:
+    """Mark of a target's own place: a cross that leaves the middle free."""
+    from matplotlib.path import Path
+
+    arms = [(x * r, y * r) for x, y in ((1, 0), (0, 1), (-1, 0), (0, -1)) for r in (0.5, 1.0)]
+    cross = Path(arms, [Path.MOVETO, Path.LINETO] * 4)
+    return {"ls": "none", "marker": cross, "color": color, "ms": 17, "mew": 1.5, "mfc": "none"}
+
+
+def _put(color: str) -> dict[str, Any]:
+    """Mark of where a response is."""
+    return {"ls": "none", "marker": "o", "color": color, "ms": 12, "mfc": "none", "mew": 1.2}
+
+
+def _is_within(place: Floats, limits: Limits) -> bool:
+    return bool(limits[0] <= place[0] <= limits[1] and limits[2] <= place[1] <= limits[3])
+
+
+def _point_to(panel: Any, place: Floats, middle: Floats, color: str) -> None:
+    """Say how far away a true place is, and where, that the panel does not show."""
+    away = place - middle
+    distance = float(np.hypot(*away))
+    panel.text(
+        0.04, 0.04, f"the target stands {distance:.3g} m away", color=color, fontsize=8, transform=panel.transAxes
+    )
+    start, tip = (0.5 + part * away / distance for part in (0.36, 0.47))
+    arrow = {"arrowstyle": "-|>", "color": color, "lw": 1.5}
+    panel.annotate("", tuple(tip), tuple(start), "axes fraction", "axes fraction", arrowprops=arrow)
+
+
+def _cuts(panel: Any, drawn: Sheet) -> None:
+    for cut, style in zip(drawn.cuts, _CUT_STYLES, strict=True):
+        panel.plot(cut.place, cut.level_db, label=cut.label, **style)
+    places = [cut.place for cut in drawn.cuts]
     panel.set(xlabel="y′ [m]", ylabel="dB to the error-free peak", ylim=(-40, 2))
-    first, last = across.start / _FINE - count // 2, (across.stop - 1) / _FINE - count // 2
-    panel.set(xlim=(first * images.spacing[1], last * images.spacing[1]))
+    panel.set(xlim=(min(float(one.min()) for one in places), max(float(one.max()) for one in places)))
     panel.grid(color="#dddddd", lw=0.5)
-    panel.set_title("Cross-range cuts", pad=46)
-    panel.legend(fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)  # above the data
+    panel.set_title("Cross-range cuts")
+
+
+PANELS: dict[str, Callable[[Any, Sheet], Any]] = {
+    "fig3": _range_error,
+    "fig4": _points,
+    "fig5": lambda panel, drawn: _image(panel, drawn.in_scene, with_points=True),
+    "fig6": lambda panel, drawn: _image(panel, drawn.rotated),
+    "fig7": lambda panel, drawn: _image(panel, drawn.focused),
+    "fig7_back": lambda panel, drawn: _image(panel, drawn.rotated_back),
+    "cuts": _cuts,
+}

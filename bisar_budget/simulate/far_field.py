@@ -9,6 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.geometry import GroundVector
 from bisar_budget.simulate.image_formation import direct_sum
 from bisar_budget.simulate.phase_history import Complexes, Floats, PhaseHistory
 
@@ -92,7 +93,11 @@ class PolarFormat(NamedTuple):
 
 
 def polar_format(
-    history: PhaseHistory, look_azimuth: float, size: tuple[float, float], shape: tuple[int, int]
+    history: PhaseHistory,
+    look_azimuth: float,
+    size: tuple[float, float],
+    shape: tuple[int, int],
+    centre: GroundVector = (0.0, 0.0),
 ) -> PolarFormat:
     """Image by (14): samples interpolated to the rectangular grid (13) of the rotated frame, then an FFT.
 
@@ -106,9 +111,12 @@ def polar_format(
     look_azimuth : float
         φ_b of (11). [rad]
     size : (2,) float
-        Extent along x′ and y′ about the scene centre. [m]
+        Extent along x′ and y′ about the patch's centre. [m]
     shape : (2,) int
-        Pixels along x′ and y′; they are those of `ground_grid((0, 0), look_azimuth, size, shape)`.
+        Pixels along x′ and y′; they are those of `ground_grid(centre, look_azimuth, size, shape)`.
+    centre : (2,) float
+        Centre of the patch, east and north. The samples are brought there by plane waves before they are
+        interpolated: (14) at other pixels, and no closer to the ground than (5) is. [m]
 
     Returns
     -------
@@ -124,7 +132,9 @@ def polar_format(
     east, north = look_sum(history)[:, :2].T / 2
     along, across = east * cosine + north * sine, north * cosine - east * sine  # (9), per hertz
     slope = across / along
-    samples, turn = history.samples, np.diff(slope)
+    to_centre = 2 * (east * centre[0] + north * centre[1])
+    samples = history.samples * np.exp(-2j * math.pi / SPEED_OF_LIGHT * np.outer(to_centre, history.frequency))
+    turn = np.diff(slope)
     if (turn < 0).all():
         samples, along, slope = samples[::-1], along[::-1], slope[::-1]
     elif slope.size < _STENCIL or not (turn > 0).all():

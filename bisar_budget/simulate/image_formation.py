@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.simulate.phase_history import Complexes, Floats, PhaseHistory
+from bisar_budget.simulate.phase_history import Complexes, Floats, PhaseHistory, is_even, split
 from bisar_budget.simulate.range_profile import (
     carrier_frequency,
     cells_per_metre,
@@ -24,7 +24,7 @@ from bisar_budget.simulate.range_profile import kernel as interpolation_kernel
 
 _TAPS = 6
 _OVERSAMPLING = 4
-_BLOCK = 1 << 22  # complex samples held at once
+_BLOCK = 1 << 20  # complex samples held at once
 _PIXELS = 1 << 16  # handled at once
 
 Kernel = Literal["auto", "numpy", "cubic", "linear"]
@@ -75,12 +75,17 @@ def direct_sum(history: PhaseHistory, points: Floats, ranges: Callable[[Floats, 
     """Sum of (4) over pulses and frequencies, for what `ranges` says ΔR of some points (n, 3) is at a pulse."""
     image: Complexes = np.zeros(points.shape[0], dtype=complex)
     wavenumber = 2 * math.pi * history.frequency / SPEED_OF_LIGHT
-    block = max(1, _BLOCK // max(1, wavenumber.size))
+    coarse, fine = split(wavenumber) if is_even(history.frequency) else (wavenumber, np.zeros(1))
+    shape = (coarse.size, fine.size)
+    block = max(1, _BLOCK // max(1, sum(shape)))
     for pulse in range(history.slow_time.size):
+        samples = np.zeros(shape, dtype=complex)
+        samples.ravel()[: wavenumber.size] = history.samples[pulse]
         for start in range(0, points.shape[0], block):
             part = slice(start, start + block)
-            phase = np.outer(ranges(points[part], pulse), wavenumber)
-            image[part] += np.exp(1j * phase) @ history.samples[pulse]
+            distance = ranges(points[part], pulse)
+            by_coarse = np.exp(1j * np.outer(distance, fine)) @ samples.T
+            image[part] += np.sum(np.exp(1j * np.outer(distance, coarse)) * by_coarse, axis=1)
     image /= max(1, history.samples.size)
     return image
 

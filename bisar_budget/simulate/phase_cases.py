@@ -23,7 +23,7 @@ from bisar_budget.simulate.study import Sizes, Study
 from bisar_budget.units import format_limit, format_quantity
 
 TOLERANCE = 0.05  # of the budget: nearer than this a limit is confirmed
-INSIDE, BEYOND = 0.9, 1.1  # of the limit: the phase on both sides shows that the limit is the limit
+INSIDE, BEYOND = 0.9, 1.1  # of the limit: through it the phase must grow with the error
 HALF_CELL = 0.5  # of range walk; beyond, one-dimensional autofocus leaves a loss (0.34 dB there, uniform)
 FOCUSED_CELLS, FOCUSED_RAD = 2 * CELLS, 12.0  # a phase up to which a response is read in so many cells
 _PEAK_CELLS = 3  # of range around the lines that autofocus reads: the peak is between two lines
@@ -288,21 +288,39 @@ def _judged(study: Study, blank: Verdict, sizes: Sizes) -> Verdict:
         return _without_image(study, blank, error)
     measured = abs(reading.quadratic)
     is_small = study.spread(errors, effect).smear <= _BESIDE_CELLS
-    beside = [_phase(study, sizes, factor * scale) if is_small else None for factor in (INSIDE, BEYOND)]
+    inside, beyond = (_phase(study, sizes, factor * scale) if is_small else None for factor in (INSIDE, BEYOND))
+    verdict, remark = _through_the_limit(inside, measured, beyond, budget)
     return blank._replace(
         **predicted(effect),
         **_of_response(chip, reference, effect, reading),
         full_qpe_rad=abs(effect.quadratic),
         measured_qpe_rad=measured,
         measured_cubic_rad=None,
-        measured_inside_rad=beside[0],
-        measured_beyond_rad=beside[1],
+        measured_inside_rad=inside,
+        measured_beyond_rad=beyond,
         displacement_published_m=published_displacement(study, sizes, scale),
         displacement_full_m=effect.displacement,
         smear_azimuth_published_rad=(study.geometry.look_azimuth + math.pi / 2) % math.pi,
-        verdict=compare(measured / budget - 1, TOLERANCE),
-        reason=_remark(study, reading.coverage),
+        verdict=verdict,
+        reason="; ".join(filter(None, (remark, _remark(study, reading.coverage)))) or None,
     )
+
+
+def _through_the_limit(inside: float | None, measured: float, beyond: float | None, budget: float) -> tuple[str, str]:
+    """Verdict on a phase at a limit, measured inside and beyond it where images are formed, and what is unusual.
+
+    A limit promises that no smaller error has more phase. Where the phase falls towards it, the larger one counts,
+    and none is near enough to the budget to be confirmed. Beyond the limit a phase may fall: that is said.
+    """
+    verdict = compare(measured / budget - 1, TOLERANCE)
+    falls_inside = inside is not None and inside >= measured
+    if inside is not None and falls_inside:
+        verdict = compare(inside / budget - 1, 0.0)
+    if not falls_inside and (beyond is None or beyond > measured):
+        return verdict, ""
+    places = ((inside, f" at {INSIDE:g} of the limit"), (measured, " at it"), (beyond, f" at {BEYOND:g}"))
+    shown = ", ".join(f"{phase:.4g} rad{where}" for phase, where in places if phase is not None)
+    return verdict, f"the phase of the image does not grow with the error: {shown}"
 
 
 def _of_response(chip: Chip, reference: Chip, effect: ExactEffect, reading: ApertureReading) -> dict[str, Any]:

@@ -14,6 +14,10 @@ from numpy.typing import NDArray
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import PlatformState
 
+_FEW = 8  # scatterers are added one by one
+_HELD = 1 << 18  # complex numbers held at once, of many
+_ROUNDING = 1e-14  # of a frequency: what numpy.linspace leaves
+
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
@@ -69,6 +73,22 @@ def cell_centres(length: float, count: int) -> Floats:
     """Centres of `count` equal cells of an interval about zero: samples that stand for the whole of it."""
     centres: Floats = np.linspace(-(length - length / count) / 2, (length - length / count) / 2, count)
     return centres
+
+
+def is_even(frequency: Floats) -> bool:
+    """Whether frequencies are evenly spaced, to rounding: over kilometres of range that is no phase."""
+    return frequency.size > 2 and float(np.ptp(np.diff(frequency))) <= _ROUNDING * float(np.abs(frequency).max())
+
+
+def split(wavenumber: Floats) -> tuple[Floats, Floats]:
+    """Wavenumbers, evenly spaced, as the sums of a coarse and a fine one, row by row; the last row may be too long.
+
+    A phase over n of them is a product, of which only 2√n exponentials are formed.
+    """
+    fine = math.isqrt(wavenumber.size - 1) + 1
+    coarse = -(-wavenumber.size // fine)
+    step = float(wavenumber[-1] - wavenumber[0]) / (wavenumber.size - 1)
+    return float(wavenumber[0]) + step * fine * np.arange(float(coarse)), step * np.arange(float(fine))
 
 
 def path(
@@ -176,17 +196,25 @@ def phase_history(
     Raises
     ------
     ValueError
-        Noise without a generator.
+        Noise without a generator, or not one amplitude for each scatterer.
     """
     wavenumber = 2 * math.pi * frequency / SPEED_OF_LIGHT
     reference = np.linalg.norm(transmitter.measured, axis=1) + np.linalg.norm(receiver.measured, axis=1)
     clock = SPEED_OF_LIGHT * np.broadcast_to(np.asarray(clock_error, dtype=float), slow_time.shape)
     samples = np.zeros((slow_time.size, frequency.size), dtype=complex)
-    for position, amplitude in zip(np.atleast_2d(scatterers), np.atleast_1d(amplitudes), strict=True):
-        actual = np.linalg.norm(transmitter.actual - position, axis=1)
-        actual += np.linalg.norm(receiver.actual - position, axis=1)
-        differential_range = actual - reference + clock  # (1)
-        samples += amplitude * np.exp(-1j * np.outer(differential_range, wavenumber))  # (2), (3)
+    scatterers, amplitudes = np.atleast_2d(scatterers), np.atleast_1d(amplitudes)
+    if len(scatterers) != len(amplitudes):
+        raise ValueError(f"{len(scatterers)} scatterers have {len(amplitudes)} amplitudes")
+    if len(scatterers) > _FEW and is_even(frequency):
+        _add_many(
+            samples, scatterers, amplitudes, (transmitter.actual, receiver.actual), clock - reference, wavenumber
+        )
+    else:
+        for position, amplitude in zip(scatterers, amplitudes, strict=True):
+            actual = np.linalg.norm(transmitter.actual - position, axis=1)
+            actual += np.linalg.norm(receiver.actual - position, axis=1)
+            differential_range = actual - reference + clock  # (1)
+            samples += amplitude * np.exp(-1j * np.outer(differential_range, wavenumber))  # (2), (3)
     if noise_power:
         if rng is None:
             raise ValueError("noise needs a random generator")
@@ -199,3 +227,29 @@ def phase_history(
         transmitter=transmitter.measured,
         receiver=receiver.measured,
     )
+
+
+def _add_many(
+    samples: Complexes,
+    scatterers: Floats,
+    amplitudes: Complexes,
+    actual: tuple[Floats, Floats],
+    offset: Floats,
+    wavenumber: Floats,
+) -> None:
+    """Add the echoes of many scatterers: (3) with the frequency split into coarse and fine steps, two products less.
+
+    e^{-j(k + q)R} is a product, so the sum over scatterers is one of matrices. Frequencies are evenly spaced.
+    """
+    coarse, fine = split(wavenumber)
+    shape = (coarse.size, fine.size)
+    many = max(1, _HELD // sum(shape))
+    for pulse in range(samples.shape[0]):
+        total = np.zeros(shape, dtype=complex)
+        for start in range(0, len(scatterers), many):
+            part = slice(start, start + many)
+            ranges = sum(np.linalg.norm(one[pulse] - scatterers[part], axis=1) for one in actual) + offset[pulse]
+            by_coarse = np.exp(-1j * np.outer(coarse, ranges))
+            by_fine = np.exp(-1j * np.outer(ranges, fine))
+            total += (by_coarse * amplitudes[part]) @ by_fine
+        samples[pulse] += total.ravel()[: wavenumber.size]

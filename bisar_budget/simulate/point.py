@@ -1,7 +1,7 @@
-"""The image of a point with a mission's declared errors: Section V and VI of Rigling & Moses, Figures 3 to 7."""
+"""Images of points with a mission's declared errors: Section V and VI of Rigling & Moses, Figures 3 to 7."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,9 +16,10 @@ from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState,
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.mission.model import MotionError as DeclaredError
 from bisar_budget.simulate.autofocus import ALGORITHMS
-from bisar_budget.simulate.collection import baseband, superposed_motion
+from bisar_budget.simulate.collection import superposed_motion
 from bisar_budget.simulate.exact import ExactEffect, exact_effect
-from bisar_budget.simulate.image_formation import backprojection, ground_grid, taylor_window
+from bisar_budget.simulate.former import IMAGE_FORMERS, ExactRanges, Former, PlaneWaves
+from bisar_budget.simulate.image_formation import ground_grid, taylor_window
 from bisar_budget.simulate.impulse_response import ImpulseResponse, impulse_response
 from bisar_budget.simulate.phase_history import (
     Complexes,
@@ -32,6 +33,8 @@ from bisar_budget.simulate.phase_history import (
     phase_history,
 )
 from bisar_budget.simulate.range_lines import Flown
+from bisar_budget.simulate.resampling import between
+from bisar_budget.simulate.targets import Target, Targets
 
 _MARGIN_CELLS = 16  # of the patch beyond the smear, each way
 _SAMPLES_PER_CELL = 3
@@ -42,21 +45,50 @@ _SCENE_PIXELS = 1 << 18  # of the image in (x, y)
 _BYTES_PER_PIXEL = 16 * 4  # image, grid and what forming a block of them holds
 _BYTES_PER_SAMPLE = 16 * 5  # of the phase history; it is a product of terms of its own size
 _BYTES_HELD = 40e6  # profiles of a block of pulses, and copies of a block of pixels
-_BLOCK = 1 << 18  # pixels formed between two words on the progress
+_APART = 3.0  # range cells: what is nearer in range shares a line with a target's response
+_NEAREST = 6  # cells across that a response takes, at least
+_CLUTTER_STREAM = 1  # of the file's seed, so that clutter changes no noise
+
+
+A_POINT = Targets()  # at the scene centre
 
 
 class SimulationError(Exception):
     """An image that cannot be formed as asked; the message says what to change."""
 
 
-class PointImages(NamedTuple):
-    """Images of a point scatterer at the scene centre, and what explains them.
+class Response(NamedTuple):
+    """What the images show of one target.
 
-    `in_scene` is on a grid along (x, y), of as much of the patch as a quarter of a million pixels hold; the others
-    are on `grid`, (nx, ny, 3) [m], whose lines are lines of equal range, along y′. All are complex and centred where
-    the errors move the point; `scene_spacing` and `spacing`, (2,) [m], are those of their pixels there. `range_error`
-    is its quadratic and higher part over `slow_time`; `segments` are the slopes and `points` the ground points of
-    (26)-(29), relative to the displaced point. `outside` says which declared echoes lie beyond the patch.
+    `effect` is what the errors do to it by exact ranges, its displacement counted from the target; `shown` is where
+    the image former puts it in the rotated images, `shown_in_scene` in the one along (x, y) (east, north). [m]
+    `clean`, `smeared` and `focused` are its cross-range cuts, None where it cannot be measured for what stands beside
+    it.
+    """
+
+    target: Target
+    effect: ExactEffect
+    shown: GroundVector
+    shown_in_scene: GroundVector
+    clean: ImpulseResponse | None
+    smeared: ImpulseResponse | None
+    focused: ImpulseResponse | None
+
+
+class PointImages(NamedTuple):
+    """Images of point scatterers, by themselves one at the scene centre, and what explains them.
+
+    All places are in the axes of the scene, east and north of its centre. [m]
+
+    `in_scene` is on `scene_grid`, (nx, ny, 3) along (x, y), of as much of the patch as a quarter of a million pixels
+    hold; the others are on `grid`, (nx, ny, 3), along (x′, y′): by exact ranges along lines of equal range, by plane
+    waves along the axes of (10). All are complex and lie where the errors move the targets; `scene_spacing` and
+    `spacing`, (2,) [m], are those of their pixels. `range_error` is what is quadratic and higher in the range error
+    of the scene centre over `slow_time`; `segments` (3, 2) are its value [m] and slope [m/s] at `segment_times`,
+    `points` (3, 2) the ground points (29) of those pieces of the whole range error: the middle one is where (25) puts
+    a point at the scene centre. `effect` is that of the scene centre, too. `responses` are one for each target, and
+    `response`, `focused_response`, `clean_response` the cuts through the brightest pixels. `outside` says which
+    declared echoes lie beyond the patch.
     """
 
     slow_time: Floats
@@ -68,7 +100,10 @@ class PointImages(NamedTuple):
     spacing: tuple[float, float]
     scene_spacing: tuple[float, float]
     look_azimuth: float
+    image_former: str
+    targets: Targets
     grid: Floats
+    scene_grid: Floats
     in_scene: Complexes
     rotated: Complexes
     focused: Complexes
@@ -76,6 +111,7 @@ class PointImages(NamedTuple):
     response: ImpulseResponse
     focused_response: ImpulseResponse
     clean_response: ImpulseResponse
+    responses: tuple[Response, ...]
     outside: str = ""
 
 
@@ -103,13 +139,15 @@ class Plan(NamedTuple):
     in_scene: Patch
     pulses: int
     frequencies: int
+    own_cells: int
     outside: str
+    bytes_held: float
 
     @property
     def memory(self) -> float:
         """At the peak. [B]"""
         images = _BYTES_PER_PIXEL * (self.in_scene.pixels + 3 * self.rotated.pixels)
-        return images + _BYTES_PER_SAMPLE * self.pulses * self.frequencies + _BYTES_HELD
+        return images + _BYTES_PER_SAMPLE * self.pulses * self.frequencies + _BYTES_HELD + self.bytes_held
 
     @property
     def work(self) -> int:
@@ -129,14 +167,20 @@ class Plan(NamedTuple):
             )
 
 
-def simulate_point(mission: Mission, progress: Callable[[int, int], None] = lambda done, work: None) -> PointImages:
-    """Form the image of a point at the scene centre with the declared errors, before and after autofocus.
+def simulate_point(
+    mission: Mission,
+    progress: Callable[[int, int], None] = lambda done, work: None,
+    *,
+    image_former: str = "backprojection",
+    targets: Targets = A_POINT,
+) -> PointImages:
+    """Form the image of points with the declared errors, before and after autofocus.
 
     Signs and coverage factor of the file are used; of a covariance, which has no sign, the most probable error
     whose quadratic phase is one sigma, times the coverage factor. Vibration along the line of sight is in the
-    data, wideband by the file's seed. The patch lies where the errors move the point, along the lines of equal range
+    data, wideband by the file's seed. The patch lies where the errors move the points, along the lines of equal range
     of the measured paths, and is as long as the smear and the paired echoes. The error-free image is that of the same
-    processor: a point at the displaced place, recorded from where the paths were measured.
+    processor: points at the displaced places, recorded from where the paths were measured.
 
     Parameters
     ----------
@@ -144,41 +188,68 @@ def simulate_point(mission: Mission, progress: Callable[[int, int], None] = lamb
         As loaded.
     progress : callable
         Told the pixels times pulses done since it was last told, and all there are.
+    image_former : str
+        One of `IMAGE_FORMERS`. Polar format forms the rotated images; the one along (x, y) is backprojected then, as
+        Figure 5 of the paper is by (4) and Figure 6 by (14).
+    targets : Targets
+        What stands in the scene. Clutter is one random scatterer for each resolution cell of the patch.
 
     Raises
     ------
     SimulationError
-        No ground point has the recorded range history, too few pulses for the patch, or images and phase history
-        beyond `simulation.memory_limit`. Nothing is formed before that is known.
+        No ground point has the recorded range history, too few pulses for the patch, images and phase history
+        beyond `simulation.memory_limit`, or a collection that the image former cannot take. Nothing is formed before
+        that is known.
+    ValueError
+        An unknown image former.
     """
+    if image_former not in IMAGE_FORMERS:
+        raise ValueError(f"image former {image_former!r}; known: {', '.join(IMAGE_FORMERS)}")
     geometry, settings = mission.geometry, mission.simulation
     T, wavelength = mission.collection.aperture_time, mission.radar.wavelength
     nodes, fine = aperture_nodes(T), cell_centres(T, 2049)
+    at_nodes = _paths(mission, geometry, nodes, vibrating=False)
+    smooth = _paths(mission, geometry, fine, vibrating=False)
+
+    def effect_at(place: GroundVector) -> ExactEffect:
+        transmitter, receiver = (_seen_from(place, one) for one in at_nodes)
+        return exact_effect(nodes, transmitter, receiver, _clock(mission, nodes), wavelength, T)
+
     try:
-        effect = exact_effect(
-            nodes, *_paths(mission, geometry, nodes, vibrating=False), _clock(mission, nodes), wavelength, T
-        )
+        effect = effect_at((0.0, 0.0))
+        effects = [effect_at((one.east, one.north)) for one in targets.points]
         begin, middle, end = (
             _paths(mission, geometry, np.array([tau]), vibrating=False) for tau in (-T / 2, 0.0, T / 2)
         )
         flown = Flown(*(np.concatenate([at[leg].measured for at in (begin, middle, end)]) for leg in (0, 1)))
-        cells = flown.cells(effect.displacement, mission.radar.bandwidth, wavelength)
+        former, scene_former = _formers(mission, image_former, flown, smooth)
+        displaced = [
+            (one.east + moved.displacement[0], one.north + moved.displacement[1])
+            for one, moved in zip(targets.points, effects, strict=True)
+        ]
+        left = _left_over(smooth, effect) + SPEED_OF_LIGHT * _clock(mission, fine)
+        recorded = [_recorded(smooth, (one.east, one.north)) for one in targets.points]
+        recorded = [one + SPEED_OF_LIGHT * _clock(mission, fine) for one in recorded]
+        shown = [former.place(*one) for one in zip(displaced, recorded, strict=True)]
+        in_scene_shown = [scene_former.place(*one) for one in zip(displaced, recorded, strict=True)]
+        smear = former.left(shown[0], left, recorded[0])
+        slope = np.gradient(smear, fine)
+        plan = _plan(mission, former, scene_former, np.array(shown), np.array(in_scene_shown), smear, slope)
     except ValueError as error:
         raise SimulationError(f"the declared errors leave no image of a point: {error}") from None
-    left = _left_over(_paths(mission, geometry, fine, vibrating=False), effect) + SPEED_OF_LIGHT * _clock(
-        mission, fine
-    )
-    slope = np.gradient(left, fine)
-    plan = _plan(mission, flown, effect, cells, left, slope)
     plan.require_memory((settings or Simulation()).memory_limit, mission.collection.pulses)
     slow_time = cell_centres(T, plan.pulses)
     frequency = mission.radar.center_frequency + cell_centres(mission.radar.bandwidth, plan.frequencies)
     rng = np.random.default_rng(settings.seed if settings else 1)
+    lines = former.grid(_middle(shown), plan.rotated.spacing, plan.rotated.shape)
+    scene = ground_grid(_middle(in_scene_shown), 0.0, plan.in_scene.size, plan.in_scene.shape)
+    clutter, clutter_amplitudes = _clutter(targets.clutter_db, lines, settings.seed if settings else 1)
+    amplitudes = np.concatenate(([10 ** (one.level_db / 20) for one in targets.points], clutter_amplitudes))
 
-    def history(paths: tuple[Path, Path], clock: Floats, scatterer: GroundVector) -> PhaseHistory:
-        recorded = phase_history(
-            np.array([[*scatterer, 0.0]]),
-            np.ones(1, dtype=complex),
+    def history(paths: tuple[Path, Path], clock: Floats, places: Floats) -> PhaseHistory:
+        formed = phase_history(
+            np.c_[places, np.zeros(len(places))],
+            amplitudes.astype(complex),
             slow_time=slow_time,
             frequency=frequency,
             transmitter=paths[0],
@@ -188,45 +259,56 @@ def simulate_point(mission: Mission, progress: Callable[[int, int], None] = lamb
             rng=rng,
         )
         if settings and settings.window == "taylor":
-            recorded.samples[:] *= np.outer(taylor_window(plan.pulses), taylor_window(plan.frequencies))
-        return recorded
-
-    def image(recorded: PhaseHistory, grid: Floats) -> Complexes:
-        formed = np.empty(grid.shape[:2], dtype=complex)
-        rows = max(1, _BLOCK // grid.shape[1])
-        for start in range(0, grid.shape[0], rows):
-            part = grid[start : start + rows]
-            formed[start : start + rows] = backprojection(recorded, part) * baseband(flown, part, wavelength)
-            progress(plan.pulses * part.shape[0] * part.shape[1], plan.work)
+            formed.samples[:] *= np.outer(taylor_window(plan.pulses), taylor_window(plan.frequencies))
         return formed
 
-    recorded = history(
-        _paths(mission, geometry, slow_time, vibrating=True, rng=rng), _clock(mission, slow_time), (0.0, 0.0)
+    def image(by: Former, data: PhaseHistory, grid: Floats) -> Complexes:
+        return by.image(data, grid, lambda pixels: progress(plan.pulses * pixels, plan.work))
+
+    flown_as_declared = _paths(mission, geometry, slow_time, vibrating=True, rng=rng)
+    standing = [(one.east, one.north) for one in targets.points]
+    data = history(
+        flown_as_declared,
+        _clock(mission, slow_time),
+        np.concatenate((standing, clutter - np.asarray(effect.displacement))),
     )
-    lines = flown.grid(effect.displacement, plan.rotated.spacing, plan.rotated.shape)
-    scene = ground_grid(effect.displacement, 0.0, plan.in_scene.size, plan.in_scene.shape)
-    rotated, in_scene = image(recorded, lines), image(recorded, scene)
-    measured = [one.measured for one in _paths(mission, geometry, slow_time, vibrating=False)]
-    as_measured = (Path(actual=measured[0], measured=measured[0]), Path(actual=measured[1], measured=measured[1]))
-    error_free = image(history(as_measured, 0 * slow_time, effect.displacement), lines)
+    try:
+        rotated, in_scene = image(former, data, lines), image(scene_former, data, scene)
+        del data
+        measured = [one.measured for one in _paths(mission, geometry, slow_time, vibrating=False)]
+        as_measured = (Path(actual=measured[0], measured=measured[0]), Path(actual=measured[1], measured=measured[1]))
+        error_free = image(former, history(as_measured, 0 * slow_time, np.concatenate((displaced, clutter))), lines)
+    except ValueError as error:
+        raise SimulationError(f"{image_former.replace('_', ' ')} cannot form this image: {error}") from None
     focused = ALGORITHMS[mission.autofocus.algorithm](rotated).image
     across = plan.rotated.spacing[1]
     clean = _measured(error_free, across, None)
-    bent = left - left[fine.size // 2] - slope[fine.size // 2] * fine  # as Figure 3 has it, from mid-aperture on
-    bent_slope = slope - slope[fine.size // 2]
+    # Figure 3 has what is quadratic and higher, from mid-aperture on; (29) all of it, from the displaced point on.
+    slope = np.gradient(left, fine)
+    bent = left - left[fine.size // 2] - slope[fine.size // 2] * fine
     times = np.array([-T / 3, 0.0, T / 3])  # centres of three sub-apertures
-    values, slopes = np.interp(times, fine, bent), np.interp(times, fine, bent_slope)
+    values, slopes = np.interp(times, fine, left), np.interp(times, fine, slope)
+    cells = former.offsets(np.array(shown), _middle(shown))
+    windows = [_window(plan, cells, index) for index in range(len(shown))]
     return PointImages(
         slow_time=fine,
         range_error=bent,
         segment_times=times,
-        segments=np.stack((values, slopes), axis=1),
-        points=np.array([_indicated(geometry, *args) for args in zip(times, values, slopes, strict=True)]),
+        segments=np.stack((np.interp(times, fine, bent), slopes - slope[fine.size // 2]), axis=1),
+        points=np.array(
+            [
+                np.asarray(effect.displacement) + _indicated(geometry, *piece, seen_from=effect.displacement)
+                for piece in zip(times, values, slopes, strict=True)
+            ]
+        ),
         effect=effect,
         spacing=plan.rotated.spacing,
         scene_spacing=plan.in_scene.spacing,
-        look_azimuth=geometry.look_azimuth,
+        look_azimuth=math.atan2(*former.look((0.0, 0.0))[::-1]),
+        image_former=image_former,
+        targets=targets,
         grid=lines,
+        scene_grid=scene,
         in_scene=in_scene,
         rotated=rotated,
         focused=focused,
@@ -234,52 +316,90 @@ def simulate_point(mission: Mission, progress: Callable[[int, int], None] = lamb
         response=_measured(rotated, across, clean.mask_m),
         focused_response=_measured(focused, across, clean.mask_m),
         clean_response=clean,
+        responses=tuple(
+            Response(target, moved, place, at, *_cuts((error_free, rotated, focused), window, across))
+            for target, moved, place, at, window in zip(
+                targets.points, effects, shown, in_scene_shown, windows, strict=True
+            )
+        ),
         outside=plan.outside,
     )
 
 
+def _formers(mission: Mission, image_former: str, flown: Flown, smooth: tuple[Path, Path]) -> tuple[Former, Former]:
+    """Of the rotated images, and of the one along (x, y)."""
+    radar = mission.radar
+    exact = ExactRanges(flown, radar.bandwidth, radar.wavelength, image_former == "matched_filter")
+    if image_former in ("backprojection", "matched_filter"):
+        return exact, exact
+    sight = sum(one.measured / np.linalg.norm(one.measured, axis=1, keepdims=True) for one in smooth)
+    plane = PlaneWaves(
+        np.asarray(sight)[:, :2], radar.center_frequency, radar.bandwidth, image_former == "polar_format"
+    )
+    return plane, exact if plane.is_polar else plane
+
+
+def _middle(places: Sequence[GroundVector] | Floats) -> GroundVector:
+    """Of the box around some places, which a patch is centred on."""
+    low, high = np.min(places, axis=0), np.max(places, axis=0)
+    return float(low[0] + high[0]) / 2, float(low[1] + high[1]) / 2
+
+
 def _plan(
-    mission: Mission, flown: Flown, effect: ExactEffect, cell: tuple[float, float], left: Floats, slope: Floats
+    mission: Mission,
+    former: Former,
+    scene_former: Former,
+    shown: Floats,
+    scene_shown: Floats,
+    left: Floats,
+    slope: Floats,
 ) -> Plan:
-    """Choose patches and samples no larger than the response asks for, from its range error and that one's slope.
+    """Choose patches and samples no larger than the responses ask for, from their range error and its slope.
 
     Along lines of equal range and of equal Doppler the band of a response is a box, and its smear lies along y′; in
     (x, y) both are turned.
     """
     T, radar = mission.collection.aperture_time, mission.radar
+    centre, scene_centre = _middle(shown), _middle(scene_shown)
+    cell, scene_cell = former.cells(centre), scene_former.cells(scene_centre)
     # Cycles over the aperture are cells of cross range; what the range error walks, cells of c/B.
     reach = float(np.abs(slope).max()) * T / radar.wavelength
     time = cell_centres(T, left.size)
     walk = float(np.abs(left - slope * time).max()) * radar.bandwidth / SPEED_OF_LIGHT
+    apart = np.abs(former.offsets(shown, centre)).max(axis=0)
     echoes = sorted(line.frequency * T for name in PLATFORMS for line in lines_of(mission, name) if line.amplitude)
     given = mission.collection.pulses
-    room = _ECHO_CELLS if given is None else min(_ECHO_CELLS, given / 4 - reach - _MARGIN_CELLS - 1)
-    shown = [cycles for cycles in echoes if cycles <= room]
-    outside = "" if len(shown) == len(echoes) else (
-        f"echoes {', '.join(f'{cycles:.4g}' for cycles in echoes[len(shown) :])} resolution cells from the peak lie "
+    room = _ECHO_CELLS if given is None else min(_ECHO_CELLS, given / 4 - reach - apart[1] - _MARGIN_CELLS - 1)
+    seen = [cycles for cycles in echoes if cycles <= room]
+    outside = "" if len(seen) == len(echoes) else (
+        f"echoes {', '.join(f'{cycles:.4g}' for cycles in echoes[len(seen) :])} resolution cells from the peak lie "
         "outside the patch"
     )  # fmt: skip
-    reach += max(shown, default=0.0)
-    cells = [2 * math.ceil(extra + _MARGIN_CELLS) for extra in (walk, reach)]
+    reach += max(seen, default=0.0)
+    cells = [2 * math.ceil(extra + _MARGIN_CELLS) for extra in (walk + apart[0], reach + apart[1])]
     pulses = _pulses(mission, cells[1])
     rotated = Patch(
         (_SAMPLES_PER_CELL * cells[0], _SAMPLES_PER_CELL * cells[1]),
         (cell[0] / _SAMPLES_PER_CELL, cell[1] / _SAMPLES_PER_CELL),
     )
-    by_range = flown.gradients(np.asarray(effect.displacement))[0]
-    cosine, sine = np.abs(by_range) / float(np.hypot(*by_range))
+    cosine, sine = (float(part) for part in np.abs(scene_former.look(scene_centre)))
     size = rotated.size
     extent = max(size[0] * cosine + size[1] * sine, size[0] * sine + size[1] * cosine)
-    band = (cosine / cell[0] + sine / cell[1], sine / cell[0] + cosine / cell[1])
-    extent *= min(1.0, math.sqrt(_SCENE_PIXELS / (_SAMPLES_PER_CELL**2 * extent**2 * band[0] * band[1])))
+    band = (cosine / scene_cell[0] + sine / scene_cell[1], sine / scene_cell[0] + cosine / scene_cell[1])
+    capped = extent * min(1.0, math.sqrt(_SCENE_PIXELS / (_SAMPLES_PER_CELL**2 * extent**2 * band[0] * band[1])))
+    # All targets, whatever the cap says, with the ends of their responses.
+    around = 2 * float(np.abs(scene_shown - scene_centre).max())
+    extent = max(capped, min(extent, around + _MARGIN_CELLS * max(scene_cell))) if around else capped
     shape = tuple(2 * math.ceil(_SAMPLES_PER_CELL * extent * one / 2) for one in band)
     in_scene = Patch((shape[0], shape[1]), (extent / shape[0], extent / shape[1]))
     # Twice what keeps a profile from repeating within a patch: over its range cells and what those across walk.
     relative = radar.bandwidth / radar.center_frequency
     diagonal = extent * (cosine + sine)
-    longest = max(cells[0] + cells[1] * relative, diagonal / cell[0] + diagonal / cell[1] * relative)
+    longest = max(cells[0] + cells[1] * relative, diagonal / scene_cell[0] + diagonal / scene_cell[1] * relative)
     frequencies = max(_MIN_FREQUENCIES, math.ceil(2 * longest))
-    return Plan(rotated, in_scene, pulses, frequencies, outside)
+    own = 2 * math.ceil(reach + _MARGIN_CELLS)
+    held = max(former.bytes_held, scene_former.bytes_held)
+    return Plan(rotated, in_scene, pulses, frequencies, own, outside, held)
 
 
 def _pulses(mission: Mission, cells: int) -> int:
@@ -380,6 +500,21 @@ def _clock(mission: Mission, slow_time: Floats) -> Floats:
     return clock
 
 
+def _seen_from(place: GroundVector, one: Path) -> Path:
+    """Path with a ground point for its origin."""
+    away = np.array([*place, 0.0])
+    return Path(actual=one.actual - away, measured=one.measured - away)
+
+
+def _recorded(paths: tuple[Path, Path], place: GroundVector) -> Floats:
+    """Differential range (1) of a ground point, clock excluded. [m]"""
+    at = np.array([*place, 0.0])
+    total: Floats = np.sum(
+        [np.linalg.norm(p.actual - at, axis=1) - np.linalg.norm(p.measured, axis=1) for p in paths], axis=0
+    )
+    return total
+
+
 def _left_over(paths: tuple[Path, Path], effect: ExactEffect) -> Floats:
     """Range error left at the displaced point, clock excluded. [m]"""
     point = np.array([*effect.displacement, 0.0])
@@ -388,12 +523,14 @@ def _left_over(paths: tuple[Path, Path], effect: ExactEffect) -> Floats:
     return total
 
 
-def _indicated(geometry: BistaticGeometry, time: float, value: float, slope: float) -> Floats:
-    """Ground point that a piece of range error indicates, (29), with Q at the piece's own time."""
+def _indicated(
+    geometry: BistaticGeometry, time: float, value: float, slope: float, *, seen_from: GroundVector = (0.0, 0.0)
+) -> Floats:
+    """Ground point that a piece of range error indicates, (29), from another one; Q at the piece's own time."""
     look, rate = np.zeros(2), np.zeros(2)
     for state in (geometry.transmitter, geometry.receiver):
-        position, velocity = state.at(time)
-        moved = PlatformState(position=position, velocity=velocity)
+        (x, y, z), velocity = state.at(time)
+        moved = PlatformState(position=(x - seen_from[0], y - seen_from[1], z), velocity=velocity)
         look = look + np.array(moved.look[:2])
         rate = rate + np.array(moved.look_rate[:2])
     indicated: Floats = np.asarray(np.linalg.solve(-np.stack((look, rate)), np.array([value, slope])), dtype=float)
@@ -401,7 +538,57 @@ def _indicated(geometry: BistaticGeometry, time: float, value: float, slope: flo
 
 
 def _measured(image: Complexes, spacing: float, mask_m: float | None) -> ImpulseResponse:
-    """Measure the cross-range cut through the brightest pixel, moved to the middle."""
+    """Measure the cross-range cut through the brightest pixel, moved to the middle.
+
+    A smear over most of the patch has its peak at one end, and would wrap around; it gets as much room again.
+    """
     row, column = np.unravel_index(np.argmax(np.abs(image)), image.shape)
-    cut = np.roll(image[row], image.shape[1] // 2 - int(column))
-    return impulse_response(cut, spacing, mask_m)
+    cut, count = image[row], image.shape[1]
+    try:
+        return impulse_response(np.roll(cut, count // 2 - int(column)), spacing, mask_m)
+    except ValueError:
+        wide = np.concatenate((cut, np.zeros(count, dtype=complex)))
+        return impulse_response(np.roll(wide, count - int(column)), spacing, mask_m)
+
+
+def _clutter(level_db: float | None, grid: Floats, seed: int) -> tuple[Floats, Complexes]:
+    """Random scatterers over a patch, (n, 2) [m] and (n,): one for each resolution cell, circular normal.
+
+    A cell is as large as the energy of a response of unit peak, so `level_db` is the mean power of a pixel.
+    """
+    if level_db is None:
+        return np.empty((0, 2)), np.empty(0, dtype=complex)
+    rng = np.random.default_rng([seed, _CLUTTER_STREAM])
+    nx, ny = grid.shape[:2]
+    count = round((nx - 1) * (ny - 1) / _SAMPLES_PER_CELL**2)
+    row, column = rng.uniform(0, nx - 1, count), rng.uniform(0, ny - 1, count)
+    amplitudes = 10 ** (level_db / 20) * (rng.normal(size=count) + 1j * rng.normal(size=count)) / math.sqrt(2)
+    return between(grid[..., :2], row, column), amplitudes
+
+
+def _window(plan: Plan, cells: Floats, index: int) -> tuple[slice, slice]:
+    """Part of the rotated patch in which a target's response is by itself, as far as the others leave room."""
+    away = np.abs(cells - cells[index])
+    beside = away[(away[:, 0] < 2 * _APART) & (away[:, 1] > 0), 1]
+    reach = plan.own_cells // 2 if len(cells) > 1 else plan.rotated.shape[1]
+    if beside.size:
+        reach = min(reach, max(_NEAREST, int(beside.min() / 2)))
+    rows = math.ceil(_APART) if len(cells) > 1 else plan.rotated.shape[0]
+    slices = []
+    for cell, half, count in zip(cells[index], (rows, reach), plan.rotated.shape, strict=True):
+        middle = count // 2 + round(_SAMPLES_PER_CELL * float(cell))
+        slices.append(slice(max(0, middle - _SAMPLES_PER_CELL * half), middle + _SAMPLES_PER_CELL * half + 1))
+    return slices[0], slices[1]
+
+
+def _cuts(images: Sequence[Complexes], window: tuple[slice, slice], spacing: float) -> list[ImpulseResponse | None]:
+    """Measure a target in the error-free image first, whose mask the others take."""
+    found: list[ImpulseResponse | None] = []
+    mask = None
+    for image in images:
+        try:
+            found.append(_measured(image[window], spacing, mask))
+        except ValueError:  # what stands beside it reaches into its mainlobe
+            found.append(None)
+        mask = found[0].mask_m if found[0] else None
+    return found

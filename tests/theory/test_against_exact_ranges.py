@@ -35,6 +35,21 @@ def test_acceleration_rows_are_exact_to_first_order(axis: int) -> None:
     assert size * published_row(position, velocity, "acceleration", axis)[2] == pytest.approx(exact, rel=1e-4)
 
 
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("turn", [1, -1])
+def test_cubic_of_an_acceleration_is_that_of_exact_ranges_at_broadside(axis: int, turn: int) -> None:
+    """An error's weight grows where the platform flies towards its axis: signed, for either sense of flight."""
+    position = (24e3, -9e3, 5e3)
+    velocity = turn * 150.0 * np.cross(position, (0.3, 0.5, 0.8)) / np.linalg.norm(position)  # at right angles to it
+    size = 1e-3
+    unit = np.eye(3)[axis][:, None]
+    exact = edge_phase_of_exact_error(position, velocity, lambda t: unit * size * t**2 / 2, 3)
+    # Left over: (vT/2R)², the curvature of a path of 430 m to either side at 26 km.
+    assert size * published_row(position, velocity, "acceleration", axis)[3] == pytest.approx(
+        exact, rel=3 * (430 / 26e3) ** 2
+    )
+
+
 def test_velocity_row_is_exact_at_broadside_along_the_track() -> None:
     position, velocity = (30e3, 0.0, 6e3), (0.0, 150.0, 0.0)
     size = 0.05

@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -49,6 +50,21 @@ def test_speed_is_over_ground_and_climb_its_vertical_part() -> None:
         slant_range=8e3, azimuth=0, elevation=0.1, speed=60, motion_azimuth=math.pi / 2, climb=5
     )
     assert platform.velocity == (0, 60, 5)
+
+
+@pytest.mark.parametrize("climb", [-40.0, 0.0, 25.0])
+@pytest.mark.parametrize("position", [(5e3, -2e3, 3e3), (-1e3, 4e3, 6e3)])
+def test_a_line_of_sight_turns_as_the_platform_flies(position, climb: float) -> None:
+    """Unit vectors a millisecond before and after, along the path: sinking and climbing turn it differently."""
+    velocity = (70.0, 110.0, climb)
+    step = 1e-3
+
+    def sight(tau: float) -> np.ndarray:
+        place = np.array(position) + tau * np.array(velocity)
+        return place / np.linalg.norm(place)
+
+    turned = (sight(step) - sight(-step)) / (2 * step)
+    assert state(position, velocity).look_rate == pytest.approx(turned, abs=1e-10)
 
 
 def test_bistatic_angle_and_look_azimuth() -> None:

@@ -1,0 +1,204 @@
+"""Image formers under one roof: which pixels each one takes, where it puts a point, and its image at baseband.
+
+A former by exact ranges, (4), puts a response at the displaced point itself and takes pixels along lines of equal
+range. One by plane waves, (7) to (14), puts it where plane waves have the recorded range history, and takes straight
+lines along the axes (x′, y′) of (10).
+"""
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.geometry import GroundVector
+from bisar_budget.simulate.collection import baseband
+from bisar_budget.simulate.far_field import far_field_filter, polar_format
+from bisar_budget.simulate.image_formation import backprojection, ground_grid, matched_filter
+from bisar_budget.simulate.phase_history import Complexes, Floats, PhaseHistory
+from bisar_budget.simulate.range_lines import Flown
+
+IMAGE_FORMERS = ("backprojection", "polar_format", "matched_filter", "far_field")
+
+_ORDER = 8  # of the polynomials through range histories, whose two lowest parts are compared
+_BLOCK = 1 << 18  # pixels formed between two words on the progress
+_DIRECT_BYTES = 250e6  # what the sums over all pulses and frequencies hold of a block of pixels
+
+Told = Callable[[int], None]
+
+
+class Former(Protocol):
+    """What `simulate_point` asks of an image former. Places are east, north [m]; images are at baseband."""
+
+    @property
+    def bytes_held(self) -> float:
+        """Beside the images and the phase history. [B]"""
+
+    def place(self, displaced: GroundVector, recorded: Floats) -> GroundVector:
+        """Where it puts a point, given its displaced point and its differential range over slow time. [m]"""
+
+    def left(self, place: GroundVector, left: Floats, recorded: Floats) -> Floats:
+        """What is left of the range history there, given what exact ranges leave at the displaced point. [m]"""
+
+    def cells(self, centre: GroundVector) -> tuple[float, float]:
+        """Resolution along x′ and y′, peak to first null. [m]"""
+
+    def look(self, centre: GroundVector) -> Floats:
+        """Direction of x′, a unit vector (2,)."""
+
+    def offsets(self, places: Floats, centre: GroundVector) -> Floats:
+        """Resolution cells from the centre, along x′ and y′, of places (n, 2): (n, 2)."""
+
+    def grid(self, centre: GroundVector, spacing: tuple[float, float], shape: tuple[int, int]) -> Floats:
+        """Pixels of a patch, x′ along the first axis, (nx, ny, 3). [m]"""
+
+    def image(self, history: PhaseHistory, grid: Floats, told: Told) -> Complexes:
+        """Form the image at pixels (nx, ny, 3)."""
+
+
+class ExactRanges(NamedTuple):
+    """Matched filter (4) or backprojection, which equals it."""
+
+    flown: Flown
+    bandwidth: float
+    wavelength: float
+    is_direct: bool
+
+    @property
+    def bytes_held(self) -> float:
+        """Beside the images and the phase history. [B]"""
+        return _DIRECT_BYTES if self.is_direct else 0.0
+
+    def place(self, displaced: GroundVector, recorded: Floats) -> GroundVector:
+        """Where it puts a point."""
+        return displaced
+
+    def left(self, place: GroundVector, left: Floats, recorded: Floats) -> Floats:
+        """What is left there."""
+        return left
+
+    def cells(self, centre: GroundVector) -> tuple[float, float]:
+        """Resolution."""
+        return self.flown.cells(centre, self.bandwidth, self.wavelength)
+
+    def look(self, centre: GroundVector) -> Floats:
+        """Direction of x′."""
+        by_range = self.flown.gradients(np.asarray(centre))[0]
+        towards: Floats = -by_range / float(np.hypot(*by_range))
+        return towards
+
+    def offsets(self, places: Floats, centre: GroundVector) -> Floats:
+        """Cells from the centre, by range sum and by its change over the aperture."""
+        middle = np.asarray([centre])
+        nearer = self.flown.range_sum(middle) - self.flown.range_sum(places)
+        way = 1 if self.flown.turns_left(centre) else -1
+        turned = way * (self._change(places) - self._change(middle))
+        return np.stack((nearer * self.bandwidth / SPEED_OF_LIGHT, turned / self.wavelength), axis=1)
+
+    def _change(self, places: Floats) -> Floats:
+        """Of the range sum over the aperture. [m]"""
+        total: Floats = np.zeros(len(places))
+        for one in (self.flown.transmitter, self.flown.receiver):
+            for when, sign in ((0, -1), (2, 1)):
+                total += sign * np.linalg.norm(np.c_[places, np.zeros(len(places))] - one[when], axis=1)
+        return total
+
+    def grid(self, centre: GroundVector, spacing: tuple[float, float], shape: tuple[int, int]) -> Floats:
+        """Pixels along lines of equal range and of equal Doppler."""
+        return self.flown.grid(centre, spacing, shape)
+
+    def image(self, history: PhaseHistory, grid: Floats, told: Told) -> Complexes:
+        """Form the image."""
+        form = matched_filter if self.is_direct else backprojection
+        return _in_blocks(lambda part: form(history, part) * baseband(self.flown, part, self.wavelength), grid, told)
+
+
+class PlaneWaves(NamedTuple):
+    """Far-field filter (12), or polar format (13) and (14).
+
+    `sight` are the look vectors of both measured platforms, added, over slow time, (times, 2), an odd number of them
+    with the midpoint in the middle.
+    """
+
+    sight: Floats
+    center_frequency: float
+    bandwidth: float
+    is_polar: bool
+    bytes_held: float = _DIRECT_BYTES
+
+    @property
+    def middle(self) -> Floats:
+        """Sum of look vectors at the midpoint, (2,)."""
+        towards: Floats = self.sight[len(self.sight) // 2]
+        return towards
+
+    @property
+    def azimuth(self) -> float:
+        """φ_b of (11) by the measured paths. [rad]"""
+        return math.atan2(self.middle[1], self.middle[0])
+
+    def place(self, displaced: GroundVector, recorded: Floats) -> GroundVector:
+        """Point whose plane waves have the recorded constant and linear part, (5) in place of exact ranges."""
+        time = np.linspace(-1, 1, len(self.sight))
+        parts = np.polynomial.legendre.legfit(time, np.c_[recorded, self.sight], _ORDER)[:2]
+        east, north = np.linalg.solve(-parts[:, 1:], parts[:, 0])
+        return float(east), float(north)
+
+    def left(self, place: GroundVector, left: Floats, recorded: Floats) -> Floats:
+        """What is left there: the far field's own error is in it."""
+        rest: Floats = recorded + self.sight @ np.asarray(place)
+        return rest
+
+    def cells(self, centre: GroundVector) -> tuple[float, float]:
+        """Resolution of all that was recorded, corners of the aperture included."""
+        cosine, sine = math.cos(self.azimuth), math.sin(self.azimuth)
+        rotated = self.sight @ np.array([[cosine, -sine], [sine, cosine]])  # (9)
+        band = self.center_frequency + np.array([-0.5, 0.0, 0.5]) * self.bandwidth
+        along, across = (float(np.ptp(np.outer(band, rotated[:, axis]))) for axis in (0, 1))
+        return SPEED_OF_LIGHT / along, SPEED_OF_LIGHT / across
+
+    def look(self, centre: GroundVector) -> Floats:
+        """Direction of x′."""
+        return np.array([math.cos(self.azimuth), math.sin(self.azimuth)])
+
+    def offsets(self, places: Floats, centre: GroundVector) -> Floats:
+        """Cells from the centre, in the axes of (10)."""
+        cosine, sine = self.look(centre)
+        rotated = (places - np.asarray(centre)) @ np.array([[cosine, -sine], [sine, cosine]])
+        return np.asarray(rotated / np.array(self.cells(centre)))
+
+    def grid(self, centre: GroundVector, spacing: tuple[float, float], shape: tuple[int, int]) -> Floats:
+        """Pixels along the axes of (10)."""
+        size = (spacing[0] * shape[0], spacing[1] * shape[1])
+        return ground_grid(centre, self.azimuth, size, shape)
+
+    def image(self, history: PhaseHistory, grid: Floats, told: Told) -> Complexes:
+        """Form the image; by polar format on a grid of `grid` only."""
+        if not self.is_polar:
+            return _in_blocks(lambda part: far_field_filter(history, part) * self._carrier(part), grid, told)
+        nx, ny = grid.shape[:2]
+        size = tuple(
+            count * float(np.linalg.norm(grid[step] - grid[0, 0]))
+            for count, step in ((nx, (1, 0)), (ny, (0, 1)))
+        )  # fmt: skip
+        east, north = (float(part) for part in grid[nx // 2, ny // 2, :2])
+        formed = polar_format(history, self.azimuth, (size[0], size[1]), (nx, ny), (east, north)).image
+        told(nx * ny)
+        return formed * self._carrier(grid)
+
+    def _carrier(self, points: Floats) -> Complexes:
+        """Phase of the range at the midpoint, as `baseband` has it, for plane waves."""
+        wavenumber = 2 * math.pi * self.center_frequency / SPEED_OF_LIGHT
+        carrier: Complexes = np.exp(1j * wavenumber * (points[..., :2] @ self.middle))
+        return carrier
+
+
+def _in_blocks(form: Callable[[Floats], Complexes], grid: Floats, told: Told) -> Complexes:
+    formed = np.empty(grid.shape[:2], dtype=complex)
+    rows = max(1, _BLOCK // grid.shape[1])
+    for start in range(0, grid.shape[0], rows):
+        part = grid[start : start + rows]
+        formed[start : start + rows] = form(part)
+        told(part.shape[0] * part.shape[1])
+    return formed

@@ -1,0 +1,276 @@
+"""Defects put into the code on purpose, and the tests that must fail for each: `docs/prove_mutants.py` runs them.
+
+A mutant is a slip that the code could have: a sign, a factor, a bracket, a tolerance. The tests named for it compare
+the code with geometry, images or rules of the contract, so that each fails for a reason of physics. A comparison with
+the committed output of a command is not named here.
+"""
+
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+class Mutant(NamedTuple):
+    """A slip: in the file at `path`, `before` stands once and becomes `after`; `tests` are pytest's node ids."""
+
+    name: str
+    path: str
+    before: str
+    after: str
+    tests: tuple[str, ...]
+
+    def of(self, text: str) -> str:
+        """Text of the file with the slip.
+
+        Raises
+        ------
+        ValueError
+            What it replaces does not stand there exactly once: the code has changed, and the mutant must follow.
+        """
+        if text.count(self.before) != 1:
+            raise ValueError(f"{self.name}: {self.path} has {text.count(self.before)} times {self.before!r}")
+        return text.replace(self.before, self.after)
+
+
+_DERIVED = "bisar_budget/theory/differential_range.py"
+_TABLES = "bisar_budget/theory/published.py"
+_EVALUATORS = "bisar_budget/evaluators.py"
+_GEOMETRY = "bisar_budget/geometry.py"
+_POINT = "bisar_budget/simulate/point.py"
+_PHASES = "bisar_budget/simulate/phase_cases.py"
+_VIBRATION = "bisar_budget/simulate/vibration.py"
+
+_PLOT = "bisar_budget/report/point_plot.py"
+_FIGURES = "bisar_budget/report/point_figures.py"
+
+_ARTISTS = "tests/simulate/test_plot_artists.py::"
+_BORDERS = "tests/simulate/test_verdict_borders.py::"
+_IMAGES = "tests/simulate/test_point_against_images.py::"
+_POINTS_OF_29 = f"{_IMAGES}test_points_of_29_are_where_each_third_of_the_aperture_puts_the_response"
+_SMEAR_DIRECTION = "tests/theory/test_smear_direction.py"
+_SMEAR_OF_A_VERDICT = f"{_BORDERS}test_the_smear_of_a_verdict_lies_along_31"
+_FIVE_PERCENT = f"{_BORDERS}test_a_velocity_limit_is_confirmed_within_5_percent_of_the_budget"
+_LINE_OF_SIGHT = "tests/unit/test_geometry.py::test_a_line_of_sight_turns_as_the_platform_flies"
+
+MUTANTS = (
+    Mutant(
+        "(31): sign",
+        _DERIVED,
+        "return in_angles(adjugate[:, 1], platforms)",
+        "return in_angles(-adjugate[:, 1], platforms)",
+        (_SMEAR_DIRECTION,),
+    ),
+    Mutant(
+        "(31): turned by 90°",
+        _DERIVED,
+        "return in_angles(adjugate[:, 1], platforms)",
+        "return in_angles(Matrix([adjugate[1, 1], -adjugate[0, 1]]), platforms)",
+        (_SMEAR_DIRECTION,),
+    ),
+    Mutant(
+        "(31): the first column of Q⁻¹",
+        _DERIVED,
+        "return in_angles(adjugate[:, 1], platforms)",
+        "return in_angles(adjugate[:, 0], platforms)",
+        (_SMEAR_DIRECTION,),
+    ),
+    Mutant(
+        "(31) of a verdict: turned by 90°",
+        _PHASES,
+        "(study.geometry.look_azimuth + math.pi / 2) % math.pi",
+        "study.geometry.look_azimuth % math.pi",
+        (_SMEAR_OF_A_VERDICT,),
+    ),
+    Mutant(
+        "(31) of a verdict: mirrored",
+        _PHASES,
+        "(study.geometry.look_azimuth + math.pi / 2) % math.pi",
+        "(-study.geometry.look_azimuth + math.pi / 2) % math.pi",
+        (_SMEAR_OF_A_VERDICT,),
+    ),
+    Mutant(
+        "share of the clock: the transmitter's",
+        "bisar_budget/budget/allocation.py",
+        "return self.receiver if self.clock is None else self.clock",
+        "return self.transmitter if self.clock is None else self.clock",
+        ("tests/unit/test_check.py::TestAllocation::test_without_a_share_the_clock_is_held_to_the_receivers",),
+    ),
+    Mutant(
+        "turn of a line of sight: sign of the climb in its radial part",
+        _GEOMETRY,
+        "        radial = dot(u, v)\n",
+        "        radial = dot(u, (v[0], v[1], -v[2]))\n",
+        (_LINE_OF_SIGHT,),
+    ),
+    Mutant(
+        "turn of a line of sight: sign of the climb in its vertical part",
+        _GEOMETRY,
+        "            (v[2] - u[2] * radial) / R,\n",
+        "            (-v[2] - u[2] * radial) / R,\n",
+        (_LINE_OF_SIGHT,),
+    ),
+    Mutant(
+        "cross-range resolution: without its sine",
+        _GEOMETRY,
+        "across = math.hypot(*self.doppler_gradient) * math.sin(self.gradient_angle)",
+        "across = math.hypot(*self.doppler_gradient)",
+        ("tests/unit/test_defects.py::test_cross_range_resolution_of_gradients_that_are_not_at_right_angles",),
+    ),
+    Mutant(
+        "(29): sign",
+        _POINT,
+        "np.linalg.solve(-np.stack((look, rate)), np.array([value, slope]))",
+        "np.linalg.solve(np.stack((look, rate)), np.array([value, slope]))",
+        (_POINTS_OF_29,),
+    ),
+    Mutant(
+        "(29): without the points' own Q",
+        _POINT,
+        "state.at(time)",
+        "state.at(0.0)",
+        (_POINTS_OF_29,),
+    ),
+    Mutant(
+        "(29): segments at T/2",
+        _POINT,
+        "times = np.array([-T / 3, 0.0, T / 3])",
+        "times = np.array([-T / 2, 0.0, T / 2])",
+        (_POINTS_OF_29,),
+    ),
+    Mutant(
+        "(28): twice the slope",
+        _POINT,
+        "np.interp(times, fine, left), np.interp(times, fine, slope)",
+        "np.interp(times, fine, left), 2 * np.interp(times, fine, slope)",
+        (_POINTS_OF_29,),
+    ),
+    Mutant(
+        "(27): sign of the value",
+        _POINT,
+        "np.array([value, slope])",
+        "np.array([-value, slope])",
+        (_POINTS_OF_29,),
+    ),
+    Mutant(
+        "simulate: the clock without coverage factor",
+        _POINT,
+        "np.asarray(mission.allocation.coverage_factor * polynomial, dtype=float)",
+        "np.asarray(polynomial, dtype=float)",
+        (f"{_IMAGES}test_the_clock_of_a_simulated_image_has_the_coverage_factor",),
+    ),
+    Mutant(
+        "plot: segments of twice their length",
+        _FIGURES,
+        "half = (times[1] - times[0]) / 2",
+        "half = times[1] - times[0]",
+        (f"{_ARTISTS}test_figure_3_has_tangents_over_thirds_of_the_aperture",),
+    ),
+    Mutant(
+        "plot: images transposed",
+        _PLOT,
+        "        picture.corners[..., 0],\n        picture.corners[..., 1],\n",
+        "        picture.corners[..., 1],\n        picture.corners[..., 0],\n",
+        (f"{_ARTISTS}test_figure_5_lies_where_the_thirds_say",),
+    ),
+    Mutant(
+        "plot: images mirrored",
+        _PLOT,
+        "        picture.corners[..., 0],\n",
+        "        -picture.corners[..., 0],\n",
+        (f"{_ARTISTS}test_figure_5_lies_where_the_thirds_say",),
+    ),
+    Mutant(
+        "plot: turned the other way",
+        _FIGURES,
+        "turn = np.array([[cosine, -sine], [sine, cosine]])",
+        "turn = np.array([[cosine, sine], [-sine, cosine]])",
+        (f"{_ARTISTS}test_figures_6_and_7_are_turned_by_the_look_direction",),
+    ),
+    Mutant(
+        "plot: points mirrored about the middle one",
+        _PLOT,
+        'panel.plot(*drawn.points.T, "o-"',
+        'panel.plot(*(2 * drawn.points[1] - drawn.points).T, "o-"',
+        (f"{_ARTISTS}test_figure_4_has_the_points_where_thirds_of_the_aperture_put_the_response",),
+    ),
+    Mutant(
+        "plot: points with x for y",
+        _PLOT,
+        'panel.plot(*drawn.points.T, "o-"',
+        'panel.plot(*drawn.points.T[::-1], "o-"',
+        (f"{_ARTISTS}test_figure_4_has_the_points_where_thirds_of_the_aperture_put_the_response",),
+    ),
+    Mutant(
+        "autofocus: a correction that amplifies by 1 %",
+        "bisar_budget/simulate/autofocus.py",
+        "    turn = np.exp(-1j * phase)\n    focused = ",
+        "    turn = 1.01 * np.exp(-1j * phase)\n    focused = ",
+        (f"{_IMAGES}test_autofocus_never_beats_the_error_free_image_within_the_aperture",),
+    ),
+    Mutant(
+        "Table I: sign of the cubic term of an acceleration, in the evaluators",
+        _EVALUATORS,
+        "(0.0, 0.0, constant_y*shared_3, linear_y*shared_4),  # acceleration y",
+        "(0.0, 0.0, constant_y*shared_3, -linear_y*shared_4),  # acceleration y",
+        ("tests/theory/test_against_exact_ranges.py", "tests/simulate/test_verify.py::TestTogether"),
+    ),
+    Mutant(
+        "Table I as transcribed: sign of an expression",
+        "specs/published/table_1.csv",
+        ",-atilde_yt*v_yt/(2*R_t)",
+        ",atilde_yt*v_yt/(2*R_t)",
+        ("tests/theory/test_transcription.py",),
+    ),
+    Mutant(
+        "Table II as transcribed: factor of an expression",
+        "specs/published/table_2.csv",
+        ",lambda/(2*T**2*sin(thetabar_t))",
+        ",lambda/(4*T**2*sin(thetabar_t))",
+        ("tests/theory/test_transcription.py",),
+    ),
+    Mutant(
+        "verify: refocused against twice the budget",
+        _PHASES,
+        "is_met = residual <= budget * (1 + TOLERANCE)",
+        "is_met = residual <= 2 * budget * (1 + TOLERANCE)",
+        (f"{_BORDERS}TestRefocused",),
+    ),
+    Mutant(
+        "verify: ratio of the cubic phase inverted",
+        _PHASES,
+        "measured_cubic_rad=measured, verdict=compare(measured / requirement - 1, TOLERANCE)",
+        "measured_cubic_rad=measured, verdict=compare(requirement / measured - 1, TOLERANCE)",
+        (f"{_BORDERS}TestCubic",),
+    ),
+    Mutant(
+        "verify: vibration confirmed within 2 dB, where it is conservative",
+        _VIBRATION,
+        "TOLERANCE_DB = 0.5",
+        "TOLERANCE_DB = 2.0",
+        (f"{_BORDERS}TestVibration::test_noise_1_db_inside_is_conservative",),
+    ),
+    Mutant(
+        "verify: vibration confirmed within 2 dB, where it is optimistic",
+        _VIBRATION,
+        "TOLERANCE_DB = 0.5",
+        "TOLERANCE_DB = 2.0",
+        (f"{_BORDERS}TestVibration::test_noise_that_the_rule_of_small_phases_underrates_is_optimistic",),
+    ),
+    Mutant("verify: confirmed within 5.5 %", _PHASES, "TOLERANCE = 0.05 ", "TOLERANCE = 0.055 ", (_FIVE_PERCENT,)),
+    Mutant("verify: confirmed within 4.5 %", _PHASES, "TOLERANCE = 0.05 ", "TOLERANCE = 0.045 ", (_FIVE_PERCENT,)),
+    Mutant(
+        "verify: the phase inside a limit ignored",
+        _PHASES,
+        "falls_inside = inside is not None and inside >= measured",
+        "falls_inside = False",
+        (f"{_BORDERS}TestThroughTheLimit",),
+    ),
+    Mutant(
+        "verify: the phase beyond a limit ignored",
+        _PHASES,
+        "(beyond is None or beyond > measured)",
+        "True",
+        (f"{_BORDERS}TestThroughTheLimit",),
+    ),
+)
