@@ -3,6 +3,7 @@
 import copy
 from collections.abc import Callable
 from datetime import date
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,9 @@ from bisar_budget.mission.load import parse_mission
 # Shared machines: how long an example takes says nothing.
 settings.register_profile("shared", deadline=None)
 settings.load_profile("shared")
+
+# Standard error apart from standard output: Click before 8.2 has to be asked.
+_APART: Any = {"mix_stderr": False} if "mix_stderr" in signature(CliRunner).parameters else {}
 
 ROOT = Path(__file__).resolve().parent.parent
 TODAY = date(2026, 11, 21)
@@ -76,6 +80,6 @@ def run() -> Callable[..., Result]:
     """Run the command line in this process."""
 
     def invoke(*args: str, **options: Any) -> Result:
-        return CliRunner().invoke(cli, [str(arg) for arg in args], **options)
+        return CliRunner(**_APART).invoke(cli, [str(arg) for arg in args], **options)
 
     return invoke
