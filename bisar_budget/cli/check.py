@@ -15,6 +15,7 @@ from bisar_budget import __version__
 from bisar_budget.cli.streams import (
     EXIT_BROKEN,
     FILE,
+    ParamType,
     complain,
     day_of_run,
     deliver,
@@ -75,7 +76,7 @@ class _Gate(click.Command):
         return defaults
 
 
-class _Draws(click.ParamType[int]):
+class _Draws(ParamType[int]):
     """A number of draws: 1000000 or 1e6."""
 
     name = "number"

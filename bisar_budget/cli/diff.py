@@ -12,6 +12,7 @@ from bisar_budget.cli.streams import (
     EXIT_BROKEN,
     EXIT_USAGE,
     FILE,
+    ParamType,
     complain,
     day_of_run,
     deliver,
@@ -22,7 +23,7 @@ from bisar_budget.cli.streams import (
 from bisar_budget.errors import printable
 
 
-class _Part(click.ParamType[float]):
+class _Part(ParamType[float]):
     """A part of something: `10%` or 0.1."""
 
     name = "percent"

@@ -12,14 +12,23 @@ import click
 from bisar_budget.errors import printable
 
 if TYPE_CHECKING:
+    from click import ParamType as ParamType
     from click.shell_completion import CompletionItem
 
     from bisar_budget.mission.model import Mission
+else:
+
+    class ParamType(click.ParamType):
+        """Type of a parameter; that of Click before 8.4 takes no type of its values in brackets."""
+
+        def __class_getitem__(cls, values: object) -> type:  # noqa: D105
+            return cls
+
 
 EXIT_BROKEN, EXIT_USAGE, EXIT_OUR_FAULT, EXIT_INTERRUPTED = 1, 2, 3, 130
 
 
-class FileName(click.ParamType[str]):
+class FileName(ParamType[str]):
     """Name of a file, which a shell completes; what can be read is seen when it is."""
 
     name = "file"
