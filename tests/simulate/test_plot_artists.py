@@ -17,7 +17,8 @@ MISSION = parse_mission(
     mission_text(
         platforms__transmitter__motion_error={"acceleration": [ACCELERATION, 0, 0]},
         platforms__receiver__motion_error={"position": [3, -1, 0.5]},
-    )
+    ),
+    model="full",
 )
 T = 6.0
 
