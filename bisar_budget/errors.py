@@ -99,6 +99,10 @@ class Fault(NamedTuple):
         return text
 
 
+class WorkerLostError(Exception):
+    """A worker process ended before its work did."""
+
+
 class MissionError(Exception):
     """A mission file that cannot be used, with every fault found in it, in file order.
 

@@ -2,6 +2,7 @@
 
 import os
 import re
+import stat
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -17,8 +18,11 @@ KEYS = {
     "color": str,
 }
 _KINDS = {str: "text", bool: "true or false", int: "a whole number", list: "a list of file names"}
-# Only a file in which the table can be is parsed: tomllib costs a fifth of a check's start.
-_CANDIDATE = re.compile(rb"""[.\s\["']bisar-budget["']?\s*[\].=]""")
+# Only a file in which the table can be is parsed: tomllib costs a fifth of a check's start. Escapes may hide it.
+_CANDIDATE = re.compile(
+    rb"""[.\s\[{,]bisar-budget|\.\s*["']bisar-budget|["']bisar-budget(?:["']?\s*[\].=]|\s)|\\[uUx]"""
+)
+_LARGEST = 1 << 20  # bytes
 
 
 class SettingsError(Exception):
@@ -40,7 +44,7 @@ def project_settings(folder: str) -> Settings | None:
     Raises
     ------
     SettingsError
-        No TOML, an unknown key, or a value of the wrong type.
+        No regular file, neither UTF-8 nor TOML, an unknown key, or a value of the wrong type.
     """
     folder = os.path.abspath(folder)
     while True:
@@ -52,19 +56,23 @@ def project_settings(folder: str) -> Settings | None:
 
 
 def _read(file: str) -> Settings | None:
-    try:
-        with open(file, "rb") as stream:
-            data = stream.read()
-    except OSError:
+    data = _bytes_of(file)
+    if data is None:
         return None
-    if not _CANDIDATE.search(data):
+    try:
+        text = data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise SettingsError(f"{file}: is not UTF-8: {error.reason} at byte {error.start}") from None
+    if not _CANDIDATE.search(data) and "\0" not in text:  # UTF-16 has zeros
         return None
     import tomllib
 
     try:
-        document = tomllib.loads(data.decode("utf-8"))
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        document = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
         raise SettingsError(f"{file}: is not valid TOML: {error}") from None
+    except RecursionError:
+        raise SettingsError(f"{file}: is nested too deep to be read") from None
     tools = document.get("tool")
     table = tools.get("bisar-budget") if isinstance(tools, dict) else None
     if table is None:
@@ -77,6 +85,23 @@ def _read(file: str) -> Settings | None:
     if "report" in values:
         values["report"] = [os.path.join(os.path.dirname(file), name) for name in values["report"]]
     return Settings(file, values)
+
+
+def _bytes_of(file: str) -> bytes | None:
+    """Content of a file, None where there is none; a pipe would wait for ever, and a device never end."""
+
+    try:
+        if not stat.S_ISREG(os.stat(file).st_mode):
+            raise SettingsError(f"{file}: is no regular file")
+        with open(file, "rb") as stream:
+            data = stream.read(_LARGEST + 1)
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except OSError as error:
+        raise SettingsError(f"{file}: cannot be read: {error.strerror}") from None
+    if len(data) > _LARGEST:
+        raise SettingsError(f"{file}: is larger than {_LARGEST >> 20} MiB")
+    return data
 
 
 def _hold_to_type(file: str, key: str, value: object) -> None:

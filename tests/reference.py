@@ -35,6 +35,7 @@ _PROJECT = (_BASIS * _WEIGHTS * (np.arange(4)[:, None] + 0.5)).T  # (24, 4): val
 _STEP_M, _STEP = 1e-5, 1e-6  # that Newton's last step may make, besides of the distance; the next is its square
 _NEWTON = 8
 _CORRECTION, _TRIFLE_M = 0.3, 1e-4  # of the tangent's way that Newton may add; what is no way to speak of
+PARALLEL = 0.02  # of the slopes' determinant without error
 _CHANGE = 0.25  # of the slopes' determinant, within one step
 _SMALLEST = 2.0**-16  # of the way to the next size; where no step of that is found, the solution ends
 
@@ -161,6 +162,8 @@ class Lanes:
         self.error = np.einsum("lkof,on->lknf", np.array([e.paths for e in errors]), powers)
         clock = np.array([e.clock for e in errors])
         self.clock = SPEED_OF_LIGHT * clock @ np.array([tau**order for order in range(4)])  # (L, n)
+        count = len(errors)
+        self.at_rest = self._tangent(np.zeros(count), np.zeros((count, 2)), slice(None))[1]  # (L,)
 
     def _left(self, size: Array, place: Array, lanes: Any) -> tuple[Array, Array]:
         """Recorded − predicted as P₀ … P₃ (L, 4), and the slopes of P₀ and P₁ over the ground (L, 2, 2)."""
@@ -191,7 +194,8 @@ class Lanes:
         """Solution of P₀ = P₁ = 0 at other sizes, by Newton's steps from along the tangent.
 
         The flags tell where it is one, on the same branch: Newton had to correct the tangent's way by less than a
-        third of it, and the determinant of the slopes has kept its sign and much of its size.
+        third of it, and the determinant of the slopes has kept its sign and much of its size. Below a fiftieth of it
+        without error the gradients count as parallel.
         """
         start = at.place + at.tangent * (size - at.size)[:, None]
         place, done = start.copy(), np.zeros(len(start), bool)
@@ -209,6 +213,7 @@ class Lanes:
             corrected = np.linalg.norm(place - start, axis=1) / (_TRIFLE_M + np.linalg.norm(start - at.place, axis=1))
             change = determinant / at.determinant
             found = done & (corrected < _CORRECTION) & (change > _CHANGE) & (change < 1 / _CHANGE)
+            found &= determinant / self.at_rest[lanes] > PARALLEL
         return _Reached(size, place, tangent, determinant), found
 
     def follow(self, sizes: Array, all_or_none: bool = False) -> Responses:

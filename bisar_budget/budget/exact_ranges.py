@@ -24,6 +24,8 @@ from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState,
 _NODES = ((0.1, 6), (0.5, 10), (math.inf, 16))
 _ITERATIONS = 40
 _NEAR = 0.003  # of the nearest slant range; a point so near to the centre has slopes that differ by no more
+_SKEWED = 0.01  # the same over the sine between the gradients, where they are near to parallel
+_BENT = 0.05  # of what Doppler turns by at the centre: velocity errors turn it by less, or its slopes are others
 _FEW = 4
 _SHRINKS = 0.5  # square of each step of the search over that of the one before; else it does not settle
 _EPSILON = 2e-15  # of a range sum: what rounding of a few operations leaves
@@ -263,10 +265,12 @@ class ExactRanges:
         nothing.
         """
         measured = dict(self.tracks)
-        recorded = self.recorded
+        recorded, bend = self.recorded, 0.0
         for source, size in errors:
             if source.is_position:
                 x, y, z = (size * part for part in source.direction)
+                if source.unit == "m/s":
+                    bend += abs(size)
                 powers = self.powers[source.unit]
                 for name in PLATFORMS:
                     if source.moves(name):
@@ -277,7 +281,18 @@ class ExactRanges:
             else:  # a clock, or a phase as such
                 shape = self.shape(source)
                 recorded = [whole + size * metres for whole, metres in zip(recorded, shape, strict=True)]
-        return self._settled(recorded, measured["transmitter"], measured["receiver"], near)
+        reach = self._reach if bend * self.half < self._bend else 0.0
+        return self._settled(recorded, measured["transmitter"], measured["receiver"], near, reach)
+
+    @cached_property
+    def _reach(self) -> float:
+        """Distance from the centre up to which its slopes find a point. [m]"""
+        return min(_NEAR, _SKEWED * abs(self.gradient_sine)) * self.nearest
+
+    @cached_property
+    def _bend(self) -> float:
+        """Way of a platform by a velocity error within half an aperture up to which they do. [m]"""
+        return _BENT * abs(self.plane.determinant) * self.half / self.range_gradient * self.nearest
 
     def left_over(self, source: ErrorSource, size: float, place: GroundVector) -> list[float]:
         """Range error at the nodes that an error leaves at a ground point. [m]"""
@@ -349,11 +364,11 @@ class ExactRanges:
         return [(node * node - 1 / 3) / self.k for node in self.nodes]  # a quadratic that displaces nothing
 
     def _settled(
-        self, recorded: Samples, transmitter: Track, receiver: Track, near: GroundVector
+        self, recorded: Samples, transmitter: Track, receiver: Track, near: GroundVector, reach: float
     ) -> ExactPhases | None:
-        """Newton's method for the point; with the slopes of the centre where the point stays near it."""
+        """Newton's method for the point; with the slopes of the centre where it stays within reach of that."""
         east, north = near
-        if math.hypot(east, north) < _NEAR * self.nearest:
+        if math.hypot(east, north) < reach:
             found = self._settled_near(recorded, transmitter, receiver, east, north)
             if found is not None:
                 return found

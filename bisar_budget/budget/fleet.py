@@ -52,11 +52,11 @@ def check_files(
     count = cores()
     if len(files) < MANY or count == 1 or "-" in files:
         return _checked(files, today, model, keep, is_brief)
-    from concurrent.futures import ProcessPoolExecutor
+    from bisar_budget.workers import worker_pool
 
     size = -(-len(files) // count)
     own, *others = (files[start : start + size] for start in range(0, len(files), size))
-    with ProcessPoolExecutor(len(others)) as pool:
+    with worker_pool(len(others)) as pool:
         waiting = [pool.submit(_checked, part, today, model, keep, is_brief) for part in others]
         kept = _checked(own, today, model, keep, is_brief)
         for part in waiting:

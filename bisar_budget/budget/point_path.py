@@ -1,7 +1,8 @@
 """Where one error takes the image of a point as it grows, and the first size at which it reaches a limit.
 
-The point is followed from no error on. Where range and Doppler gradients become parallel there, its way ends: no
-larger error has an image of the point, which counts as a limit reached.
+The point is followed from no error on. Where range and Doppler gradients become parallel there, its way ends:
+they span less than 2 % of what they span at the centre. No larger error has an image of the point, which counts as a
+limit reached.
 """
 
 import math
@@ -13,6 +14,8 @@ from bisar_budget.budget.effects import ErrorSource
 from bisar_budget.budget.exact_ranges import ExactPhases, ExactRanges
 from bisar_budget.geometry import GroundVector
 
+# Of what range and Doppler gradients span at the centre: with less a point has no image, they are parallel there.
+PARALLEL = 0.02
 _STRAY = 0.15  # of a step; farther from where it led, a point is not the one that was followed
 _STRAIGHT = 0.1  # of a displacement, by which it may be off a straight way
 _FLOOR_M = 1e-3
@@ -20,7 +23,7 @@ _LEAST_STEP = 1e-3  # of the size: allowables are right to 1 %
 _FINEST_STEP = 1e-6  # where the gradients stay apart, the way only turns
 _OF_FOLD = 0.8  # of the way to where the gradients seem to become parallel, that one step makes
 _SHORT = 0.1  # of the last step, below which that step says little of the way left
-_PARALLEL = 0.02  # of the sine between the gradients at the centre, over their lengths there
+_FOLDS = 0.1  # of what the gradients span at the centre; a way that ends at more of it does not end in a fold
 _CLOSE = 1e-5  # of a limit, where a search ends
 _ALMOST = 0.002  # of a limit, from where a parabola leads to it
 _NOT_FOLDED = 0.5  # of what the gradients span at the centre
@@ -64,11 +67,14 @@ class PointPath:
             if last.size == size:
                 return last.phases
             fold = self._to_fold(index)
-            step = min(step, size - last.size, _OF_FOLD * fold if fold > _LEAST_STEP * last.size else math.inf)
+            step = min(step, size - last.size, _OF_FOLD * fold if fold > _FINEST_STEP * last.size else math.inf)
             ahead = size if size - last.size < 1.2 * step else last.size + step
             near, is_straight = self._guess(index, ahead) if is_first_try else (self._ahead(index, ahead), False)
             found = self.exact.phases([(self.source, self.sign * ahead)], near)
             if found is not None and _is_on_the_way(last.phases.displacement, found.displacement, near):
+                if abs(found.turn) < PARALLEL:
+                    self.end = _parallel_between(last, _Known(ahead, found))
+                    break
                 self.known.insert(index, _Known(ahead, found))
                 if until is not None and until(found):
                     return found
@@ -77,10 +83,9 @@ class PointPath:
             if is_straight:
                 is_first_try = False
                 continue
-            is_beyond = fold < min(ahead - last.size, _LEAST_STEP * ahead)
+            is_fold = found is None and abs(last.phases.turn) < _FOLDS and fold < _LEAST_STEP * ahead
             step, is_first_try = step / 2, True
-            is_parallel = step < _LEAST_STEP * ahead and abs(last.phases.turn) < _PARALLEL
-            if is_beyond or is_parallel or step < _FINEST_STEP * ahead:
+            if is_fold or step < _FINEST_STEP * ahead:
                 self.end = last.size + min(step, fold)
         return None
 
@@ -247,6 +252,12 @@ def _on_parabola(slope: float, size: float, value: float, limit: float) -> float
     bend = (value / size - slope) / size
     root = slope * slope + 4 * bend * limit
     return 2 * limit / (slope + math.sqrt(root)) if root >= 0 and slope + root > 0 else None
+
+
+def _parallel_between(before: _Known, beyond: _Known) -> float:
+    """Size between two at which the gradients span so little that they count as parallel; their square is linear."""
+    square, less = before.phases.turn**2, beyond.phases.turn**2
+    return before.size + (beyond.size - before.size) * (square - PARALLEL**2) / (square - less)
 
 
 def _is_on_the_way(last: GroundVector, found: GroundVector, near: GroundVector) -> bool:

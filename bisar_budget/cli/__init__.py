@@ -1,17 +1,20 @@
 """The `bisar-budget` command. Everything that costs time to import is imported where it is used."""
 
+import errno
 import os
+import signal
 import sys
 from contextlib import suppress
 from importlib import import_module
-from typing import Any
+from typing import Any, NoReturn
 
 import click
 
 from bisar_budget import __version__
-from bisar_budget.cli.streams import EXIT_INTERRUPTED, EXIT_OUR_FAULT, complain
-from bisar_budget.errors import printable
+from bisar_budget.cli.streams import EXIT_INTERRUPTED, EXIT_OUR_FAULT, complain, drop_output, fail
+from bisar_budget.errors import WorkerLostError, printable
 
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
 # Each command to the module that has it, imported when it is asked for.
 _MODULES = {
     "check": "check",
@@ -37,24 +40,42 @@ class _Commands(click.Group):
         return command
 
     def main(self, *args: Any, **kwargs: Any) -> Any:
+        output = sys.stdout
         kwargs["standalone_mode"] = False  # click would exit with 1 on an interrupt or a broken pipe
         try:
             sys.exit(super().main(*args, **kwargs))
+        except SystemExit:
+            if sys.stdout is not output:  # click put it away, with 1: nobody reads on, and nothing was to be judged
+                sys.exit(0)
+            raise
         except click.ClickException as error:
             with suppress(OSError):  # standard error may be closed; the exit code still says it
                 error.show()
             sys.exit(error.exit_code)
         except (click.Abort, KeyboardInterrupt):
             sys.exit(EXIT_INTERRUPTED)
+        except OSError as error:
+            if error.errno in _NO_ROOM:
+                drop_output()
+                fail(f"cannot write standard output: {error.strerror}")
+            if error.errno in (errno.EMFILE, errno.ENFILE, errno.ENOMEM):
+                fail(f"the system refuses: {error.strerror}")
+            _own_fault(error)
+        except WorkerLostError as error:
+            fail(f"{error}; fewer processes (--jobs 1) or a smaller simulation.memory_limit need less")
         except Exception as error:
-            if os.environ.get("BISAR_BUDGET_DEBUG"):
-                raise
-            complain(
-                f"bisar-budget {__version__}: a fault of the tool itself, nothing was judged "
-                f"({type(error).__name__}: {printable(str(error))}).\n"
-                "Please report it; BISAR_BUDGET_DEBUG=1 shows where it happened."
-            )
-            sys.exit(EXIT_OUR_FAULT)
+            _own_fault(error)
+
+
+def _own_fault(error: Exception) -> NoReturn:
+    if os.environ.get("BISAR_BUDGET_DEBUG"):
+        raise error
+    complain(
+        f"bisar-budget {__version__}: a fault of the tool itself, nothing was judged "
+        f"({type(error).__name__}: {printable(str(error))}).\n"
+        "Please report it; BISAR_BUDGET_DEBUG=1 shows where it happened."
+    )
+    sys.exit(EXIT_OUR_FAULT)
 
 
 @click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
@@ -70,5 +91,13 @@ def cli() -> None:
 
 
 def main() -> None:
-    """Run the command."""
+    """Run the command; a signal that asks it to end leaves no worker and no temporary file."""
+    for name in ("SIGTERM", "SIGHUP"):
+        asked = getattr(signal, name, None)
+        if asked is not None and signal.getsignal(asked) is signal.SIG_DFL:
+            signal.signal(asked, _end)
     cli()
+
+
+def _end(number: int, frame: object) -> NoReturn:
+    sys.exit(128 + number)

@@ -15,13 +15,13 @@ from bisar_budget import __version__
 from bisar_budget.cli.streams import (
     EXIT_BROKEN,
     FILE,
+    ParamType,
     complain,
     day_of_run,
     deliver,
     expand,
     is_terminal,
     load_all,
-    print_text,
     spare,
     wants_color,
     write_file,
@@ -76,7 +76,7 @@ class _Gate(click.Command):
         return defaults
 
 
-class _Draws(click.ParamType[int]):
+class _Draws(ParamType[int]):
     """A number of draws: 1000000 or 1e6."""
 
     name = "number"
@@ -245,7 +245,7 @@ def check(
         pieces = check_files(files, day, model, keep, is_brief=is_brief)
         if says_faults:
             _say_faults(piece.unusable for piece in pieces)
-        deliver(joined(format_name, pieces, __version__, style), output)
+        deliver(joined(format_name, pieces, __version__, style), output, format_name)
         statuses = {piece.status for piece in pieces}
     else:
         report = check_all(files, day, model, verifying, illustrated, drawn)
@@ -256,7 +256,7 @@ def check(
         for path, its_format in written:
             _write_report(path, its_format, report, style._replace(color=False, verbosity=max(style.verbosity, 0)))
         if output is None:
-            print_text(render(format_name, report, style))
+            deliver(render(format_name, report, style), None, format_name)
         else:
             _write_report(output, format_name, report, style)
         if format_name == "github":

@@ -4,7 +4,7 @@ import sys
 
 import click
 
-from bisar_budget.cli.streams import EXIT_BROKEN, print_text, write_file
+from bisar_budget.cli.streams import EXIT_BROKEN, deliver, print_text, write_file
 
 
 @click.command()
@@ -38,7 +38,7 @@ def derive(table: str, format_name: str, check_only: bool, write: bool) -> None:
         return
     from bisar_budget.theory import render
 
-    print_text(render.derivation(table, format_name))
+    deliver(render.derivation(table, format_name), None, format_name)
 
 
 def _generated(write: bool) -> None:

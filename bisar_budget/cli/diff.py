@@ -12,6 +12,7 @@ from bisar_budget.cli.streams import (
     EXIT_BROKEN,
     EXIT_USAGE,
     FILE,
+    ParamType,
     complain,
     day_of_run,
     deliver,
@@ -22,7 +23,7 @@ from bisar_budget.cli.streams import (
 from bisar_budget.errors import printable
 
 
-class _Part(click.ParamType[float]):
+class _Part(ParamType[float]):
     """A part of something: `10%` or 0.1."""
 
     name = "percent"
@@ -114,6 +115,6 @@ def diff(
     else:
         write = difference.as_text if format_name == "text" else difference.as_markdown
         text = write(changes, tolerated, all_rows)
-    deliver(text, output)
+    deliver(text, output, format_name)
     is_refused = tolerated is not None and any(change.broken(tolerated) for change in changes)
     sys.exit(EXIT_BROKEN if is_refused else 0)

@@ -4,7 +4,7 @@ import os
 
 import click
 
-from bisar_budget.cli.streams import FILE, complain, deliver, fail, print_text, write_file
+from bisar_budget.cli.streams import FILE, complain, deliver, fail, print_data, write_file
 
 
 @click.command()
@@ -33,7 +33,7 @@ def init(file: str, name: str, force: bool) -> None:
     )
     text = environment.get_template("mission.yaml.j2").render(name=json.dumps(name, ensure_ascii=False))
     if file == "-":
-        print_text(text)
+        print_data(text)
         return
     if os.path.exists(file) and not force:
         fail(f"{file} exists; --force replaces it")
@@ -51,4 +51,4 @@ def schema(output: str | None) -> None:
     from bisar_budget.mission.schema import mission_schema
 
     text = json.dumps(mission_schema(), indent=2) + "\n"
-    deliver(text, output)
+    deliver(text, output, "json")

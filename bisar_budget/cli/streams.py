@@ -12,14 +12,23 @@ import click
 from bisar_budget.errors import printable
 
 if TYPE_CHECKING:
+    from click import ParamType as ParamType
     from click.shell_completion import CompletionItem
 
     from bisar_budget.mission.model import Mission
+else:
+
+    class ParamType(click.ParamType):
+        """Type of a parameter; that of Click before 8.4 takes no type of its values in brackets."""
+
+        def __class_getitem__(cls, values: object) -> type:  # noqa: D105
+            return cls
+
 
 EXIT_BROKEN, EXIT_USAGE, EXIT_OUR_FAULT, EXIT_INTERRUPTED = 1, 2, 3, 130
 
 
-class FileName(click.ParamType[str]):
+class FileName(ParamType[str]):
     """Name of a file, which a shell completes; what can be read is seen when it is."""
 
     name = "file"
@@ -85,9 +94,11 @@ def day_of_run() -> date:
     if not epoch:
         return datetime.now(UTC).date()
     try:
+        if not (epoch.isascii() and epoch.isdigit()):
+            raise ValueError
         return datetime.fromtimestamp(int(epoch), UTC).date()
     except (ValueError, OverflowError, OSError):
-        raise click.UsageError(f"SOURCE_DATE_EPOCH must be seconds since 1970 (got {epoch!r})") from None
+        raise click.UsageError(f"SOURCE_DATE_EPOCH must be seconds since 1970 (got {printable(epoch)!r})") from None
 
 
 def is_terminal() -> bool:
@@ -106,18 +117,36 @@ def wants_color() -> bool:
 
 
 def print_text(text: str) -> None:
+    """Write what a person reads to standard output, characters that its encoding lacks escaped."""
+    if hasattr(sys.stdout, "reconfigure"):
+        sys.stdout.reconfigure(errors="backslashreplace")
+    _print(text)
+
+
+def print_data(text: str) -> None:
+    """Write what a program reads to standard output: UTF-8, whatever a terminal would take."""
+    if hasattr(sys.stdout, "reconfigure"):
+        sys.stdout.reconfigure(encoding="utf-8", errors="backslashreplace", newline="\n")
+    _print(text)
+
+
+def _print(text: str) -> None:
     """Write to standard output; a reader that went away changes no exit code."""
     if sys.stdout is None:
         fail("cannot write: standard output is closed")
-    if hasattr(sys.stdout, "reconfigure"):
-        sys.stdout.reconfigure(errors="replace")
     try:
         sys.stdout.write(text)
         sys.stdout.flush()
     except OSError as error:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # else Python complains again at exit
+        drop_output()
         if not isinstance(error, BrokenPipeError):
             fail(f"cannot write standard output: {error.strerror}")
+
+
+def drop_output() -> None:
+    """Send what is left of standard output nowhere: Python would complain of it again at exit."""
+    with suppress(OSError, ValueError, AttributeError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def complain(message: str) -> None:
@@ -132,10 +161,10 @@ def fail(message: str) -> NoReturn:
     sys.exit(EXIT_USAGE)
 
 
-def deliver(text: str, output: str | None) -> None:
-    """Write to a file, else to standard output."""
+def deliver(text: str, output: str | None, format_name: str = "text") -> None:
+    """Write to a file, else to standard output: for a person in the format `text`, else for a program."""
     if output is None:
-        print_text(text)
+        (print_text if format_name == "text" else print_data)(text)
     else:
         write_file(output, text)
 
@@ -148,7 +177,7 @@ def write_file(path: str, content: str | bytes) -> None:
     import tempfile
 
     if path == "-" and isinstance(content, str):
-        print_text(content)
+        print_data(content)
         return
     data = content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
     target = os.path.realpath(path)
@@ -167,7 +196,10 @@ def write_file(path: str, content: str | bytes) -> None:
         os.umask(mask)
         os.chmod(temporary, 0o666 & ~mask)  # a temporary file is private, a report is not
         os.replace(temporary, target)
-    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        if temporary is not None and os.path.exists(temporary):
-            os.unlink(temporary)
+    except BaseException as error:
+        if temporary is not None:
+            with suppress(OSError):
+                os.unlink(temporary)
+        if not isinstance(error, (OSError, ValueError)):  # ValueError: a NUL in the name
+            raise
         fail(f"cannot write {path}: {getattr(error, 'strerror', None) or error}")

@@ -63,7 +63,7 @@ def verify(missions: Sequence[str], only: str, format_name: str, output: str | N
         text = verification.as_json(__version__, verified)
     else:
         text = verification.as_text(verified, Style(color=output is None and wants_color()))
-    deliver(text, output)
+    deliver(text, output, format_name)
     doubts = [mission for mission in verified if mission.doubt]
     for mission in doubts:
         complain(f"{printable(mission.file)}: {mission.doubt}")

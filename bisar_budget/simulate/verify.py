@@ -1,10 +1,8 @@
 """Form images with each error set exactly at its limit, and measure whether the limit is true."""
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
 from fnmatch import fnmatchcase
 from functools import partial
-from multiprocessing import get_context
 
 from bisar_budget.budget.aggregates import aggregate_rows
 from bisar_budget.budget.echoes import SLOWEST
@@ -16,6 +14,7 @@ from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.simulate import phase_cases, vibration
 from bisar_budget.simulate.location_case import location
 from bisar_budget.simulate.study import Study
+from bisar_budget.workers import worker_pool
 
 __all__ = ["Study", "rows_to_verify", "verify_mission"]
 
@@ -52,8 +51,7 @@ def verify_mission(
             rows.append(known[row_id]())
             progress(row_id)
     else:
-        # A fresh interpreter for each: a fork would copy the threads of a numerical library half way.
-        with ProcessPoolExecutor(min(jobs, len(wanted)), mp_context=get_context("spawn")) as pool:
+        with worker_pool(min(jobs, len(wanted)), "spawn") as pool:
             for row in pool.map(partial(_verify_row, mission), wanted):
                 rows.append(row)
                 progress(row.id)

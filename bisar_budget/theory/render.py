@@ -3,9 +3,10 @@
 import re
 import textwrap
 import unicodedata
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from html import escape
+from typing import Any
 
 from sympy import Basic, MatrixBase, Symbol, atan2
 from sympy.printing.latex import LatexPrinter
@@ -131,18 +132,33 @@ class _MathML(MathMLPresentationPrinter):  # type: ignore[misc]
             return super()._print_Function(expr)
         return self._call(self._name(expr.func.__name__), expr)
 
+    def _print_Abs(self, expr: Basic) -> object:
+        return self._fenced([self._print(expr.args[0])], "||")
+
     def _call(self, name: object, expr: Basic) -> object:
         row = self.dom.createElement("mrow")
         row.appendChild(name)
-        fence = self.dom.createElement("mrow")
-        fence.appendChild(self._leaf("mo", "("))
-        for index, argument in enumerate(expr.args):
-            if index:
-                fence.appendChild(self._leaf("mo", ","))
-            fence.appendChild(self._print(argument))
-        fence.appendChild(self._leaf("mo", ")"))
-        row.appendChild(fence)
+        row.appendChild(self._fenced([self._print(argument) for argument in expr.args]))
         return row
+
+    def _fenced(self, parts: Sequence[object], brackets: str = "()") -> object:
+        row = self.dom.createElement("mrow")
+        row.appendChild(self._leaf("mo", brackets[0]))
+        for index, part in enumerate(parts):
+            if index:
+                row.appendChild(self._leaf("mo", ","))
+            row.appendChild(part)
+        row.appendChild(self._leaf("mo", brackets[1]))
+        return row
+
+    def without_fences(self, node: Any) -> Any:
+        """Write brackets as operators. SymPy 1.13 has `mfenced`, which browsers no longer draw, and 1.14 has not."""
+        for child in list(node.childNodes):
+            node.replaceChild(self.without_fences(child), child)
+        if node.nodeName != "mfenced":
+            return node
+        brackets = (node.getAttribute("open") or "(") + (node.getAttribute("close") or ")")
+        return self._fenced(list(node.childNodes), brackets)
 
     def _name(self, name: str) -> object:
         parts = _Name.of(name)
@@ -184,7 +200,8 @@ def as_mathml(expression: Basic) -> str:
 
 def as_mathml_content(expression: Basic) -> str:
     """Presentation MathML without the `math` element around it."""
-    xml = str(_MathML()._print(expression).toxml())
+    printer = _MathML()
+    xml = str(printer.without_fences(printer._print(expression)).toxml())
     for name, character in (
         ("InvisibleTimes", "\u2062"),
         ("ApplyFunction", "\u2061"),

@@ -9,7 +9,8 @@ import pytest
 from sympy import Float, Rational
 
 from bisar_budget import evaluators
-from bisar_budget.theory import emit, emit_catalogue
+from bisar_budget.theory import emit, emit_catalogue, render
+from bisar_budget.theory.symbols import tau
 
 ALLOWED = (
     ast.Add
@@ -34,6 +35,20 @@ ALLOWED = (
 @pytest.mark.parametrize("generated", [emit, emit_catalogue], ids=lambda module: module.TARGET.name)
 def test_committed_file_is_current(generated) -> None:
     assert generated.TARGET.read_text(encoding="utf-8") == generated.source()
+
+
+def test_brackets_that_sympy_1_13_writes_as_fences_are_operators() -> None:
+    """The catalogue does not depend on SymPy's version: fences become the operators that 1.14 writes."""
+    printer = render._MathML()
+    inner = printer.dom.createElement("mfenced")
+    inner.setAttribute("open", "|")
+    inner.setAttribute("close", "|")
+    inner.appendChild(printer._print(tau))
+    outer = printer.dom.createElement("mfenced")
+    for part in (inner, printer._print(tau)):
+        outer.appendChild(part)
+    row = "<mrow><mo>(</mo><mrow><mo>|</mo><mi>τ</mi><mo>|</mo></mrow><mo>,</mo><mi>τ</mi><mo>)</mo></mrow>"
+    assert printer.without_fences(outer).toxml() == row
 
 
 def test_emission_is_deterministic_across_processes() -> None:

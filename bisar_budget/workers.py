@@ -1,0 +1,59 @@
+"""Worker processes that end when the command does, whatever ends it."""
+
+import os
+import signal
+import threading
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from multiprocessing import active_children, get_context, parent_process
+from multiprocessing.connection import wait
+
+from bisar_budget.errors import WorkerLostError
+
+
+@contextmanager
+def worker_pool(count: int, start: str | None = None) -> Iterator[ProcessPoolExecutor]:
+    """Give a pool of processes that leaves none behind.
+
+    Parameters
+    ----------
+    count : int
+        Processes.
+    start : str, optional
+        `spawn` for fresh interpreters: a fork would copy the threads of a numerical library half way.
+
+    Raises
+    ------
+    WorkerLostError
+        Something ended a worker: the system does when memory runs out.
+    """
+    pool = ProcessPoolExecutor(count, mp_context=get_context(start), initializer=_begin)
+    try:
+        yield pool
+    except BaseException as error:  # an interrupt or a signal too: the work that is left serves nobody
+        threading.excepthook = lambda _: None  # the pool's own thread may stumble over workers that are gone
+        pool.shutdown(wait=False, cancel_futures=True)
+        for worker in active_children():
+            worker.terminate()
+        if isinstance(error, BrokenProcessPool):
+            raise WorkerLostError("a worker process was ended from outside, as when memory runs out") from None
+        raise
+    pool.shutdown()
+
+
+def _begin() -> None:
+    """Leave interrupts to the parent, and end with it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for name in ("SIGTERM", "SIGHUP"):  # a fork has the handlers of the command
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_DFL)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(1)
