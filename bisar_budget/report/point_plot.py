@@ -173,15 +173,15 @@ def _of_the_point(images: PointImages) -> list[str]:
 def _of_targets(images: PointImages) -> list[str]:
     """One line for each target; peaks are over its own without error, and widths in its own cut."""
     lines = [
-        f"{'target [m]':>17} {'level':>7} {'moved by [m]':>15} {'phase':>9} {'with errors':>14} {'autofocused':>14}",
-        f"{'east':>8} {'north':>8} {'[dB]':>7} {'east':>7} {'north':>7} {'[rad]':>9} "
+        f"{'target [m]':>17} {'level':>7} {'moved by [m]':>15} {'phase':>8} {'with errors':>14} {'autofocused':>14}",
+        f"{'east':>8} {'north':>8} {'[dB]':>7} {'east':>7} {'north':>7} {'[rad]':>8} "
         f"{'[dB]':>7} {'[m]':>6} {'[dB]':>7} {'[m]':>6}",
     ]
     for one in images.responses:
         moved = np.round(one.effect.displacement, 3) + 0.0
         lines.append(
             f"{one.target.east:>8.6g} {one.target.north:>8.6g} {one.target.level_db:>7.4g} "
-            f"{moved[0]:>7.3f} {moved[1]:>7.3f} {one.effect.quadratic:>+9.3f} "
+            f"{moved[0]:>7.3f} {moved[1]:>7.3f} {one.effect.quadratic:>+8.3f} "
             f"{_peak_and_width(one.smeared, one.clean)} {_peak_and_width(one.focused, one.clean)}"
         )
     return lines

@@ -23,7 +23,7 @@ IMAGE_FORMERS = ("backprojection", "polar_format", "matched_filter", "far_field"
 
 _ORDER = 8  # of the polynomials through range histories, whose two lowest parts are compared
 _BLOCK = 1 << 18  # pixels formed between two words on the progress
-_DIRECT_BYTES = 250e6  # what the sums over all pulses and frequencies hold of a block of pixels
+_DIRECT_BYTES = 30e6  # what the sums over all pulses and frequencies hold of a block of pixels
 
 Told = Callable[[int], None]
 

@@ -178,3 +178,30 @@ else:
     raise AssertionError("no error")
 """
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
+
+
+class TestManyFrequencies:
+    """Even frequencies are split into coarse and fine ones; uneven ones are summed as they stand."""
+
+    def test_the_matched_filter_is_the_sum_of_4_either_way(self) -> None:
+        c = near(pulses=5, frequencies=23)
+        history = c.record([[3.0, -2, 0]], [1])
+        points = ground_grid((1.0, 2.0), 0.3, (8.0, 12.0), (6, 7))
+        bent = replace(history, frequency=history.frequency * (1 + 1e-3 * np.linspace(0, 1, 23) ** 2))
+        for one in (history, bent):
+            want = np.zeros(points.shape[:2], dtype=complex)
+            for k, (t, r) in enumerate(zip(one.transmitter, one.receiver, strict=True)):
+                away = np.linalg.norm(points - t, axis=-1) + np.linalg.norm(points - r, axis=-1)
+                away -= np.linalg.norm(t) + np.linalg.norm(r)
+                for i, f in enumerate(one.frequency):
+                    want += one.samples[k, i] * np.exp(2j * math.pi * f * away / 299792458.0)
+            assert np.abs(matched_filter(one, points) - want / one.samples.size).max() < 1e-9
+
+    @pytest.mark.parametrize("frequencies", [7, 16, 23])
+    def test_echoes_of_many_are_those_of_each(self, frequencies: int) -> None:
+        c = near(pulses=6, frequencies=frequencies)
+        rng = np.random.default_rng(4)
+        places = np.c_[rng.uniform(-40, 40, (30, 2)), np.zeros(30)]
+        amplitudes = rng.normal(size=30) + 1j * rng.normal(size=30)
+        each = sum(c.record([place], [a]).samples for place, a in zip(places, amplitudes, strict=True))
+        assert np.abs(c.record(places, amplitudes).samples - each).max() < 1e-8

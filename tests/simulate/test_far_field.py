@@ -156,6 +156,18 @@ class TestPolarFormat:
         assert 0 < trimmed < 0.2
         assert np.abs(middle - want).max() < 1.22 * trimmed + 0.01
 
+    def test_a_patch_elsewhere_is_the_same_image(self, broadside: Collection) -> None:
+        """Centred 6 and 4 pixels away, the same pixels; interpolation differs by what it leaves."""
+        history, look = broadside.record([1.2, -0.6, 0.0]), broadside.geometry.look_azimuth
+        size, shape = (48.0, 48.0), (160, 160)
+        at = (
+            6 * 0.3 * math.cos(look) - 4 * 0.3 * math.sin(look),
+            6 * 0.3 * math.sin(look) + 4 * 0.3 * math.cos(look),
+        )
+        here = polar_format(history, look, size, shape)
+        there = polar_format(history, look, size, shape, at)
+        assert np.abs(here.image[60:100, 60:100] - there.image[54:94, 56:96]).max() < 1e-4
+
     @pytest.mark.parametrize("squint", [0, 30, 45])
     def test_the_rectangle_trims_the_aperture(self, squint: int) -> None:
         """The same curvature over less aperture: 3 to 5 % of quadratic phase, a size that makes steps fine."""
