@@ -38,7 +38,7 @@ def tested(tree: Path, tests: Iterable[str]) -> tuple[int, str]:
     if not failed:
         return done.returncode, done.stdout.strip().rpartition("\n")[2]
     what = (failed[2] or "").removeprefix("AssertionError: ")
-    return done.returncode, f"{failed[1]}: {what}"
+    return done.returncode, f"{failed[1]}: {what}" if what else failed[1]
 
 
 def verdict(tree: Path, mutant: Mutant) -> tuple[bool, str]:
