@@ -44,11 +44,11 @@ _VIBRATION = "bisar_budget/simulate/vibration.py"
 _PLOT = "bisar_budget/report/point_plot.py"
 _FIGURES = "bisar_budget/report/point_figures.py"
 
-_ARTISTS = "tests/simulate/test_plot_artists.py::"
+_FIGURES_3_TO_7 = "tests/simulate/test_figures.py::"
 _BORDERS = "tests/simulate/test_verdict_borders.py::"
 _IMAGES = "tests/simulate/test_point_against_images.py::"
 _POINTS_OF_29 = f"{_IMAGES}test_points_of_29_are_where_each_third_of_the_aperture_puts_the_response"
-_SMEAR_DIRECTION = "tests/theory/test_smear_direction.py"
+_SMEAR_DIRECTION = "tests/theory/test_smear_direction.py::test_a_range_rate_moves_the_image_along_31"
 _SMEAR_OF_A_VERDICT = f"{_BORDERS}test_the_smear_of_a_verdict_lies_along_31"
 _FIVE_PERCENT = f"{_BORDERS}test_a_velocity_limit_is_confirmed_within_5_percent_of_the_budget"
 _LINE_OF_SIGHT = "tests/unit/test_geometry.py::test_a_line_of_sight_turns_as_the_platform_flies"
@@ -164,42 +164,56 @@ MUTANTS = (
         _FIGURES,
         "half = (times[1] - times[0]) / 2",
         "half = times[1] - times[0]",
-        (f"{_ARTISTS}test_figure_3_has_tangents_over_thirds_of_the_aperture",),
+        (f"{_FIGURES_3_TO_7}TestFigure3::test_segments_are_thirds_of_the_aperture_and_touch_the_curve",),
     ),
     Mutant(
         "plot: images transposed",
         _PLOT,
         "        picture.corners[..., 0],\n        picture.corners[..., 1],\n",
         "        picture.corners[..., 1],\n        picture.corners[..., 0],\n",
-        (f"{_ARTISTS}test_figure_5_lies_where_the_thirds_say",),
+        (f"{_FIGURES_3_TO_7}TestDrawing::test_the_figure_draws_the_sheet",),
     ),
     Mutant(
         "plot: images mirrored",
         _PLOT,
         "        picture.corners[..., 0],\n",
         "        -picture.corners[..., 0],\n",
-        (f"{_ARTISTS}test_figure_5_lies_where_the_thirds_say",),
+        (f"{_FIGURES_3_TO_7}TestDrawing::test_the_figure_draws_the_sheet",),
+    ),
+    Mutant(
+        "plot: image data transposed",
+        _FIGURES,
+        "return np.where(is_missing, math.nan, _decibels(fine, peak)), corners",
+        "return np.where(is_missing, math.nan, _decibels(fine, peak)), corners[..., ::-1]",
+        (f"{_FIGURES_3_TO_7}TestPictures::test_targets_stand_where_they_are_in_every_picture",),
+    ),
+    Mutant(
+        "plot: pixels half a step off",
+        _FIGURES,
+        "(np.arange(count * factor + 1) - 0.5) / factor",
+        "np.arange(count * factor + 1) / factor",
+        (f"{_FIGURES_3_TO_7}TestPictures::test_targets_stand_where_they_are_in_every_picture",),
     ),
     Mutant(
         "plot: turned the other way",
         _FIGURES,
         "turn = np.array([[cosine, -sine], [sine, cosine]])",
         "turn = np.array([[cosine, sine], [-sine, cosine]])",
-        (f"{_ARTISTS}test_figures_6_and_7_are_turned_by_the_look_direction",),
+        (f"{_FIGURES_3_TO_7}TestPictures::test_targets_stand_where_they_are_in_every_picture",),
     ),
     Mutant(
         "plot: points mirrored about the middle one",
         _PLOT,
         'panel.plot(*drawn.points.T, "o-"',
         'panel.plot(*(2 * drawn.points[1] - drawn.points).T, "o-"',
-        (f"{_ARTISTS}test_figure_4_has_the_points_where_thirds_of_the_aperture_put_the_response",),
+        (f"{_FIGURES_3_TO_7}TestDrawing::test_the_figure_draws_the_sheet",),
     ),
     Mutant(
         "plot: points with x for y",
         _PLOT,
         'panel.plot(*drawn.points.T, "o-"',
         'panel.plot(*drawn.points.T[::-1], "o-"',
-        (f"{_ARTISTS}test_figure_4_has_the_points_where_thirds_of_the_aperture_put_the_response",),
+        (f"{_FIGURES_3_TO_7}TestDrawing::test_the_figure_draws_the_sheet",),
     ),
     Mutant(
         "autofocus: a correction that amplifies by 1 %",

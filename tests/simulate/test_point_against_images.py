@@ -57,7 +57,6 @@ SQUINTED = {
             "motion_error": {"velocity": [0.05, -0.02, 0.1]},
         },
     },
-    "allocation": {"model": "full"},
 }
 
 
@@ -65,7 +64,7 @@ SQUINTED = {
 def test_points_of_29_are_where_each_third_of_the_aperture_puts_the_response(case: str) -> None:
     """An image from the pulses of a third alone, against that from the middle third: side, distance and direction."""
     text = (MISSIONS / "rigling_moses_section_v.yaml").read_text(encoding="utf-8")
-    mission = parse_mission(text if case == "Section V" else mission_text(**SQUINTED))
+    mission = parse_mission(text if case == "Section V" else mission_text(**SQUINTED), model="full")
     images = simulate_point(mission)
     T, moved = mission.collection.aperture_time, images.effect.displacement
     seen = np.array([peak_of_part(mission, -T / 2 + i * T / 3, -T / 2 + (i + 1) * T / 3, moved) for i in range(3)])
