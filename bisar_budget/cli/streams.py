@@ -12,7 +12,7 @@ import click
 from bisar_budget.errors import printable
 
 if TYPE_CHECKING:
-    from click import ParamType
+    from click import ParamType as ParamType
     from click.shell_completion import CompletionItem
 
     from bisar_budget.mission.model import Mission

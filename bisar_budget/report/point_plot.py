@@ -153,7 +153,7 @@ def _range_error(panel: Any, images: PointImages) -> None:
 
 def _points(panel: Any, images: PointImages, places: Floats) -> None:
     panel.plot(*images.points.T, "o-", color="#c1502e")
-    panel.set(title="Fig. 4: points of the segments, (29)", xlabel="x [m]", ylabel="y [m]")
+    panel.set(title=f"Fig. 4: points of the segments, (29)\nby {images.points_by}", xlabel="x [m]", ylabel="y [m]")
     half = max(
         float(np.abs(images.points).max()) * 1.3, float(np.ptp(places[places.shape[0] // 2], axis=0).max()) / 2
     )

@@ -10,9 +10,10 @@ from bisar_budget.budget.analysis import Analysis
 from bisar_budget.budget.correlation import correlated_errors, likely_error
 from bisar_budget.budget.effects import PLATFORMS
 from bisar_budget.budget.exact_arrays import aperture_nodes
+from bisar_budget.budget.pieces import Piece, gradients_of, indicated_point
 from bisar_budget.budget.vibration_lines import along_line_of_sight, lines_of
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vector
+from bisar_budget.geometry import BistaticGeometry, GroundVector, Vector
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.mission.model import MotionError as DeclaredError
 from bisar_budget.simulate.autofocus import ALGORITHMS
@@ -56,7 +57,8 @@ class PointImages(NamedTuple):
     are on `grid`, (nx, ny, 3) [m], whose lines are lines of equal range, along y′. All are complex and centred where
     the errors move the point; `scene_spacing` and `spacing`, (2,) [m], are those of their pixels there. `range_error`
     is its quadratic and higher part over `slow_time`; `segments` are the slopes and `points` the ground points of
-    (26)-(29), relative to the displaced point. `outside` says which declared echoes lie beyond the patch.
+    (26)-(29), relative to the displaced point; `points_by` says by which gradients (29) has them. `outside` says
+    which declared echoes lie beyond the patch.
     """
 
     slow_time: Floats
@@ -64,6 +66,7 @@ class PointImages(NamedTuple):
     segment_times: Floats
     segments: Floats
     points: Floats
+    points_by: str
     effect: ExactEffect
     spacing: tuple[float, float]
     scene_spacing: tuple[float, float]
@@ -216,12 +219,14 @@ def simulate_point(mission: Mission, progress: Callable[[int, int], None] = lamb
     bent_slope = slope - slope[fine.size // 2]
     times = np.array([-T / 3, 0.0, T / 3])  # centres of three sub-apertures
     values, slopes = np.interp(times, fine, bent), np.interp(times, fine, bent_slope)
+    pieces = [Piece(*map(float, one)) for one in zip(times, values, slopes, strict=True)]
     return PointImages(
         slow_time=fine,
         range_error=bent,
         segment_times=times,
         segments=np.stack((values, slopes), axis=1),
-        points=np.array([_indicated(geometry, *args) for args in zip(times, values, slopes, strict=True)]),
+        points=np.array([indicated_point(geometry, one, mission.allocation.model) for one in pieces]),
+        points_by=gradients_of(mission.allocation.model),
         effect=effect,
         spacing=plan.rotated.spacing,
         scene_spacing=plan.in_scene.spacing,
@@ -386,18 +391,6 @@ def _left_over(paths: tuple[Path, Path], effect: ExactEffect) -> Floats:
     legs = [np.linalg.norm(p.actual, axis=1) - np.linalg.norm(p.measured - point, axis=1) for p in paths]
     total: Floats = np.sum(legs, axis=0)
     return total
-
-
-def _indicated(geometry: BistaticGeometry, time: float, value: float, slope: float) -> Floats:
-    """Ground point that a piece of range error indicates, (29), with Q at the piece's own time."""
-    look, rate = np.zeros(2), np.zeros(2)
-    for state in (geometry.transmitter, geometry.receiver):
-        position, velocity = state.at(time)
-        moved = PlatformState(position=position, velocity=velocity)
-        look = look + np.array(moved.look[:2])
-        rate = rate + np.array(moved.look_rate[:2])
-    indicated: Floats = np.asarray(np.linalg.solve(-np.stack((look, rate)), np.array([value, slope])), dtype=float)
-    return indicated
 
 
 def _measured(image: Complexes, spacing: float, mask_m: float | None) -> ImpulseResponse:
