@@ -5,7 +5,8 @@ with what the derivation gives today.
 
 Only + - * / and ** on the arguments: floats, and arrays of any library, go through and broadcast.
 SI units and radians. Frame: scene centre at the origin, x east, y north, z up; platform position and
-velocity at the aperture midpoint. A slant range, a wavelength and an aperture time must be greater than 0.
+velocity at the aperture midpoint. A slant range, a wavelength and an aperture time must be greater than 0, as must
+a total and an effect per unit; of two shares one must be.
 """
 
 
@@ -122,16 +123,79 @@ def full_motion(
     )
 
 
+def full_ground_inverse(
+    s_x: float,
+    s_y: float,
+    rate_x: float,
+    rate_y: float,
+) -> tuple[tuple[float, ...], ...]:
+    """Adjugate and determinant of Q = −[s; ṡ], by the true gradients of range and Doppler.
+
+    As published_ground_inverse has them with the range held constant. Derived here.
+    """
+    return (
+        (-rate_y, s_y),  # adjugate, first row
+        (rate_x, -s_x),  # adjugate, second row
+        (-rate_x*s_y + rate_y*s_x,),  # determinant
+    )
+
+
+def allowable_error(
+    budget: float,
+    per_unit: float,
+) -> float:
+    """Size of an error at which an effect of so much per unit, without sign, reaches a budget. [unit]
+
+    The step from a quadratic phase error to its limit. Source: Rigling & Moses, Table II.
+    """
+    return budget/per_unit
+
+
+def autofocus_gain(
+    n_pull: float,
+    total_qpe: float,
+) -> float:
+    """Factor by which autofocus that corrects n_pull·π radians raises a limit. [-]
+
+    4·n_pull for a total of π/4 rad. Source: Rigling & Moses, Section VI.
+    """
+    return 3.1415926535897932*n_pull/total_qpe
+
+
 def vibration_limit(
     wavelength: float,
-    root_power: float,
+    power: float,
+    share: float,
 ) -> float:
     """Largest sinusoidal amplitude, 0 to peak, or wideband rms along the line of sight. [m]
 
-    root_power is √(PSLR·share) for a sinusoid, √(ISLR·share) for wideband motion, as power ratios.
-    Source: Rigling & Moses, Section V.
+    power is PSLR for a sinusoid, ISLR for wideband motion, as a power ratio; the platform has a share
+    of it. Source: Rigling & Moses, Section V.
     """
-    return 0.5*root_power*wavelength/3.1415926535897932
+    return 0.5*power**0.5*share**0.5*wavelength/3.1415926535897932
+
+
+def motion_of_phase(
+    wavelength: float,
+    phase: float,
+) -> float:
+    """Motion of one platform along its line of sight that makes a phase [rad], one way. [m]
+
+    Derived here.
+    """
+    return 0.5*phase*wavelength/3.1415926535897932
+
+
+def amplitude_share(
+    share: float,
+    other_share: float,
+) -> float:
+    """Part of a platform in an amplitude that both make, by its share of power and the other's. [-]
+
+    In the ratio of the roots of power, the parts of both sum to 1. Derived here.
+    """
+    shared_0 = share**0.5
+    return shared_0/(other_share**0.5 + shared_0)
 
 
 # Nodes over -1 … 1, in half apertures, and the weights that fit a history sampled there: value P₀,

@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
+from bisar_budget import evaluators
 from bisar_budget.budget.correlation import combined_phase, correlated_errors
 from bisar_budget.budget.effects import ErrorSource
 from bisar_budget.mission.model import MetricSplits, Mission, Shares
@@ -50,7 +51,7 @@ class Allocation(NamedTuple):
     @property
     def autofocus_gain(self) -> float:
         """Factor on QPE limits: π·N_pull over the total, never below 1 (Section VI; 4·N_pull for π/4)."""
-        return 1.0 if self.n_pull is None else max(1.0, math.pi * self.n_pull / self.qpe_total)
+        return 1.0 if self.n_pull is None else max(1.0, evaluators.autofocus_gain(self.n_pull, self.qpe_total))
 
     def qpe_limit(self, owner: str) -> float:
         """QPE that an owner may use, before autofocus. [rad]"""

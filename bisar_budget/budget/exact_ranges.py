@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from bisar_budget.budget.effects import CLOCK_UNITS, PLATFORMS, Effect, ErrorSource, ImagePlane
 from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
-from bisar_budget.evaluators import LEGENDRE_FITS, full_motion
+from bisar_budget.evaluators import LEGENDRE_FITS, full_ground_inverse, full_motion
 from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vector
 
 # Way of a platform in half an aperture, over its slant range, up to which so many nodes change phases by less than
@@ -134,7 +134,8 @@ class ExactRanges:
         """Q⁻¹: from the constant [m] and the linear part [m/s] of a range error to the displacement."""
         (s_x, rate_x, *_), (s_y, rate_y, *_) = self._gradient
         rate_x, rate_y = rate_x / self.half, rate_y / self.half
-        return ImagePlane(((-rate_y, s_y), (rate_x, -s_x)), s_x * rate_y - s_y * rate_x, "")
+        first, second, (determinant,) = full_ground_inverse(s_x, s_y, rate_x, rate_y)
+        return ImagePlane((first, second), determinant, "")
 
     @cached_property
     def phases_per_term(self) -> tuple[tuple[float, float], tuple[float, float]]:

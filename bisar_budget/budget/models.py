@@ -8,6 +8,7 @@ has two signs and a bound covers both, so that phases and allowables are those o
 import math
 from typing import NamedTuple
 
+from bisar_budget import evaluators
 from bisar_budget.budget.effects import PLATFORMS, Effect, ErrorSource, ImagePlane, image_plane
 from bisar_budget.budget.exact_ranges import ExactPhases, ExactRanges
 from bisar_budget.budget.point_path import PointPath, Value
@@ -74,8 +75,8 @@ class PublishedModel:
 
     def small(self, source: ErrorSource, requirement: str, limit: float) -> float:
         """Size at which an error would reach a limit, were its effects those of a small one; infinite: never."""
-        per_unit = _per_unit(source.effect, self.plane, requirement)
-        return limit / per_unit if per_unit else math.inf
+        found = _size(limit, _per_unit(source.effect, self.plane, requirement))
+        return math.inf if found is None else found
 
     def declared(self, source: ErrorSource) -> Declared:
         """What the declared error does."""
@@ -87,7 +88,7 @@ class PublishedModel:
 
     def allowable(self, source: ErrorSource, requirement: str, limit: float, upto: float = math.inf) -> float | None:
         """Largest size of an error within a limit [rad], or [m] for the location; None: no limit, or none `upto`."""
-        found = quotient(limit, _per_unit(source.effect, self.plane, requirement))
+        found = _size(limit, _per_unit(source.effect, self.plane, requirement))
         return found if found is not None and found <= upto else None
 
 
@@ -132,8 +133,8 @@ class FullModel:
 
     def small(self, source: ErrorSource, requirement: str, limit: float) -> float:
         """Size at which an error would reach a limit, were its effects those of a small one; infinite: never."""
-        per_unit = _per_unit(source.full, self.plane, requirement)
-        return limit / per_unit if per_unit else math.inf
+        found = _size(limit, _per_unit(source.full, self.plane, requirement))
+        return math.inf if found is None else found
 
     def declared(self, source: ErrorSource) -> Declared:
         """What the declared error does."""
@@ -158,7 +159,7 @@ class FullModel:
         None where none does that takes its platform no farther than a tenth of the slant range, or `upto`.
         """
         per_unit = _per_unit(source.full, self.plane, requirement)
-        linear = quotient(limit, per_unit)
+        linear = _size(limit, per_unit)
         if not source.is_motion:
             return linear
         farthest = min(upto, self.farthest(source))
@@ -170,7 +171,7 @@ class FullModel:
 
     def is_linear_at(self, source: ErrorSource, requirement: str, limit: float) -> bool:
         """Whether effects of an error are proportional to its size up to a limit."""
-        linear, farthest = quotient(limit, _per_unit(source.full, self.plane, requirement)), self.farthest(source)
+        linear, farthest = _size(limit, _per_unit(source.full, self.plane, requirement)), self.farthest(source)
         first = farthest if linear is None else min(linear, farthest)
         return self._adds(source, first, requirement) <= _SHARE * limit
 
@@ -240,6 +241,12 @@ def _per_unit(effect: Effect, plane: ImagePlane, requirement: str) -> float:
     if requirement == CUBIC:
         return abs(effect.cubic)
     return math.hypot(*(plane.displacement(effect, 1.0) or (0.0, 0.0)))
+
+
+def _size(limit: float, per_unit: float) -> float | None:
+    """Size at which an effect of so much per unit reaches a limit; None: it has no effect."""
+    size = evaluators.allowable_error(limit, per_unit) if per_unit else math.inf
+    return size if math.isfinite(size) else None
 
 
 def quotient(numerator: float, denominator: float) -> float | None:

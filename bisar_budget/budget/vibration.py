@@ -117,14 +117,17 @@ def vibration_limits(mission: Mission, allocation: Allocation, metric: str) -> d
         all_of_it, part = spread_phase(power), power_share
     found = {}
     for name in PLATFORMS:
-        phases = (math.sqrt(power * split.of(name)), all_of_it * part(split, name))
-        found[name] = VibrationLimits(*(evaluators.vibration_limit(wavelength, phase) for phase in phases))
+        published = evaluators.vibration_limit(wavelength, power, split.of(name))
+        found[name] = VibrationLimits(
+            published, evaluators.motion_of_phase(wavelength, all_of_it * part(split, name))
+        )
     return found
 
 
 def amplitude_share(split: Split, name: str) -> float:
     """Part of a platform in the amplitude of both: they sum to 1, in the ratio of the roots of power."""
-    return math.sqrt(split.of(name)) / (math.sqrt(split.transmitter) + math.sqrt(split.receiver))
+    own, other = split.of(name), split.of(next(one for one in PLATFORMS if one != name))
+    return evaluators.amplitude_share(own, other)
 
 
 def power_share(split: Split, name: str) -> float:

@@ -16,6 +16,13 @@ from bisar_budget.cli.streams import EXIT_BROKEN, deliver, print_text, write_fil
     help="What to derive.",
 )
 @click.option(
+    "--equation",
+    "number",
+    type=click.IntRange(1, 31),
+    metavar="N",
+    help="One equation of the paper, 1 to 31, in place of a table.",
+)
+@click.option(
     "--format",
     "format_name",
     type=click.Choice(["text", "latex", "markdown", "mathml"]),
@@ -25,20 +32,23 @@ from bisar_budget.cli.streams import EXIT_BROKEN, deliver, print_text, write_fil
 )
 @click.option("--check", "check_only", is_flag=True, help="Fail if a generated file is not what it gives.")
 @click.option("--write", is_flag=True, help="Rewrite the generated files: evaluators and formulas.")
-def derive(table: str, format_name: str, check_only: bool, write: bool) -> None:
+def derive(table: str, number: int | None, format_name: str, check_only: bool, write: bool) -> None:
     """Derive the paper's tables from the geometry and print them.
 
-    Rigling & Moses, Tables I and II, the equations before them, vibration limits; and the full model.
-    Equation and table numbers are the paper's.
+    Rigling & Moses, equations (1) to (31) with the slips of the print, Tables I and II, vibration limits; and the
+    full model. Equation and table numbers are the paper's.
     """
     if check_only and write:
         raise click.UsageError("--check and --write cannot be combined.")
+    if number is not None and (table != "all" or check_only or write):
+        raise click.UsageError("--equation goes with --format alone.")
     if check_only or write:
         _generated(write)
         return
     from bisar_budget.theory import render
 
-    deliver(render.derivation(table, format_name), None, format_name)
+    text = render.derivation(table, format_name) if number is None else render.numbered(number, format_name)
+    deliver(text, None, format_name)
 
 
 def _generated(write: bool) -> None:

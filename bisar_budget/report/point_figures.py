@@ -73,13 +73,15 @@ class Sheet(NamedTuple):
     """All that is drawn.
 
     `segments` (3, 2, 2) are the ends of the three pieces of the range error, time [s] and range error [mm], each as
-    long as a third of the aperture; `points` (3, 2) what (29) makes of them for a point at the scene centre. [m]
+    long as a third of the aperture; `points` (3, 2) what (29) makes of them for a point at the scene centre [m],
+    `points_by` by which gradients.
     """
 
     slow_time: Floats
     range_error_mm: Floats
     segments: Floats
     points: Floats
+    points_by: str
     in_scene: Picture
     rotated: Picture
     focused: Picture
@@ -118,6 +120,7 @@ def sheet(images: PointImages) -> Sheet:
         range_error_mm=1e3 * images.range_error,
         segments=_segments(images),
         points=images.points,
+        points_by=images.points_by,
         in_scene=picture(
             f"Fig. 5: in (x, y), {in_scene_how}", images.in_scene, images.scene_grid, scene_crop, shown_in_scene
         ),

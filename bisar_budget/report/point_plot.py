@@ -205,7 +205,7 @@ def _points(panel: Any, drawn: Sheet) -> None:
     panel.plot(*drawn.points.T, "o-", color=_ERROR, zorder=3)
     panel.plot(0, 0, **_stands("#1b7fa3"))
     panel.plot(*drawn.points[1], **_put("#2a8f4f"))
-    panel.set(title="Fig. 4: points of the segments, (29)", xlabel="x [m]", ylabel="y [m]")
+    panel.set(title=f"Fig. 4: points of the segments, (29)\nby {drawn.points_by}", xlabel="x [m]", ylabel="y [m]")
     span = float(np.ptp(drawn.points, axis=0).max()) or 1.0
     low, high = drawn.points.min(axis=0), drawn.points.max(axis=0)
     if float(np.hypot(*drawn.points[1])) < 10 * span:  # else the three would be one

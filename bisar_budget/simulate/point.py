@@ -10,9 +10,10 @@ from bisar_budget.budget.analysis import Analysis
 from bisar_budget.budget.correlation import correlated_errors, likely_error
 from bisar_budget.budget.effects import PLATFORMS
 from bisar_budget.budget.exact_arrays import aperture_nodes
+from bisar_budget.budget.pieces import Piece, gradients_of, indicated_point
 from bisar_budget.budget.vibration_lines import along_line_of_sight, lines_of
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vector
+from bisar_budget.geometry import BistaticGeometry, GroundVector, Vector
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.mission.model import MotionError as DeclaredError
 from bisar_budget.simulate.autofocus import ALGORITHMS
@@ -86,7 +87,8 @@ class PointImages(NamedTuple):
     `spacing`, (2,) [m], are those of their pixels. `range_error` is what is quadratic and higher in the range error
     of the scene centre over `slow_time`; `segments` (3, 2) are its value [m] and slope [m/s] at `segment_times`,
     `points` (3, 2) the ground points (29) of those pieces of the whole range error: the middle one is where (25) puts
-    a point at the scene centre. `effect` is that of the scene centre, too. `responses` are one for each target, and
+    a point at the scene centre; `points_by` says by which gradients (29) has them. `effect` is that of the
+    scene centre, too. `responses` are one for each target, and
     `response`, `focused_response`, `clean_response` the cuts through the brightest pixels. `outside` says which
     declared echoes lie beyond the patch.
     """
@@ -96,6 +98,7 @@ class PointImages(NamedTuple):
     segment_times: Floats
     segments: Floats
     points: Floats
+    points_by: str
     effect: ExactEffect
     spacing: tuple[float, float]
     scene_spacing: tuple[float, float]
@@ -290,17 +293,16 @@ def simulate_point(
     values, slopes = np.interp(times, fine, left), np.interp(times, fine, slope)
     cells = former.offsets(np.array(shown), _middle(shown))
     windows = [_window(plan, cells, index) for index in range(len(shown))]
+    pieces = [Piece(*map(float, one)) for one in zip(times, values, slopes, strict=True)]
+    model = mission.allocation.model
     return PointImages(
         slow_time=fine,
         range_error=bent,
         segment_times=times,
         segments=np.stack((np.interp(times, fine, bent), slopes - slope[fine.size // 2]), axis=1),
-        points=np.array(
-            [
-                np.asarray(effect.displacement) + _indicated(geometry, *piece, seen_from=effect.displacement)
-                for piece in zip(times, values, slopes, strict=True)
-            ]
-        ),
+        points=np.array(effect.displacement)
+        + [indicated_point(geometry, piece, model, seen_from=effect.displacement) for piece in pieces],
+        points_by=gradients_of(model),
         effect=effect,
         spacing=plan.rotated.spacing,
         scene_spacing=plan.in_scene.spacing,
@@ -521,20 +523,6 @@ def _left_over(paths: tuple[Path, Path], effect: ExactEffect) -> Floats:
     legs = [np.linalg.norm(p.actual, axis=1) - np.linalg.norm(p.measured - point, axis=1) for p in paths]
     total: Floats = np.sum(legs, axis=0)
     return total
-
-
-def _indicated(
-    geometry: BistaticGeometry, time: float, value: float, slope: float, *, seen_from: GroundVector = (0.0, 0.0)
-) -> Floats:
-    """Ground point that a piece of range error indicates, (29), from another one; Q at the piece's own time."""
-    look, rate = np.zeros(2), np.zeros(2)
-    for state in (geometry.transmitter, geometry.receiver):
-        (x, y, z), velocity = state.at(time)
-        moved = PlatformState(position=(x - seen_from[0], y - seen_from[1], z), velocity=velocity)
-        look = look + np.array(moved.look[:2])
-        rate = rate + np.array(moved.look_rate[:2])
-    indicated: Floats = np.asarray(np.linalg.solve(-np.stack((look, rate)), np.array([value, slope])), dtype=float)
-    return indicated
 
 
 def _measured(image: Complexes, spacing: float, mask_m: float | None) -> ImpulseResponse:

@@ -5,22 +5,53 @@ Each function derives one numbered equation from the one before it. Frame, units
 
 from functools import cache
 
-from sympy import Expr, Function, Matrix, Poly, Symbol, atan2, cos, diff, expand, simplify, sin, sqrt
+from sympy import (
+    Expr,
+    Function,
+    ImmutableMatrix,
+    Matrix,
+    Poly,
+    Symbol,
+    atan2,
+    cos,
+    diff,
+    expand,
+    simplify,
+    sin,
+    sqrt,
+    zeros,
+)
 
-from bisar_budget.theory.symbols import PLATFORMS, Platform, c, clock_coefficients, point, tau
+from bisar_budget.theory.symbols import AXES, PLATFORMS, Platform, c, clock_coefficients, point, real, scatterer, tau
 
 # Size of all errors together, for the expansion to first order.
 _EPSILON = Symbol("epsilon", real=True)
 
 
-def exact_range(platform: Platform, target: Matrix) -> Expr:
-    """Distance from a platform to a point, d(τ) of (1). [m]"""
-    return sqrt(sum((r - x) ** 2 for r, x in zip(platform.position, target, strict=True)))
+def distance(one: Matrix, other: Matrix) -> Expr:
+    """Distance of two points, d(τ) of (1). [m]"""
+    return sqrt(sum((r - x) ** 2 for r, x in zip(one, other, strict=True)))
+
+
+def observed_differential_range(platforms: tuple[Platform, ...] = PLATFORMS) -> Expr:
+    """Return ΔR̂_m of (1): true distances to a scatterer less measured ones to the scene centre, and the clock. [m]"""
+    total = c * Function("ttilde")(tau)
+    for platform in platforms:
+        measured = platform.position + measured_error(platform)
+        total += distance(platform.position, scatterer) - distance(measured, zeros(3, 1))
+    return total
+
+
+def measured_error(platform: Platform) -> Matrix:
+    """Error of a platform's measured position at one slow time, r̃ of (1), (3,). [m]"""
+    return ImmutableMatrix([real(f"{axis}tilde_{platform.subscript}") for axis in AXES])
 
 
 def exact_differential_range(platforms: tuple[Platform, ...] = PLATFORMS) -> Expr:
-    """Differential range of a scatterer without errors: (1) with r̃ = 0 and t̃ = 0. [m]"""
-    return sum(exact_range(platform, point) - platform.exact_slant_range() for platform in platforms)
+    """Differential range of a point (x, y, z) without errors: (1) with r̃ = 0 and t̃ = 0. [m]"""
+    free = dict.fromkeys((e for platform in platforms for e in measured_error(platform)), 0)
+    exact = observed_differential_range(platforms).subs(Function("ttilde")(tau), 0).subs(free)
+    return exact.subs(dict(zip(scatterer, point, strict=True)))
 
 
 def far_field_differential_range(platforms: tuple[Platform, ...] = PLATFORMS) -> Expr:
@@ -54,7 +85,7 @@ def hold_range_constant(expression: Expr, platforms: tuple[Platform, ...] = PLAT
 def linear_differential_range(platforms: tuple[Platform, ...] = PLATFORMS) -> tuple[Expr, Expr]:
     """Return β₀, β₁ of (17). [m], [m/s]
 
-    The print lost the + and the τ between its two brackets.
+    The print lost the + between its two brackets.
     """
     beta_0, beta_1 = coefficients(hold_range_constant(far_field_differential_range(platforms), platforms))[:2]
     return beta_0, beta_1
@@ -80,22 +111,40 @@ def clock_polynomial() -> Expr:
 
 def first_order_range_error(platform: Platform) -> Expr:
     """Return |r| − |r + r̃| of one platform to first order in r̃ of (22): −r·r̃/|r|. [m]"""
-    error = Matrix([Function(f"e_{axis}")(tau) for axis in range(3)])
-    measured = sqrt(sum((r + _EPSILON * e) ** 2 for r, e in zip(platform.position, error, strict=True)))
-    first_order = diff(platform.exact_slant_range() - measured, _EPSILON).subs(_EPSILON, 0)
-    return first_order.subs(dict(zip(error, error_polynomial(platform), strict=True)))
+    return _first_order(platform).subs(dict(zip(error_track(platform), error_polynomial(platform), strict=True)))
+
+
+def error_track(platform: Platform) -> Matrix:
+    """Position error as any function of slow time, x̃_t(τ) …, (3,). [m]"""
+    return ImmutableMatrix([Function(f"{axis}tilde_{platform.subscript}")(tau) for axis in AXES])
+
+
+def _first_order(platform: Platform) -> Expr:
+    """What (1) holds of a platform for a scatterer at the scene centre, to first order in its error. [m]"""
+    grown = dict(zip(measured_error(platform), _EPSILON * error_track(platform), strict=True))
+    leg = observed_differential_range((platform,)).subs(dict.fromkeys(scatterer, 0)).subs(grown)
+    return diff(leg, _EPSILON).subs(_EPSILON, 0)
 
 
 @cache
-def range_error(platforms: tuple[Platform, ...] = PLATFORMS) -> Expr:
-    """Return (23) with (22) put in: error of the differential range, a cubic in slow time. [m]
+def range_error_of_tracks(platforms: tuple[Platform, ...] = PLATFORMS) -> Expr:
+    """Return (23): error of the differential range for errors of any course. [m]
 
     The processor subtracts the measured distance |r + r̃| where the data hold |r|, so (1) leaves
     |r| − |r + r̃| for each platform. First order in r̃, then the motion model of (17).
     """
-    total = c * clock_polynomial()
+    total = c * Function("ttilde")(tau)
     for platform in platforms:
-        total += hold_range_constant(first_order_range_error(platform), (platform,))
+        total += hold_range_constant(_first_order(platform), (platform,))
+    return total
+
+
+@cache
+def range_error(platforms: tuple[Platform, ...] = PLATFORMS) -> Expr:
+    """Return (23) with (22) put in, a cubic in slow time. [m]"""
+    total = range_error_of_tracks(platforms).subs(Function("ttilde")(tau), clock_polynomial())
+    for platform in platforms:
+        total = total.subs(dict(zip(error_track(platform), error_polynomial(platform), strict=True)))
     return expand(total)
 
 

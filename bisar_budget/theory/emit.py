@@ -1,7 +1,7 @@
 """Turn derived expressions into `bisar_budget/evaluators.py`: plain arithmetic, no imports, the same text every time.
 
 Emission is deterministic: arguments, rows and common subexpressions keep a fixed order, constants are
-literals, nothing is dated. Anything that can meet a zero or needs a root is left to the caller.
+literals, nothing is dated. Anything that can meet a zero is left to the caller.
 """
 
 import textwrap
@@ -11,6 +11,7 @@ from pathlib import Path
 
 import sympy
 from sympy import Expr, Float, Rational, Symbol, cse, numbered_symbols, pi
+from sympy.printing.precedence import precedence
 from sympy.printing.pycode import PythonCodePrinter
 
 from bisar_budget.theory import differential_range as dr
@@ -22,10 +23,12 @@ from bisar_budget.theory.symbols import (
     T,
     c,
     clock_coefficients,
+    n_pull,
     positive,
     pslr,
     share,
     tau,
+    total_qpe,
     wavelength,
 )
 
@@ -41,7 +44,8 @@ with what the derivation gives today.
 
 Only + - * / and ** on the arguments: floats, and arrays of any library, go through and broadcast.
 SI units and radians. Frame: scene centre at the origin, x east, y north, z up; platform position and
-velocity at the aperture midpoint. A slant range, a wavelength and an aperture time must be greater than 0.
+velocity at the aperture midpoint. A slant range, a wavelength and an aperture time must be greater than 0, as must
+a total and an effect per unit; of two shares one must be.
 """
 '''
 
@@ -66,6 +70,11 @@ class Evaluator:
 class _Printer(PythonCodePrinter):  # type: ignore[misc]
     def _print_Pi(self, expr: Expr) -> str:
         return str(pi.evalf(17))
+
+    def _print_Pow(self, expr: Expr, rational: bool = False, sqrt: str = "") -> str:
+        if expr.exp == Rational(1, 2):  # no import for a root
+            return f"{self.parenthesize(expr.base, precedence(expr))}**0.5"
+        return str(super()._print_Pow(expr, rational=rational))
 
 
 def platform_arguments(platform: Platform) -> tuple[tuple[Symbol, str], ...]:
@@ -107,10 +116,10 @@ def evaluators() -> tuple[Evaluator, ...]:
         *TRANSMITTER.acceleration_error,
     )
     adjugate, determinant = dr.ground_inverse()
-    root_power = positive("rootpower")
-    power = positive("power")
+    power, other, phase = positive("power"), positive("other"), positive("phase")
+    per_unit, budget = positive("perunit"), positive("budget")
     (vibration_row, _) = published.vibration().rows
-    vibration_limit = vibration_row.cells[1].subs(pslr, power).subs(share, 1)
+    gradients, full_adjugate, full_determinant = full.gradient_inverse()
     phase_arguments = ((wavelength, "wavelength"), (T, "aperture_time"))
     return (
         Evaluator(
@@ -171,14 +180,54 @@ def evaluators() -> tuple[Evaluator, ...]:
             ),
         ),
         Evaluator(
+            name="full_ground_inverse",
+            summary="Adjugate and determinant of Q = −[s; ṡ], by the true gradients of range and Doppler.",
+            details="As published_ground_inverse has them with the range held constant. Derived here.",
+            arguments=tuple(zip(gradients, ("s_x", "s_y", "rate_x", "rate_y"), strict=True)),
+            rows=(tuple(full_adjugate[0, :]), tuple(full_adjugate[1, :]), (full_determinant,)),
+            row_names=("adjugate, first row", "adjugate, second row", "determinant"),
+        ),
+        Evaluator(
+            name="allowable_error",
+            summary="Size of an error at which an effect of so much per unit, without sign, reaches a budget. [unit]",
+            details="The step from a quadratic phase error to its limit. Source: Rigling & Moses, Table II.",
+            arguments=((budget, "budget"), (per_unit, "per_unit")),
+            rows=((published.allowable(budget, per_unit),),),
+            row_names=("",),
+        ),
+        Evaluator(
+            name="autofocus_gain",
+            summary="Factor by which autofocus that corrects n_pull·π radians raises a limit. [-]",
+            details="4·n_pull for a total of π/4 rad. Source: Rigling & Moses, Section VI.",
+            arguments=((n_pull, "n_pull"), (total_qpe, "total_qpe")),
+            rows=((published.pull_in_factor(),),),
+            row_names=("",),
+        ),
+        Evaluator(
             name="vibration_limit",
             summary="Largest sinusoidal amplitude, 0 to peak, or wideband rms along the line of sight. [m]",
             details=(
-                "root_power is √(PSLR·share) for a sinusoid, √(ISLR·share) for wideband motion, as power ratios. "
-                "Source: Rigling & Moses, Section V."
+                "power is PSLR for a sinusoid, ISLR for wideband motion, as a power ratio; the platform has a share "
+                "of it. Source: Rigling & Moses, Section V."
             ),
-            arguments=((wavelength, "wavelength"), (root_power, "root_power")),
-            rows=((vibration_limit.subs(power, root_power**2),),),
+            arguments=((wavelength, "wavelength"), (power, "power"), (share, "share")),
+            rows=((vibration_row.cells[1].subs(pslr, power),),),
+            row_names=("",),
+        ),
+        Evaluator(
+            name="motion_of_phase",
+            summary="Motion of one platform along its line of sight that makes a phase [rad], one way. [m]",
+            details="Derived here.",
+            arguments=((wavelength, "wavelength"), (phase, "phase")),
+            rows=((full.motion_of_phase(phase),),),
+            row_names=("",),
+        ),
+        Evaluator(
+            name="amplitude_share",
+            summary="Part of a platform in an amplitude that both make, by its share of power and the other's. [-]",
+            details="In the ratio of the roots of power, the parts of both sum to 1. Derived here.",
+            arguments=((share, "share"), (other, "other_share")),
+            rows=((full.amplitude_share(share, other),),),
             row_names=("",),
         ),
     )

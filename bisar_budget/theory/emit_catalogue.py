@@ -9,6 +9,7 @@ from pathlib import Path
 from sympy import Expr, MatrixBase
 
 from bisar_budget.theory import differential_range as dr
+from bisar_budget.theory import equations as paper
 from bisar_budget.theory import full, published
 from bisar_budget.theory.published import Equation, Table
 from bisar_budget.theory.render import as_latex, as_mathml_content, as_text
@@ -32,7 +33,12 @@ _NUMBERS = ("(11)", "(19)", "(22)", "(25)", "(30)", "(31)")
 
 def equations() -> tuple[Equation, ...]:
     """Return the equations that a report shows, the paper's first."""
-    return (*(equation for equation in published.equations() if equation.number in _NUMBERS), *full.equations())
+    return (*(equation for equation in paper.equations() if _is_shown(equation)), *full.equations())
+
+
+def _is_shown(equation: Equation) -> bool:
+    """Whether a report shows it: of (30) the one at mid-aperture."""
+    return equation.number in _NUMBERS and not equation.right.has(paper.tau_i)
 
 
 def formulas() -> Iterator[Expr]:

@@ -28,7 +28,6 @@ from sympy import (
     expand,
     factorial,
     legendre,
-    pi,
     series,
     solve,
     sqrt,
@@ -49,7 +48,6 @@ from bisar_budget.theory.symbols import (
     real,
     share,
     tau,
-    wavelength,
 )
 
 ORDER = 4  # of slow time: the quartic term of a long aperture is in part a quadratic phase
@@ -126,6 +124,27 @@ def ground_matrix() -> Matrix:
     """Q = −[s; ṡ], (2, 2): takes a ground point to its constant and linear range. [-], [1/s]"""
     s, rate, *_ = ground_history()
     return -Matrix([list(s), list(rate)])
+
+
+def gradient_inverse() -> tuple[tuple[Symbol, ...], Matrix, Expr]:
+    """Gradients s_x, s_y, ṡ_x, ṡ_y on the ground, and adjugate (2, 2) and determinant of their Q = −[s; ṡ]."""
+    s, rate = Matrix([real("s_x"), real("s_y")]), Matrix([real("sdot_x"), real("sdot_y")])
+    Q = -Matrix([list(s), list(rate)])
+    return (*s, *rate), Q.adjugate(), Q.det()
+
+
+def amplitude_share(own: Expr, other: Expr) -> Expr:
+    """Part of a platform in an amplitude that both make, in the ratio of the roots of their shares of power."""
+    part = positive("a")
+    (found,) = solve(Eq(part * sqrt(other), (1 - part) * sqrt(own)), part)
+    return found
+
+
+def motion_of_phase(phase: Expr) -> Expr:
+    """Motion along the line of sight that makes a phase, one way. [m]"""
+    motion = positive("A")
+    (found,) = solve(Eq(published.one_way_phase(motion), phase), motion)
+    return found
 
 
 def quartic_as_quadratic() -> Expr:
@@ -251,11 +270,10 @@ def vibration() -> Table:
     (largest,) = solve(Eq(echo, sqrt(pslr)), phase)
     spread = exp(phase**2) - 1
     (noise,) = (root for root in solve(Eq(spread, islr), phase) if root.is_nonnegative is not False)
-    to_metres = wavelength / (2 * pi)
     rows = (
-        (amplitude, echo**2, largest * to_metres, "one platform alone"),
-        (amplitude, echo**2, largest * part * to_metres, "a part a of the amplitude of both, in phase"),
-        (rms, spread, sqrt(share) * noise * to_metres, "share s of the power of both, independent"),
+        (amplitude, echo**2, motion_of_phase(largest), "one platform alone"),
+        (amplitude, echo**2, part * motion_of_phase(largest), "a part a of the amplitude of both, in phase"),
+        (rms, spread, sqrt(share) * motion_of_phase(noise), "share s of the power of both, independent"),
     )
     return Table(
         number="Vibration, first principles",

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from sympy import Abs, Eq, Expr, Function, Matrix, Rational, Symbol, diff, pi, solve
+from sympy import Abs, Eq, Expr, Function, Rational, Symbol, diff, pi, solve
 
 from bisar_budget.theory import differential_range as dr
 from bisar_budget.theory.symbols import (
@@ -53,12 +53,14 @@ class Table:
 
 @dataclass(frozen=True)
 class Equation:
-    """A numbered equation."""
+    """A numbered equation: whether it is `defined` or `derived`, and what the print gets wrong."""
 
     number: str
     title: str
     left: Expr
     right: Expr
+    origin: str = "derived"
+    slip: str = ""
 
 
 def motion_errors(platform: Platform) -> tuple[Symbol, ...]:
@@ -105,6 +107,12 @@ def table_1(platforms: tuple[Platform, ...] = PLATFORMS) -> Table:
         rows=tuple(rows),
         notes=("Rows are numbered as printed; the paper prints the transmitter's and has the receiver's by t to r.",),
     )
+
+
+def allowable(budget: Expr, per_unit: Expr) -> Expr:
+    """Size of an error at which a phase of so much per unit, without sign, reaches a budget: the step of Table II."""
+    error = Symbol("error", real=True)
+    return limit(per_unit * error, error, budget)
 
 
 def edge_phase(beta: Expr, order: int) -> Expr:
@@ -160,6 +168,11 @@ def table_2(platforms: tuple[Platform, ...] = PLATFORMS, budget: Expr = EQUAL_SH
     )
 
 
+def one_way_phase(motion: Expr) -> Expr:
+    """Phase of a motion of one platform along its line of sight, 2πA/λ. [rad]"""
+    return 2 * pi * motion / wavelength
+
+
 def vibration() -> Table:
     """Vibration limits of Section V, amplitude and rms along the line of sight, with a share of power.
 
@@ -169,7 +182,7 @@ def vibration() -> Table:
     amplitude, rms = positive("A"), positive("sigma")
 
     def bound(motion: Symbol, ratio: Symbol) -> Row:
-        phase = 2 * pi * motion / wavelength
+        phase = one_way_phase(motion)
         (allowable,) = solve(Eq(phase**2, ratio * share), motion)
         return Row(
             number=None,
@@ -193,40 +206,6 @@ def pull_in_factor() -> Expr:
     4·N_pull for the total of π/4, Section VI.
     """
     return pi * n_pull / total_qpe
-
-
-def equations() -> tuple[Equation, ...]:
-    """Return the numbered equations that lead to the tables, in the paper's order."""
-    beta_0, beta_1 = dr.linear_differential_range()
-    adjugate, determinant = dr.ground_inverse()
-    moved = Matrix([real("beta_0tilde"), real("beta_1tilde")])
-    delta_range = Function("DeltaR")(tau)
-    transmitter = PLATFORMS[0]
-    return (
-        Equation("(5)", "First-order differential range", delta_range, dr.far_field_differential_range()),
-        Equation("(6)", "The same in angles", delta_range, dr.in_angles(dr.far_field_differential_range())),
-        Equation("(11)", "Bistatic look angle", real("phi_b"), dr.look_azimuth()),
-        Equation("(17)", "Constant coefficient", real("beta_0"), beta_0),
-        Equation("(17)", "Linear coefficient", real("beta_1"), beta_1),
-        Equation("(19)", "Ground point to coefficients", Symbol("Q"), dr.ground_matrix()),
-        Equation("(30)", "Determinant of Q", Symbol("detQ"), determinant),
-        Equation("(30)", "Inverse of Q, times its determinant", Symbol("adjQ"), adjugate),
-        Equation(
-            "(22)",
-            "Position error of a platform",
-            Symbol(f"rtilde_{transmitter.subscript}"),
-            dr.error_polynomial(transmitter),
-        ),
-        Equation("(23)", "Range error", Function("DeltaRtilde")(tau), dr.range_error()),
-        Equation(
-            "(25)",
-            "Displacement of the image, times the determinant of Q",
-            Symbol("detQ") * Matrix([real("xtilde"), real("ytilde")]),
-            adjugate * moved,
-        ),
-        Equation("(31)", "Smear direction", Symbol("v_defocus"), dr.smear_direction()),
-        Equation("Section VI", "Gain of the limits by autofocus", real("G"), pull_in_factor()),
-    )
 
 
 def sensitivity(expression: Expr, error: Symbol) -> Expr:

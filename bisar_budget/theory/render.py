@@ -13,14 +13,16 @@ from sympy.printing.latex import LatexPrinter
 from sympy.printing.mathml import MathMLPresentationPrinter
 from sympy.printing.str import StrPrinter
 
+from bisar_budget.theory import equations as paper
 from bisar_budget.theory import full, published
 from bisar_budget.theory.published import Equation, Table
 
 _NAME = re.compile(
-    r"(?P<letter>[A-Za-z]+?)(?P<index>_\d)?(?P<accent>tilde|bar|hat|dot|ddot|dddot|ddddot)?(?:_(?P<subscript>\w+))?"
+    r"(?P<letter>[A-Za-z]+?)(?P<index>_\d)?(?P<accent>tilde|bar|hat|prime|dot|ddot|dddot|ddddot)?(?:_(?P<subscript>\w+))?"
 )
-_GREEK = {"lambda": "λ", "tau": "τ", "phi": "φ", "theta": "θ", "beta": "β", "sigma": "σ"}
+_GREEK = {"lambda": "λ", "tau": "τ", "phi": "φ", "Phi": "Φ", "theta": "θ", "beta": "β", "sigma": "σ"}
 _ACCENTS = {
+    "prime": "′",
     "tilde": "\u0303",
     "bar": "\u0304",
     "hat": "\u0302",
@@ -32,6 +34,7 @@ _ACCENTS = {
 _ABOVE = {"tilde": "~", "bar": "¯", "hat": "^", "dot": "˙", "ddot": "¨", "dddot": "...", "ddddot": "...."}
 _COMMANDS = {
     "Delta": r"\Delta{}",
+    "tau": r"\tau",
     "PSLR": r"\mathrm{PSLR}",
     "ISLR": r"\mathrm{ISLR}",
     "pull": r"\mathrm{pull}",
@@ -63,7 +66,7 @@ class _Name:
     def text(self) -> str:
         letter = self.letter.replace("Delta", "Δ").replace("det", "det ").replace("adj", "adj ")
         head = unicodedata.normalize("NFC", _GREEK.get(letter, letter) + _ACCENTS.get(self.accent, ""))
-        return f"{head}_{self.subscript}" if self.subscript else head
+        return f"{head}_{_GREEK.get(self.subscript, self.subscript)}" if self.subscript else head
 
     def latex(self) -> str:
         head = f"\\{self.letter}" if self.letter in _GREEK else _COMMANDS.get(self.letter, self.letter)
@@ -72,7 +75,9 @@ class _Name:
                 head = rf"{_operator(operator)} {head.removeprefix(operator)}"
         if head.startswith("Delta"):
             head = r"\Delta " + head.removeprefix("Delta")
-        if self.accent:
+        if self.accent == "prime":
+            head += "'"
+        elif self.accent:
             # Only the last letter carries the accent: Δ R̃.
             start, _, last = head.rpartition(" ")
             head = f"{start} \\{self.accent}{{{last}}}".strip()
@@ -81,6 +86,8 @@ class _Name:
 
 
 class _Text(StrPrinter):  # type: ignore[misc]
+    printmethod = "_as_text"  # SymPy's own leads past _print_Indexed
+
     def _print_Symbol(self, expr: Symbol) -> str:
         return _Name.of(expr.name).text()
 
@@ -93,6 +100,18 @@ class _Text(StrPrinter):  # type: ignore[misc]
 
     def _print_Pi(self, expr: Basic) -> str:
         return "π"
+
+    def _print_ImaginaryUnit(self, expr: Basic) -> str:
+        return "j"
+
+    def _print_Indexed(self, expr: Basic) -> str:
+        return f"{self._print(expr.base.label)}_{self._print(expr.indices[0])}"
+
+    def _print_Sum(self, expr: Basic) -> str:
+        limits = ", ".join(
+            f"{n} = {first} … {last}" for n, first, last in (map(self._print, one) for one in expr.limits)
+        )
+        return f"Σ({self._print(expr.function)}; {limits})"
 
     def _print_Relational(self, expr: Basic) -> str:
         return f"{self._print(expr.lhs)} = {self._print(expr.rhs)}"
@@ -135,6 +154,18 @@ class _MathML(MathMLPresentationPrinter):  # type: ignore[misc]
     def _print_Abs(self, expr: Basic) -> object:
         return self._fenced([self._print(expr.args[0])], "||")
 
+    def _print_Sum(self, expr: Basic) -> object:
+        row = self.dom.createElement("mrow")
+        for n, first, last in expr.limits:  # SymPy's own draws the first alone
+            sign, under = self.dom.createElement("munderover"), self.dom.createElement("mrow")
+            for part in (self._print(n), self._leaf("mo", "="), self._print(first)):
+                under.appendChild(part)
+            for part in (self._leaf("mo", "∑"), under, self._print(last)):
+                sign.appendChild(part)
+            row.appendChild(sign)
+        row.appendChild(self._print(expr.function))
+        return row
+
     def _call(self, name: object, expr: Basic) -> object:
         row = self.dom.createElement("mrow")
         row.appendChild(name)
@@ -164,7 +195,9 @@ class _MathML(MathMLPresentationPrinter):  # type: ignore[misc]
         parts = _Name.of(name)
         letter = parts.letter.replace("Delta", "Δ").replace("det", "det ").replace("adj", "adj ")
         head = self._leaf("mi", _GREEK.get(letter, letter))
-        if parts.accent:
+        if parts.accent == "prime":
+            head = self._leaf("mi", _GREEK.get(letter, letter) + _ACCENTS["prime"])
+        elif parts.accent:
             over = self.dom.createElement("mover")
             over.setAttribute("accent", "true")
             over.appendChild(head)
@@ -174,8 +207,11 @@ class _MathML(MathMLPresentationPrinter):  # type: ignore[misc]
             return head
         sub = self.dom.createElement("msub")
         sub.appendChild(head)
-        sub.appendChild(self._leaf("mi", parts.subscript))
+        sub.appendChild(self._leaf("mi", _GREEK.get(parts.subscript, parts.subscript)))
         return sub
+
+    def _print_ImaginaryUnit(self, expr: Basic) -> object:
+        return self._leaf("mi", "j")
 
     def _leaf(self, tag: str, text: str) -> object:
         leaf = self.dom.createElement(tag)
@@ -190,7 +226,7 @@ def as_text(expression: Basic) -> str:
 
 def as_latex(expression: Basic, times: str = " ") -> str:
     """LaTeX without delimiters; `times` stands between factors."""
-    return str(_Latex({"mul_symbol": times}).doprint(expression))
+    return str(_Latex({"mul_symbol": times, "imaginary_unit": "j"}).doprint(expression))
 
 
 def as_mathml(expression: Basic) -> str:
@@ -222,7 +258,7 @@ def derivation(selection: str, format_name: str) -> str:
     }
     blocks = []
     if selection in ("all", "equations"):
-        blocks.append(_EQUATIONS[format_name]("Equations of Rigling & Moses, derived", published.equations()))
+        blocks.append(_EQUATIONS[format_name](_TITLE, paper.equations()))
     for name, table in tables.items():
         if selection in ("all", name):
             if name == "full":
@@ -233,12 +269,30 @@ def derivation(selection: str, format_name: str) -> str:
     return "\n".join(blocks)
 
 
+def numbered(number: int, format_name: str) -> str:
+    """Write one equation of the paper, all its parts."""
+    return _EQUATIONS[format_name](_TITLE, tuple(e for e in paper.equations() if e.number == f"({number})"))
+
+
+_TITLE = "Equations of Rigling & Moses"
+
+
+def _heading(equation: Equation) -> str:
+    """Number and title; of the paper's own, whether it defines the equation or SymPy derives it."""
+    return f"{equation.number} {equation.title} [{equation.origin}]" if equation.number else equation.title
+
+
+def _slip(equation: Equation) -> list[str]:
+    return [f"In print: {equation.slip}."] if equation.slip else []
+
+
 def _text_equations(title: str, equations: tuple[Equation, ...]) -> str:
     lines = [title, ""]
     for equation in equations:
         formula = f"    {as_text(equation.left)} = {as_text(equation.right)}"
-        lines.append(f"{equation.number} {equation.title}".strip())
+        lines.append(_heading(equation))
         lines += textwrap.wrap(formula, 100, subsequent_indent=" " * 8, break_long_words=False)
+        lines += (f"    {line}" for line in _slip(equation))
     return "\n".join(lines) + "\n"
 
 
@@ -247,7 +301,8 @@ def _latex_equations(title: str, equations: tuple[Equation, ...]) -> str:
     for equation in equations:
         tag = rf" \tag*{{{equation.number}}}" if equation.number else ""
         lines += [
-            f"% {equation.number} {equation.title}",
+            f"% {_heading(equation)}",
+            *(f"% {line}" for line in _slip(equation)),
             rf"\[ {as_latex(equation.left)} = {as_latex(equation.right)}{tag} \]",
         ]
     return "\n".join(lines) + "\n"
@@ -257,7 +312,7 @@ def _markdown_equations(title: str, equations: tuple[Equation, ...]) -> str:
     lines = [f"## {title}", ""]
     for equation in equations:
         lines += [
-            f"{equation.number} {equation.title}".strip(),
+            " ".join([_heading(equation), *_slip(equation)]),
             "",
             "```math",
             f"{as_latex(equation.left)} = {as_latex(equation.right)}",
@@ -270,10 +325,8 @@ def _markdown_equations(title: str, equations: tuple[Equation, ...]) -> str:
 def _mathml_equations(title: str, equations: tuple[Equation, ...]) -> str:
     lines = [f"<h2>{escape(title)}</h2>", "<dl>"]
     for equation in equations:
-        lines.append(
-            f"<dt>{f'{equation.number} {equation.title}'.strip()}</dt>"
-            f"<dd>{as_mathml(equation.left)} = {as_mathml(equation.right)}</dd>"
-        )
+        heading = " ".join([_heading(equation), *_slip(equation)])
+        lines.append(f"<dt>{escape(heading)}</dt><dd>{as_mathml(equation.left)} = {as_mathml(equation.right)}</dd>")
     return "\n".join([*lines, "</dl>"]) + "\n"
 
 

@@ -27,6 +27,7 @@ c = positive("c")  # speed of light [m/s]
 wavelength = positive("lambda")  # at the centre frequency [m]
 center_frequency = positive("f_0")  # [Hz]; the paper's f₀ is the band's lower edge
 point = Matrix([real(axis) for axis in AXES])  # a point of the scene [m]
+scatterer = Matrix([real(f"{axis}_m") for axis in AXES])  # the m-th of the scene [m]
 clock_coefficients = tuple(real(f"ttilde_{n}") for n in range(4))  # t̃ₙ [s, 1, 1/s, 1/s²]
 total_qpe = positive("q")  # total budget for the quadratic phase error [rad]
 share = positive("s")  # share of one platform in a budget [-]

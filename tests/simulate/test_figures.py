@@ -25,7 +25,7 @@ THREE = Targets((Target(0, 0, 0), Target(9, 2, -3), Target(-1, 6, -6)))
 
 @pytest.fixture(scope="module")
 def polar():
-    return simulate_point(load_mission(str(SECTION_V)), image_former="polar_format")
+    return simulate_point(load_mission(str(SECTION_V), "full"), image_former="polar_format")
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +77,7 @@ class TestFigure4:
     @pytest.mark.parametrize("error", [{"acceleration": [5e-3, 0, 0]}, {"position": [1, 5, 2]}, {"velocity": 0.01}])
     def test_its_points_are_where_exact_ranges_have_value_and_slope(self, error) -> None:
         """First order in the way from the displaced point to them, at most a metre of 8 km: 1e-4 of it."""
-        mission = parse_mission(mission_text(platforms__transmitter__motion_error=error))
+        mission = parse_mission(mission_text(platforms__transmitter__motion_error=error, allocation__model="full"))
         images = simulate_point(mission)
         want = np.array([indicated(mission, tau) for tau in (-2.0, 0.0, 2.0)])
         assert images.points == pytest.approx(want, abs=1e-3)

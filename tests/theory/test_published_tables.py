@@ -107,7 +107,7 @@ def test_clock_quadratic_limit() -> None:
     assert simplify(clock.cells[1] - 2 * (pi / 8) / (pi * center_frequency * T**2)) == 0
 
 
-def test_17_has_the_plus_and_the_tau_that_the_print_lost() -> None:
+def test_17_has_the_plus_that_the_print_lost() -> None:
     beta_0, beta_1 = dr.linear_differential_range()
     for index, x in enumerate(point):
         assert beta_0.coeff(x) == -sum(p.position[index] / p.slant_range for p in PLATFORMS)

@@ -322,6 +322,22 @@ class TestDerive:
         root = ElementTree.fromstring(f"<div>{text}</div>")
         assert len(root.findall(".//{http://www.w3.org/1998/Math/MathML}math")) > 80
 
+    def test_one_equation_and_what_its_print_gets_wrong(self, run) -> None:
+        for format_name in ("text", "latex", "markdown", "mathml"):
+            text = run("derive", "--equation", "16", "--format", format_name).stdout
+            assert "(16)" in text
+            assert "1/(N_x·N_y) is lost" in text
+            assert "(15) Phase" not in text
+
+    @pytest.mark.parametrize("other", [("--table", "II"), ("--check",), ("--write",)])
+    def test_one_equation_goes_with_nothing_else(self, run, other) -> None:
+        result = run("derive", "--equation", "16", *other)
+        assert result.exit_code == 2
+        assert "--equation" in result.stderr
+
+    def test_mathml_of_a_double_sum_has_both_indices(self, run) -> None:
+        assert run("derive", "--equation", "4", "--format", "mathml").stdout.count("<munderover>") == 2
+
     def test_check_passes_on_the_committed_file(self, run) -> None:
         assert run("derive", "--check").exit_code == 0
 
