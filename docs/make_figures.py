@@ -105,6 +105,49 @@ def compliance_report() -> None:
         browser.close()
 
 
+SCENE = "0, 0; 6 m, -3 m, -6 dB; -5 m, 5 m, -3 dB; clutter -30 dB"
+ERROR_ALONG_TRACK = (1.0, 5.0, 2.0)  # m, of the transmitter's position, for the picture of a displaced response
+# What docs/section-v-figures.md shows: name of the file, panel of `point_plot`, which images.
+PICTURES = (
+    ("fig3", "fig3", "paper"),
+    ("fig4", "fig4", "paper"),
+    ("fig5", "fig5", "paper"),
+    ("fig6", "fig6", "paper"),
+    ("fig7", "fig7", "paper"),
+    ("fig7-back", "fig7_back", "paper"),
+    ("cuts", "cuts", "paper"),
+    ("displaced", "fig5", "displaced"),
+    ("scene-before", "fig5", "scene"),
+    ("scene-after", "fig7_back", "scene"),
+)
+
+
+def gallery() -> None:
+    """Draw Figures 3 to 7 of the paper, one picture each, a displaced response, and a scene."""
+    from bisar_budget.report import point_plot
+    from bisar_budget.report.point_figures import sheet
+    from bisar_budget.simulate.point import simulate_point
+    from bisar_budget.simulate.targets import parse_targets
+
+    mission = load_mission(str(MISSION))
+    platforms = mission.platforms
+    error = platforms.transmitter.motion_error._replace(position=ERROR_ALONG_TRACK)
+    transmitter = platforms.transmitter._replace(motion_error=error)
+    displaced = mission._replace(platforms=platforms._replace(transmitter=transmitter))
+    paper = simulate_point(mission, image_former="polar_format")
+    point_plot.draw(paper, mission.name, str(HERE / "section-v-images.png"))
+    sheets = {
+        "paper": sheet(paper),
+        "displaced": sheet(simulate_point(displaced)),
+        "scene": sheet(simulate_point(mission, targets=parse_targets(SCENE))),
+    }
+    folder = HERE / "section-v-figures"
+    folder.mkdir(exist_ok=True)
+    for name, panel, images in PICTURES:
+        point_plot.draw_one(panel, sheets[images], str(folder / f"{name}.png"))
+
+
 if __name__ == "__main__":
     section_v()
+    gallery()
     compliance_report()

@@ -1,10 +1,13 @@
 """Figures 3 to 7: what is drawn stands where it should, is as large as it should be, and is not mirrored."""
 
 import math
+import re
+import tracemalloc
 
 import numpy as np
 import pytest
 
+from bisar_budget.cli.simulate import simulate
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.report import point_plot
 from bisar_budget.report.point_figures import Picture, rotated_back, sheet
@@ -294,6 +297,26 @@ class TestImageFormers:
         result = run("simulate", squinted, "--image-former", "polar_format")
         assert result.exit_code == 2
         assert "polar format cannot form this image: no rectangle" in result.stderr
+
+    @pytest.mark.parametrize("name", IMAGE_FORMERS)
+    def test_their_memory_is_estimated_and_the_estimate_holds(self, run, tmp_path, name: str) -> None:
+        small = tmp_path / "small.yaml"
+        short = {"collection__aperture_time": "1 s", "radar__bandwidth": "20 MHz"}
+        small.write_text(mission_text(simulation={"memory_limit": "1 MB"}, **short), encoding="utf-8")
+        said = run("simulate", small, "--image-former", name).stderr
+        estimate = 1e6 * float(re.search(r"need about ([\d.]+) MB", said)[1])
+        mission = parse_mission(mission_text(**short))
+        tracemalloc.start()
+        try:
+            simulate_point(mission, image_former=name)
+            peak = tracemalloc.get_traced_memory()[1]
+        finally:
+            tracemalloc.stop()
+        assert peak < estimate
+
+    def test_the_command_knows_all_of_them(self) -> None:
+        (choice,) = [option.type for option in simulate.params if option.name == "image_former"]
+        assert tuple(choice.choices) == IMAGE_FORMERS
 
     def test_an_unknown_one_is_refused(self, run) -> None:
         assert run("simulate", SECTION_V, "--image-former", "omega_k").exit_code == 2

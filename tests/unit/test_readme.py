@@ -10,16 +10,17 @@ from bisar_budget.report import FORMATS, format_of
 from tests.conftest import ROOT
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+FIGURES = (ROOT / "docs" / "section-v-figures.md").read_text(encoding="utf-8")
 
 
-def blocks(language: str) -> list[str]:
-    return re.findall(rf"(?ms)^```{language}\n(.*?)^```", README)
+def blocks(language: str, page: str = README) -> list[str]:
+    return re.findall(rf"(?ms)^```{language}\n(.*?)^```", page)
 
 
 def shown() -> list[tuple[str, str]]:
     """Console blocks: each `$ command` with the output under it."""
     pairs = []
-    for block in blocks("console"):
+    for block in blocks("console") + blocks("console", FIGURES):
         for part in re.split(r"(?m)^\$ ", block)[1:]:
             command, _, output = part.partition("\n")
             pairs.append((command, output))
@@ -50,6 +51,19 @@ def test_console_examples(run, monkeypatch, command: str, output: str) -> None:
 def test_yaml_examples_pass_the_loader(run, text: str) -> None:
     result = run("check", "-", input=text)
     assert result.exit_code in (0, 1), result.output
+
+
+def test_the_page_of_figures_shows_every_picture_that_the_script_draws() -> None:
+    """And no other one; each is small."""
+    script = (ROOT / "docs" / "make_figures.py").read_text(encoding="utf-8")
+    listed = re.search(r"(?ms)^PICTURES = \((.*?)^\)", script)
+    assert listed is not None
+    drawn = {f"section-v-figures/{name}.png" for name in re.findall(r'(?m)^    \("([^"]+)"', listed[1])}
+    linked = re.findall(r"!\[[^]]+\]\(([^)]+)\)", FIGURES)
+    assert sorted(linked) == sorted(drawn)
+    folder = ROOT / "docs" / "section-v-figures"
+    assert {f"section-v-figures/{file.name}" for file in folder.iterdir()} == drawn
+    assert all(file.stat().st_size < 150e3 for file in folder.iterdir())
 
 
 def test_python_examples_run() -> None:
