@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Sequence
+from io import StringIO
 from typing import TYPE_CHECKING
 
 import click
@@ -88,4 +89,4 @@ def verify_all(missions: "Sequence[Mission]", only: str, jobs: int | None) -> "l
 def progress_bar(total: int = 1) -> "ProgressBar[int]":
     """Bar on standard error, where somebody watches."""
     watched = sys.stderr is not None and sys.stderr.isatty()
-    return click.progressbar(length=total, label="Forming images", file=sys.stderr, hidden=not watched)
+    return click.progressbar(length=total, label="Forming images", file=sys.stderr if watched else StringIO())

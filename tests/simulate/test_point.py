@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 
+from bisar_budget.budget.pieces import gradients_of
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.simulate.autofocus import phase_gradient_autofocus
 from bisar_budget.simulate.phase_history import cell_centres
@@ -45,6 +46,10 @@ class TestSectionV:
         line = math.atan2(*(last - first)[::-1]) % math.pi
         across = (section_v.look_azimuth + math.pi / 2) % math.pi  # (31)
         assert math.degrees(abs(line - across)) < 5
+
+    def test_figure_4_says_by_which_gradients_it_has_its_points(self, section_v) -> None:
+        assert section_v.points_by == gradients_of("published")
+        assert gradients_of("full") == gradients_of("strictest") != gradients_of("published")
 
     def test_figure_5_smears_along_the_line_of_the_points(self, section_v) -> None:
         first, _, last = section_v.points
