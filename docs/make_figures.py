@@ -135,7 +135,7 @@ def gallery() -> None:
     transmitter = platforms.transmitter._replace(motion_error=error)
     displaced = mission._replace(platforms=platforms._replace(transmitter=transmitter))
     paper = simulate_point(mission, image_former="polar_format")
-    point_plot.draw(paper, mission.name, str(HERE / "section-v-images.png"))
+    (HERE / "section-v-images.png").write_bytes(point_plot.drawn(paper, mission.name, "png"))
     sheets = {
         "paper": sheet(paper),
         "displaced": sheet(simulate_point(displaced)),
@@ -144,7 +144,7 @@ def gallery() -> None:
     folder = HERE / "section-v-figures"
     folder.mkdir(exist_ok=True)
     for name, panel, images in PICTURES:
-        point_plot.draw_one(panel, sheets[images], str(folder / f"{name}.png"))
+        (folder / f"{name}.png").write_bytes(point_plot.drawn_panel(panel, sheets[images]))
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ import os
 
 import click
 
-from bisar_budget.cli.streams import FILE, fail, load_all, print_text, spare
+from bisar_budget.cli.streams import FILE, fail, load_all, print_text, spare, write_file
 from bisar_budget.cli.verify import progress_bar
 from bisar_budget.errors import printable
 
@@ -62,11 +62,8 @@ def simulate(mission: str, plot: str | None, output: str | None, image_former: s
             images = simulate_point(loaded, progress, image_former=image_former, targets=standing)
     except (SimulationError, ValueError) as error:
         fail(f"{mission}: {error}")
-    try:
-        if output is not None:
-            point_plot.save(images, output)
-        if plot is not None:
-            point_plot.draw(images, loaded.name, plot)
-    except OSError as error:
-        fail(f"cannot write {error.filename}: {error.strerror}")
+    if output is not None:
+        write_file(output, point_plot.archive(images))
+    if plot is not None:
+        write_file(plot, point_plot.drawn(images, loaded.name, os.path.splitext(plot)[1][1:].lower()))
     print_text(point_plot.summary(images, loaded))

@@ -81,11 +81,26 @@ def load_all(files: Sequence[str], model: str | None = None) -> "list[Mission]":
 
 
 def spare(files: Sequence[str], targets: Iterable[str | None]) -> None:
-    """Refuse to write a report over a mission."""
-    written = {os.path.realpath(target): target for target in targets if target is not None}
+    """Refuse to write over a mission, standard input's file too, and to write two outputs to one file."""
+    written: dict[str, str] = {}
+    for target in targets:
+        if target is None or target == "-":
+            continue
+        place = os.path.realpath(target)
+        if place in written:
+            fail(f"two outputs would be written to one file: {written[place]} and {target}")
+        written[place] = target
     for file in files if written else ():
-        if file != "-" and os.path.realpath(file) in written:
-            fail(f"{written[os.path.realpath(file)]} is a mission file; a report would replace it")
+        for place, target in written.items():
+            if os.path.realpath(file) == place if file != "-" else _is_standard_input(place):
+                fail(f"{target} is a mission file; a report would replace it")
+
+
+def _is_standard_input(path: str) -> bool:
+    try:
+        return os.path.isfile(path) and os.path.samestat(os.fstat(0), os.stat(path))
+    except OSError:  # either is missing
+        return False
 
 
 def day_of_run() -> date:

@@ -1,7 +1,9 @@
 """Figures 3 to 7 of Rigling & Moses for a mission of one's own: drawn, saved, and said in a few lines."""
 
 import math
+import os
 from collections.abc import Callable, Mapping
+from io import BytesIO
 from typing import Any
 
 import numpy as np
@@ -25,15 +27,15 @@ _CUT_STYLES: tuple[Mapping[str, Any], ...] = (
 )
 
 
-def draw(images: PointImages, title: str, path: str) -> None:
-    """Draw the figures on one sheet; the suffix of `path` says PNG, SVG or PDF."""
-    _save(figure(sheet(images), title), path)
+def drawn(images: PointImages, title: str, kind: str) -> bytes:
+    """Draw the figures on one sheet, as a `png`, `svg` or `pdf` file."""
+    return _file(figure(sheet(images), title), kind)
 
 
 def figure(drawn: Sheet, title: str) -> Any:
     """Lay all panels on one Matplotlib figure."""
-    plt = _pyplot()
-    page, panels = plt.subplots(2, 4, figsize=(16.5, 8), layout="constrained")
+    page = _page(figsize=(16.5, 8))
+    panels = page.subplots(2, 4)
     for name, panel in zip(("fig3", "fig4", "fig5", "cuts", "fig6", "fig7", "fig7_back"), panels.flat, strict=False):
         artist = PANELS[name](panel, drawn)
     key = panels[1, 3]
@@ -50,40 +52,46 @@ def figure(drawn: Sheet, title: str) -> Any:
     ]
     key.add_artist(key.legend(handles=panels[0, 3].lines, loc="upper center", fontsize=10, frameon=False))
     key.legend(handles=marks, loc="lower center", facecolor=_NOT_FORMED, labelcolor="white", fontsize=10)
-    page.suptitle(title)
+    page.suptitle(title, parse_math=False)  # a name is no formula
     return page
 
 
-def draw_one(name: str, drawn: Sheet, path: str) -> None:
-    """Draw a single panel, small, for a page; `name` is one of `PANELS`."""
-    plt = _pyplot()
-    page, panel = plt.subplots(figsize=(4.4, 3.6), layout="constrained")
+def drawn_panel(name: str, drawn: Sheet) -> bytes:
+    """Draw a single panel, small, for a page, as a PNG file; `name` is one of `PANELS`."""
+    page = _page(figsize=(4.4, 3.6))
+    panel = page.subplots()
     artist = PANELS[name](panel, drawn)
     if name == "cuts":
         panel.legend(fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.06), frameon=False)  # above the data
     if artist is not None:
         page.colorbar(artist, ax=panel, pad=0.02).set_label("dB to the error-free peak")
-    _save(page, path, dpi=80)
+    return _file(page, "png", dpi=80)
 
 
-def _pyplot() -> Any:
+def _page(**settings: Any) -> Any:
+    """Give a Matplotlib figure that looks the same whatever a user's matplotlibrc and MPLBACKEND say."""
+    os.environ.pop("MPLBACKEND", None)  # a name that Matplotlib does not know would end its import
     import matplotlib
+    from matplotlib.figure import Figure
 
-    matplotlib.use("agg")
-    import matplotlib.pyplot as plt
-
-    return plt
-
-
-def _save(page: Any, path: str, dpi: int = 110) -> None:
-    page.savefig(path, dpi=dpi, metadata={"Software": None} if path.lower().endswith("png") else None)
-    _pyplot().close(page)
+    matplotlib.rcdefaults()
+    matplotlib.rcParams["svg.hashsalt"] = "bisar-budget"
+    return Figure(**settings, layout="constrained")
 
 
-def save(images: PointImages, path: str) -> None:
-    """Save the images, complex, and what explains them, as an NPZ archive."""
+def _file(page: Any, kind: str, dpi: int = 110) -> bytes:
+    """Give the file of a figure: of the same input the same bytes."""
+    undated = {"png": {"Software": None}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
+    file = BytesIO()
+    page.savefig(file, format=kind, dpi=dpi, metadata=undated[kind])
+    return file.getvalue()
+
+
+def archive(images: PointImages) -> bytes:
+    """Give the images, complex, and what explains them, as an NPZ file."""
+    file = BytesIO()
     np.savez_compressed(
-        path,
+        file,
         in_scene=images.in_scene,
         rotated=images.rotated,
         focused=images.focused,
@@ -103,6 +111,7 @@ def save(images: PointImages, path: str) -> None:
         targets_db=[one.level_db for one in images.targets.points],
         shown_m=[one.shown for one in images.responses],
     )
+    return file.getvalue()
 
 
 def _flown(mission: Mission) -> str:

@@ -175,7 +175,7 @@ class TestPictures:
         assert clean.place[np.argmax(clean.level_db)] == pytest.approx(across, abs=0.02)
 
     def test_rotated_back_is_the_image_without_error(self) -> None:
-        """Autofocus in (x′, y′), then back to (x, y): within 1 % of the image that never had the error."""
+        """Autofocus in (x′, y′), then back to (x, y): within 3 % of the image that never had the error."""
         error = {"acceleration": [5e-3, 0, 0]}
         images = simulate_point(parse_mission(mission_text(platforms__transmitter__motion_error=error)))
         clean = simulate_point(parse_mission(mission_text()))
@@ -236,12 +236,12 @@ class TestDrawing:
         said = [text.get_text() for panel in page.axes for text in panel.texts]
         away = np.hypot(*images.points[1])
         assert said.count(f"the target stands {away:.3g} m away") >= 4
-        point_plot.draw(images, "title", str(tmp_path / "far.svg"))
+        (tmp_path / "far.svg").write_bytes(point_plot.drawn(images, "title", "svg"))
         assert (tmp_path / "far.svg").read_text(encoding="utf-8").endswith("</svg>\n")
 
     @pytest.mark.parametrize("name", point_plot.PANELS)
     def test_one_panel_by_itself(self, polar, tmp_path, name: str) -> None:
-        point_plot.draw_one(name, sheet(polar), str(tmp_path / "one.png"))
+        (tmp_path / "one.png").write_bytes(point_plot.drawn_panel(name, sheet(polar)))
         assert (tmp_path / "one.png").stat().st_size > 1000
 
 

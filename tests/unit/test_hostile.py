@@ -228,3 +228,48 @@ def test_a_report_allows_nothing_but_its_own_styles_and_images(tmp_path, mission
     for part in ("default-src 'none'", "style-src 'unsafe-inline'", "img-src data:", "base-uri 'none'"):
         assert part in policy
     assert "script-src" not in policy
+
+
+class TestTargets:
+    """Two reports in one file, or a report over the mission that standard input came from, were written."""
+
+    def test_two_outputs_to_one_file_are_refused(self, mission, tmp_path) -> None:
+        done = run("check", mission, "--report", tmp_path / "a.json", "-o", tmp_path / "." / "a.json")
+        assert done.returncode == 2
+        assert b"two outputs would be written to one file" in done.stderr
+        assert not (tmp_path / "a.json").exists()
+
+    def test_the_file_of_standard_input_is_no_target(self, mission) -> None:
+        before = mission.read_bytes()
+        with mission.open("rb") as file:
+            done = run("check", "-", "-o", mission, stdin=file)
+        assert done.returncode == 2
+        assert b"is a mission file; a report would replace it" in done.stderr
+        assert mission.read_bytes() == before
+
+
+class TestPlots:
+    @pytest.fixture
+    def folder(self, tmp_path) -> Path:
+        folder = tmp_path
+        (folder / "m.yaml").write_text(mission_text(name="A $\\frac$ of $x_"))
+        (folder / "matplotlibrc").write_text("backend: nonsense\nfigure.figsize: 1, 1\nfont.size: 40\n")
+        return folder
+
+    def plot(self, folder: Path, name: str, **environment: str) -> bytes:
+        done = run("simulate", "m.yaml", "--plot", name, cwd=folder, env={**os.environ, **environment})
+        assert done.returncode == 0, done.stderr
+        return (folder / name).read_bytes()
+
+    def test_a_name_is_text_and_settings_of_matplotlib_do_not_matter(self, folder) -> None:
+        """A name with a dollar ended in exit 3; the same input gives the same bytes, whatever a user's matplotlibrc says."""
+        plain = self.plot(folder, "a.svg", MATPLOTLIBRC=os.devnull)
+        theirs = self.plot(folder, "b.svg", MPLBACKEND="nonsense")
+        assert theirs == plain
+        assert b"<dc:date>" not in plain
+
+    def test_an_archive_has_the_name_that_was_asked_for(self, folder) -> None:
+        done = run("simulate", "m.yaml", "-o", "X.NPZ", cwd=folder)
+        assert done.returncode == 0, done.stderr
+        assert (folder / "X.NPZ").exists()
+        assert not (folder / "X.NPZ.npz").exists()
