@@ -34,7 +34,7 @@ def approx(expected: Any, rel: float | None = None, abs: float | None = None, na
     if abs is None:
         values = list(expected.values()) if isinstance(expected, dict) else expected
         try:
-            largest = np.abs(np.asarray(values, dtype=float)).max(initial=0.0)
+            largest = np.abs(np.asarray(values)).max(initial=0.0)
         except (TypeError, ValueError):
             largest = math.inf  # not numbers alone
         if 0 < largest < 1e-6:

@@ -38,6 +38,7 @@ _TABLES = "bisar_budget/theory/published.py"
 _EVALUATORS = "bisar_budget/evaluators.py"
 _GEOMETRY = "bisar_budget/geometry.py"
 _POINT = "bisar_budget/simulate/point.py"
+_PIECES = "bisar_budget/budget/pieces.py"
 _PHASES = "bisar_budget/simulate/phase_cases.py"
 _VIBRATION = "bisar_budget/simulate/vibration.py"
 
@@ -119,15 +120,15 @@ MUTANTS = (
     ),
     Mutant(
         "(29): sign",
-        _POINT,
-        "np.linalg.solve(-np.stack((look, rate)), np.array([value, slope]))",
-        "np.linalg.solve(np.stack((look, rate)), np.array([value, slope]))",
+        _PIECES,
+        "evaluators.full_ground_inverse(*look, *rate)",
+        "evaluators.full_ground_inverse(*[-part for part in look], *rate)",
         (_POINTS_OF_29,),
     ),
     Mutant(
         "(29): without the points' own Q",
-        _POINT,
-        "state.at(time)",
+        _PIECES,
+        "state.at(piece.time)",
         "state.at(0.0)",
         (_POINTS_OF_29,),
     ),
@@ -148,8 +149,8 @@ MUTANTS = (
     Mutant(
         "(27): sign of the value",
         _POINT,
-        "np.array([value, slope])",
-        "np.array([-value, slope])",
+        "zip(times, values, slopes, strict=True)]\n    model",
+        "zip(times, -values, slopes, strict=True)]\n    model",
         (_POINTS_OF_29,),
     ),
     Mutant(

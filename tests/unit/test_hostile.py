@@ -262,7 +262,7 @@ class TestPlots:
         return (folder / name).read_bytes()
 
     def test_a_name_is_text_and_settings_of_matplotlib_do_not_matter(self, folder) -> None:
-        """A name with a dollar ended in exit 3; the same input gives the same bytes, whatever a user's matplotlibrc says."""
+        """A name with a dollar ended in exit 3. Of the same input a plot has the same bytes."""
         plain = self.plot(folder, "a.svg", MATPLOTLIBRC=os.devnull)
         theirs = self.plot(folder, "b.svg", MPLBACKEND="nonsense")
         assert theirs == plain
