@@ -250,7 +250,8 @@ class TestCommand:
         assert said not in run("simulate", SECTION_V).stdout
 
     def test_unwritable_target_is_2(self, run, tmp_path) -> None:
-        result = run("simulate", SECTION_V, "-o", tmp_path / "no" / "v.npz")
+        (taken := tmp_path / "taken").write_text("a file, no folder")
+        result = run("simulate", SECTION_V, "-o", taken / "v.npz")
         assert result.exit_code == 2
         assert "cannot write" in result.stderr
         assert json.dumps(result.stdout) == '""'
