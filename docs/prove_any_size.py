@@ -12,7 +12,6 @@ if there is one. `python -m tests.families FAMILY SEED` prints a mission.
 
 import argparse
 import os
-import re
 import sys
 import time
 from collections import Counter
@@ -27,6 +26,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # small arrays: threads of a proc
 from bisar_budget.mission.load import parse_mission
 from tests.compared import Compared, compared
 from tests.families import FAMILIES, mission_text
+from tests.recorded import record
 
 PAGE = Path(__file__).with_name("full-model.md")
 Outcome = tuple[str, int, list[Compared] | str]
@@ -92,22 +92,6 @@ class Tally:
             yield f"  crash: {crash}"
 
 
-def record(lines: list[str]) -> None:
-    """Replace what stands between the page's marks."""
-    block = "\n".join(
-        ["```text", f"$ python docs/{' '.join([Path(sys.argv[0]).name, *sys.argv[1:]])}", *lines, "```"]
-    )
-    text, found = re.subn(
-        r"(<!-- exact ranges -->\n).*?(\n<!-- end -->)",
-        lambda match: match[1] + block + match[2],
-        PAGE.read_text(encoding="utf-8"),
-        flags=re.DOTALL,
-    )
-    if found != 1:
-        sys.exit(f"{PAGE.name} has no place for the result")
-    PAGE.write_text(text, encoding="utf-8")
-
-
 def main() -> int:
     """Run it; 1 if there is a miss."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -136,7 +120,9 @@ def main() -> int:
     in_all = f"{missions} missions, {numbers} numbers, {missed} misses, {crashes} crashes"
     print(f"{in_all} ({time.perf_counter() - start:.0f} s)")
     if chosen.write:
-        record([*(line for family in families for line in tallies[family].lines(family)), in_all])
+        record(
+            PAGE, "exact ranges", [*(line for family in families for line in tallies[family].lines(family)), in_all]
+        )
     return 0 if all(tally.is_clean for tally in tallies.values()) else 1
 
 

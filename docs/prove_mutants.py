@@ -22,6 +22,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from tests.mutants import MUTANTS, ROOT, Mutant
+from tests.recorded import record
 
 PAGE = ROOT / "docs" / "mutants.md"
 PASSED, FAILED = 0, 1  # pytest's exit codes; any other means that nothing was tested
@@ -57,22 +58,6 @@ def verdict(tree: Path, mutant: Mutant) -> tuple[bool, str]:
     return False, "its tests pass" if code == PASSED else f"not tested: {said}"
 
 
-def record(lines: list[str]) -> None:
-    """Replace what stands between the page's marks."""
-    block = "\n".join(
-        ["```text", f"$ python docs/{' '.join([Path(sys.argv[0]).name, *sys.argv[1:]])}", *lines, "```"]
-    )
-    text, found = re.subn(
-        r"(<!-- result -->\n).*?(\n<!-- end -->)",
-        lambda match: match[1] + block + match[2],
-        PAGE.read_text(encoding="utf-8"),
-        flags=re.DOTALL,
-    )
-    if found != 1:
-        sys.exit(f"{PAGE.name} has no place for the result")
-    PAGE.write_text(text, encoding="utf-8")
-
-
 def main() -> int:
     """Test the copy, then every mutant; 1 if one is missed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -102,7 +87,7 @@ def main() -> int:
             say(f"{'caught  ' if is_caught else 'SURVIVED'} {mutant.name}", f"         {said}")
     say(f"{len(chosen)} mutants, {len(chosen) - missed} caught")
     if asked.write:
-        record(lines)
+        record(PAGE, "result", lines)
     return 1 if missed else 0
 
 

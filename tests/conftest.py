@@ -38,10 +38,7 @@ def approx(expected: Any, rel: float | None = None, abs: float | None = None, na
         except (TypeError, ValueError):
             largest = math.inf  # not numbers alone
         if 0 < largest < 1e-6:
-            rel, abs = (
-                1e-6 if rel is None else rel,
-                0.0,
-            )  # a relative one is looked at beside an absolute one if given
+            rel, abs = 1e-6 if rel is None else rel, 0.0  # given an absolute one alone, pytest drops the relative
     return _approx(expected, rel=rel, abs=abs, nan_ok=nan_ok)
 
 
