@@ -270,11 +270,10 @@ class ExactRanges:
         for source, size in errors:
             if source.is_position:
                 x, y, z = (size * part for part in source.direction)
-                if source.unit == "m/s":
-                    bend += abs(size)
                 powers = self.powers[source.unit]
                 for name in PLATFORMS:
                     if source.moves(name):
+                        bend += abs(size) if source.unit == "m/s" else 0.0
                         measured[name] = [
                             (a + p * x, b + p * y, c + p * z)
                             for (a, b, c), p in zip(measured[name], powers, strict=True)
@@ -292,7 +291,7 @@ class ExactRanges:
 
     @cached_property
     def _bend(self) -> float:
-        """Way of a platform by a velocity error within half an aperture up to which they do. [m]"""
+        """Way of both platforms by velocity errors within half an aperture up to which they do. [m]"""
         return _BENT * abs(self.plane.determinant) * self.half / self.range_gradient * self.nearest
 
     def left_over(self, source: ErrorSource, size: float, place: GroundVector) -> list[float]:
