@@ -315,11 +315,11 @@ def montecarlo(runs: int) -> None:
 
     (ours,), (evaluated,), (both,) = in_turn(
         runs,
-        clock(lambda: monte_carlo(mission, n, seed)),
+        clock(lambda: monte_carlo(Analysis(mission), n, seed)),
         clock(lambda: formulas(drawn)),
         clock(lambda: formulas(draw())),
     )
-    got = [one.probability for one in monte_carlo(mission, n, seed).requirements]
+    got = [one.probability for one in monte_carlo(Analysis(mission), n, seed).requirements]
     want = formulas(drawn)
     off = max(abs(a - b) for a, b in zip(got, want, strict=True))
     print(

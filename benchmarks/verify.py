@@ -14,7 +14,7 @@ import sys
 import time
 from pathlib import Path
 
-from bisar_budget.budget.images import VerifiedMission
+from bisar_budget.findings.images import VerifiedMission
 from bisar_budget.mission.load import load_mission
 from bisar_budget.simulate import collection
 from bisar_budget.simulate.image_formation import matched_filter

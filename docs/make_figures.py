@@ -92,7 +92,7 @@ def compliance_report() -> None:
 
     from bisar_budget import __version__
     from bisar_budget.budget.check import check_mission
-    from bisar_budget.budget.findings import Report
+    from bisar_budget.findings.mission import Report
     from bisar_budget.report import Style, render
 
     found = check_mission(load_mission(str(MISSION)), date(2026, 11, 21))

@@ -15,8 +15,9 @@ from click.testing import CliRunner, Result
 from hypothesis import settings
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.findings import MissionFindings, Row
 from bisar_budget.cli import cli
+from bisar_budget.findings.mission import MissionFindings
+from bisar_budget.findings.row import Row
 from bisar_budget.mission.load import parse_mission
 
 # Shared machines: how long an example takes says nothing.

@@ -15,12 +15,12 @@ from bisar_budget.budget.correlation import (
     phase_parts,
 )
 from bisar_budget.budget.effects import ErrorSource
-from bisar_budget.budget.findings import Row
 from bisar_budget.budget.judgement import judged
 from bisar_budget.budget.models import CUBIC, LOCATION, QUADRATIC, Declared
 from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.budget.slow_vibration import slow_phases
 from bisar_budget.constants import UTILIZATION_TOLERANCE
+from bisar_budget.findings.row import Row, subject
 from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.model import Mission
 from bisar_budget.units import format_limit, format_quantity
@@ -123,7 +123,7 @@ def _qpe_rows(analysis: Analysis, mine: Together, theirs: Together, allocation: 
                 over += f"; {needed_sentence(allocation.n_pull_needed(qpe, owner), caps(mission))}"
         yield _judged(
             mission,
-            id=f"{'timing' if owner == 'clock' else owner}.quadratic_phase_error",
+            subject=subject(owner, QUADRATIC),
             metric=QUADRATIC,
             unit="rad",
             declared=qpe,
@@ -154,7 +154,7 @@ def _qpe_of_all(analysis: Analysis, mine: Together, allocation: Allocation) -> I
         return  # its own row says so
     yield _judged(
         mission,
-        id="mission.quadratic_phase_error",
+        subject=subject("mission", QUADRATIC),
         metric=QUADRATIC,
         unit="rad",
         declared=largest,
@@ -178,7 +178,7 @@ def _cubic_row(analysis: Analysis, mine: Together, theirs: Together) -> Row:
         doubt = _of_all("cubic phase", combined_phase(phases, "rss", groups), limit, "rad") or doubt
     row = _judged(
         mission,
-        id="mission.cubic_phase_error",
+        subject=subject("mission", CUBIC),
         metric=CUBIC,
         unit="rad",
         declared=cubic,
@@ -206,7 +206,7 @@ def _location_row(analysis: Analysis, mine: Together, theirs: Together) -> Row:
     no_image = "with a declared error no ground point has the recorded range history: there is no image"
     return judged(
         mission,
-        id="mission.location_error",
+        subject=subject("mission", LOCATION),
         metric=LOCATION,
         unit="m",
         declared=moved,
@@ -236,7 +236,7 @@ def _pull_in_row(analysis: Analysis, mine: Together, theirs: Together, pull_in: 
     total, by_other = (math.fsum(abs(phase) for _, phase in of) if of else None for of in (phases, others))
     return _judged(
         analysis.mission,
-        id="mission.autofocus_pull_in",
+        subject=subject("mission", "autofocus_pull_in"),
         metric=QUADRATIC,
         unit="rad",
         declared=total,

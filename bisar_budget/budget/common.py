@@ -6,8 +6,9 @@ full model, is linear in the errors, so the common effect is the sum of the two 
 
 from collections.abc import Iterator, Sequence
 
-from bisar_budget.budget.effects import MOTION_UNITS, Effect, ErrorSource
+from bisar_budget.budget.effects import MOTION_UNITS, PLATFORMS, Effect, ErrorSource
 from bisar_budget.constants import ROUNDING
+from bisar_budget.findings.row import subject
 from bisar_budget.mission.model import Mission
 
 
@@ -24,20 +25,19 @@ def common_sources(mission: Mission, sources: Sequence[ErrorSource]) -> Iterator
     error = mission.common_motion_error
     if error is None:
         return
-    by_id = {source.id: source for source in sources}
+    by_subject = {source.subject: source for source in sources}
     factor = mission.allocation.coverage_factor
     for kind, unit in MOTION_UNITS.items():
         values = getattr(error, kind)
         for axis, letter in enumerate("xyz"):
-            legs = [by_id[f"{platform}.{kind}.{letter}"] for platform in ("transmitter", "receiver")]
+            legs = [by_subject[subject(platform, kind, letter)] for platform in PLATFORMS]
             full = _sum([leg.full for leg in legs])
             if kind == "position" and letter != "z":
                 # A horizontal shift of both platforms is a shift of the scene: x̂ is the error itself, and β̃ₙ and
                 # ½s̈·x̂ cancel. What a sum of rounded numbers leaves would be a limit out of nothing.
                 full = full._replace(qpe=0.0, cubic=0.0)
             yield ErrorSource(
-                id=f"common.{kind}.{letter}",
-                owner="mission",
+                subject=subject("mission", kind, letter),
                 unit=unit,
                 declared=None if values is None else values[axis] * factor,
                 path=("common_motion_error", kind, axis),

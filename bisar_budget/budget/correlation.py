@@ -11,6 +11,7 @@ from typing import NamedTuple
 from bisar_budget.budget.combine import combine_displacements, combine_phases
 from bisar_budget.budget.effects import PLATFORMS, ErrorSource
 from bisar_budget.errors import Place
+from bisar_budget.findings.row import subject
 from bisar_budget.geometry import FRAME_AXES, GroundVector
 from bisar_budget.mission.model import Mission, MotionError
 from bisar_budget.mission.symmetric import quadratic_form
@@ -44,7 +45,9 @@ def correlated_errors(mission: Mission) -> tuple[Correlated, ...]:
         error: MotionError = getattr(mission.platforms, name).motion_error
         if error.covariance is not None:
             ids = tuple(
-                f"{name}.{kind}.{axis}" for kind in ("position", "velocity") for axis in FRAME_AXES[error.frame]
+                subject(name, kind, axis, error.frame).id
+                for kind in ("position", "velocity")
+                for axis in FRAME_AXES[error.frame]
             )
             found.append(Correlated(name, ids, error.covariance.correlation))
     return tuple(found)

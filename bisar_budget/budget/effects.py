@@ -10,10 +10,11 @@ from typing import NamedTuple
 from bisar_budget import evaluators
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG
 from bisar_budget.errors import KeyPath
+from bisar_budget.findings.row import MOTION, Subject
 from bisar_budget.geometry import BistaticGeometry, GroundVector, Vector, angle_between_lines
 
 PLATFORMS = ("transmitter", "receiver")
-MOTION_UNITS = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2"}
+MOTION_UNITS = dict(zip(MOTION, ("m", "m/s", "m/s^2"), strict=True))
 CLOCK_UNITS = {"constant": "s", "linear": "s/s", "quadratic": "1/s", "cubic": "1/s^2"}
 NOWHERE: Vector = (0.0, 0.0, 0.0)  # direction of what is no motion
 
@@ -34,17 +35,16 @@ class Effect(NamedTuple):
 
 
 class ErrorSource(NamedTuple):
-    """One error: who owns it, how large it is declared, what one unit of it does.
+    """One error: what it is, how large it is declared, what one unit of it does.
 
-    `owner` is transmitter, receiver, clock or mission (nobody's). `declared` is signed and includes the
+    `declared` is signed and includes the
     coverage factor; None where the file is silent. `is_independent` marks the errors as the file states
     them: sums and root-sum-squares run over these alone, so that an error stated along the track is not
     counted again by its components along the scene's axes. `direction` is a unit vector of the scene, zero for
     what is no motion; of the mission's own it is that of both platforms.
     """
 
-    id: str
-    owner: str
+    subject: Subject
     unit: str
     declared: float | None
     path: KeyPath
@@ -58,6 +58,16 @@ class ErrorSource(NamedTuple):
     notes: tuple[str, ...] = ()
 
     @property
+    def id(self) -> str:
+        """That of its row."""
+        return self.subject.id
+
+    @property
+    def owner(self) -> str:
+        """Whose share it counts against: transmitter, receiver, clock or mission."""
+        return self.subject.owner
+
+    @property
     def is_motion(self) -> bool:
         """Whether it moves platforms, or the clock: what only is a phase displaces nothing."""
         return self.unit != "rad"
@@ -66,6 +76,11 @@ class ErrorSource(NamedTuple):
     def is_position(self) -> bool:
         """Whether it is an error of a platform's measured path, or of both."""
         return self.direction != NOWHERE
+
+    @property
+    def is_common(self) -> bool:
+        """Whether it is one error of the paths of both platforms."""
+        return self.owner == "mission" and self.subject.kind in MOTION
 
     def moves(self, platform: str) -> bool:
         """Whether it is an error of a platform's position; one of the mission's own is of both."""

@@ -10,8 +10,8 @@ from datetime import date
 from typing import TypeVar
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.findings import MissionFindings, UnusableMission
 from bisar_budget.errors import MissionError
+from bisar_budget.findings.mission import MissionFindings, UnusableMission
 from bisar_budget.mission.load import load_mission
 from bisar_budget.resources import cores
 
@@ -21,9 +21,9 @@ Kept = TypeVar("Kept")
 MANY = 200  # files from which a second process pays: starting one costs what checking fifty does
 
 
-def without_mission(found: Found) -> Found:
-    """Keep all that is found, but not the mission: a thousand would fill memory."""
-    return found if isinstance(found, UnusableMission) else found._replace(mission=None)
+def without_analysis(found: Found) -> Found:
+    """Keep all that is found, but not the analysis: a thousand would fill memory."""
+    return found if isinstance(found, UnusableMission) else found._replace(analysis=None)
 
 
 def check_files(

@@ -247,9 +247,3 @@ def _size(limit: float, per_unit: float) -> float | None:
     """Size at which an effect of so much per unit reaches a limit; None: it has no effect."""
     size = evaluators.allowable_error(limit, per_unit) if per_unit else math.inf
     return size if math.isfinite(size) else None
-
-
-def quotient(numerator: float, denominator: float) -> float | None:
-    """Divide; None where there is no finite quotient: a zero coefficient or a vanishing error."""
-    quotient = numerator / denominator if denominator else math.inf
-    return quotient if math.isfinite(quotient) else None

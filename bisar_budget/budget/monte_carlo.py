@@ -77,13 +77,13 @@ class MonteCarlo(NamedTuple):
     notes: tuple[str, ...]
 
 
-def monte_carlo(mission: Mission, draws: int, seed: int | None = None) -> MonteCarlo:
+def monte_carlo(analysis: Analysis, draws: int, seed: int | None = None) -> MonteCarlo:
     """Draw the declared errors of a mission and count how often each requirement holds.
 
     Parameters
     ----------
-    mission : Mission
-        As loaded.
+    analysis : Analysis
+        Of the mission.
     draws : int
         From 1 to `MAX_DRAWS`; memory does not grow with it.
     seed : int, optional
@@ -96,9 +96,9 @@ def monte_carlo(mission: Mission, draws: int, seed: int | None = None) -> MonteC
     """
     if not 1 <= draws <= MAX_DRAWS:
         raise ValueError(f"the number of draws must be from 1 to {MAX_DRAWS}, not {draws}")
+    mission = analysis.mission
     if seed is None:
         seed = (mission.simulation or Simulation()).seed
-    analysis = Analysis(mission)
     variables = list(_variables(analysis))
     judged = list(_requirements(mission, analysis.allocation, analysis.stated))
     counted = count(analysis, variables, judged, draws, seed)
@@ -125,7 +125,7 @@ def monte_carlo(mission: Mission, draws: int, seed: int | None = None) -> MonteC
 def _distribution(mission: Mission, source: ErrorSource) -> str:
     if source.owner in PLATFORMS:
         return str(getattr(mission.platforms, source.owner).motion_error.distribution)
-    if source.id.startswith("common.") and mission.common_motion_error is not None:
+    if source.is_common and mission.common_motion_error is not None:
         return mission.common_motion_error.distribution
     # A clock's values are one sigma, as the coverage factor on them says; what has none is a bound.
     return "normal" if source.owner == "clock" else "bound"
@@ -145,7 +145,7 @@ def _variables(analysis: Analysis) -> Iterator[Variable]:
             yield _variable(f"{group.id}.{index}", group.platform, "normal", parts, plane)
     for source in left.values():
         distribution = _distribution(mission, source)
-        is_covered = source.owner != "mission" or source.id.startswith("common.")
+        is_covered = source.owner != "mission" or source.is_common
         size = abs(source.declared or 0.0) / (factor if is_covered else 1.0)
         if distribution == "uniform":
             size /= math.sqrt(3)  # the standard uncertainty of ±a, GUM 4.3.7
@@ -317,7 +317,7 @@ def _notes(mission: Mission, declared: Sequence[ErrorSource], is_exact: bool) ->
         yield f"drawn by the full model; the rows are judged by allocation.model, {mission.allocation.model}"
     if mission.allocation.combine == "each":
         yield "a draw is the sum of all errors at once; the rows are judged one by one, allocation.combine being each"
-    bounds = [source.id for source in declared if source.owner == "mission" and not source.id.startswith("common.")]
+    bounds = [source.id for source in declared if source.owner == "mission" and not source.is_common]
     if bounds:
         yield f"{', '.join(bounds)}: drawn as plus or minus the declared value, which has no distribution"
     vibrations = [getattr(mission.platforms, name).motion_error.vibration for name in PLATFORMS]

@@ -11,11 +11,11 @@ from typing import NamedTuple
 from bisar_budget.budget.allocation import Allocation
 from bisar_budget.budget.echoes import SLOWEST
 from bisar_budget.budget.effects import PLATFORMS
-from bisar_budget.budget.findings import Row
 from bisar_budget.budget.judgement import judged
 from bisar_budget.budget.models import CUBIC, QUADRATIC
 from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.budget.vibration_lines import Line, lines_of, projected
+from bisar_budget.findings.row import Row, subject
 from bisar_budget.mission.model import Mission, MotionError
 from bisar_budget.units import format_limit
 
@@ -57,7 +57,7 @@ def slow_phases(mission: Mission) -> list[SlowPhase]:
             cycles = line.frequency * T
             if cycles < SLOWEST:
                 phase = 2 * math.pi * line.amplitude / mission.radar.wavelength
-                row_id = f"{name}.vibration.sinusoidal.{index}"
+                row_id = subject(name, "vibration", "sinusoidal", entry=index).id
                 found.append(SlowPhase(row_id, name, phase * quadratic_part(cycles), phase * cubic_part(cycles)))
     return found
 
@@ -109,7 +109,7 @@ def slow_row(mission: Mission, allocation: Allocation, name: str, index: int, li
     use = line.amplitude / limits.smallest
     row = judged(
         mission,
-        id=f"{name}.vibration.sinusoidal.{index}",
+        subject=subject(name, "vibration", "sinusoidal", entry=index),
         metric=QUADRATIC,
         unit="m",
         declared=line.amplitude,

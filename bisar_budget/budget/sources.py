@@ -21,6 +21,7 @@ from bisar_budget.budget.effects import (
 from bisar_budget.budget.exact_ranges import ExactRanges
 from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
 from bisar_budget.errors import KeyPath
+from bisar_budget.findings.row import Subject, subject
 from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, PlatformState, Vector
 from bisar_budget.mission.model import Mission, MotionError
 
@@ -58,7 +59,7 @@ def _motion(mission: Mission, name: str, state: PlatformState, full_effects: lis
         values: Vector | None = getattr(error, kind) if covariance is None else covariance.of(kind)
         declared = None if values is None else tuple([value * factor for value in values])
         path: KeyPath = ("platforms", name, "motion_error", kind if covariance is None else "covariance")
-        for axis, (row_id, own_path, equation, no_limit) in enumerate(_scene_axes(name, kind)):
+        for axis, (what, own_path, equation, no_limit) in enumerate(_scene_axes(name, kind)):
             on_axis = None
             if declared is not None:
                 if in_scene:
@@ -69,29 +70,24 @@ def _motion(mission: Mission, name: str, state: PlatformState, full_effects: lis
                     on_axis = factor * covariance.along(kind, [direction[axis] for direction in axes])
             if covariance is not None:
                 own_path = (*path, *covariance.path(kind, axis))
-            yield ErrorSource._make(  # twice as quick as by keyword, and there are 18 in every mission
-                (
-                    row_id,
-                    name,
-                    unit,
-                    on_axis,
-                    own_path if in_scene and declared is not None else path,
-                    effects[axis],
-                    full[axis],
-                    _AXES[axis],
-                    equation,
-                    no_limit,
-                    error.source,
-                    in_scene,
-                    (),
-                )
+            yield ErrorSource(
+                subject=what,
+                unit=unit,
+                declared=on_axis,
+                path=own_path if in_scene and declared is not None else path,
+                effect=effects[axis],
+                full=full[axis],
+                direction=_AXES[axis],
+                equation=equation,
+                no_limit=no_limit,
+                evidence=error.source,
+                is_independent=in_scene,
             )
         if in_scene or declared is None:
             continue
         for index, (axis_name, direction) in enumerate(zip(FRAME_AXES[error.frame], axes, strict=True)):
             yield ErrorSource(
-                id=f"{name}.{kind}.{axis_name}",
-                owner=name,
+                subject=subject(name, kind, axis_name, error.frame),
                 unit=unit,
                 declared=declared[index],
                 path=(*path, *((index,) if covariance is None else covariance.path(kind, index))),
@@ -105,11 +101,11 @@ def _motion(mission: Mission, name: str, state: PlatformState, full_effects: lis
 
 
 @cache
-def _scene_axes(name: str, kind: str) -> tuple[tuple[str, KeyPath, str, str], ...]:
-    """Row id, path in the file, equation and reason for no limit, along each axis of the scene."""
+def _scene_axes(name: str, kind: str) -> tuple[tuple[Subject, KeyPath, str, str], ...]:
+    """Subject, path in the file, equation and reason for no limit, along each axis of the scene."""
     return tuple(
         (
-            f"{name}.{kind}.{letter}",
+            subject(name, kind, letter),
             ("platforms", name, "motion_error", kind, axis),
             _equation(kind, axis),
             _no_limit(kind, letter),
@@ -163,8 +159,7 @@ def _clock(mission: Mission, full_effects: list[Effect]) -> Iterator[ErrorSource
     for (term, unit), row, full in zip(CLOCK_UNITS.items(), rows, full_effects, strict=True):
         value: float | None = getattr(mission.timing_error, term)
         yield ErrorSource(
-            id=f"timing.{term}",
-            owner="clock",
+            subject=subject("clock", "timing", term),
             unit=unit,
             declared=None if value is None else value * mission.allocation.coverage_factor,
             path=("timing_error", term),
@@ -181,10 +176,10 @@ def _terrain(mission: Mission, sources: list[ErrorSource]) -> Iterator[ErrorSour
     height = mission.scene.height_error
     if height is None:
         return
-    up = [source for source in sources if source.id in ("transmitter.position.z", "receiver.position.z")]
+    of_platforms = [subject(name, "position", "z") for name in PLATFORMS]
+    up = [source for source in sources if source.subject in of_platforms]
     yield ErrorSource(
-        id="mission.terrain",
-        owner="mission",
+        subject=subject("mission", "terrain"),
         unit="m",
         declared=height,
         path=("scene", "height_error"),
@@ -200,8 +195,7 @@ def _terrain(mission: Mission, sources: list[ErrorSource]) -> Iterator[ErrorSour
 def _other(mission: Mission) -> Iterator[ErrorSource]:
     for index, other in enumerate(mission.other_errors):
         yield ErrorSource(
-            id=f"other.{other.name}",
-            owner="mission",
+            subject=subject("mission", "other", other.name),
             unit="rad",
             declared=other.quadratic_phase_error,
             path=("other_errors", index, "quadratic_phase_error"),

@@ -23,12 +23,12 @@ from bisar_budget import evaluators
 from bisar_budget.budget.allocation import Allocation, Split
 from bisar_budget.budget.echoes import NEAR_CYCLES, SLOWEST, near_lines, worst_phases
 from bisar_budget.budget.effects import PLATFORMS
-from bisar_budget.budget.findings import Row
 from bisar_budget.budget.judgement import judged
 from bisar_budget.budget.slow_vibration import cubic_part, quadratic_part, slow_row
 from bisar_budget.budget.vibration_lines import Line, along_line_of_sight, lines_of, projected
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.errors import KeyPath
+from bisar_budget.findings.row import Row, Subject, subject
 from bisar_budget.mission.model import Mission, MotionError
 from bisar_budget.units import format_limit, format_quantity
 
@@ -61,7 +61,7 @@ class VibrationCase(NamedTuple):
     those of a row.
     """
 
-    id: str
+    subject: Subject
     metric: str
     declared: float | None
     limits: VibrationLimits | None
@@ -160,7 +160,7 @@ def _row(mission: Mission, case: VibrationCase, model: str) -> Row:
     allowed = case.limits
     row = judged(
         mission,
-        id=case.id,
+        subject=case.subject,
         metric=case.metric,
         unit="m",
         declared=case.declared,
@@ -184,11 +184,17 @@ def _row(mission: Mission, case: VibrationCase, model: str) -> Row:
 
 
 def _case(
-    mission: Mission, allowed: VibrationLimits | None, metric: str, name: str, own_id: str, *path: str | int
+    mission: Mission,
+    allowed: VibrationLimits | None,
+    metric: str,
+    name: str,
+    axis: str,
+    entry: int | None,
+    *path: str | int,
 ) -> VibrationCase:
     """What every row of a platform's vibration has, before anything is declared."""
     error: MotionError = getattr(mission.platforms, name).motion_error
-    case = _blank(metric, name, own_id, path, mission.allocation.model)
+    case = _blank(subject(name, "vibration", axis, entry=entry), metric, path, mission.allocation.model)
     if allowed is None and error.source is None:
         return case
     missing = "" if allowed else case.missing
@@ -198,17 +204,17 @@ def _case(
 
 
 @cache
-def _blank(metric: str, name: str, own_id: str, path: KeyPath, model: str) -> VibrationCase:
+def _blank(what_it_is: Subject, metric: str, path: KeyPath, model: str) -> VibrationCase:
     """The row of a mission that says nothing of vibration."""
     what, kind = ("paired echoes", "sinusoidal") if metric == "pslr" else ("power spread", "wideband")
     missing = f"no requirements.{metric} to hold it to"
     rule = f"Section V, {kind}" if model == "published" else "first principles"
     return VibrationCase(
-        id=f"{name}.vibration.{own_id}",
+        subject=what_it_is,
         metric=metric,
         declared=None,
         limits=None,
-        path=("platforms", name, "motion_error", "vibration", kind, *path),
+        path=("platforms", what_it_is.owner, "motion_error", "vibration", kind, *path),
         equation=rule,
         missing=missing,
         not_evaluated=missing,
@@ -229,7 +235,7 @@ def _line(
     both: "_Together",
 ) -> VibrationCase:
     error: MotionError = getattr(mission.platforms, name).motion_error
-    case = _case(mission, allowed, "pslr", name, f"sinusoidal.{index}", index, "amplitude")
+    case = _case(mission, allowed, "pslr", name, "sinusoidal", index, index, "amplitude")
     if line is None:
         return case
     case = _with_doubt(case._replace(declared=line.amplitude), mission.allocation.model)
@@ -265,7 +271,7 @@ def _together(
     """Lines of one platform so near each other that their echoes add: the one line that has an echo as high."""
     T = mission.collection.aperture_time
     shown = ", ".join(map(str, numbers[:5])) + (f" and {len(numbers) - 5} more" if len(numbers) > 5 else "")
-    case = _case(mission, allowed, "pslr", name, f"sinusoidal.sum.{index}", numbers[0], "frequency")
+    case = _case(mission, allowed, "pslr", name, "sinusoidal.sum", index, numbers[0], "frequency")
     declared = worst_phases([line.amplitude for line in members], [line.frequency * T for line in members]).amplitude
     near = (
         f"entries {shown}, at {_band(members)}, are at most {NEAR_CYCLES:g} cycles per aperture apart: in the worst "
@@ -281,7 +287,7 @@ def _band(lines: Sequence[Line]) -> str:
 
 def _noise(mission: Mission, allowed: VibrationLimits | None, name: str, error: MotionError) -> VibrationCase:
     wideband = error.vibration.wideband
-    case = _case(mission, allowed, "islr", name, "wideband", "rms")
+    case = _case(mission, allowed, "islr", name, "wideband", None, "rms")
     if wideband is None:
         return case
     rms = along_line_of_sight(wideband.rms, error, getattr(mission.platforms, name).state, "islr")

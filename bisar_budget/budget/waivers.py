@@ -4,15 +4,9 @@ from collections.abc import Sequence
 from datetime import date
 from fnmatch import fnmatchcase
 
-from bisar_budget.budget.findings import FileWarning, Row
+from bisar_budget.findings.mission import FileWarning
+from bisar_budget.findings.row import Row, Waiver
 from bisar_budget.mission.model import Mission
-
-_WORDS, _EXPIRED = "waiver of line", "expired "
-
-
-def waiver_notes(row: Row) -> tuple[str, ...]:
-    """Those of the notes of a row that are about waivers, valid or expired."""
-    return tuple(note for note in row.notes if note.removeprefix(_EXPIRED).startswith(_WORDS))
 
 
 def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> tuple[list[Row], list[FileWarning]]:
@@ -30,7 +24,7 @@ def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> tuple[l
     Returns
     -------
     rows : list of Row
-        Failing rows with a valid waiver are `waived`; one with an expired waiver keeps its status, with a note.
+        Failing rows with a valid waiver are `waived`; one with an expired waiver keeps its status.
     warnings : list of FileWarning
         Waivers that name no row, or none that fails.
     """
@@ -40,14 +34,13 @@ def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> tuple[l
         line = mission.line(("waivers", index, "id"))
         named = [position for position, row in enumerate(rows) if _names(waiver.id, row.id)]
         failing = [position for position in named if rows[position].status == "fail"]
-        expired = today > waiver.until
+        applied = Waiver(line, waiver.until, waiver.reason, is_expired=today > waiver.until)
         for position in failing:
             row = result[position]
-            words = f"{_WORDS} {line}, until {waiver.until}: {waiver.reason}"
-            if expired:
-                result[position] = row._replace(notes=(*row.notes, f"{_EXPIRED}{words}"))
+            if applied.is_expired:
+                result[position] = row._replace(waivers=(*row.waivers, applied))
             elif row.status == "fail":
-                result[position] = row._replace(status="waived", notes=(*row.notes, words))
+                result[position] = row._replace(status="waived", waivers=(*row.waivers, applied))
         if not named:
             warnings.append(FileWarning(line=line, message=f"waiver {waiver.id}: matches no row"))
         elif len(named) == len(rows):

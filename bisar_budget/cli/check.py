@@ -30,7 +30,7 @@ from bisar_budget.constants import MAX_DRAWS
 from bisar_budget.errors import printable
 
 if TYPE_CHECKING:
-    from bisar_budget.budget.findings import MissionFindings, Option, Report, UnusableMission
+    from bisar_budget.findings.mission import MissionFindings, Option, Report, UnusableMission
     from bisar_budget.mission.model import Mission
     from bisar_budget.report import Style
 
@@ -214,7 +214,7 @@ def check(
     Defaults of --format, --report, --strict, --exit-zero, --model, --monte-carlo, --seed and --color:
     [tool.bisar-budget] in the nearest pyproject.toml, and over it the variables BISAR_BUDGET_FORMAT and so on.
     """
-    from bisar_budget.budget.findings import exit_code
+    from bisar_budget.findings.status import exit_code
     from bisar_budget.report import ILLUSTRATED, PIECEWISE, Style, joined, piece, render
 
     written = [(name, _format_of(name)) for name in reports]
@@ -268,16 +268,15 @@ def check(
 
 def _has_waivers(missions: "Iterable[MissionFindings | UnusableMission]") -> bool:
     """Whether the day decides anything."""
-    from bisar_budget.budget.findings import MissionFindings
-    from bisar_budget.budget.waivers import waiver_notes
+    from bisar_budget.findings.mission import MissionFindings
 
     usable = [mission for mission in missions if isinstance(mission, MissionFindings)]
-    return any(waiver_notes(row) for mission in usable for row in mission.rows)
+    return any(row.waivers for mission in usable for row in mission.rows)
 
 
 def _options(judged_on: date | None) -> "Iterator[Option]":
     """Say what the options that bear on the result are, and where each came from."""
-    from bisar_budget.budget.findings import Option
+    from bisar_budget.findings.mission import Option
 
     context = click.get_current_context()
     origins = {
@@ -325,14 +324,14 @@ def check_all(
     `drawn` is the number of draws of a Monte Carlo and their seed.
     """
     from bisar_budget.budget.check import check_mission
-    from bisar_budget.budget.findings import Report, UnusableMission
     from bisar_budget.errors import MissionError
+    from bisar_budget.findings.mission import Report, UnusableMission
     from bisar_budget.mission.load import load_mission
 
     if not (verifying or illustrated or drawn):
-        from bisar_budget.budget.fleet import check_files, without_mission
+        from bisar_budget.budget.fleet import check_files, without_analysis
 
-        return Report(version=__version__, missions=tuple(check_files(files, today, model, without_mission)))
+        return Report(version=__version__, missions=tuple(check_files(files, today, model, without_analysis)))
     missions: list[MissionFindings | UnusableMission] = []
     usable: dict[int, Mission] = {}
     for index, file in enumerate(files):
@@ -342,8 +341,8 @@ def check_all(
             if drawn is not None:
                 from bisar_budget.budget.monte_carlo import monte_carlo
 
-                found = found._replace(monte_carlo=monte_carlo(mission, *drawn))
-            missions.append(found if illustrated else found._replace(mission=None))
+                found = found._replace(monte_carlo=monte_carlo(found.analysed(), *drawn))
+            missions.append(found if illustrated or verifying else without_analysis(found))
             if verifying:
                 usable[index] = mission
         except MissionError as error:
@@ -418,8 +417,8 @@ def _append_step_summary(report: "Report", style: "Style") -> None:
 
 
 def _say_faults(missions: "Iterable[MissionFindings | UnusableMission | None]") -> None:
-    from bisar_budget.budget.findings import UnusableMission
     from bisar_budget.errors import MissionError
+    from bisar_budget.findings.mission import UnusableMission
 
     for mission in missions:
         if isinstance(mission, UnusableMission):

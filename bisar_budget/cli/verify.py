@@ -25,7 +25,7 @@ from bisar_budget.resources import cores
 if TYPE_CHECKING:
     from click._termui_impl import ProgressBar
 
-    from bisar_budget.budget.images import VerifiedMission
+    from bisar_budget.findings.images import VerifiedMission
     from bisar_budget.mission.model import Mission
 
 

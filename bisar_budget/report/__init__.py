@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from importlib import import_module
 from typing import NamedTuple
 
-from bisar_budget.budget.findings import MissionFindings, Report, UnusableMission
+from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
 
 # Format name to its module; imported when asked for, so that none costs the others anything.
 FORMATS = {

@@ -4,9 +4,10 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from bisar_budget.budget.findings import MissionFindings, Row
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.errors import KeyPath
+from bisar_budget.findings.mission import MissionFindings
+from bisar_budget.findings.row import Row
 from bisar_budget.mission.model import Mission
 
 _JUDGES_NOTHING = ("info", "not_declared", "not_evaluated", "waived")

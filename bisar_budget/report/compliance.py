@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 from bisar_budget.budget.allocation import Allocation
 from bisar_budget.budget.analysis import Analysis
 from bisar_budget.budget.effects import MOTION_UNITS, ErrorSource
-from bisar_budget.budget.findings import MissionFindings, Report, Row, UnusableMission, worst_first
-from bisar_budget.budget.images import PointImage
-from bisar_budget.budget.waivers import waiver_notes
 from bisar_budget.catalogue import EQUATIONS
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.errors import KeyPath
+from bisar_budget.findings.images import PointImage
+from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
+from bisar_budget.findings.row import Row, worst_first
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import Style, verification
 from bisar_budget.report.compliance_view import (
@@ -59,7 +59,6 @@ from bisar_budget.report.text_table import (
     multiple_of_pi,
     narrow_gradients,
     percent,
-    reasons,
 )
 from bisar_budget.units import format_quantity
 
@@ -115,7 +114,7 @@ def compliance(report: Report, style: Style) -> Compliance:
     Raises
     ------
     ValueError
-        Findings that do not carry their mission.
+        Findings that do not carry their analysis.
     """
     pages = []
     for number, mission in enumerate(report.missions, start=1):
@@ -171,10 +170,8 @@ def _unusable(found: UnusableMission, style: Style, anchor: str) -> MissionPage:
 
 
 def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
-    mission = found.mission
-    if mission is None:
-        raise ValueError("a compliance report needs findings that carry their mission")
-    analysis = Analysis(mission)
+    analysis = found.analysed()
+    mission = analysis.mission
     sources = {source.id: source for source in analysis.sources}
     rows = worst_first(found.rows)
     judged = [row for row in rows if row.status in _JUDGED]
@@ -197,7 +194,7 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
             use_text=_use(row),
             margin=_margin(None if row.status == "not_evaluated" else row.margin),
             status=row.status,
-            waiver="; ".join(waiver_notes(row)),
+            waiver="; ".join(waiver.words for waiver in row.waivers),
             line=row.line,
             remarks=_remarks(row),
             in_summary=row.id in in_summary,
@@ -226,7 +223,7 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
         matrix=matrix,
         remarks=tuple(_grouped((row.id, row.remarks) for row in matrix)),
         reasons=tuple(
-            _grouped((row.id, reasons(row)) for row in judged if row.status in EXPLAINED and row.id not in driving)
+            _grouped((row.id, row.decisive) for row in judged if row.status in EXPLAINED and row.id not in driving)
         ),
         hidden=sum(not row.in_summary for row in matrix),
         pictures=drawings(found),
@@ -385,12 +382,11 @@ def _drivers(judged: Sequence[Row], status: str) -> Iterator[Driver]:
 
 def _driver(row: Row) -> Driver:
     use = None if row.status == "not_evaluated" or row.allowable is None else row.utilization
-    return Driver(row.id, row.requirement_id or "", row.status, measure(row), "; ".join(reasons(row)), use)
+    return Driver(row.id, row.requirement_id or "", row.status, measure(row), "; ".join(row.decisive), use)
 
 
 def _remarks(row: Row) -> tuple[str, ...]:
-    waivers = waiver_notes(row)
-    return tuple(text for text in (row.reason, *row.notes) if text and text not in waivers)
+    return tuple(text for text in (row.reason, *row.remarks, *row.refuted) if text)
 
 
 def _grouped(said: Iterable[tuple[str, Sequence[str]]]) -> Iterator[Remark]:
@@ -412,18 +408,18 @@ def _requirement(mission: Mission, found: MissionFindings, row: Row, source: Err
         split = allocation.pslr if row.metric == "pslr" else allocation.islr
         if value is None:
             return "none stated"
-        return f"{what} ≤ {value:g} dB, {split.of(row.id.split('.')[0]):.3g} of the power"
+        return f"{what} ≤ {value:g} dB, {split.of(row.owner):.3g} of the power"
     if binding == "cubic_phase_error":
         value = requirements.cubic_phase_error
         return "none stated" if value is None else f"cubic phase ≤ {_limit(value, 'rad')}"
     if binding == "location_error":
         value = requirements.location_error
         return "none stated" if value is None else f"displacement ≤ {_limit(value, 'm')}"
-    if row.id == "mission.autofocus_pull_in":
+    if row.subject.kind == "autofocus_pull_in":
         return "all QPE together within what autofocus corrects, π·N_pull"
-    if row.id == "mission.spatial_variance":  # one correction for the whole scene: no gain
+    if row.subject.kind == "spatial_variance":  # one correction for the whole scene: no gain
         return f"QPE differs over the scene by ≤ {_limit(allocation.qpe_total, 'rad')}"
-    owner = {"timing": "clock"}.get(row.id.split(".")[0], row.id.split(".")[0]) if source is None else source.owner
+    owner = row.owner
     limit = allocation.qpe_limit(owner) * allocation.autofocus_gain
     share = "" if owner == "mission" else f", {allocation.qpe.of(owner):.3g} of the budget"
     return f"QPE ≤ {_limit(limit, 'rad')}{share}"
@@ -499,12 +495,10 @@ def _moves(found: MissionFindings, stated: Iterable[ErrorSource]) -> tuple[Move,
 
 def _kind(source: ErrorSource) -> tuple[str, str, str]:
     """Owner, kind and axis of an error."""
-    first, kind, axis = (*source.id.split(".", 2), "", "")[:3]
+    _, owner, kind, axis, *_ = source.subject
     if kind in MOTION_UNITS:
-        return "both platforms" if first == "common" else first, kind, axis.replace("_", " ")
-    if first == "timing":
-        return "clock", "timing", kind
-    return ("mission", "terrain", "height") if source.is_motion else ("mission", "other", source.id.partition(".")[2])
+        return "both platforms" if source.is_common else owner, kind, axis.replace("_", " ")
+    return owner, kind, axis or "height"
 
 
 def _phase(value: float) -> str:
@@ -581,11 +575,8 @@ def _inputs(mission: Mission, found: MissionFindings, file: str) -> Iterator[Inp
 
 
 def _may_have_a_source(row: Row) -> bool:
-    parts = row.id.split(".")
     return (
-        row.declared is not None
-        and row.is_independent
-        and (parts[1] in (*MOTION_UNITS, "vibration") or parts[0] == "other")
+        row.declared is not None and row.is_independent and row.subject.kind in (*MOTION_UNITS, "vibration", "other")
     )
 
 

@@ -3,7 +3,7 @@
 from datetime import date
 from typing import NamedTuple
 
-from bisar_budget.budget.findings import Option
+from bisar_budget.findings.mission import Option
 from bisar_budget.mission.model import Document
 from bisar_budget.report.formulas import Step
 

@@ -4,8 +4,8 @@ import csv
 import io
 from collections.abc import Iterable, Iterator, Sequence
 
-from bisar_budget.budget.findings import MissionFindings, UnusableMission
 from bisar_budget.errors import printable
+from bisar_budget.findings.mission import MissionFindings, UnusableMission
 from bisar_budget.report import Piece, Style
 
 COLUMNS = (

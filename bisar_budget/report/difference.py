@@ -4,8 +4,8 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-from bisar_budget.budget.findings import Row
 from bisar_budget.errors import printable
+from bisar_budget.findings.row import Row
 from bisar_budget.report.comparison import Change, MissionChange, Moved
 from bisar_budget.report.escapes import markdown_text
 from bisar_budget.report.layout import table, wrapped

@@ -6,7 +6,7 @@ a satellite, or two satellites flying together. The description of each drawing 
 
 import math
 
-from bisar_budget.budget.findings import MissionFindings
+from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.geometry import BistaticGeometry, PlatformState, Vector, norm
 from bisar_budget.report.collection_view import Place, SeenPlatform, View, degrees, draw
 from bisar_budget.units import format_quantity

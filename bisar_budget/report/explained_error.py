@@ -5,9 +5,10 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from bisar_budget.budget.analysis import Analysis
 from bisar_budget.budget.effects import MOTION_UNITS, PLATFORMS, ErrorSource
-from bisar_budget.budget.findings import MissionFindings
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.errors import KeyPath, printable
+from bisar_budget.findings.mission import MissionFindings
+from bisar_budget.findings.row import Subject, subject
 from bisar_budget.geometry import FRAME_AXES, PlatformState
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import formulas
@@ -23,9 +24,9 @@ def declaration(mission: Mission, source: ErrorSource) -> Iterator[Step]:
     yield from step(f"Declared in {place(mission, source.path)}", as_written(mission, source.path))
     if source.evidence:
         yield from step("Evidence", printable(source.evidence))
-    platform, kind, axis = (*source.id.split(".", 2), "")[:3]
+    platform, kind, axis = source.owner, source.subject.kind, source.subject.axis
     k = mission.allocation.coverage_factor
-    if kind in MOTION_UNITS and platform in ("transmitter", "receiver"):
+    if platform in PLATFORMS:
         error = getattr(mission.platforms, platform).motion_error
         stated = error.stated(kind)
         if error.frame != "scene" and axis in formulas.AXES:
@@ -34,10 +35,10 @@ def declaration(mission: Mission, source: ErrorSource) -> Iterator[Step]:
         if error.covariance is not None and error.covariance.is_matrix and kind != "acceleration":
             yield from step("One sigma is the root of the variance")
         own = stated[FRAME_AXES[error.frame].index(axis)]
-    elif platform == "common":
+    elif source.is_common:
         own = getattr(mission.common_motion_error, kind)[formulas.AXES.index(axis)]
     elif source.owner == "clock":
-        own = getattr(mission.timing_error, kind)
+        own = getattr(mission.timing_error, axis)
     else:
         return  # an error of nobody's: no coverage factor
     lines = equation("declared", "k*|value|", {"k": k, "value": own}, abs(source.declared), source.unit)
@@ -46,7 +47,7 @@ def declaration(mission: Mission, source: ErrorSource) -> Iterator[Step]:
 
 def _turned(mission: Mission, source: ErrorSource, axis: str) -> Iterator[Step]:
     """Errors of another frame along one axis of the scene."""
-    platform, kind, _ = source.id.split(".")
+    platform, kind = source.owner, source.subject.kind
     error = getattr(mission.platforms, platform).motion_error
     axes = getattr(mission.platforms, platform).state.frame(error.frame)
     covariance = error.covariance if kind != "acceleration" else None
@@ -85,18 +86,18 @@ def _quadratic_form(parts: Sequence[str], correlation: Sequence[Sequence[float]]
 def effect(analysis: Analysis, found: MissionFindings, source: ErrorSource, model: str | None) -> Iterator[Step]:
     """From `declared` to the quadratic phase error; for one unit where nothing is declared."""
     mission = analysis.mission
-    sources = {one.id: one for one in analysis.sources}
+    sources = {one.subject: one for one in analysis.sources}
     size = 1.0 if source.declared is None else abs(source.declared)
     each = " of one unit" if source.declared is None else ""
     signed = math.copysign(size, source.declared or 1.0)
     qpe = abs(source.effect.qpe) * size
-    platform, kind, axis = (*source.id.split(".", 2), "")[:3]
+    platform, kind, axis = source.owner, source.subject.kind, source.subject.axis
     gates_by_full = model == "full"
     if gates_by_full and source.is_motion and source.owner != "mission":
         yield from step("The published model, for comparison; what gates, the full model, comes after it")
     if not source.is_motion:
         yield from step("Quadratic phase error, as declared", f"QPE = {size:.6g} rad")
-    elif platform == "common":
+    elif source.is_common:
         yield from _common_effect(mission, found, source, sources, signed, each)
     elif source.owner == "mission":
         yield from step("Published model: a height error moves the image, no quadratic term")
@@ -146,7 +147,7 @@ def _motion_values(
 
 
 def _clock_effect(mission: Mission, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
-    order = ("constant", "linear", "quadratic", "cubic").index(source.id.split(".")[1])
+    order = ("constant", "linear", "quadratic", "cubic").index(source.subject.axis)
     values = {
         "c": SPEED_OF_LIGHT,
         "T": mission.collection.aperture_time,
@@ -169,15 +170,15 @@ def _common_effect(
     mission: Mission,
     found: MissionFindings,
     source: ErrorSource,
-    sources: Mapping[str, ErrorSource],
+    sources: Mapping[Subject, ErrorSource],
     size: float,
     each: str,
 ) -> Iterator[Step]:
     """The effects of both platforms, added with their signs."""
-    _, kind, axis = source.id.split(".")
+    _, _, kind, axis, *_ = source.subject
     values = {}
     for platform in PLATFORMS:
-        leg, phase = sources[source.id.replace("common", platform)], f"φ_{platform[0]}"
+        leg, phase = sources[subject(platform, kind, axis)], f"φ_{platform[0]}"
         values[phase] = leg.effect.qpe * size
         known = _motion_values(mission, getattr(found.geometry, platform), platform, kind, axis, size)
         for order, formula in formulas.motion_coefficients(kind, axis, platform).items():
@@ -198,16 +199,15 @@ def _projected_effect(
     mission: Mission,
     found: MissionFindings,
     source: ErrorSource,
-    sources: Mapping[str, ErrorSource],
+    sources: Mapping[Subject, ErrorSource],
     size: float,
     each: str,
 ) -> Iterator[Step]:
     """Along an axis of another frame: the projection of the effects along the axes of the scene."""
-    platform, kind, axis = source.id.split(".")
+    _, platform, kind, axis, frame, _ = source.subject
     state: PlatformState = getattr(found.geometry, platform)
-    frame = getattr(mission.platforms, platform).motion_error.frame
     direction = state.frame(frame)[FRAME_AXES[frame].index(axis)]
-    along = [sources[f"{platform}.{kind}.{letter}"].effect.qpe for letter in formulas.AXES]
+    along = [sources[subject(platform, kind, letter)].effect.qpe for letter in formulas.AXES]
     terms = " + ".join(f"{number(q)}*{number(d)}" for q, d in zip(along, direction, strict=True))
     unit = f"rad per {source.unit}"
     yield from step(

@@ -9,7 +9,6 @@ from bisar_budget.budget.analysis import Analysis
 from bisar_budget.budget.correlation import displacement_parts, phase_parts
 from bisar_budget.budget.echoes import near_lines, sinc, worst_phases
 from bisar_budget.budget.effects import ErrorSource, image_plane
-from bisar_budget.budget.findings import MissionFindings, Row
 from bisar_budget.budget.models import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.budget.scene import ScenePhases, at
 from bisar_budget.budget.slow_vibration import cubic_part, quadratic_part, slow_limits
@@ -17,6 +16,8 @@ from bisar_budget.budget.vibration import amplitude_share, echo_phase
 from bisar_budget.budget.vibration_lines import lines_of
 from bisar_budget.constants import ROUNDING
 from bisar_budget.errors import KeyPath, printable
+from bisar_budget.findings.mission import MissionFindings
+from bisar_budget.findings.row import Row
 from bisar_budget.geometry import dot, without_rounding
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import formulas
@@ -66,22 +67,22 @@ def _fitted(line: str) -> list[str]:
 
 def chain(mission: Mission, found: MissionFindings, row: Row) -> Iterator[Step]:
     """Steps from the line of the mission file to how much of the allowable a row uses."""
-    analysis = Analysis(mission)
+    analysis = found.analysed()
     together = Together(analysis, analysis.full if row.model == "full" else analysis.published)
     source = next((source for source in analysis.sources if source.id == row.id), None)
     if source is not None:
         yield from declaration(mission, source)
         yield from effect(analysis, found, source, row.model)
         yield from _budget(analysis, source, row)
-    elif ".vibration." in row.id:
+    elif row.subject.kind == "vibration":
         yield from _vibration(mission, found.allocation, row)
-    elif row.id.endswith(".quadratic_phase_error") or row.id == "mission.autofocus_pull_in":
+    elif row.subject.kind in (QUADRATIC, "autofocus_pull_in"):
         yield from _phase_aggregate(together, found, row)
-    elif row.id == "mission.cubic_phase_error":
+    elif row.subject.kind == CUBIC:
         yield from _cubic_aggregate(together, found, row)
-    elif row.id == "mission.spatial_variance":
+    elif row.subject.kind == "spatial_variance":
         yield from _spatial_variance(analysis, found, row)
-    elif row.id == "mission.location_error":
+    elif row.subject.kind == LOCATION:
         yield from _location_aggregate(mission, together, found, row)
     if row.declared is not None and row.allowable is not None and row.utilization is not None:
         values = {"declared": row.declared, "allowable": row.allowable}
@@ -178,22 +179,22 @@ def _autofocus_gain(allocation: Allocation) -> Iterator[Step]:
 
 def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
     """From the file to the limits of both models, for one line, lines near each other, or noise."""
-    platform, _, _, *rest = row.id.split(".")
-    is_sinusoid, is_sum = row.metric != "islr", rest[:1] == ["sum"]
+    platform, entry = row.owner, row.subject.entry or 0
+    is_sinusoid, is_sum = row.metric != "islr", row.subject.axis == "sinusoidal.sum"
     path: KeyPath = ("platforms", platform, "motion_error", "vibration", "sinusoidal" if is_sinusoid else "wideband")
     if row.declared is None:
         yield Step(missing(mission, path))
     elif is_sum:
-        yield from _near_lines(mission, platform, int(rest[1]), row.declared)
+        yield from _near_lines(mission, platform, entry, row.declared)
     else:
-        path = (*path, int(rest[0]), "amplitude") if is_sinusoid else (*path, "rms")
+        path = (*path, entry, "amplitude") if is_sinusoid else (*path, "rms")
         yield from step(f"Declared in {place(mission, path)}", as_written(mission, path))
-        yield from _line_of_sight(mission, platform, is_sinusoid, rest, row.declared)
+        yield from _line_of_sight(mission, platform, is_sinusoid, entry, row.declared)
     if row.evidence:
         yield from step("Evidence", printable(row.evidence))
     wavelength = mission.radar.wavelength
     if row.qpe_full_rad is not None and row.declared is not None:
-        line = lines_of(mission, platform)[int(rest[0])]
+        line = lines_of(mission, platform)[entry]
         values = {
             "A": row.declared,
             "λ": wavelength,
@@ -255,7 +256,7 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[S
 
 def _slow_vibration(mission: Mission, allocation: Allocation, row: Row, cycles: float) -> Iterator[Step]:
     """From the phases of a vibration below one cycle per aperture to the amplitude that they allow."""
-    platform, wavelength = row.id.partition(".")[0], mission.radar.wavelength
+    platform, wavelength = row.owner, mission.radar.wavelength
     values = {"A": row.declared or 0.0, "λ": wavelength, "c": cubic_part(cycles)}
     lines = equation("cubic", "2*π*A*c/λ", values, row.cubic_rad or 0.0, "rad")
     yield from step("Cubic phase in the worst phase, c = 17.5·j₃(π·f·T)", *lines)
@@ -275,13 +276,11 @@ def _slow_vibration(mission: Mission, allocation: Allocation, row: Row, cycles: 
     yield from step("Allowable, the smallest", *equation("allowable", smallest, sizes, limits.smallest, "m"))
 
 
-def _line_of_sight(
-    mission: Mission, platform: str, is_sinusoid: bool, rest: Sequence[str], declared: float
-) -> Iterator[Step]:
+def _line_of_sight(mission: Mission, platform: str, is_sinusoid: bool, entry: int, declared: float) -> Iterator[Step]:
     """What of a vibration along three axes is along the line of sight."""
     body = getattr(mission.platforms, platform)
     vibration = body.motion_error.vibration
-    value = vibration.sinusoidal[int(rest[0])].amplitude if is_sinusoid else vibration.wideband.rms
+    value = vibration.sinusoidal[entry].amplitude if is_sinusoid else vibration.wideband.rms
     if not isinstance(value, tuple):
         return
     u, v, w = (dot(axis, body.state.look) for axis in body.state.frame(body.motion_error.frame))
@@ -312,8 +311,7 @@ def _near_lines(mission: Mission, platform: str, index: int, total: float) -> It
 
 
 def _phase_aggregate(together: Together, found: MissionFindings, row: Row) -> Iterator[Step]:
-    owner = {"timing": "clock"}.get(row.id.split(".")[0], row.id.split(".")[0])
-    is_pull_in = row.id == "mission.autofocus_pull_in"
+    owner, is_pull_in = row.owner, row.subject.kind == "autofocus_pull_in"
     rule = "sum" if is_pull_in else found.combine
     phases = together.owed(found.allocation, owner)
     parts = phase_parts(phases, rule, together.groups)

@@ -6,8 +6,9 @@ The runner shows ten errors and ten warnings of a step, so the worst come first.
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from bisar_budget.budget.findings import MissionFindings, Report, UnusableMission, worst_first
 from bisar_budget.errors import Fault, Place, Region
+from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
+from bisar_budget.findings.row import worst_first
 from bisar_budget.report import Style
 from bisar_budget.report.escapes import command_property, command_text, markdown_text, source_path
 from bisar_budget.report.sentences import finding

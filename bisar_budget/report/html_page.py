@@ -6,8 +6,8 @@ from base64 import b64encode
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from bisar_budget.budget.findings import Report
 from bisar_budget.errors import printable
+from bisar_budget.findings.mission import Report
 from bisar_budget.report import Style, typeset
 from bisar_budget.report.compliance import compliance
 from bisar_budget.report.compliance_view import STATUS_WORDS

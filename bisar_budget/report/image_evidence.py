@@ -5,7 +5,7 @@ import zlib
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from bisar_budget.budget.images import FLOOR_DB, ImageEvidence, PointImage, Verdict
+from bisar_budget.findings.images import FLOOR_DB, ImageEvidence, PointImage, Verdict
 from bisar_budget.report.svg import Box, Canvas, Point, axis_number, round_step, ticks
 from bisar_budget.units import format_limit, format_quantity
 

@@ -6,7 +6,9 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from bisar_budget.budget.allocation import Split
-from bisar_budget.budget.findings import MissionFindings, UnusableMission, worst
+from bisar_budget.findings.mission import MissionFindings, UnusableMission
+from bisar_budget.findings.row import Row
+from bisar_budget.findings.status import worst
 from bisar_budget.geometry import PlatformState
 from bisar_budget.report import Piece, Style
 
@@ -30,6 +32,9 @@ def joined(pieces: Sequence[Piece], version: str, style: Style) -> str:
     return f'{head},\n  "missions": [\n{_MARGIN}{missions}\n  ]\n}}\n'
 
 
+# Names of a row's values in the contract, in the order of its fields; what follows them is in `notes`.
+_RENAMED = {"subject": "id", "remarks": "notes"}
+_ROW = tuple(_RENAMED.get(name, name) for name in Row._fields[: Row._fields.index("waivers")])
 _LEVELS, _MARGIN = 2, "    "  # of a mission: itself and its rows; what is inside a row stays on its line
 
 
@@ -121,13 +126,21 @@ def _mission(mission: MissionFindings) -> dict[str, Any]:
             "searched_radius_m": mission.scene.searched,
         },
         "summary": mission.summary,
-        "rows": [row._asdict() for row in mission.rows],
+        "rows": [_row(row) for row in mission.rows],
         "warnings": [{"line": warning.line, "message": warning.message} for warning in mission.warnings],
         "notes": mission.notes,
         "errors": [],
         "monte_carlo": None if mission.monte_carlo is None else _monte_carlo(mission.monte_carlo),
         "verification": None if mission.verdicts is None else [verdict._asdict() for verdict in mission.verdicts],
     }
+
+
+def _row(row: Row) -> dict[str, Any]:
+    found = dict(zip(_ROW, row, strict=False))
+    found["id"] = row.id
+    if row.waivers or row.refuted:
+        found["notes"] = row.notes
+    return found
 
 
 def _monte_carlo(drawn: "MonteCarlo") -> dict[str, Any]:

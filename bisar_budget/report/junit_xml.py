@@ -9,7 +9,8 @@ from collections.abc import Iterator
 from functools import cache
 from os.path import splitext
 
-from bisar_budget.budget.findings import MissionFindings, Report, Row, UnusableMission
+from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
+from bisar_budget.findings.row import Row
 from bisar_budget.report import Style
 from bisar_budget.report.escapes import source_path, xml_text
 from bisar_budget.report.sentences import cause, measure

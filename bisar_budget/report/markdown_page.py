@@ -7,8 +7,8 @@ from html import unescape
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
-from bisar_budget.budget.findings import MissionFindings, Report
 from bisar_budget.errors import printable
+from bisar_budget.findings.mission import MissionFindings, Report
 from bisar_budget.report import Style, typeset
 from bisar_budget.report.compliance import compliance, drawings, illustrations
 from bisar_budget.report.compliance_view import STATUS_WORDS, Chip, Compliance

@@ -10,7 +10,8 @@ import re
 from os.path import splitext
 from typing import Any
 
-from bisar_budget.budget.findings import MissionFindings, Report, Row, UnusableMission
+from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
+from bisar_budget.findings.row import Row
 from bisar_budget.report import Style
 from bisar_budget.report.escapes import need_text, rst_text, source_path
 from bisar_budget.report.sentences import cause, measure

@@ -5,13 +5,13 @@ a result with a suppression, a file that cannot be used gives notifications of t
 """
 
 import json
-import re
 from functools import cache
 from hashlib import sha256
 from typing import Any
 
-from bisar_budget.budget.findings import FileWarning, MissionFindings, Report, Row, UnusableMission
 from bisar_budget.errors import Fault, Place, printable
+from bisar_budget.findings.mission import FileWarning, MissionFindings, Report, UnusableMission
+from bisar_budget.findings.row import Row
 from bisar_budget.report import Style
 from bisar_budget.report.escapes import source_path, uri
 from bisar_budget.report.sentences import finding
@@ -73,7 +73,6 @@ RULES = {
     ),
 }
 _RULE_INDEX = {rule: index for index, rule in enumerate(RULES)}
-_WAIVER = re.compile(r"waiver of line (\d+|None), until ([\d-]+): (.*)", re.DOTALL)
 
 
 def render(report: Report, style: Style) -> str:
@@ -141,7 +140,7 @@ def _artifact_location(file: str, style: Style) -> dict[str, Any]:
 
 
 def _result(row: Row, mission: MissionFindings, artifact: dict[str, Any]) -> dict[str, Any]:
-    rule = "autofocus_pull_in" if row.id.endswith(".autofocus_pull_in") else row.metric
+    rule = "autofocus_pull_in" if row.subject.kind == "autofocus_pull_in" else row.metric
     rule = rule if rule in RULES else "other"
     result = _located(rule, LEVELS[row.status], finding(row), row.line, artifact, row.id)
     result["properties"] = {
@@ -209,15 +208,14 @@ def _region(line: int | None) -> dict[str, int]:
 
 def _suppression(row: Row, artifact: dict[str, Any]) -> dict[str, Any]:
     """Return the waiver: it stands in the file that is checked, which the standard calls `inSource`."""
-    match = next(found for note in row.notes if (found := _WAIVER.fullmatch(note)))
-    line, until, reason = match.groups()
-    region = {"startLine": int(line)} if line != "None" else {"startLine": 1}
+    waiver = next(one for one in row.waivers if not one.is_expired)
+    region = {"startLine": int(waiver.line or 1)}
     return {
         "kind": "inSource",
         "status": "accepted",
-        "justification": printable(reason),
+        "justification": printable(waiver.reason),
         "location": {"physicalLocation": {"artifactLocation": artifact, "region": region}},
-        "properties": {"until": until},
+        "properties": {"until": waiver.until.isoformat()},
     }
 
 

@@ -1,6 +1,6 @@
 """What a row says, in a sentence: for formats that have room for one line of text."""
 
-from bisar_budget.budget.findings import Row
+from bisar_budget.findings.row import Row
 from bisar_budget.report.text_table import binding_words, percent
 from bisar_budget.units import format_quantity
 

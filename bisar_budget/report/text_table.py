@@ -5,9 +5,10 @@ import re
 from collections.abc import Iterator, Sequence
 from functools import cache
 
-from bisar_budget.budget.findings import MissionFindings, Row, UnusableMission, image_notes, worst, worst_first
-from bisar_budget.budget.waivers import waiver_notes
 from bisar_budget.errors import printable
+from bisar_budget.findings.mission import MissionFindings, UnusableMission
+from bisar_budget.findings.row import Row, worst_first
+from bisar_budget.findings.status import worst
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.mission.model import Document
 from bisar_budget.report import Piece, Style
@@ -300,7 +301,7 @@ def _details(mission: MissionFindings, style: Style) -> Iterator[str]:
         if style.verbosity > 0:
             yield from _detail([row], [*filter(None, [row.reason]), *row.notes, *_more(row)], mission, style)
         elif row.status in EXPLAINED:
-            groups.setdefault((row.status, reasons(row)), []).append(row)
+            groups.setdefault((row.status, row.decisive), []).append(row)
     for (_, texts), rows in groups.items():
         yield from _detail(rows, texts, mission, style)
 
@@ -317,11 +318,6 @@ def _detail(rows: Sequence[Row], texts: Sequence[str], mission: MissionFindings,
     yield from rest
     for text in texts:
         yield from wrapped(f"  {text}", "  ")
-
-
-def reasons(row: Row) -> tuple[str, ...]:
-    """What decides the status of a row: its reason, and of its notes those on waivers and images."""
-    return tuple(text for text in (row.reason, *waiver_notes(row), *image_notes(row)) if text)
 
 
 def _more(row: Row) -> Iterator[str]:

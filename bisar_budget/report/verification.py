@@ -4,8 +4,8 @@ import json
 import math
 from collections.abc import Iterator, Sequence
 
-from bisar_budget.budget.images import Verdict, VerifiedMission
 from bisar_budget.errors import printable
+from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.report import Style
 from bisar_budget.report.layout import table, wrapped, wrapped_counts
 from bisar_budget.units import format_limit, format_quantity

@@ -4,10 +4,11 @@ import math
 
 import numpy as np
 
-from bisar_budget.budget.findings import MissionFindings
-from bisar_budget.budget.images import FLOOR_DB, ImageEvidence, PointImage, Verdict
 from bisar_budget.budget.pull_in import ROOM
 from bisar_budget.budget.verdicts import rows_worth_showing
+from bisar_budget.findings.images import FLOOR_DB, ImageEvidence, PointImage, Verdict
+from bisar_budget.findings.mission import MissionFindings
+from bisar_budget.findings.row import Subject
 from bisar_budget.mission.model import Mission
 from bisar_budget.simulate.collection import OVERSAMPLING, Chip
 from bisar_budget.simulate.impulse_response import upsampled
@@ -36,12 +37,15 @@ def form_image_evidence(mission: Mission, findings: MissionFindings) -> tuple[Im
         The worst row first; empty where no row has an image.
     """
     verdicts = rows_worth_showing(findings)
-    study = Study(mission) if verdicts else None
-    return tuple(_evidence(study, findings.file, verdict) for verdict in verdicts) if study else ()
+    if not verdicts:
+        return ()
+    study = Study(mission, findings.analysis)
+    subjects = {row.id: row.subject for row in findings.rows}
+    return tuple(_evidence(study, findings.file, subjects[verdict.id], verdict) for verdict in verdicts)
 
 
-def _evidence(study: Study, file: str, verdict: Verdict) -> ImageEvidence:
-    chip, reference, errors, effect = study.images(verdict.id, verdict.boundary_error)
+def _evidence(study: Study, file: str, subject: Subject, verdict: Verdict) -> ImageEvidence:
+    chip, reference, errors, effect = study.images(subject, verdict.boundary_error)
     found = ImageEvidence(
         file=file,
         verdict=verdict,
@@ -51,7 +55,7 @@ def _evidence(study: Study, file: str, verdict: Verdict) -> ImageEvidence:
     if verdict.boundary_autofocus is None or verdict.measured_residual_qpe_rad is None:
         return found
     chip, reference, errors, effect = study.images(
-        verdict.id, verdict.boundary_autofocus, ROOM[study.mission.autofocus.algorithm]
+        subject, verdict.boundary_autofocus, ROOM[study.mission.autofocus.algorithm]
     )
     return found._replace(
         before_autofocus=_point_image(chip, reference, study.spread(errors, effect).smear),

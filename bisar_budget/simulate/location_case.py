@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from bisar_budget.budget.images import Verdict
+from bisar_budget.findings.images import Verdict
 from bisar_budget.geometry import GroundVector
 from bisar_budget.simulate.phase_cases import moved, predicted, published_displacement
 from bisar_budget.simulate.shift import measured_shift

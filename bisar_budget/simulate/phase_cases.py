@@ -7,11 +7,11 @@ import numpy as np
 
 from bisar_budget.budget.collection_notes import COARSE_CELL_RAD, phase_across_a_cell
 from bisar_budget.budget.effects import ErrorSource
-from bisar_budget.budget.images import Verdict
 from bisar_budget.budget.models import CUBIC
 from bisar_budget.budget.pull_in import ROOM
 from bisar_budget.budget.slow_vibration import slow_limits
 from bisar_budget.budget.vibration_lines import Line
+from bisar_budget.findings.images import Verdict
 from bisar_budget.geometry import GroundVector
 from bisar_budget.simulate.aperture_reading import READ_CELLS, ApertureReading
 from bisar_budget.simulate.collection import CELLS, MAX_CELLS, OVERSAMPLING, RANGE_CELLS, Chip, Errors

@@ -11,6 +11,7 @@ from bisar_budget.budget.effects import ErrorSource
 from bisar_budget.budget.error_rows import Allowed, allowed_by
 from bisar_budget.budget.models import QUADRATIC
 from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.findings.row import Subject
 from bisar_budget.mission.model import Mission
 from bisar_budget.simulate.aperture_reading import READ_CELLS, ApertureReading, read_aperture
 from bisar_budget.simulate.autofocus import ALGORITHMS
@@ -45,8 +46,8 @@ class Spread(NamedTuple):
 class Study:
     """One mission with what its rows share."""
 
-    def __init__(self, mission: Mission) -> None:
-        self.mission, self.analysis = mission, Analysis(mission)
+    def __init__(self, mission: Mission, analysis: Analysis | None = None) -> None:
+        self.mission, self.analysis = mission, analysis or Analysis(mission)
         self.geometry, self.sources = self.analysis.geometry, self.analysis.sources
         self.model = mission.allocation.model
         self.allocation = self.analysis.allocation
@@ -86,21 +87,20 @@ class Study:
 
     def errors(self, source: ErrorSource, size: float) -> Errors:
         """Return one error of a given size and nothing else."""
-        owner, *rest = source.id.split(".")
-        if owner == "timing":
-            order = _CLOCK_TERMS.index(rest[0])
+        _, owner, kind, axis, *_ = source.subject
+        if owner == "clock":
+            order = _CLOCK_TERMS.index(axis)
             return Errors(clock=tuple(size if index == order else 0.0 for index in range(4)))
-        if owner == "mission":  # a scene that is higher: both platforms measured too high
+        if kind == "terrain":  # a scene that is higher: both platforms measured too high
             up = MotionError(position=(0.0, 0.0, size))
             return Errors(transmitter=up, receiver=up)
-        kind = rest[0]
         x, y, z = (size * component for component in source.direction)
         error = {
             "position": MotionError(position=(x, y, z)),
             "velocity": MotionError(velocity=(x, y, z)),
             "acceleration": MotionError(acceleration=(x, y, z)),
         }[kind]
-        return Errors(transmitter=error, receiver=error) if owner == "common" else Errors().of(owner, error)
+        return Errors(transmitter=error, receiver=error) if source.is_common else Errors().of(owner, error)
 
     def together(self, sizes: Sizes, scale: float = 1.0) -> Errors:
         """Several errors at once, each `scale` times its size."""
@@ -161,18 +161,15 @@ class Study:
         found = model.declared(source._replace(declared=size)).qpe
         return found if math.isfinite(found) else math.inf
 
-    def at_limit(self, row_id: str, limit: float) -> Errors:
+    def at_limit(self, of: Subject, limit: float) -> Errors:
         """Return the errors that a verdict of quadratic phase was read with."""
-        source = next((s for s in self.sources if s.id == row_id), None)
-        if source is not None:
-            sizes = [(source, limit)]
-        else:
-            sizes = self.summed(self.members(row_id.partition(".")[0].replace("timing", "clock")), limit)
+        source = next((s for s in self.sources if s.subject == of), None)
+        sizes = [(source, limit)] if source is not None else self.summed(self.members(of.owner), limit)
         return self.together(sizes, self.worse_sign(sizes, 1.0))
 
-    def images(self, row_id: str, limit: float, room: float = 1.0) -> tuple[Chip, Chip, Errors, ExactEffect]:
+    def images(self, of: Subject, limit: float, room: float = 1.0) -> tuple[Chip, Chip, Errors, ExactEffect]:
         """Image at a limit of a row of quadratic phase, as its verdict reads it, and of no error at that place."""
-        errors = self.at_limit(row_id, limit)
+        errors = self.at_limit(of, limit)
         effect = self.collection.effect(errors)
         return *self.chips(errors, effect, room=room), errors, effect
 

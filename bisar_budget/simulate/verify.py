@@ -7,9 +7,10 @@ from functools import partial
 from bisar_budget.budget.aggregates import aggregate_rows
 from bisar_budget.budget.echoes import SLOWEST
 from bisar_budget.budget.effects import PLATFORMS
-from bisar_budget.budget.findings import Row
-from bisar_budget.budget.images import Verdict, VerifiedMission
+from bisar_budget.budget.models import QUADRATIC
 from bisar_budget.budget.vibration_lines import lines_of
+from bisar_budget.findings.images import Verdict, VerifiedMission
+from bisar_budget.findings.row import Row, Subject, subject
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.simulate import phase_cases, vibration
 from bisar_budget.simulate.location_case import location
@@ -88,10 +89,9 @@ def _conditions(mission: Mission) -> Iterator[str]:
     yield "pulses as needed" + (f" (the {given} of collection.pulses must not alias)" if given else "")
 
 
-def _order(row_id: str) -> tuple[bool, int, int]:
+def _order(one: Subject) -> tuple[int, int]:
     """Of a platform's vibrations as `check` has it: lines, lines together, noise."""
-    parts = row_id.split(".")
-    return (parts[2] != "sinusoidal", len(parts), int(parts[-1]) if parts[-1].isdigit() else 0)
+    return (("sinusoidal", "sinusoidal.sum", "wideband").index(one.axis), one.entry or 0)
 
 
 def _cases(study: Study) -> Iterator[tuple[str, Case]]:
@@ -101,28 +101,28 @@ def _cases(study: Study) -> Iterator[tuple[str, Case]]:
             yield source.id, partial(phase_cases.other, study, source)
         elif study.allowed(source).smallest is not None:
             yield source.id, partial(phase_cases.quadratic, study, source)
-    slow: dict[str, Case] = {}
+    slow: dict[Subject, Case] = {}
     for name in PLATFORMS:
         for index, line in enumerate(lines_of(mission, name)):
             if line.frequency * study.collection.aperture_time < SLOWEST:
-                row_id = f"{name}.vibration.sinusoidal.{index}"
-                slow[row_id] = partial(phase_cases.slow_vibration, study, row_id, name, line)
+                one = subject(name, "vibration", "sinusoidal", entry=index)
+                slow[one] = partial(phase_cases.slow_vibration, study, one.id, name, line)
     swaying = slow | dict(vibration.cases(mission, allocation, study.collection))
     for owner in (*PLATFORMS, "mission"):
-        for row_id in sorted((one for one in swaying if one.startswith(f"{owner}.")), key=_order):
-            yield row_id, swaying[row_id]
+        for one in sorted((one for one in swaying if one.owner == owner), key=_order):
+            yield one.id, swaying[one]
     requirements = mission.requirements
     if mission.allocation.combine == "each":
         # The row exists only where it warns.
-        if any(row.id == "mission.quadratic_phase_error" for row in _aggregates(study)):
-            row_id = "mission.quadratic_phase_error"
+        if any(row.subject == subject("mission", QUADRATIC) for row in _aggregates(study)):
+            row_id = subject("mission", QUADRATIC).id
             yield row_id, partial(phase_cases.total, study, row_id, "mission")
     else:
         owners = ["transmitter", "receiver", "mission"]
         if allocation.qpe.clock is not None:
             owners.insert(2, "clock")
         for owner in owners:
-            row_id = f"{'timing' if owner == 'clock' else owner}.quadratic_phase_error"
+            row_id = subject(owner, QUADRATIC).id
             yield row_id, partial(phase_cases.total, study, row_id, owner)
     if requirements.cubic_phase_error is not None:
         yield "mission.cubic_phase_error", partial(phase_cases.cubic, study, requirements.cubic_phase_error)

@@ -14,9 +14,10 @@ import numpy as np
 from bisar_budget.budget.allocation import Allocation
 from bisar_budget.budget.echoes import SLOWEST, near_lines, sinc, worst_phases
 from bisar_budget.budget.effects import PLATFORMS
-from bisar_budget.budget.images import Verdict
 from bisar_budget.budget.vibration import vibration_limits
 from bisar_budget.budget.vibration_lines import Line, lines_of
+from bisar_budget.findings.images import Verdict
+from bisar_budget.findings.row import Subject, subject
 from bisar_budget.mission.model import Mission
 from bisar_budget.simulate.collection import CELLS, Errors, PointCollection
 from bisar_budget.simulate.impulse_response import upsampled
@@ -31,8 +32,8 @@ _UNDECLARED_CYCLES = 10  # of a vibration per aperture, where the file gives no 
 Case = Callable[[], Verdict]
 
 
-def cases(mission: Mission, allocation: Allocation, collection: PointCollection) -> Iterator[tuple[str, Case]]:
-    """Give the id of each vibration limit and the call that verifies it.
+def cases(mission: Mission, allocation: Allocation, collection: PointCollection) -> Iterator[tuple[Subject, Case]]:
+    """Give the subject of each vibration limit and the call that verifies it.
 
     Parameters
     ----------
@@ -57,22 +58,22 @@ def cases(mission: Mission, allocation: Allocation, collection: PointCollection)
             for index, frequency in enumerate([line.frequency for line in lines[name]] or [None]):
                 if frequency is not None and frequency * T < SLOWEST:
                     continue  # a phase, which `phase_cases` looks at
-                row_id = f"{name}.vibration.sinusoidal.{index}"
-                yield row_id, partial(echo, row_id, frequency)
+                one = subject(name, "vibration", "sinusoidal", entry=index)
+                yield one, partial(echo, one.id, frequency)
             for index, members in enumerate(near_lines([line.frequency * T for line in lines[name]])):
-                row_id = f"{name}.vibration.sinusoidal.sum.{index}"
+                one = subject(name, "vibration", "sinusoidal.sum", entry=index)
                 near = [lines[name][member] for member in members]
-                yield row_id, partial(_near, collection, model, pslr, {name: amplitude[name]}, row_id, near)
+                yield one, partial(_near, collection, model, pslr, {name: amplitude[name]}, one.id, near)
         if islr is not None:
-            row_id = f"{name}.vibration.wideband"
-            yield row_id, partial(_wideband, collection, model, islr, {name: rms[name]}, row_id, seed)
+            one = subject(name, "vibration", "wideband")
+            yield one, partial(_wideband, collection, model, islr, {name: rms[name]}, one.id, seed)
     if pslr is not None:
         frequency = next((line.frequency for name in PLATFORMS for line in lines[name]), None)
-        row_id = "mission.vibration.sinusoidal"
-        yield row_id, partial(_sinusoidal, collection, model, pslr, amplitude, row_id, frequency)
+        both = subject("mission", "vibration", "sinusoidal")
+        yield both, partial(_sinusoidal, collection, model, pslr, amplitude, both.id, frequency)
     if islr is not None:
-        row_id = "mission.vibration.wideband"
-        yield row_id, partial(_wideband, collection, model, islr, rms, row_id, seed)
+        both = subject("mission", "vibration", "wideband")
+        yield both, partial(_wideband, collection, model, islr, rms, both.id, seed)
 
 
 def _blank(row_id: str, model: str, limits: dict[str, float], requirement_db: float) -> Verdict:

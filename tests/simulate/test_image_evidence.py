@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.findings import Report
-from bisar_budget.budget.images import FLOOR_DB, ImageEvidence, Verdict
 from bisar_budget.budget.verdicts import rows_worth_showing
 from bisar_budget.cli.check import check_all
+from bisar_budget.findings.images import FLOOR_DB, ImageEvidence, Verdict
+from bisar_budget.findings.mission import Report
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.report import Style, render
 from bisar_budget.simulate.collection import RANGE_CELLS, Errors

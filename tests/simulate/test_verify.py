@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.images import Verdict, VerifiedMission
 from bisar_budget.budget.verdicts import with_verdicts
+from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.simulate import collection as collection_module
 from bisar_budget.simulate.exact import NoGroundPointError

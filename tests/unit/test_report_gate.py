@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.findings import Report, UnusableMission
 from bisar_budget.cli.check import check
 from bisar_budget.errors import Fault
+from bisar_budget.findings.mission import Report, UnusableMission
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.report import FORMATS, SUFFIXES, Style, escapes, format_of, render
 from bisar_budget.report.github import step_summary

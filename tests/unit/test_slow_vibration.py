@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.findings import Report
 from bisar_budget.budget.slow_vibration import slow_phases
+from bisar_budget.findings.mission import Report
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.report import FORMATS, Style, render
 from bisar_budget.report.explanation import explain

@@ -16,6 +16,7 @@ FLOORS = [
     {"geometry"},
     {"theory", "evaluators", "catalogue"},
     {"mission"},
+    {"findings"},
     {"budget"},
     {"simulate"},
     {"report"},
@@ -106,7 +107,7 @@ def test_a_check_loads_nothing_heavy(name: str, is_for_people: bool) -> None:
 from bisar_budget.budget.check import check_mission
 from bisar_budget.mission.load import load_mission
 from bisar_budget.report import FORMATS, ILLUSTRATED, Style, render
-from bisar_budget.budget.findings import Report
+from bisar_budget.findings.mission import Report
 from datetime import date
 found = check_mission(load_mission({str(mission)!r}), date(2026, 1, 1))
 for name in ILLUSTRATED if {is_for_people} else FORMATS.keys() - ILLUSTRATED:

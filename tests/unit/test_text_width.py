@@ -2,8 +2,8 @@
 
 import pytest
 
-from bisar_budget.budget.findings import Report
-from bisar_budget.budget.images import Verdict, VerifiedMission
+from bisar_budget.findings.images import Verdict, VerifiedMission
+from bisar_budget.findings.mission import Report
 from bisar_budget.mission.load import load_mission
 from bisar_budget.report import Style, render
 from bisar_budget.report.layout import WIDTH, table

@@ -1,65 +1,20 @@
-"""What a check finds, as frozen data. Field names and order are those of the JSON contract."""
+"""What was found about one mission file, and about all of a run."""
 
-from collections.abc import Container, Iterable, Sequence
 from datetime import date
 from typing import TYPE_CHECKING, NamedTuple
 
 from bisar_budget.budget.allocation import Allocation
 from bisar_budget.errors import Fault
-from bisar_budget.geometry import BistaticGeometry, GroundVector
+from bisar_budget.findings.row import Row
+from bisar_budget.findings.status import STATUSES, worst
+from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Document, Mission
 
 if TYPE_CHECKING:
-    from bisar_budget.budget.images import ImageEvidence, Verdict
+    from bisar_budget.budget.analysis import Analysis
     from bisar_budget.budget.monte_carlo import MonteCarlo
     from bisar_budget.budget.scene import SceneEdge
-
-# Worst first. The status of a mission or a run is the worst one found; the last three gate nothing.
-GATING = ("error", "fail", "not_evaluated", "warn", "pass_with_autofocus", "pass")
-STATUSES = (*GATING, "waived", "info", "not_declared")
-# For reading. What is waived breaks its requirement: it stands before all that meets one.
-READING = ("error", "fail", "not_evaluated", "warn", "waived", "pass_with_autofocus", "pass", "info", "not_declared")
-OPTIMISTIC = "optimistic limit"  # how a note begins by which an image refutes a limit
-_RANK = {status: index for index, status in enumerate(READING)}
-
-
-class Row(NamedTuple):
-    """One line of the budget. Numbers in SI and radians; None where a value does not exist.
-
-    `is_independent` marks the rows that sums run over: errors as the file states them. Along the scene's axes an
-    error stated in another frame is shown again, but not counted again. `qpe_exact_rad` is `qpe_full_rad`, which is
-    that of exact ranges; `published_margin_db` how far the published rule of a vibration stays inside first
-    principles. `binding_requirement` is the requirement that sets `allowable`, `cubic_rad` the magnitude of the
-    declared error's cubic phase at the aperture edge, `islr_db` the ISLR that a declared random error adds, `model`
-    the one whose numbers these are.
-    """
-
-    id: str
-    metric: str
-    unit: str
-    declared: float | None
-    allowable: float | None
-    allowable_published: float | None
-    allowable_full: float | None
-    qpe_published_rad: float | None
-    qpe_full_rad: float | None
-    displacement_m: GroundVector | None
-    utilization: float | None
-    margin: float | None
-    status: str
-    line: int | None
-    reason: str | None
-    notes: tuple[str, ...]
-    equation: str
-    requirement_id: str | None
-    evidence: str | None
-    is_independent: bool
-    qpe_exact_rad: float | None = None
-    published_margin_db: float | None = None
-    binding_requirement: str | None = None
-    cubic_rad: float | None = None
-    islr_db: float | None = None
-    model: str | None = None
+    from bisar_budget.findings.images import ImageEvidence, Verdict
 
 
 class FileWarning(NamedTuple):
@@ -83,10 +38,10 @@ class Resolution(NamedTuple):
 class MissionFindings(NamedTuple):
     """What was found about one mission file that can be used.
 
-    `mission` is what was checked; None where nothing after the check needs it and a thousand would fill memory.
+    `analysis` is that of the check, for whoever goes on from it; None where a thousand would fill memory.
     """
 
-    mission: Mission | None
+    analysis: "Analysis | None"
     file: str
     name: str
     model: str
@@ -107,6 +62,23 @@ class MissionFindings(NamedTuple):
     image_evidence: "tuple[ImageEvidence, ...]" = ()  # a few of those images, where a report shows them
     monte_carlo: "MonteCarlo | None" = None  # if errors were drawn
     document: Document = Document()
+
+    @property
+    def mission(self) -> Mission | None:
+        """What was checked, with its analysis or not at all."""
+        return None if self.analysis is None else self.analysis.mission
+
+    def analysed(self) -> "Analysis":
+        """Return the analysis of the check.
+
+        Raises
+        ------
+        ValueError
+            It was left out.
+        """
+        if self.analysis is None:
+            raise ValueError("these findings do not carry their analysis")
+        return self.analysis
 
     @property
     def is_empty(self) -> bool:
@@ -165,27 +137,3 @@ class Report(NamedTuple):
     def status(self) -> str:
         """Worst status of the missions."""
         return worst(mission.status for mission in self.missions)
-
-
-def image_notes(row: Row) -> tuple[str, ...]:
-    """Those of the notes of a row by which an image refutes its limit."""
-    return tuple(note for note in row.notes if note.startswith(OPTIMISTIC))
-
-
-def exit_code(statuses: Container[str], strict: bool) -> int:
-    """Return 2 if a file is unusable, 1 if a requirement is broken, else 0; `strict` breaks on doubt too."""
-    if "error" in statuses:
-        return 2
-    failing = ("fail", "not_evaluated", "warn") if strict else ("fail",)
-    return 1 if any(status in statuses for status in failing) else 0
-
-
-def worst(statuses: Iterable[str]) -> str:
-    """Return the worst of the gating statuses; `pass` if there is none."""
-    found = set(statuses)
-    return next((status for status in GATING if status in found), "pass")
-
-
-def worst_first(rows: Sequence[Row]) -> list[Row]:
-    """Sort rows by status, then by utilization, the highest first; equals keep their order."""
-    return sorted(rows, key=lambda row: (_RANK[row.status], -(row.utilization or 0.0)))
