@@ -35,6 +35,11 @@ class Status(NamedTuple):
     color: str = "mission"
     symbol: str = "open square"
 
+    @property
+    def is_held(self) -> bool:
+        """Whether a number was held to a limit and the outcome stands: neither waived nor without a value."""
+        return self.is_judged and self.junit != "skipped"
+
 
 # Worst first, for reading. What is waived breaks its requirement: it stands before all that meets one.
 _WORST_FIRST = (

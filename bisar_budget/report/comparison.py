@@ -8,9 +8,9 @@ from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.errors import KeyPath
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import Row
+from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.model import Mission
 
-_JUDGES_NOTHING = ("info", "not_declared", "not_evaluated", "waived")
 SMALL = 0.01  # a row that moves by less than this part tells a reader nothing
 
 
@@ -68,7 +68,7 @@ class Change(NamedTuple):
 
     def breaks(self, tolerated: float) -> bool:
         """Whether it newly fails, or a row that is judged loses more than the tolerated part of what was left."""
-        is_judged = _status(self.after) not in (None, *_JUDGES_NOTHING)
+        is_judged = self.after is not None and STATUS[self.after.status].is_held
         return self.is_newly_failing or (is_judged and self.erosion > tolerated + UTILIZATION_TOLERANCE)
 
 

@@ -17,10 +17,10 @@ from bisar_budget.errors import KeyPath
 from bisar_budget.findings.images import PointImage
 from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
 from bisar_budget.findings.row import Row, worst_first
+from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import Style, verification
 from bisar_budget.report.compliance_view import (
-    STATUS_WORDS,
     Chip,
     Compliance,
     Contribution,
@@ -53,7 +53,6 @@ from bisar_budget.report.image_evidence import (
 )
 from bisar_budget.report.sentences import measure
 from bisar_budget.report.text_table import (
-    EXPLAINED,
     head,
     matters,
     multiple_of_pi,
@@ -65,21 +64,11 @@ from bisar_budget.units import format_quantity
 if TYPE_CHECKING:
     from bisar_budget.budget.monte_carlo import MonteCarlo
 
-_VERDICTS = {
-    "error": "Cannot be judged",
-    "fail": "Does not comply",
-    "not_evaluated": "Not shown to comply",
-    "warn": "Complies, with warnings",
-    "pass_with_autofocus": "Complies, with autofocus",
-    "pass": "Complies",
-}
 _NOTHING = "Nothing was judged"
 _ALONE = "; each error alone"
 _OWNERS = ("transmitter", "receiver", "clock", "reserve")
 _DRIVERS = 3
 _MATRIX_ROWS = 40  # of a summary; beyond, those that use least are left to the annex
-_JUDGED = ("fail", "not_evaluated", "warn", "waived", "pass_with_autofocus", "pass")
-_MET = ("pass_with_autofocus", "pass")
 _DISTRIBUTIONS = {
     "normal": "one-sigma values",
     "uniform": "uniform within the values given",
@@ -137,7 +126,7 @@ def compliance(report: Report, style: Style) -> Compliance:
 def _verdict(status: str, waived: int) -> str:
     """Verdict on rows, with what it owes to waivers."""
     rows = f"{waived} rows over their limits are" if waived > 1 else "1 row over its limit is"
-    return f"{_VERDICTS[status]}; {rows} waived" if waived else _VERDICTS[status]
+    return f"{STATUS[status].verdict}; {rows} waived" if waived else STATUS[status].verdict
 
 
 def _overall(report: Report, pages: Sequence[MissionPage]) -> str:
@@ -162,7 +151,7 @@ def _unusable(found: UnusableMission, style: Style, anchor: str) -> MissionPage:
         file=source_path(found.file, style.root),
         sha256=_digest(found.data),
         status="error",
-        verdict=_VERDICTS["error"],
+        verdict=STATUS["error"].verdict,
         name=source_path(found.file, style.root),
         counts=f"{count} fault{'s' if count != 1 else ''}",
         faults=tuple((f"{fault.line or '–'}:{fault.column or '–'}", str(fault)) for fault in found.faults),
@@ -174,14 +163,16 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
     mission = analysis.mission
     sources = {source.id: source for source in analysis.sources}
     rows = worst_first(found.rows)
-    judged = [row for row in rows if row.status in _JUDGED]
+    judged = [row for row in rows if STATUS[row.status].is_judged]
     evidence = {verdict.id: verdict for verdict in found.verdicts or ()}
     file = source_path(found.file, style.root)
     placed = mission if mission.file == file else mission._replace(file=file)  # the same name in every section
     allocation = found.allocation
     is_full = style.detail == "full"
     important = [row for row in rows if matters(row)]
-    in_summary = {row.id for place, row in enumerate(important) if place < _MATRIX_ROWS or row.status in EXPLAINED}
+    in_summary = {
+        row.id for place, row in enumerate(important) if place < _MATRIX_ROWS or STATUS[row.status].is_explained
+    }
     matrix = tuple(
         MatrixRow(
             id=row.id,
@@ -214,16 +205,18 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
         status=found.status,
         verdict=_verdict(found.status, found.summary.get("waived", 0)) if judged else _NOTHING,
         name=found.name,
-        counts=", ".join(f"{count} {STATUS_WORDS[status]}" for status, count in found.summary.items()),
+        counts=", ".join(f"{count} {STATUS[status].words}" for status, count in found.summary.items()),
         worst=judged[0].id if judged else "",
         worst_use=_use(judged[0]) if judged else "",
         head=tuple(head(found)),
-        tone="warn" if found.status in _MET and found.summary.get("waived") else found.status,
+        tone="warn" if STATUS[found.status].is_met and found.summary.get("waived") else found.status,
         drivers=drivers,
         matrix=matrix,
         remarks=tuple(_grouped((row.id, row.remarks) for row in matrix)),
         reasons=tuple(
-            _grouped((row.id, row.decisive) for row in judged if row.status in EXPLAINED and row.id not in driving)
+            _grouped(
+                (row.id, row.decisive) for row in judged if STATUS[row.status].is_explained and row.id not in driving
+            )
         ),
         hidden=sum(not row.in_summary for row in matrix),
         pictures=drawings(found),
@@ -374,9 +367,9 @@ def _margin(margin: float | None) -> str:
 
 def _drivers(judged: Sequence[Row], status: str) -> Iterator[Driver]:
     """Rows that a verdict rests on: what breaks, is in doubt or is waived; of a pass also what comes nearest."""
-    is_met = status in _MET
+    is_met = STATUS[status].is_met
     for row in judged[:_DRIVERS]:
-        if row.status not in _MET or (is_met and row.utilization):
+        if not STATUS[row.status].is_met or (is_met and row.utilization):
             yield _driver(row)
 
 
@@ -428,7 +421,11 @@ def _requirement(mission: Mission, found: MissionFindings, row: Row, source: Err
 def _method(found: MissionFindings, row: Row, verdict: str | None) -> str:
     """Say how the row is verified: by analysis, and by the image where one was formed."""
     analysis = f"analysis: {row.equation}"
-    return analysis if verdict is None else f"{analysis}; simulation: {STATUS_WORDS.get(verdict, verdict)}"
+    return (
+        analysis
+        if verdict is None
+        else f"{analysis}; simulation: {STATUS[verdict].words if verdict in STATUS else verdict}"
+    )
 
 
 def _gain(allocation: Allocation) -> str:

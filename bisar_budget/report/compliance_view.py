@@ -7,18 +7,6 @@ from bisar_budget.findings.mission import Option
 from bisar_budget.mission.model import Document
 from bisar_budget.report.formulas import Step
 
-STATUS_WORDS = {
-    "error": "unusable",
-    "fail": "fail",
-    "not_evaluated": "not evaluated",
-    "warn": "warning",
-    "pass_with_autofocus": "pass with autofocus",
-    "pass": "pass",
-    "waived": "waived",
-    "info": "info",
-    "not_declared": "not declared",
-}
-
 
 class Driver(NamedTuple):
     """A row that the verdict rests on."""

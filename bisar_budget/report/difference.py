@@ -6,10 +6,11 @@ from typing import Any
 
 from bisar_budget.errors import printable
 from bisar_budget.findings.row import Row
+from bisar_budget.findings.status import STATUS
 from bisar_budget.report.comparison import Change, MissionChange, Moved
 from bisar_budget.report.escapes import markdown_text
 from bisar_budget.report.layout import table, wrapped
-from bisar_budget.report.text_table import WORDS, percent
+from bisar_budget.report.text_table import percent
 from bisar_budget.units import format_quantity
 
 FORMAT = "bisar-budget/diff/1"
@@ -61,7 +62,7 @@ def _erosion(change: Change) -> str:
 
 
 def _statuses(change: Change) -> str:
-    before, after = ("-" if row is None else WORDS[row.status] for row in (change.before, change.after))
+    before, after = ("-" if row is None else STATUS[row.status].text for row in (change.before, change.after))
     return after if before == after else f"{before} -> {after}"
 
 

@@ -18,6 +18,7 @@ from bisar_budget.constants import ROUNDING
 from bisar_budget.errors import KeyPath, printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import Row
+from bisar_budget.findings.status import STATUS
 from bisar_budget.geometry import dot, without_rounding
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import formulas
@@ -25,7 +26,7 @@ from bisar_budget.report.explained_error import as_written, declaration, effect,
 from bisar_budget.report.explained_full import at_the_allowable
 from bisar_budget.report.formulas import Equation, Step, Sum, equation, number, step, with_unit
 from bisar_budget.report.layout import wrapped
-from bisar_budget.report.text_table import WORDS, percent
+from bisar_budget.report.text_table import percent
 from bisar_budget.units import format_quantity
 
 _DEEPER = 3  # a broken equation goes on; no symbol has the width that would put its equals sign there
@@ -47,7 +48,7 @@ def explain(mission: Mission, found: MissionFindings, row_id: str) -> str:
     """
     row = next(row for row in found.rows if row.id == row_id)
     own_id = f" [{printable(row.requirement_id)}]" if row.requirement_id else ""
-    lines = [f"{WORDS[row.status]} {printable(row.id)}{own_id} of {printable(mission.name)}", ""]
+    lines = [f"{STATUS[row.status].text} {printable(row.id)}{own_id} of {printable(mission.name)}", ""]
     lines += [line for step in chain(mission, found, row) for line in step.lines]
     lines += _verdict(row)
     return "\n".join(part for line in lines for part in _fitted(line)) + "\n"
@@ -397,5 +398,5 @@ def _verdict(row: Row) -> Iterator[str]:
     texts = [text for text in (row.reason, *row.notes) if text]
     declared = "" if row.declared is None else f", declared {format_quantity(row.declared, row.unit)}"
     allowable = "" if row.allowable is None else f", allowable {format_quantity(row.allowable, row.unit, 3, 'down')}"
-    yield f"{WORDS[row.status]}{declared}{allowable}"
+    yield f"{STATUS[row.status].text}{declared}{allowable}"
     yield from (f"    {printable(text)}" for text in texts)

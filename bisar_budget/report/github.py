@@ -9,18 +9,12 @@ from typing import NamedTuple
 from bisar_budget.errors import Fault, Place, Region
 from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
 from bisar_budget.findings.row import worst_first
+from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report.escapes import command_property, command_text, markdown_text, source_path
 from bisar_budget.report.sentences import finding
-from bisar_budget.report.text_table import WORDS, percent
+from bisar_budget.report.text_table import percent
 
-COMMANDS = {
-    "fail": "error",
-    "not_evaluated": "warning",
-    "warn": "warning",
-    "waived": "notice",
-    "pass_with_autofocus": "notice",
-}
 _ORDER = ("error", "warning", "notice")
 _SHOWN_IN_SUMMARY = 20
 
@@ -48,9 +42,9 @@ def _annotations(report: Report, style: Style) -> Iterator[_Annotation]:
                 yield _Annotation("error", file, _place(fault), "Unusable mission file", str(fault))
             continue
         for row in worst_first(mission.rows):
-            if row.status in COMMANDS:
-                title = f"{WORDS[row.status]} {row.id}"
-                yield _Annotation(COMMANDS[row.status], file, _region(row.line), title, finding(row))
+            if command := STATUS[row.status].github:
+                title = f"{STATUS[row.status].text} {row.id}"
+                yield _Annotation(command, file, _region(row.line), title, finding(row))
         for warning in mission.warnings:
             yield _Annotation("warning", file, _region(warning.line), "Mission file", warning.message)
 
@@ -87,18 +81,18 @@ def _counted(report: Report) -> str:
 
 def step_summary(report: Report, style: Style) -> str:
     """Write the table that GitHub shows on the page of the run, as Markdown."""
-    lines = [f"### bisar-budget: {WORDS[report.status]}, {_counted(report)}", ""]
+    lines = [f"### bisar-budget: {STATUS[report.status].text}, {_counted(report)}", ""]
     lines += ["| status | mission | worst row | use |", "| --- | --- | --- | --- |"]
     for mission in report.missions:
         file = markdown_text(source_path(mission.file, style.root))
         if isinstance(mission, UnusableMission):
             fault = markdown_text(str(mission.faults[0]))
-            lines.append(f"| {WORDS['error']} | {file} | {fault} | |")
+            lines.append(f"| {STATUS['error'].text} | {file} | {fault} | |")
             continue
         row, use = worst_first(mission.rows)[0], ""
         if row.utilization is not None and row.allowable is not None:
             use = percent(row.utilization)
-        status = WORDS[mission.status] + ("; each error alone" if mission.combine == "each" else "")
+        status = STATUS[mission.status].text + ("; each error alone" if mission.combine == "each" else "")
         lines.append(f"| {status} | {file} | {markdown_text(row.id)} | {use} |")
     broken = [
         f"- {markdown_text(finding(row))}"

@@ -8,9 +8,9 @@ from markupsafe import Markup, escape
 
 from bisar_budget.errors import printable
 from bisar_budget.findings.mission import Report
+from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style, typeset
 from bisar_budget.report.compliance import compliance
-from bisar_budget.report.compliance_view import STATUS_WORDS
 from bisar_budget.report.formulas import Equation, Sum
 from bisar_budget.report.text_table import document_words
 from bisar_budget.resources import resource
@@ -38,7 +38,8 @@ def render(report: Report, style: Style) -> str:
     template = environment.get_template("report.html.j2")
     return template.render(
         report=compliance(report, style),
-        words=STATUS_WORDS,
+        words={name: status.words for name, status in STATUS.items()},
+        statuses=STATUS.values(),
         equation=_equation,
         general=_general,
         inline=_inline,

@@ -11,17 +11,10 @@ from os.path import splitext
 
 from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
 from bisar_budget.findings.row import Row
+from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report.escapes import source_path, xml_text
 from bisar_budget.report.sentences import cause, measure
-
-_SKIPPED = {
-    "not_evaluated": "not evaluated",
-    "waived": "waived",
-    "not_declared": "not declared",
-    "info": "computed, not judged",
-}
-_PASSED_WITH_REMARK = ("warn", "pass_with_autofocus")
 
 
 def render(report: Report, style: Style) -> str:
@@ -51,8 +44,8 @@ def _unusable(mission: UnusableMission, style: Style, counts: Counter[str]) -> I
 
 
 def _mission(mission: MissionFindings, style: Style, counts: Counter[str]) -> Iterator[str]:
-    failures = sum(row.status == "fail" for row in mission.rows)
-    skipped = sum(row.status in _SKIPPED for row in mission.rows)
+    failures = sum(STATUS[row.status].junit == "failure" for row in mission.rows)
+    skipped = sum(STATUS[row.status].junit == "skipped" for row in mission.rows)
     counts.update(tests=len(mission.rows), failures=failures)
     yield _suite(mission.name, tests=len(mission.rows), failures=failures, errors=0, skipped=skipped)
     yield "    <properties>"
@@ -97,17 +90,17 @@ def _case(row: Row, class_name: str, file: str) -> Iterator[str]:
     )
     yield from [_property(name, value) for name, value in values if value is not None]
     yield "      </properties>"
-    status = row.status
-    if status == "fail":
+    status = STATUS[row.status]
+    if status.junit == "failure":
         place = f"{file}:{row.line}: " if row.line is not None else ""
         text = f"{place}{xml_text(measure(row))}\n{xml_text(cause(row))}\n{xml_text(row.equation)}"
-        yield f'      <failure message="{xml_text(_remark(row))}" type="fail">{text}</failure>'
-    elif status in _SKIPPED:
+        yield f'      <failure message="{xml_text(_remark(row))}" type="{status.name}">{text}</failure>'
+    elif status.junit == "skipped":
         why = cause(row)
-        message = f"{_SKIPPED[status]}{f': {why}' if why else ''}"
-        yield f'      <skipped message="{xml_text(message)}" type="{status}"/>'
-    elif status in _PASSED_WITH_REMARK:
-        yield f"      <system-out>{xml_text(f'{status}: {_remark(row)}')}</system-out>"
+        message = f"{status.junit_words}{f': {why}' if why else ''}"
+        yield f'      <skipped message="{xml_text(message)}" type="{status.name}"/>'
+    elif status.junit == "remark":
+        yield f"      <system-out>{xml_text(f'{status.name}: {_remark(row)}')}</system-out>"
     yield "    </testcase>"
 
 

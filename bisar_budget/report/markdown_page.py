@@ -9,9 +9,10 @@ from markupsafe import Markup
 
 from bisar_budget.errors import printable
 from bisar_budget.findings.mission import MissionFindings, Report
+from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style, typeset
 from bisar_budget.report.compliance import compliance, drawings, illustrations
-from bisar_budget.report.compliance_view import STATUS_WORDS, Chip, Compliance
+from bisar_budget.report.compliance_view import Chip, Compliance
 from bisar_budget.report.escapes import markdown_text, uri
 from bisar_budget.report.formulas import Equation, Sum
 from bisar_budget.report.text_table import document_words
@@ -36,7 +37,7 @@ def render(report: Report, style: Style) -> str:
     page: Compliance = compliance(report, style)
     text = environment.get_template("report.md.j2").render(
         report=page,
-        words=STATUS_WORDS,
+        words={name: status.words for name, status in STATUS.items()},
         assets=Markup(uri(style.assets)),
         bar=_bar,
         equation=_equation,

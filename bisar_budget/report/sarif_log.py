@@ -12,21 +12,13 @@ from typing import Any
 from bisar_budget.errors import Fault, Place, printable
 from bisar_budget.findings.mission import FileWarning, MissionFindings, Report, UnusableMission
 from bisar_budget.findings.row import Row
+from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report.escapes import source_path, uri
 from bisar_budget.report.sentences import finding
 
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
 SRCROOT = "%SRCROOT%"
-
-# Status of a row to the level of its result.
-LEVELS = {
-    "fail": "error",
-    "not_evaluated": "warning",
-    "warn": "warning",
-    "waived": "error",
-    "pass_with_autofocus": "note",
-}
 
 # Rule id to what is held to what, and what to do about it.
 RULES = {
@@ -87,7 +79,7 @@ def render(report: Report, style: Style) -> str:
         if isinstance(mission, UnusableMission):
             notifications += [_notification(fault, artifact) for fault in mission.faults]
             continue
-        results += [_result(row, mission, artifact) for row in mission.rows if row.status in LEVELS]
+        results += [_result(row, mission, artifact) for row in mission.rows if STATUS[row.status].sarif]
         results += [_warning(warning, mission, artifact) for warning in mission.warnings]
     run = {
         "tool": {"driver": _driver(report.version)},
@@ -142,7 +134,7 @@ def _artifact_location(file: str, style: Style) -> dict[str, Any]:
 def _result(row: Row, mission: MissionFindings, artifact: dict[str, Any]) -> dict[str, Any]:
     rule = "autofocus_pull_in" if row.subject.kind == "autofocus_pull_in" else row.metric
     rule = rule if rule in RULES else "other"
-    result = _located(rule, LEVELS[row.status], finding(row), row.line, artifact, row.id)
+    result = _located(rule, STATUS[row.status].sarif, finding(row), row.line, artifact, row.id)
     result["properties"] = {
         key: value if not isinstance(value, str) else printable(value)
         for key, value in (

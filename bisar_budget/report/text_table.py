@@ -8,40 +8,18 @@ from functools import cache
 from bisar_budget.errors import printable
 from bisar_budget.findings.mission import MissionFindings, UnusableMission
 from bisar_budget.findings.row import Row, worst_first
-from bisar_budget.findings.status import worst
+from bisar_budget.findings.status import STATUS, worst
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.mission.model import Document
 from bisar_budget.report import Piece, Style
 from bisar_budget.report.layout import WIDTH, wrapped, wrapped_counts
 from bisar_budget.units import format_quantity
 
-WORDS = {
-    "error": "ERROR",
-    "fail": "FAIL",
-    "not_evaluated": "NOT EVAL",
-    "warn": "WARN",
-    "pass_with_autofocus": "pass AF",
-    "pass": "pass",
-    "waived": "waived",
-    "info": "info",
-    "not_declared": "not decl",
-}
 # A requirement that can set an allowable, in words; the terminal has room for the first.
 BINDING_WORDS = {
     "quadratic_phase_error": "quadratic phase error",
     "cubic_phase_error": "cubic phase error",
     "location_error": "location error",
-}
-_ANSI = {
-    "error": "1;31",
-    "fail": "1;31",
-    "not_evaluated": "35",
-    "warn": "33",
-    "pass_with_autofocus": "32",
-    "pass": "32",
-    "waived": "36",
-    "info": "0",
-    "not_declared": "2",
 }
 _MODELS = {
     "published": "published (Rigling & Moses, Tables I and II)",
@@ -49,7 +27,6 @@ _MODELS = {
     "strictest": "strictest (the stricter of published and full for each row)",
 }
 RULES = {"each": "each error alone", "sum": "worst-case sum", "rss": "root-sum-square"}
-EXPLAINED = ("fail", "not_evaluated", "warn", "waived")  # the rows whose reason decides something
 _NARROW_DEG = 30.0  # between range and Doppler gradients; below it the verdict says what that does
 
 
@@ -68,7 +45,9 @@ def joined(pieces: Sequence[Piece], version: str, style: Style) -> str:
 
 def _unusable(mission: UnusableMission, style: Style) -> list[str]:
     count = len(mission.faults)
-    summary = f"{WORDS['error']} {printable(mission.file)}: cannot be used, {count} fault{'s' if count != 1 else ''}"
+    summary = (
+        f"{STATUS['error'].text} {printable(mission.file)}: cannot be used, {count} fault{'s' if count != 1 else ''}"
+    )
     if style.verbosity < 0:
         return [_lead(summary, "error", style)]
     places = [f"  {fault.line or '-'}:{fault.column or '-'}  {fault}" for fault in mission.faults]
@@ -202,7 +181,7 @@ def _table(mission: MissionFindings, style: Style) -> Iterator[str]:
             yield _line(("", "", *line[2:]), widths)
         else:
             yield _word(row.status, style, widths[0]) + _line(line, widths)[widths[0] :]
-        if row.requirement_id and (row.status not in EXPLAINED and style.verbosity < 1):
+        if row.requirement_id and (not STATUS[row.status].is_explained and style.verbosity < 1):
             yield f"{'':<{widths[0]}} [{row.requirement_id}]"  # the others have it with their reason
     yield from wrapped(_table_key(rows, hidden), "  ")
 
@@ -246,7 +225,7 @@ def _row(row: Row) -> tuple[str, ...]:
         allowable = format_quantity(limit, unit, 3, "down")
         if row.utilization is not None and status != "not_evaluated":
             use = percent(row.utilization)
-    return WORDS[status], row.id, size, allowable, use, _limited_by(row)
+    return STATUS[status].text, row.id, size, allowable, use, _limited_by(row)
 
 
 def binding_words(row: Row) -> str:
@@ -300,7 +279,7 @@ def _details(mission: MissionFindings, style: Style) -> Iterator[str]:
     for row in worst_first(mission.rows):
         if style.verbosity > 0:
             yield from _detail([row], [*filter(None, [row.reason]), *row.notes, *_more(row)], mission, style)
-        elif row.status in EXPLAINED:
+        elif STATUS[row.status].is_explained:
             groups.setdefault((row.status, row.decisive), []).append(row)
     for (_, texts), rows in groups.items():
         yield from _detail(rows, texts, mission, style)
@@ -313,7 +292,7 @@ def _detail(rows: Sequence[Row], texts: Sequence[str], mission: MissionFindings,
         own_id = f" [{row.requirement_id}]" if row.requirement_id else ""
         place = f"{file}:{row.line}" if row.line is not None else file
         names.append(f"{row.id}{own_id} ({place})")
-    first, *rest = wrapped(f"{WORDS[rows[0].status]} {', '.join(names)}", "  ")
+    first, *rest = wrapped(f"{STATUS[rows[0].status].text} {', '.join(names)}", "  ")
     yield _lead(first, rows[0].status, style)
     yield from rest
     for text in texts:
@@ -338,20 +317,20 @@ def _asides(mission: MissionFindings, style: Style) -> Iterator[str]:
 
 
 def _summary(mission: MissionFindings) -> str:
-    counts = ", ".join(f"{count} {WORDS[status]}" for status, count in mission.summary.items())
-    return f"{WORDS[mission.status]} {printable(mission.file)}: {counts}"
+    counts = ", ".join(f"{count} {STATUS[status].text}" for status, count in mission.summary.items())
+    return f"{STATUS[mission.status].text} {printable(mission.file)}: {counts}"
 
 
 def _overall(statuses: Sequence[str], style: Style) -> str:
-    counts = ", ".join(f"{statuses.count(status)} {WORDS[status]}" for status in WORDS if status in statuses)
+    counts = ", ".join(f"{statuses.count(status)} {STATUS[status].text}" for status in STATUS if status in statuses)
     return f"{_word(worst(statuses), style)} {len(statuses)} missions: {counts}"
 
 
 def _lead(line: str, status: str, style: Style) -> str:
     """Colour the status that a line begins with."""
-    return _word(status, style) + line.removeprefix(WORDS[status])
+    return _word(status, style) + line.removeprefix(STATUS[status].text)
 
 
 def _word(status: str, style: Style, width: int = 0) -> str:
-    word = f"{WORDS[status]:<{width}}"
-    return f"\x1b[{_ANSI[status]}m{word}\x1b[0m" if style.color else word
+    word = f"{STATUS[status].text:<{width}}"
+    return f"\x1b[{STATUS[status].sgr}m{word}\x1b[0m" if style.color else word
