@@ -14,7 +14,7 @@ from typing import Any, BinaryIO, cast
 import yaml
 from yaml import AliasEvent, MappingEndEvent, ScalarEvent
 
-from bisar_budget.errors import Fault, KeyPath, MissionError, Problem, printable
+from bisar_budget.errors import Fault, KeyPath, MissionError, Problem, printable, shown
 from bisar_budget.mission.model import MISSION, Mission
 from bisar_budget.mission.readers import INVALID
 
@@ -152,7 +152,7 @@ class _Tree:
                 break
             place = self.keys.get(path[:length]) or self.values.get(path[:length])
         mark = None if place is None else place.start_mark
-        given = _shown(value) if isinstance(value, str) and not is_key else ""
+        given = shown(value) if isinstance(value, str) and not is_key else ""
         self.fault(mark, path, problem.problem, given=given, accepted=problem.accepted, hint=problem.hint)
 
     def read_document(self, next_event: Callable[[], Any]) -> None:
@@ -196,7 +196,7 @@ class _Tree:
             if event.flow_style:
                 self._decimal_commas(items, path)
         if event.tag is not None and event.tag != "!":
-            self.fault(mark, path, "carries a YAML tag", given=_shown(event.tag), accepted="plain values")
+            self.fault(mark, path, "carries a YAML tag", given=shown(event.tag), accepted="plain values")
             return INVALID
         return value
 
@@ -215,7 +215,7 @@ class _Tree:
         for index, is_tight, before, item in commas:
             has_unit = any(char.isalpha() and char not in "eE" for char in item.value)
             if is_tight and has_unit and before.value.lstrip("+-").isdigit() and item.value[:1].isdigit():
-                given = _shown(f"{before.value},{item.value}")
+                given = shown(f"{before.value},{item.value}")
                 problem, accepted = (
                     "may be half of a number with a decimal comma",
                     "a point, or a blank behind commas",
@@ -275,10 +275,4 @@ def _dotted(path: KeyPath) -> str:
     text = ""
     for part in path:
         text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
-    return printable(text) if len(text) <= 200 else _shown(text)
-
-
-def _shown(text: str) -> str:
-    """Say a value from the file so that it cannot do anything to a terminal."""
-    text = printable(text)
-    return text if len(text) <= 60 else text[:57] + "..."
+    return printable(text) if len(text) <= 200 else shown(text)
