@@ -215,11 +215,12 @@ def check(
     [tool.bisar-budget] in the nearest pyproject.toml, and over it the variables BISAR_BUDGET_FORMAT and so on.
     """
     from bisar_budget.findings.status import exit_code
-    from bisar_budget.report import ILLUSTRATED, PIECEWISE, Style, joined, piece, render
+    from bisar_budget.report import ILLUSTRATED, PIECEWISE, Style, joined, piece
 
     written = [(name, _format_of(name)) for name in reports]
     files = expand(missions)
-    spare(files, [output, *reports])
+    folders = [_folder_of_pictures(name, its_format) for name, its_format in [*written, (output or "-", format_name)]]
+    spare(files, [output, *reports, _step_summary(format_name)], [*filter(None, folders)])
     given = click.get_current_context().get_parameter_source
     if seed is not None and draws is None and given("seed") is ParameterSource.COMMANDLINE:
         raise click.UsageError("--seed needs --monte-carlo N.")
@@ -255,12 +256,9 @@ def check(
             _say_faults(report.missions)
         for path, its_format in written:
             _write_report(path, its_format, report, style._replace(color=False, verbosity=max(style.verbosity, 0)))
-        if output is None:
-            deliver(render(format_name, report, style), None, format_name)
-        else:
-            _write_report(output, format_name, report, style)
-        if format_name == "github":
-            _append_step_summary(report, style)
+        _write_report(output or "-", format_name, report, style)
+        if summary := _step_summary(format_name):
+            _append_step_summary(summary, report, style)
         statuses = {mission.status for mission in report.missions}
     code = exit_code(statuses, strict)
     sys.exit(0 if exit_zero and code == EXIT_BROKEN else code)
@@ -401,11 +399,13 @@ def _repository() -> str:
     return ""
 
 
-def _append_step_summary(report: "Report", style: "Style") -> None:
+def _step_summary(format_name: str) -> str | None:
+    """File that GitHub shows on the page of a run; None where there is none."""
+    return (os.environ.get("GITHUB_STEP_SUMMARY") or None) if format_name == "github" else None
+
+
+def _append_step_summary(path: str, report: "Report", style: "Style") -> None:
     """Add to the page of the run on GitHub; that it cannot be written changes no exit code."""
-    path = os.environ.get("GITHUB_STEP_SUMMARY")
-    if not path:
-        return
     from bisar_budget.report.github import step_summary
 
     try:
@@ -428,13 +428,20 @@ def _say_faults(missions: "Iterable[MissionFindings | UnusableMission | None]") 
 
 def _write_report(path: str, format_name: str, report: "Report", style: "Style") -> None:
     """Write a report to a file, its pictures first: a text never names a picture that is not there."""
-    from bisar_budget.report import WITH_PICTURES, pictures, render
+    from bisar_budget.report import pictures, render
 
-    folder = ""
-    if format_name in WITH_PICTURES and path != "-" and (os.path.isfile(path) or not os.path.exists(path)):
-        folder = f"{os.path.splitext(path)[0]}.assets"
+    folder = _folder_of_pictures(path, format_name)
     style = style._replace(assets=os.path.basename(folder))
     text = render(format_name, report, style)
     for name, content in pictures(format_name, report, style).items():
         write_file(os.path.join(folder, name), content)
-    write_file(path, text)
+    deliver(text, path, format_name)
+
+
+def _folder_of_pictures(path: str, format_name: str) -> str:
+    """Folder beside a report for its pictures; empty if the format has none, or nothing can stand beside it."""
+    from bisar_budget.report import WITH_PICTURES
+
+    if format_name not in WITH_PICTURES or path == "-" or (os.path.exists(path) and not os.path.isfile(path)):
+        return ""
+    return f"{os.path.splitext(path)[0]}.assets"

@@ -95,9 +95,10 @@ def diff(
 
     if base is None and len(files) != 2:
         raise click.UsageError("give two mission files, OLD and NEW, or mission files and --base REV.")
+    files = files if base is None else expand(files)
     spare(files, [output])
     day = today.date() if today else day_of_run()
-    pairs = [(files[0], files[1])] if base is None else [(file, file) for file in expand(files)]
+    pairs = [(files[0], files[1])] if base is None else [(file, file) for file in files]
     changes = []
     for before, after in pairs:
         try:

@@ -4,7 +4,7 @@ import os
 
 import click
 
-from bisar_budget.cli.streams import FILE, fail, load_all, print_text, spare, write_file
+from bisar_budget.cli.streams import FILE, deliver, fail, load_all, spare, write_file
 from bisar_budget.cli.verify import progress_bar
 from bisar_budget.errors import printable
 
@@ -66,4 +66,4 @@ def simulate(mission: str, plot: str | None, output: str | None, image_former: s
         write_file(output, point_plot.archive(images))
     if plot is not None:
         write_file(plot, point_plot.drawn(images, loaded.name, os.path.splitext(plot)[1][1:].lower()))
-    print_text(point_plot.summary(images, loaded))
+    deliver(point_plot.summary(images, loaded))
