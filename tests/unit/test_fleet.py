@@ -44,7 +44,7 @@ def test_every_format_says_the_same_for_any_number_of_processes(files, monkeypat
 
 def test_standard_input_is_read_once_by_one_process(monkeypatch) -> None:
     monkeypatch.setattr(fleet, "MANY", 1)
-    monkeypatch.setattr(fleet, "_checked", lambda files, *how: list(files))
+    monkeypatch.setattr(fleet, "_of", lambda files, one: list(files))
     assert fleet.check_files(["a", "-", "b"], DAY, None, fleet.without_analysis) == ["a", "-", "b"]
 
 

@@ -106,11 +106,11 @@ def test_a_check_loads_nothing_heavy(name: str, is_for_people: bool) -> None:
     code = f"""
 from bisar_budget.budget.check import check_mission
 from bisar_budget.mission.load import load_mission
-from bisar_budget.report import FORMATS, ILLUSTRATED, Style, render
+from bisar_budget.report import FORMATS, Style, render
 from bisar_budget.findings.mission import Report
 from datetime import date
 found = check_mission(load_mission({str(mission)!r}), date(2026, 1, 1))
-for name in ILLUSTRATED if {is_for_people} else FORMATS.keys() - ILLUSTRATED:
+for name in [one.name for one in FORMATS.values() if one.is_illustrated == {is_for_people}]:
     render(name, Report(version="", missions=(found,)), Style())
 """
     loaded = loaded_after(code)
