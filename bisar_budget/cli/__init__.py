@@ -14,6 +14,7 @@ import click
 from bisar_budget import __version__
 from bisar_budget.cli.streams import EXIT_INTERRUPTED, EXIT_OUR_FAULT, complain, drop_output, fail
 from bisar_budget.errors import WorkerLostError, printable
+from bisar_budget.resources import docstring
 
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
 # Each command to the module that has it, imported when it is asked for.
@@ -38,9 +39,11 @@ class _Commands(click.Group):
         if cmd_name not in _MODULES:
             return None
         command: click.Command = getattr(import_module(f"bisar_budget.cli.{_MODULES[cmd_name]}"), cmd_name)
+        command.help = command.help or docstring(command.callback)  # without one under -OO
         return command
 
     def main(self, *args: Any, **kwargs: Any) -> Any:
+        self.help = self.help or docstring(self.callback)
         output = sys.stdout
         kwargs["standalone_mode"] = False  # click would exit with 1 on an interrupt or a broken pipe
         kwargs["prog_name"] = "bisar-budget"  # whatever name it was called by

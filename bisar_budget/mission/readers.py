@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from bisar_budget.errors import InvalidValueError, KeyPath, Problem
+from bisar_budget.resources import docstring
 from bisar_budget.units import Dimension, format_quantity, parse_quantity
 
 INVALID: Any = object()  # in place of a value that was reported
@@ -364,7 +365,7 @@ class Section(Reader):
                 accepted = {**accepted, "default": default}
             properties[name] = accepted
         return {
-            "description": (self.kind.__doc__ or "").partition("\n")[0],
+            "description": docstring(self.kind).partition("\n")[0],
             "type": "object",
             "properties": properties,
             **({"required": self.required} if self.required else {}),
