@@ -15,7 +15,15 @@ from numpy.typing import NDArray
 
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import GroundVector
-from bisar_budget.simulate.collection import CELLS, OVERSAMPLING, Chip, Errors, PointCollection, pulses_for
+from bisar_budget.simulate.collection import (
+    CELLS,
+    CONTRIBUTIONS,
+    OVERSAMPLING,
+    Chip,
+    Errors,
+    PointCollection,
+    pulses_for,
+)
 from bisar_budget.simulate.exact import ExactEffect
 from bisar_budget.simulate.image_formation import taylor_window
 from bisar_budget.simulate.phase_history import Complexes, Floats, cell_centres
@@ -33,7 +41,7 @@ _REPRODUCED, _EXACT = (
     0.05,
     2e-3,
 )  # of an image's norm: less left over, and the polynomial is the image's; is it for sure
-_HELD = 1 << 21  # contributions held at once
+_BLOCK = 1 << 18  # contributions formed at once
 _KERNEL = np.linspace(0, 64, 4097)  # range cells, of a tapered range response
 
 
@@ -95,7 +103,7 @@ def read_aperture(
     images = [one.image[rows] for one in (chip, reference)]
     tapered = np.stack([(one * _taper(columns)).reshape(-1) for one in images])
     correlated = np.empty((2, slow_time.size), dtype=complex)
-    block = max(1, _HELD // pixels.shape[0])
+    block = max(1, _BLOCK // pixels.shape[0])
     for start in range(0, slow_time.size, block):
         part = slice(start, start + block)
         contribution = _contributions(collection, errors, centre, slow_time[part], pixels)
@@ -120,7 +128,7 @@ def read_aperture(
         fit = np.zeros(max(4, order + 1))
         fit[: order + 1] = np.polynomial.legendre.legfit(place[kept], phase, order, w=np.abs(clean[kept]))
     # Of a large patch some pixels are enough for a polynomial.
-    some = slice(None, None, -(-pixels.shape[0] * slow_time.size // _HELD))
+    some = slice(None, None, -(-pixels.shape[0] * slow_time.size // CONTRIBUTIONS))
     seen_there, clean_there = (one.reshape(-1)[some] for one in images)
     at_rest = _contributions(collection, errors, centre, slow_time, pixels[some]).sum(axis=0)
     gain = complex(np.vdot(at_rest, clean_there) / np.vdot(at_rest, at_rest))
@@ -218,28 +226,34 @@ def _contributions(
     flown = collection.flown(errors)
     at_middle = flown.range_sum(pixels) - flown.range_sum(np.asarray(centre, dtype=float))
     point = np.array([[*centre, 0.0]])
-    farther = np.zeros((slow_time.size, pixels.shape[0]))
-    for one in collection.paths(errors.smooth(), slow_time):
-        farther += _distance(one.measured, pixels)
-        farther -= _distance(one.measured, point)
-    # Whole cycles are taken off in double precision; of what is left single precision holds 1e-6 rad, in a quarter
-    # of the time.
-    cycles = (farther - at_middle) / collection.wavelength
-    cycles -= np.rint(cycles)
-    turned = (2 * math.pi * cycles).astype(np.float32)
-    contribution = np.empty(turned.shape, dtype=np.complex64)
-    if left is not None:
-        farther -= left[:, None]
-    cells = (farther * (collection.radar.bandwidth / SPEED_OF_LIGHT)).astype(np.float32)
+    paths = collection.paths(errors.smooth(), slow_time)
     if collection.is_tapered:
         weights = taylor_window(257)
         frequency = cell_centres(1.0, 257)
         kernel = np.cos(2 * math.pi * np.outer(_KERNEL, frequency)) @ weights / 257
-        strength = np.interp(np.abs(cells), _KERNEL, kernel, right=0.0) * _weights(collection, slow_time)[:, None]
-    else:
-        strength = np.sinc(cells)
-    np.multiply(np.cos(turned), strength, out=contribution.real)
-    np.multiply(np.sin(turned), strength, out=contribution.imag)
+        by_time = _weights(collection, slow_time)[:, None]
+    contribution = np.empty((slow_time.size, pixels.shape[0]), dtype=np.complex64)
+    pulses = max(1, _BLOCK // pixels.shape[0])
+    for start in range(0, slow_time.size, pulses):
+        part = slice(start, start + pulses)
+        farther = np.zeros(contribution[part].shape)
+        for one in paths:
+            farther += _distance(one.measured[part], pixels)
+            farther -= _distance(one.measured[part], point)
+        # Whole cycles are taken off in double precision; of what is left single precision holds 1e-6 rad, in a
+        # quarter of the time.
+        cycles = (farther - at_middle) / collection.wavelength
+        cycles -= np.rint(cycles)
+        turned = (2 * math.pi * cycles).astype(np.float32)
+        if left is not None:
+            farther -= left[part, None]
+        cells = (farther * (collection.radar.bandwidth / SPEED_OF_LIGHT)).astype(np.float32)
+        if collection.is_tapered:
+            strength = np.interp(np.abs(cells), _KERNEL, kernel, right=0.0) * by_time[part]
+        else:
+            strength = np.sinc(cells)
+        np.multiply(np.cos(turned), strength, out=contribution[part].real)
+        np.multiply(np.sin(turned), strength, out=contribution[part].imag)
     return contribution
 
 

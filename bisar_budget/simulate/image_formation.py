@@ -26,6 +26,8 @@ _TAPS = 6
 _OVERSAMPLING = 4
 _BLOCK = 1 << 20  # complex samples held at once
 _PIXELS = 1 << 16  # handled at once
+_HELD = {"numpy": 30e6, "cubic": 110e6}  # bytes beside data and image: what works on them, and compiled code itself
+_SPACIOUS = 3 * _HELD["cubic"]
 
 Kernel = Literal["auto", "numpy", "cubic", "linear"]
 
@@ -105,7 +107,8 @@ def backprojection(history: PhaseHistory, points: Floats, kernel: Kernel = "auto
         Pixels, anywhere. [m]
     kernel : "auto", "numpy", "cubic" or "linear"
         NumPy does every job; cubic and linear are compiled by Numba (extra `fast`) and read the profiles with
-        splines. Linear is faster and good to -80 dB. Auto is cubic where Numba is installed, else NumPy.
+        splines. Linear is faster and good to -80 dB. Auto is cubic where Numba is installed, else NumPy. Pixels that
+        alias are left to NumPy.
 
     Returns
     -------
@@ -131,7 +134,18 @@ def backprojection(history: PhaseHistory, points: Floats, kernel: Kernel = "auto
         raise ImportError(f"kernel {kernel} needs Numba, which is missing: pip install 'bisar-budget[fast]'")
     from bisar_budget.simulate.compiled import backproject
 
-    return backproject(history, points, kernel)
+    image = backproject(history, points, kernel)
+    return _backprojection(history, points) if image is None else image
+
+
+def kernel_within(memory_limit: float) -> Kernel:
+    """Kernel for a limit of memory [B]: the compiled one, whose code takes 60 MB itself, only with room to spare."""
+    return "cubic" if is_compiled() and memory_limit >= _SPACIOUS else "numpy"
+
+
+def bytes_held(kernel: Kernel) -> float:
+    """What backprojection takes beside data and image. [B]"""
+    return _HELD["numpy" if kernel == "numpy" else "cubic"]
 
 
 @cache

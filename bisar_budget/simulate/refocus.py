@@ -16,6 +16,8 @@ from bisar_budget.simulate.autofocus import Focused
 from bisar_budget.simulate.collection import OVERSAMPLING, Chip, Errors, PointCollection
 from bisar_budget.simulate.phase_history import Complexes, Floats, cell_centres
 
+_TIMES = 64  # read from the lines' spectra at once
+
 
 def refocused(
     collection: PointCollection,
@@ -51,8 +53,11 @@ def refocused(
     middle = lines // 2
     used = chip.image[middle - half : middle + half + 1]
     place = np.arange(columns) - columns // 2
-    read = np.exp(-2j * math.pi * np.outer(place, frequency))
-    aperture = (used @ read) * np.abs(step)
+    aperture = np.empty((used.shape[0], slow_time.size), dtype=complex)
+    for start in range(0, slow_time.size, _TIMES):
+        part = slice(start, start + _TIMES)
+        aperture[:, part] = used @ np.exp(-2j * math.pi * np.outer(place, frequency[part]))
+    aperture *= np.abs(step)
     # As an image of its own, sampled like the chip: the aperture in the middle of a band.
     count = slow_time.size
     samples = math.ceil(OVERSAMPLING * count)

@@ -12,12 +12,12 @@ from bisar_budget.budget.vibration_lines import lines_of
 from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.findings.row import Row, Subject, subject
 from bisar_budget.mission.model import Mission, Simulation
-from bisar_budget.simulate import phase_cases, vibration
+from bisar_budget.simulate import duration, phase_cases, vibration
 from bisar_budget.simulate.location_case import location
 from bisar_budget.simulate.study import Study
 from bisar_budget.workers import worker_pool
 
-__all__ = ["Study", "rows_to_verify", "verify_mission"]
+__all__ = ["Study", "rows_to_verify", "seconds_to_verify", "verify_mission"]
 
 Case = Callable[[], Verdict]
 
@@ -64,6 +64,13 @@ def verify_mission(
 def rows_to_verify(mission: Mission, only: str = "*") -> list[str]:
     """Ids of the rows that `verify_mission` would verify."""
     return [row_id for row_id in cases(Study(mission)) if fnmatchcase(row_id, only)]
+
+
+def seconds_to_verify(mission: Mission, only: str = "*", jobs: int = 1) -> float:
+    """About how long `verify_mission` will take; 0 where it is far below a minute. [s]"""
+    mission = mission._replace(places={})
+    wanted = rows_to_verify(mission, only)
+    return duration.seconds_to_verify(mission, cases, wanted) / max(1, min(jobs, len(wanted)))
 
 
 def cases(study: Study) -> dict[str, Case]:

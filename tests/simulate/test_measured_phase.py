@@ -273,7 +273,7 @@ class TestRoom:
 
     def test_memory_limit_names_what_is_needed(self) -> None:
         c = point_collection(0, simulation={"memory_limit": "1 MB"})
-        with pytest.raises(ValueError, match=r"needs about \d+ MB, simulation.memory_limit is 1 MB"):
+        with pytest.raises(ValueError, match=r"needs about [\d.]+ MB, simulation.memory_limit is 1 MB"):
             c.chip((0.0, 0.0), Errors())
 
     def test_a_patch_of_a_thousand_cells_is_the_largest(self) -> None:

@@ -139,7 +139,7 @@ class TestRefusals:
         changes = {"collection__pulses": 65536, "simulation": {"memory_limit": "100 MB"}}
         with pytest.raises(
             SimulationError,
-            match=r"65536 pulses of \d+ frequencies need about 615.1 MB, .*: raise it, or lower collection.pulses",
+            match=r"65536 pulses of \d+ frequencies need about 607.6 MB, .*: raise it, or lower collection.pulses",
         ):
             simulate_point(parse_mission(mission_text(**changes)))
 
@@ -154,12 +154,12 @@ class TestRefusals:
             if fits:
                 simulate_point(parse_mission(text))
             else:
-                with pytest.raises(SimulationError, match=r"need about 101\.9 MB"):
+                with pytest.raises(SimulationError, match=r"need about 109\.4 MB"):
                     simulate_point(parse_mission(text))
             peak = tracemalloc.get_traced_memory()[1]
         finally:
             tracemalloc.stop()
-        assert peak < (102e6 if fits else 20e6)  # nothing is formed before it is known
+        assert peak < (109.4e6 if fits else 20e6)  # nothing is formed before it is known
 
 
 class TestLinesOfEqualRangeThatBend:
