@@ -29,7 +29,7 @@ def by_arrays(study: Study, source, sizes):
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_scalars_and_arrays_agree(family: str, seed: int) -> None:
     """Every error, at a hundredth and at a tenth of the largest that is one of navigation, both signs.
 

@@ -323,10 +323,10 @@ class TestLargeErrors:
         mission = parse_mission(
             mission_text(timing_error={"constant": "100 us"}, requirements={"location_error": "1000 km"})
         )
-        moved = drawn_by_hand(mission, 500, 5, {"clock"}).moved[0]
+        moved = drawn_by_hand(mission, 200, 5, {"clock"}).moved[0]
         has_image = np.isfinite(moved)
         assert 0.1 < has_image.mean() < 0.9
-        found = monte_carlo(Analysis(mission), 500, 5)
+        found = monte_carlo(Analysis(mission), 200, 5)
         one = requirement(found, "mission.location_error")
         assert one.probability == has_image.mean()
         assert one.sigma == pytest.approx(math.sqrt(np.mean(moved[has_image] ** 2)), rel=1e-6)
