@@ -22,15 +22,14 @@ from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
 from bisar_budget.budget.findings import GATING, STATUSES
+from bisar_budget.catalogue import SYMBOLS
 from bisar_budget.mission import readers
 from bisar_budget.mission.model import MISSION
 from bisar_budget.report import FORMATS, SUFFIXES
 from bisar_budget.report.text_table import WORDS
-from bisar_budget.units import format_quantity
+from bisar_budget.units import DIMENSIONS, format_quantity
 
 MISSIONS = ROOT / "specs" / "missions"
-# Missions for the keys of the JSON: between them they have every part of a report.
-_EVERY_PART = ("uav_pair_l_band.yaml", "drones_same_gnss.yaml", "one_stationary_spotlight.yaml")
 
 
 def table(heads: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
@@ -48,9 +47,10 @@ class Generated(SphinxDirective):
     optional_arguments = 1
     final_argument_whitespace = True
     write: Callable[["Generated"], str]
+    folder: str  # of the finished site
 
     def run(self) -> list[nodes.Node]:
-        """Write and parse it; the page is read again when its mission changes."""
+        """Write and parse it."""
         try:
             text = type(self).write(self)
         except ValueError as error:
@@ -104,24 +104,34 @@ def json_keys(directive: Generated) -> str:
         for path, value in _leaves(document, ()):
             if found.get(path) is None:
                 found[path] = value
+    parts = {path.rpartition(".")[0].removesuffix("[]") for path in found}
+    found = {path: value for path, value in found.items() if path not in parts}  # a part that is null in one of them
     rows = _joined(found, directive.words(), "keys of the JSON")
     return table(("key", "example", "means"), [(f"`{path}`", _example(found[path]), text) for path, text in rows])
 
 
 @cache
 def _documents() -> list[dict[str, Any]]:
-    options = ("--format", "json", "--verify", "--monte-carlo", "1000", "--date", "2026-01-01")
-    texts = [_output("check", f"specs/missions/{name}", *options) for name in _EVERY_PART]
-    texts.append(_output("check", "specs/missions/none.yaml", "--format", "json"))
+    """Reports that between them have every part that a report can have."""
+    checked = (
+        ("specs/missions/rigling_moses_section_v_autofocus.yaml", "--verify", "--monte-carlo", "1000"),
+        ("specs/missions/drones_same_gnss.yaml", "--monte-carlo", "1000"),
+        ("specs/missions/one_stationary_spotlight.yaml",),
+        ("no such file.yaml",),
+    )
+    texts = [_output("check", *arguments, "--format", "json") for arguments in checked]
+    more = "scene: { radius: 250 m }\nwaivers: [{ id: timing.linear, until: 2000-01-01, reason: expired }]\n"
+    text = (MISSIONS / "rigling_moses_section_v.yaml").read_text(encoding="utf-8") + more
+    texts.append(_output("check", "-", "--format", "json", given=text))
     return [json.loads(text) for text in texts]
 
 
 # Mappings whose keys are names of the mission, not of the contract.
-_NAMED = ("summary", "requirement_ids")
+_NAMED = ("summary",)
 
 
 def _leaves(value: Any, path: tuple[str, ...]) -> Iterator[tuple[str, Any]]:
-    if isinstance(value, dict) and path[-1:] not in [(name,) for name in _NAMED]:
+    if isinstance(value, dict) and not set(path[-1:]) & set(_NAMED):
         for key, item in value.items():
             yield from _leaves(item, (*path, key))
     elif isinstance(value, list) and value and isinstance(value[0], dict):
@@ -138,9 +148,9 @@ def _example(value: Any) -> str:
     return f"`{text if len(text) < 40 else text[:36] + ' ...'}`"
 
 
-def _output(*arguments: str) -> str:
+def _output(*arguments: str, given: str = "") -> str:
     command = [sys.executable, "-m", "bisar_budget", *arguments]
-    done = subprocess.run(command, cwd=ROOT, encoding="utf-8", capture_output=True, check=False)
+    done = subprocess.run(command, cwd=ROOT, input=given, encoding="utf-8", capture_output=True, check=False)
     if done.returncode > 2:
         raise ValueError(done.stderr)
     return done.stdout
@@ -256,6 +266,19 @@ def _bound(value: float, si: str) -> str:
     return f"{value:g} {si}".rstrip()
 
 
+def units(_: Generated) -> str:
+    """Every kind of quantity with the units that may stand behind a number."""
+    rows = [
+        (
+            dimension.name,
+            ", ".join(f"`{unit}`" for unit in dimension.units if unit),
+            "refused, except 0" if dimension.usual else dimension.si or "a ratio",
+        )
+        for dimension in DIMENSIONS
+    ]
+    return table(("quantity", "units", "a bare number is in"), rows)
+
+
 # Missions of the gallery
 
 
@@ -270,40 +293,51 @@ def _about(file: Path) -> tuple[str, str]:
     sources, _, finding = "\n".join(lines).partition("Finding:")
     if not finding:
         raise ValueError(f"{file.name} does not say its finding")
-    return sources.strip(), finding.strip()
+    # Sources and assumptions are paragraphs of their own, or stay one where they go on indented.
+    return re.sub(r"\n(?=\S[^\n]{0,40}: )", "\n\n", sources.strip()), finding.strip()
 
 
 @cache
-def _found(name: str) -> tuple[dict[str, Any], dict[str, str]]:
-    """The findings of a mission as JSON, and the drawings of its report by their names."""
+def _found(name: str) -> tuple[dict[str, Any], list[str], bytes]:
+    """Of a mission: its findings as JSON, the drawings of its report, and the report as a page."""
     with TemporaryDirectory() as folder:
-        reports = [f"{folder}/report.json", f"{folder}/report.md"]
+        reports = [Path(folder, f"report.{suffix}") for suffix in ("json", "md", "html")]
         _output("check", "-q", f"specs/missions/{name}.yaml", *(f"--report={report}" for report in reports))
-        found = json.loads(Path(reports[0]).read_text(encoding="utf-8"))["missions"][0]
-        drawings = sorted(Path(folder).glob("*.assets/*.svg"))
-        return found, {file.stem.partition("-")[2]: file.read_text(encoding="utf-8") for file in drawings}
+        found = json.loads(reports[0].read_text(encoding="utf-8"))["missions"][0]
+        # The plan before the elevation.
+        drawings = sorted(Path(folder).glob("*.assets/*.svg"), reverse=True)
+        return found, [file.read_text(encoding="utf-8") for file in drawings], reports[2].read_bytes()
 
 
-def mission(directive: Generated) -> str:
-    """A mission of the gallery: finding, drawings, what `check` prints, the file."""
+def finding(directive: Generated) -> str:
+    """What a mission's file says is found, drawings of the collection, what `check` prints, the report to sign."""
     name = directive.arguments[0]
-    file = MISSIONS / f"{name}.yaml"
-    directive.env.note_dependency(str(file))
-    sources, finding = _about(file)
-    _, drawings = _found(name)
-    parts = [f"**Finding.** {finding}"]
-    parts += [f"```{{raw}} html\n<figure class='drawing'>{svg}</figure>\n```" for svg in reversed(drawings.values())]
+    directive.env.note_dependency(str(MISSIONS / f"{name}.yaml"))
+    _, drawings, page = _found(name)
+    report = Path(Generated.folder, "reports", f"{name}.html")
+    report.parent.mkdir(parents=True, exist_ok=True)
+    report.write_bytes(page)
+    up = "../" * directive.env.docname.count("/")
+    _, says = _about(MISSIONS / f"{name}.yaml")
+    parts = [says[0].upper() + says[1:]]
+    parts += [f"```{{raw}} html\n<figure class='drawing'>{svg}</figure>\n```" for svg in drawings]
     parts.append(f"```console\n$ bisar-budget check specs/missions/{name}.yaml\n$ echo $?\n```")
-    parts.append("## Where the numbers come from\n\n" + "\n".join(f"> {line}  " for line in sources.splitlines()))
-    parts.append(f"## The file\n\n```{{literalinclude}} ../../specs/missions/{name}.yaml\n:language: yaml\n```")
+    link = f"<a href='{up}reports/{name}.html'>The report to sign</a>"
+    parts.append(f"```{{raw}} html\n<p>{link}, as <code>--report report.html</code> writes it.</p>\n```")
     return "\n\n".join(parts)
+
+
+def sources(directive: Generated) -> str:
+    """What a mission's file says of where its numbers come from."""
+    says, _ = _about(MISSIONS / f"{directive.arguments[0]}.yaml")
+    return "\n".join(f"> {line}" if line else ">" for line in says.splitlines())
 
 
 def missions(directive: Generated) -> str:
     """The gallery's table of contents: a line for each mission of the project, each with a page."""
     rows = []
     for name, text in _joined([file.stem for file in sorted(MISSIONS.glob("*.yaml"))], directive.words(), "missions"):
-        found, _ = _found(name)
+        found = _found(name)[0]
         rows.append((f"[{found['name']}]({name}.md)", f"`{WORDS[found['status']]}`", text))
     return table(("mission", "result", "shows"), rows)
 
@@ -324,6 +358,32 @@ def derived(directive: Generated) -> str:
     if len(found) != 1:
         raise ValueError(f"{len(found)} headings of the derivation begin with this: {list(_derivation())}")
     return found[0]
+
+
+def tables_of_statuses(_: Generated) -> str:
+    """Modules that say something of most statuses: what a new one has to be written into."""
+    found = []
+    for file in sorted((ROOT / "bisar_budget").rglob("*.py")):
+        tree = ast.parse(file.read_text(encoding="utf-8"))
+        named = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant)} & set(STATUSES)
+        if len(named) > len(STATUSES) / 2:
+            says = (ast.get_docstring(tree) or "").partition("\n")[0]
+            found.append((f"`{file.relative_to(ROOT / 'bisar_budget')}`", says))
+    return table(("module", "is"), found)
+
+
+# A symbol of one platform along one axis stands for those of both, along all axes.
+_OF_A_PLATFORM = re.compile(r"_[xyz]?[tr]$")
+_OF_A_PLATFORM_IN_LATEX = re.compile(r"_\{[xyz]?[tr]\}$")
+
+
+def symbols(directive: Generated) -> str:
+    """Every symbol of the formulas, as they draw it, with the words of the body."""
+    latex = {_OF_A_PLATFORM.sub("_k", name): text for name, (text, _) in SYMBOLS.items()}
+    rows = _joined(latex, directive.words(), "symbols")
+    return table(
+        ("symbol", "is"), [(f"${_OF_A_PLATFORM_IN_LATEX.sub('_{k}', latex[name])}$", text) for name, text in rows]
+    )
 
 
 def rooms(_: Generated) -> str:
@@ -348,15 +408,20 @@ DIRECTIVES = {
     "formats": formats,
     "json-keys": json_keys,
     "mission-keys": mission_keys,
-    "mission": mission,
+    "units": units,
+    "finding": finding,
+    "sources": sources,
     "missions": missions,
     "derived": derived,
+    "symbols": symbols,
+    "tables-of-statuses": tables_of_statuses,
     "rooms": rooms,
 }
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
     """Register a directive for each function."""
+    Generated.folder = str(app.outdir)
     for name, write in DIRECTIVES.items():
         app.add_directive(name, type(f"{write.__name__.title()}Directive", (Generated,), {"write": write}))
     return {"parallel_read_safe": True}
