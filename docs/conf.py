@@ -1,4 +1,4 @@
-"""Sphinx settings of the documentation: `sphinx-build -W --keep-going -q docs build/docs`."""
+"""Sphinx settings of the documentation: `sphinx-build -j auto -EW --keep-going -q docs build/docs`."""
 
 import sys
 from pathlib import Path

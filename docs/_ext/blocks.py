@@ -132,6 +132,11 @@ class Page:
             raise ExampleError("".join(told))
 
 
+def blocks(page: str) -> list[tuple[str, str]]:
+    """The fenced blocks of a Markdown page, each with the word behind its fence."""
+    return re.findall(r"(?ms)^```(\S+)[^\n]*\n(.*?)^```", page)
+
+
 def commands(text: str) -> Iterator[tuple[str, str]]:
     """Split a console block into commands, each with the output stated under it."""
     for part in re.split(r"(?m)^\$ ", text)[1:]:
