@@ -94,11 +94,11 @@ def one(seed: int) -> None:
     text, former, targets, is_compiled = drawn(seed)
     if not is_compiled:
         sys.modules["numba"] = sys.modules["finufft"] = None  # type: ignore[assignment]
-    from bisar_budget.report.point_plot import archive
+    from bisar_budget.report.drawing.point_plot import archive
     from bisar_budget.simulate.image_formation import is_compiled as has_kernels
     from bisar_budget.simulate.point import SimulationError, simulate_point
     from bisar_budget.simulate.targets import parse_targets
-    from bisar_budget.simulate.verify import rows_to_verify, verify_mission
+    from bisar_budget.verify.limits import rows_to_verify, verify_mission
 
     if has_kernels():
         import finufft  # noqa: F401

@@ -4,13 +4,13 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from bisar_budget.budget.allocation import Allocation
-from bisar_budget.budget.analysis import Analysis, Model
-from bisar_budget.budget.effects import ErrorSource
+from bisar_budget.analysis.allocation import Allocation
+from bisar_budget.analysis.analysis import Analysis, Model
 from bisar_budget.budget.judgement import judgement
-from bisar_budget.budget.models import CUBIC, LOCATION, QUADRATIC, Declared
 from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.constants import UTILIZATION_TOLERANCE
+from bisar_budget.effects.effect import ErrorSource
+from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC, Declared
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import FRAME_AXES
 from bisar_budget.units import format_limit, format_quantity

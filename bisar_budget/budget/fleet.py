@@ -98,7 +98,7 @@ def _kept(
     except MissionError as error:
         return keep(UnusableMission(file=file, faults=error.faults, data=error.data))
     if drawn is not None:
-        from bisar_budget.budget.monte_carlo import monte_carlo
+        from bisar_budget.monte_carlo.probability import monte_carlo
 
         found = found._replace(monte_carlo=monte_carlo(found.analysed(), *drawn))
     return keep(found)

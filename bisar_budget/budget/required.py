@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
-from bisar_budget.budget.effects import PLATFORMS
+from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.model import Mission
 

@@ -345,7 +345,7 @@ def _with_images(
     for (place, found), images in zip(usable.items(), verified, strict=True):
         judged = with_verdicts(found, images)
         if illustrated:
-            from bisar_budget.simulate.image_evidence import form_image_evidence
+            from bisar_budget.verify.evidence import form_image_evidence
 
             shown = form_image_evidence(judged.analysed().mission, judged)
             result[place] = judged._replace(image_evidence=shown)
@@ -358,7 +358,7 @@ def _explain(files: Sequence[str], row_id: str, today: date, model: str | None, 
     """Explain a row in every mission that has it."""
     from bisar_budget.budget.check import check_mission
     from bisar_budget.mission.readers import did_you_mean
-    from bisar_budget.report.explanation import explain
+    from bisar_budget.report.explain.explanation import explain
 
     texts: list[str] = []
     known: dict[str, None] = {}
@@ -397,7 +397,7 @@ def _step_summary(format_name: str) -> str | None:
 
 def _append_step_summary(path: str, report: "Report", style: "Style") -> None:
     """Add to the page of the run on GitHub; that it cannot be written changes no exit code."""
-    from bisar_budget.report.github import step_summary
+    from bisar_budget.report.formats.github import step_summary
 
     try:
         with open(path, "a", encoding="utf-8", errors="backslashreplace", newline="\n") as file:

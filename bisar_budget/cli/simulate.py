@@ -49,7 +49,7 @@ def simulate(mission: str, plot: str | None, output: str | None, image_former: s
     except ValueError as error:
         raise click.UsageError(f"--targets: {printable(str(error))}.") from None
     (loaded,) = load_all([mission])
-    from bisar_budget.report import point_plot
+    from bisar_budget.report.drawing import point_plot
     from bisar_budget.simulate.point import SimulationError, simulate_point
 
     try:

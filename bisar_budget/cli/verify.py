@@ -57,7 +57,8 @@ def verify(missions: Sequence[str], only: str, format_name: str, output: str | N
     each limit is formed again with its gain and refocused. Exit code: 0, or 1 if a limit is optimistic, 2
     for wrong usage, an unusable file, or a mission on whose limits no image gave a verdict.
     """
-    from bisar_budget.report import Style, verification
+    from bisar_budget.report import Style
+    from bisar_budget.report.formats import verification
 
     files = expand(missions)
     spare(files, [output])
@@ -78,7 +79,7 @@ def verify(missions: Sequence[str], only: str, format_name: str, output: str | N
 def verify_all(missions: "Sequence[Mission]", only: str, jobs: int | None) -> "list[VerifiedMission]":
     """Verify missions, with a progress bar where somebody watches."""
     from bisar_budget.simulate.image_formation import is_compiled
-    from bisar_budget.simulate.verify import rows_to_verify, seconds_to_verify, verify_mission
+    from bisar_budget.verify.limits import rows_to_verify, seconds_to_verify, verify_mission
 
     total = sum(len(rows_to_verify(mission, only)) for mission in missions)
     if not total and only != "*":

@@ -3,7 +3,7 @@
 from datetime import date
 from typing import TYPE_CHECKING, NamedTuple
 
-from bisar_budget.budget.allocation import Allocation
+from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.errors import Fault
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUSES, worst
@@ -11,10 +11,10 @@ from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Document, Mission
 
 if TYPE_CHECKING:
-    from bisar_budget.budget.analysis import Analysis
-    from bisar_budget.budget.monte_carlo import MonteCarlo
-    from bisar_budget.budget.scene import SceneEdge
+    from bisar_budget.analysis.analysis import Analysis
+    from bisar_budget.analysis.scene import SceneEdge
     from bisar_budget.findings.images import ImageEvidence, Verdict
+    from bisar_budget.findings.monte_carlo import MonteCarlo
 
 
 class FileWarning(NamedTuple):

@@ -72,7 +72,7 @@ class Style(NamedTuple):
 
 def _module(format_name: str) -> Any:
     """Imported when it is asked for, so that none costs the others anything."""
-    return import_module(f"bisar_budget.report.{FORMATS[format_name].module}")
+    return import_module(f"bisar_budget.report.formats.{FORMATS[format_name].module}")
 
 
 def render(format_name: str, report: "Report", style: Style) -> str:

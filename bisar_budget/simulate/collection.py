@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bisar_budget.budget.exact_arrays import aperture_nodes
 from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.effects.exact_arrays import aperture_nodes
 from bisar_budget.geometry import BistaticGeometry, GroundVector
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.simulate.exact import ExactEffect, exact_effect

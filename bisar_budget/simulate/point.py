@@ -7,13 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bisar_budget.budget.analysis import Analysis
-from bisar_budget.budget.correlation import correlated_errors, likely_error
-from bisar_budget.budget.effects import PLATFORMS
-from bisar_budget.budget.exact_arrays import aperture_nodes
-from bisar_budget.budget.pieces import Piece, gradients_of, indicated_point
-from bisar_budget.budget.vibration_lines import along_line_of_sight, lines_of
+from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.effects.correlation import correlated_errors, likely_error
+from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.exact_arrays import aperture_nodes
+from bisar_budget.effects.pieces import Piece, gradients_of, indicated_point
+from bisar_budget.effects.vibration_lines import along_line_of_sight, lines_of
 from bisar_budget.geometry import BistaticGeometry, GroundVector, Vector
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.mission.model import MotionError as DeclaredError

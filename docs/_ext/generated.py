@@ -16,17 +16,17 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from bisar_budget.budget.findings import GATING, STATUSES
 from blocks import ROOT
 from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
-from bisar_budget.budget.findings import GATING, STATUSES
 from bisar_budget.catalogue import SYMBOLS
 from bisar_budget.mission import readers
 from bisar_budget.mission.model import MISSION
 from bisar_budget.report import FORMATS, SUFFIXES
-from bisar_budget.report.text_table import WORDS
+from bisar_budget.report.formats.text_table import WORDS
 from bisar_budget.units import DIMENSIONS, format_quantity
 
 MISSIONS = ROOT / "specs" / "missions"

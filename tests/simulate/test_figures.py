@@ -9,8 +9,8 @@ import pytest
 
 from bisar_budget.cli.simulate import simulate
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.report import point_plot
-from bisar_budget.report.point_figures import Picture, rotated_back, sheet
+from bisar_budget.report.drawing import point_plot
+from bisar_budget.report.drawing.point_figures import Picture, rotated_back, sheet
 from bisar_budget.simulate import point as point_module
 from bisar_budget.simulate.former import IMAGE_FORMERS
 from bisar_budget.simulate.image_formation import ground_grid

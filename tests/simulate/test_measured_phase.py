@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.evaluators import LEGENDRE_FITS
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.simulate.aperture_reading import _distance, read_aperture
 from bisar_budget.simulate.collection import Errors, PointCollection, superposed
 from bisar_budget.simulate.phase_history import MotionError, cell_centres
-from bisar_budget.simulate.shift import measured_shift
-from bisar_budget.simulate.verify import verify_mission
+from bisar_budget.verify.aperture_reading import _distance, read_aperture
+from bisar_budget.verify.limits import verify_mission
+from bisar_budget.verify.shift import measured_shift
 from tests.conftest import mission_text
 from tests.simulate.conftest import collection
 

@@ -12,7 +12,7 @@ from bisar_budget.simulate import far_field, image_formation, range_profile
 from bisar_budget.simulate.far_field import far_field_filter
 from bisar_budget.simulate.image_formation import backprojection, is_compiled, kernel_within, matched_filter
 from bisar_budget.simulate.point import SimulationError, simulate_point
-from bisar_budget.simulate.verify import rows_to_verify, seconds_to_verify, verify_mission
+from bisar_budget.verify.limits import rows_to_verify, seconds_to_verify, verify_mission
 from tests.conftest import ROOT, mission_text
 from tests.simulate.conftest import collection
 
@@ -157,8 +157,8 @@ class TestTime:
 
     def test_a_long_one_grows_with_its_rows(self, monkeypatch) -> None:
         """Measured is one image; the rest is counted."""
-        monkeypatch.setattr("bisar_budget.simulate.duration._SLOWEST", 1e3)
-        monkeypatch.setattr("bisar_budget.simulate.duration._smallest_pair", lambda collection: 10.0)
+        monkeypatch.setattr("bisar_budget.verify.duration._SLOWEST", 1e3)
+        monkeypatch.setattr("bisar_budget.verify.duration._smallest_pair", lambda collection: 10.0)
         mission = load_mission(str(SECTION_V))
         rows = rows_to_verify(mission)
         whole = seconds_to_verify(mission)
@@ -167,13 +167,13 @@ class TestTime:
         assert 10.0 <= seconds_to_verify(mission, rows[0]) < whole / 2
 
     def test_the_smallest_pair_is_measured(self, monkeypatch) -> None:
-        monkeypatch.setattr("bisar_budget.simulate.duration._SLOWEST", 1e3)
+        monkeypatch.setattr("bisar_budget.verify.duration._SLOWEST", 1e3)
         assert 0 < seconds_to_verify(load_mission(str(SECTION_V)), "timing.quadratic") < 60
 
     @pytest.mark.parametrize("command", ["verify", "simulate"])
     def test_the_command_says_so_and_what_to_change(self, run, monkeypatch, command) -> None:
         monkeypatch.setattr("bisar_budget.cli.verify.LONG", 1e-9)
-        monkeypatch.setattr("bisar_budget.simulate.duration._SLOWEST", 1e3)
+        monkeypatch.setattr("bisar_budget.verify.duration._SLOWEST", 1e3)
         result = run(command, SECTION_V, *(["--only", "timing.quadratic"] if command == "verify" else []))
         (line,) = [line for line in result.stderr.splitlines() if line.startswith("Forming the images of ")]
         assert re.search(r"will take about [\d.]+ (s|minutes); ", line)

@@ -19,8 +19,8 @@ from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.simulate import collection as collection_module
 from bisar_budget.simulate.exact import NoGroundPointError
 from bisar_budget.simulate.image_formation import backprojection
-from bisar_budget.simulate.study import Study
-from bisar_budget.simulate.verify import rows_to_verify, verify_mission
+from bisar_budget.verify.limits import rows_to_verify, verify_mission
+from bisar_budget.verify.study import Study
 from tests import families
 from tests.conftest import ROOT, findings, mission_text
 from tests.conftest import row as row_of

@@ -9,12 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bisar_budget.budget import draws as drawing
-from bisar_budget.budget.analysis import Analysis
-from bisar_budget.budget.monte_carlo import MonteCarlo, Requirement, _wilson, _within, monte_carlo
+from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import MAX_DRAWS
+from bisar_budget.findings.monte_carlo import MonteCarlo, Requirement
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
+from bisar_budget.monte_carlo import draws as drawing
+from bisar_budget.monte_carlo.probability import _wilson, _within, monte_carlo
 from tests import reference
 from tests.conftest import findings, mission_text, row
 from tests.unit.test_settings import project, table  # noqa: F401

@@ -14,15 +14,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
-from bisar_budget.budget.analysis import Analysis
+from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.monte_carlo import monte_carlo
 from bisar_budget.errors import Fault, printable
 from bisar_budget.findings.images import ImageEvidence, PointImage, Verdict
 from bisar_budget.findings.mission import MissionFindings, Option, Report, UnusableMission
 from bisar_budget.mission.load import load_mission
+from bisar_budget.monte_carlo.probability import monte_carlo
 from bisar_budget.report import Style, pictures, render
-from bisar_budget.report.compliance import compliance
+from bisar_budget.report.compliance.page import compliance
 from tests.conftest import ROOT, TODAY, findings, mission_text
 from tests.page import Element, read_page
 

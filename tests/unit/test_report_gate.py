@@ -18,8 +18,9 @@ from bisar_budget.cli.check import check
 from bisar_budget.errors import Fault
 from bisar_budget.findings.mission import Report, UnusableMission
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.report import FORMATS, Style, escapes, format_of, render
-from bisar_budget.report.github import step_summary
+from bisar_budget.report import FORMATS, Style, format_of, render
+from bisar_budget.report.formats.github import step_summary
+from bisar_budget.report.words import escapes
 from tests.conftest import ROOT, TODAY, findings, mission_text
 from tests.page import read_page
 
