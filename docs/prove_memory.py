@@ -110,7 +110,7 @@ def one(seed: int) -> None:
     try:
         if former == "verify":
             found = verify_mission(mission, Random(seed).choice(rows)).rows[0]
-            said = found.reason or found.verdict
+            said = (found.verdict == "not_evaluated" and found.reason) or found.verdict
         else:
             archive(simulate_point(mission, image_former=former, targets=parse_targets(targets)))
             said = "formed"

@@ -1,5 +1,6 @@
 """From an analysis to findings: each error and their sums held to what is allowed, waivers, many files."""
 
+# What other rooms may use.
 __all__ = [
     "aggregates",
     "check",
@@ -8,4 +9,4 @@ __all__ = [
     "fleet",
     "pull_in",
     "verdicts",
-]  # what other rooms may use
+]

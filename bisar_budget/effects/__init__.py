@@ -1,5 +1,6 @@
 """What errors do to range history and image, by the published model, the full one and exact ranges."""
 
+# What other rooms may use.
 __all__ = [
     "combine",
     "correlation",
@@ -14,4 +15,4 @@ __all__ = [
     "sources",
     "subject",
     "vibration_lines",
-]  # what other rooms may use
+]

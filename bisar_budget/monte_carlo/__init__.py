@@ -1,3 +1,4 @@
 """Errors drawn from their distributions, and how often the requirements hold. Needs NumPy."""
 
-__all__ = ["probability"]  # what other rooms may use
+# What other rooms may use.
+__all__ = ["probability"]

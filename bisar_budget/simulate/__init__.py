@@ -1,5 +1,6 @@
 """Images of point scatterers with motion errors, from exact ranges. Needs NumPy."""
 
+# What other rooms may use.
 __all__ = [
     "autofocus",
     "collection",
@@ -10,4 +11,4 @@ __all__ = [
     "point",
     "resampling",
     "targets",
-]  # what other rooms may use
+]

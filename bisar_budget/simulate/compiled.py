@@ -39,6 +39,7 @@ _REFINEMENT = {"linear": 16, "cubic": 8}  # samples per sample from the FFT
 _ORDER = {"linear": 1, "cubic": 3}
 _MARGIN = 8  # samples beyond the last pixel on each side
 _BLOCK_BYTES = 24e6  # of profiles held at once; about what a processor's last cache holds
+_WORTH = 4  # samples refined for a pixel; NumPy reads one in the time of about ten
 _PHASE_LIMIT = 1e-6  # rad, of the first neglected order of the expansion
 _OFF_LATTICE = 1e-8  # wavelengths
 
@@ -102,8 +103,8 @@ def lattice_of(points: Floats, tolerance: float) -> Lattice | None:
 def backproject(history: PhaseHistory, points: Floats, spline: Spline) -> Complexes | None:
     """Image by backprojection, see `image_formation.backprojection`; all inputs finite.
 
-    None where pixels are farther apart in range than a profile is long: there it is read again and again, and to lay
-    the repeats out would take time and memory without bound.
+    None where pixels are so few and so far apart in range that to refine what lies between them would take longer
+    than to read them one by one, or more memory than a block has.
 
     Parameters
     ----------
@@ -134,7 +135,7 @@ def backproject(history: PhaseHistory, points: Floats, spline: Spline) -> Comple
         middle = np.linalg.norm(history.transmitter - centre, axis=1)
         middle = middle + np.linalg.norm(history.receiver - centre, axis=1)
         # Neither leg's range changes faster than the pixel moves.
-        within = _needed(history, middle - 2 * radius, middle + 2 * radius)
+        within = _needed(history, middle - 2 * radius, middle + 2 * radius, image.size)
     if lattice is not None and within is not None:
         padded = np.zeros((lattice.shape[0], -(-lattice.shape[1] // _LINE) * _LINE), dtype=complex)
         for block in _profile_blocks(history, within, spline):
@@ -143,7 +144,8 @@ def backproject(history: PhaseHistory, points: Floats, spline: Spline) -> Comple
         image = np.ascontiguousarray(image if shape == points.shape[:-1] else image.T)
     else:
         axes = np.ascontiguousarray(points.reshape(-1, 3).T)
-        within = _needed(history, *_reach(history.transmitter, history.receiver, axes))
+        nearest, farthest = _reach(history.transmitter, history.receiver, axes)
+        within = _needed(history, nearest, farthest, image.size)
         if within is None:
             return None
         for block in _profile_blocks(history, within, spline):
@@ -187,12 +189,15 @@ class _Needed(NamedTuple):
     samples: int
 
 
-def _needed(history: PhaseHistory, nearest: Floats, farthest: Floats) -> _Needed | None:
-    """What pixels between two range sums, (pulses,) [m], can need; None if it is more than a profile has."""
+def _needed(history: PhaseHistory, nearest: Floats, farthest: Floats, pixels: int) -> _Needed | None:
+    """What pixels between two range sums, (pulses,) [m], can need; None if it is too much for so few.
+
+    A profile repeats: where more is needed than it has, repeats are laid out.
+    """
     length = profile_length(history, _OVERSAMPLING)
     per_metre = cells_per_metre(history, length)
     count = float((farthest - nearest).max()) * per_metre + 2 * _MARGIN + 1
-    if count > length + 4 * _MARGIN:
+    if count > max(length + 4 * _MARGIN, min(_WORTH * pixels, _BLOCK_BYTES / (8 * max(_REFINEMENT.values())))):
         return None
     return _Needed(np.floor((nearest - _reference(history)) * per_metre).astype(np.int64) - _MARGIN, int(count))
 

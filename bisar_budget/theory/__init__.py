@@ -1,3 +1,4 @@
 """Derivation of the limits from the geometry, by SymPy. Nothing outside this package imports SymPy."""
 
-__all__ = ["emit", "emit_catalogue", "render"]  # what other rooms may use
+# What other rooms may use.
+__all__ = ["emit", "emit_catalogue", "render"]

@@ -1,3 +1,4 @@
 """Images with errors exactly at their limits, and verdicts on the limits. Needs NumPy."""
 
-__all__ = ["evidence", "limits"]  # what other rooms may use
+# What other rooms may use.
+__all__ = ["evidence", "limits"]
