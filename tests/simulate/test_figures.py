@@ -10,7 +10,7 @@ import pytest
 from bisar_budget.cli.simulate import simulate
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.report.drawing import point_plot
-from bisar_budget.report.drawing.point_figures import Picture, rotated_back, sheet
+from bisar_budget.report.drawing.point_figures import ImagePanel, rotated_back, sheet
 from bisar_budget.simulate import point as point_module
 from bisar_budget.simulate.former import IMAGE_FORMERS
 from bisar_budget.simulate.image_formation import ground_grid
@@ -100,13 +100,13 @@ class TestFigure3:
         assert drawn.range_error_mm == pytest.approx(-2.5 * 30.414 / 31.0 * drawn.slow_time**2, abs=0.02)
 
 
-def centres(picture: Picture):
+def centres(picture: ImagePanel):
     return (
         picture.corners[1:, 1:] + picture.corners[:-1, 1:] + picture.corners[1:, :-1] + picture.corners[:-1, :-1]
     ) / 4
 
 
-def summit(picture: Picture, near) -> tuple[np.ndarray, float]:
+def summit(picture: ImagePanel, near) -> tuple[np.ndarray, float]:
     """Place and level of the highest pixel within 1.5 m, between pixels by a parabola each way."""
     places = centres(picture)
     away = np.hypot(*np.moveaxis(places - near, -1, 0))
