@@ -30,7 +30,6 @@ source_suffix = {".md": "markdown"}
 myst_enable_extensions = ["amsmath", "attrs_inline", "colon_fence", "deflist", "dollarmath"]
 myst_fence_as_directive = ["math"]
 myst_heading_anchors = 3
-suppress_warnings = ["myst.header"]  # some of the pages were written for GitHub and begin with the second level
 
 html_theme = "furo"
 html_title = f"bisar-budget {version}"
