@@ -24,12 +24,12 @@ extensions = [
     "checked",
 ]
 exclude_patterns = ["_ext"]
+smartquotes = False  # two hyphens are an option, not a dash
 source_suffix = {".md": "markdown"}
 
 myst_enable_extensions = ["amsmath", "attrs_inline", "colon_fence", "deflist", "dollarmath"]
 myst_fence_as_directive = ["math"]
 myst_heading_anchors = 3
-suppress_warnings = ["myst.header"]  # some of the pages were written for GitHub and begin with the second level
 
 html_theme = "furo"
 html_title = f"bisar-budget {version}"
@@ -42,11 +42,10 @@ copybutton_prompt_text = "$ "
 copybutton_only_copy_prompt_lines = True
 
 autodoc_member_order = "bysource"
-autodoc_typehints = "description"
-autodoc_typehints_description_target = "documented"
+autodoc_typehints = "none"  # docstrings say types, with shapes and units
 napoleon_numpy_docstring = True
 napoleon_use_rtype = False
 
 nitpicky = True
-# Names of other projects, whose pages a build without a network cannot ask for; types that are not documented here.
-nitpick_ignore_regex = [("py:.*", r".*")]
+# Types in docstrings are words of NumPy, or names that have no page here.
+nitpick_ignore_regex = [("py:class", ".*"), ("py:exc", "MissionError")]

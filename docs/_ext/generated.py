@@ -6,6 +6,7 @@ missing: a status without a meaning, the meaning of a key that no report has.
 
 import ast
 import json
+import math
 import re
 import subprocess
 import sys
@@ -16,18 +17,17 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from bisar_budget.budget.findings import GATING, STATUSES
 from blocks import ROOT
 from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
 from bisar_budget.catalogue import SYMBOLS
+from bisar_budget.findings.status import STATUS
 from bisar_budget.mission import readers
 from bisar_budget.mission.model import MISSION
-from bisar_budget.report import FORMATS, SUFFIXES
-from bisar_budget.report.formats.text_table import WORDS
-from bisar_budget.units import DIMENSIONS, format_quantity
+from bisar_budget.report import FORMATS
+from bisar_budget.units import DIMENSIONS
 
 MISSIONS = ROOT / "specs" / "missions"
 
@@ -83,17 +83,18 @@ def _joined(names: Iterable[str], words: Mapping[str, str], what: str) -> list[t
 
 def statuses(directive: Generated) -> str:
     """Every status, worst first, with the words of the body."""
-    rows = _joined(STATUSES, directive.words(), "statuses")
+    rows = _joined(STATUS, directive.words(), "statuses")
     heads = ("status", "in the text", "decides the result", "means")
     return table(
-        heads, [(f"`{name}`", f"`{WORDS[name]}`", "yes" if name in GATING else "", text) for name, text in rows]
+        heads,
+        [(f"`{name}`", f"`{STATUS[name].text}`", "yes" if STATUS[name].gates else "", text) for name, text in rows],
     )
 
 
 def formats(directive: Generated) -> str:
     """Every format of a report, with the names of files that choose it."""
     rows = _joined(FORMATS, directive.words(), "formats")
-    ends = {name: ", ".join(f"`{end}`" for end, of in SUFFIXES.items() if of == name) for name in FORMATS}
+    ends = {name: ", ".join(f"`{end}`" for end in one.suffixes) for name, one in FORMATS.items()}
     return table(("`--format`", "`--report` with", "is"), [(f"`{name}`", ends[name], text) for name, text in rows])
 
 
@@ -106,8 +107,14 @@ def json_keys(directive: Generated) -> str:
                 found[path] = value
     parts = {path.rpartition(".")[0].removesuffix("[]") for path in found}
     found = {path: value for path, value in found.items() if path not in parts}  # a part that is null in one of them
-    rows = _joined(found, directive.words(), "keys of the JSON")
-    return table(("key", "example", "means"), [(f"`{path}`", _example(found[path]), text) for path, text in rows])
+    groups: dict[str, list[tuple[str, str, str]]] = {}
+    for path, text in _joined(found, directive.words(), "keys of the JSON"):
+        part, _, key = path.rpartition(".")
+        groups.setdefault(part, []).append((f"`{key}`", _example(found[path]), text))
+    heads = ("key", "example", "means")
+    return "\n".join(
+        f"## {f'`{part}`' if part else 'The report'}\n\n{table(heads, rows)}" for part, rows in groups.items()
+    )
 
 
 @cache
@@ -192,49 +199,60 @@ def _forms(reader: readers.Reader) -> list[readers.Reader]:
 
 def _sections(sections: Mapping[str, readers.Section]) -> str:
     parts = []
+    places = {section.kind: path for path, section in sections.items()}
     for path, section in sections.items():
-        rows = [
-            (f"`{name}`", _takes(key.reader), _default(section, name), key.description)
-            for name, key in section.keys.items()
-        ]
-        about = (section.kind.__doc__ or "").partition("\n")[0] if path else ""
-        title = f"`{path}`" if path else "The file"
+        rows = []
+        for name, key in section.keys.items():
+            inner = _inner(key.reader)
+            takes = " or ".join(dict.fromkeys(_form(form) for form in _forms(key.reader)))
+            for kind in inner:
+                takes = takes.replace("section", f"[section](#{_anchor(places[kind])})", 1)
+            means = key.description or " ".join(_first_line(kind) for kind in inner)
+            rows.append((f"`{name}`", takes, _default(section, name), means))
+        title, about = (f"`{path}`", _first_line(section.kind)) if path else ("The file", "")
         keys = table(("key", "takes", "default", "means"), rows)
-        parts.append(f"## {title}\n\n{about}\n\n{keys}")
+        parts.append(f"({_anchor(path)})=\n\n## {title}\n\n{about}\n\n{keys}")
     return "\n".join(parts)
+
+
+def _inner(reader: readers.Reader) -> list[type[Any]]:
+    """The sections that a key takes."""
+    forms = [form.section if isinstance(form, readers.ListOf) else form for form in _forms(reader)]
+    return [form.kind for form in forms if isinstance(form, readers.Section)]
+
+
+def _anchor(path: str) -> str:
+    return "key-" + re.sub(r"\W+", "-", path)
+
+
+def _first_line(kind: type[Any]) -> str:
+    return (kind.__doc__ or "").partition("\n")[0]
 
 
 def _default(section: readers.Section, name: str) -> str:
     if name in section.required:
         return "required"
     value = section.defaults.get(name)
-    if isinstance(value, str | float | int):
-        reader = section.keys[name].reader
-        if isinstance(reader, readers.Quantity) and reader.dimension.si:
-            return format_quantity(float(value), reader.dimension.si)
-        return f"`{value:g}`" if isinstance(value, float) else f"`{value}`"
-    return ""
-
-
-def _takes(reader: readers.Reader) -> str:
-    """What a key takes, in words: unit and range of a quantity, the words of a choice."""
-    return " or ".join(dict.fromkeys(_form(each) for each in _forms(reader)))
+    reader = section.keys[name].reader
+    if isinstance(reader, readers.Quantity) and isinstance(value, float):
+        return _quantity(value, reader.dimension.si)
+    return f"`{value}`" if isinstance(value, str | int) else ""
 
 
 def _form(reader: readers.Reader) -> str:
+    """What a key takes, in words: unit and range of a quantity, the words of a choice."""
     if isinstance(reader, readers.Quantity):
-        return _quantity(reader)
+        return _range(reader)
     if isinstance(reader, readers.Triple):
-        one = _quantity(reader.component)
-        return f"one or three of {one}" if reader.or_scalar else f"three of {one}"
+        return f"{'one, or ' if reader.or_scalar else ''}`[a, b, c]`, each: {_range(reader.component)}"
     if isinstance(reader, readers.Choice):
         return ", ".join(f"`{name}`" for name in reader.names)
     if isinstance(reader, readers.Words):
         return "some of " + ", ".join(f"`{name}`" for name in reader.word.names)
     if isinstance(reader, readers.Whole):
-        return f"whole number, {reader.low} to {reader.high}"
+        return f"whole number, {_quantity(reader.low, '')} to {_quantity(reader.high, '')}"
     if isinstance(reader, readers.ListOf):
-        return "list of sections"
+        return "list, each a section"
     words = {
         readers.Section: "section",
         readers.TextMap: "row id: text",
@@ -246,23 +264,33 @@ def _form(reader: readers.Reader) -> str:
     for kind, word in words.items():
         if isinstance(reader, kind):
             return word
+    # Of a reader that only its own module knows, the schema says what it takes.
     schema = reader.schema({})
-    return "6 × 6 matrix" if schema.get("type") == "array" else str(schema.get("type", "value"))
+    words_of_json = {"array": "6 × 6 matrix", "object": "`ERROR-ERROR: number` for each pair"}
+    return " or ".join(words_of_json[form["type"]] for form in schema.get("anyOf", [schema]))
 
 
-def _quantity(reader: readers.Quantity) -> str:
+def _range(reader: readers.Quantity) -> str:
     dimension = reader.dimension
     gt, ge, lt, le = reader.bounds
-    low = f"> {_bound(gt, dimension.si)}" if gt >= ge else f"≥ {_bound(ge, dimension.si)}"
-    high = f"< {_bound(lt, dimension.si)}" if lt <= le else f"≤ {_bound(le, dimension.si)}"
-    # Beside "greater than nothing" the outer bound only keeps squares finite.
-    limits = [low if max(gt, ge) > -1e299 else "", high if min(lt, le) < 1e299 else ""]
-    si = f" [{dimension.si}]" if dimension.si else ""
-    return f"{dimension.name}{si}, " + ", ".join(limit for limit in limits if limit)
+    low = f"> {_quantity(gt, dimension.si)}" if gt >= ge else f"≥ {_quantity(ge, dimension.si)}"
+    high = f"< {_quantity(lt, dimension.si)}" if lt <= le else f"≤ {_quantity(le, dimension.si)}"
+    name = re.sub("^an? ", "", dimension.name)
+    limits = [low if max(gt, ge) > -math.inf else "", high if min(lt, le) < math.inf else ""]
+    return ", ".join([name, *filter(None, limits)])
 
 
-def _bound(value: float, si: str) -> str:
-    return f"{value:g} {si}".rstrip()
+def _quantity(value: float, si: str) -> str:
+    """A value as one writes it: powers of ten, an angle in degrees."""
+    if si == "rad" and abs(value) > 1e-3:
+        value, si = math.degrees(value), "deg"
+    text = f"{value:.6g}".replace("-", "−")
+    if "e" in text or abs(value) >= 1e5:
+        power = math.floor(math.log10(abs(value)))
+        digits = f"{value / 10**power:.4g}".replace("-", "−")
+        raised = str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+        text = f"{digits} · 10{raised}".replace("−1 · ", "−").removeprefix("1 · ")
+    return f"{text} {si}".strip()
 
 
 def units(_: Generated) -> str:
@@ -337,7 +365,7 @@ def missions(directive: Generated) -> str:
     rows = []
     for name, text in _joined([file.stem for file in sorted(MISSIONS.glob("*.yaml"))], directive.words(), "missions"):
         found = _found(name)[0]
-        rows.append((f"[{found['name']}]({name}.md)", f"`{WORDS[found['status']]}`", text))
+        rows.append((f"[{found['name']}]({name}.md)", f"`{STATUS[found['status']].text}`", text))
     return table(("mission", "result", "shows"), rows)
 
 
@@ -357,18 +385,6 @@ def derived(directive: Generated) -> str:
     if len(found) != 1:
         raise ValueError(f"{len(found)} headings of the derivation begin with this: {list(_derivation())}")
     return found[0]
-
-
-def tables_of_statuses(_: Generated) -> str:
-    """Modules that say something of most statuses: what a new one has to be written into."""
-    found = []
-    for file in sorted((ROOT / "bisar_budget").rglob("*.py")):
-        tree = ast.parse(file.read_text(encoding="utf-8"))
-        named = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant)} & set(STATUSES)
-        if len(named) > len(STATUSES) / 2:
-            says = (ast.get_docstring(tree) or "").partition("\n")[0]
-            found.append((f"`{file.relative_to(ROOT / 'bisar_budget')}`", says))
-    return table(("module", "is"), found)
 
 
 # A symbol of one platform along one axis stands for those of both, along all axes.
@@ -413,7 +429,6 @@ DIRECTIVES = {
     "missions": missions,
     "derived": derived,
     "symbols": symbols,
-    "tables-of-statuses": tables_of_statuses,
     "rooms": rooms,
 }
 
