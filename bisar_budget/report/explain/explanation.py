@@ -25,8 +25,8 @@ from bisar_budget.report.explain import formulas
 from bisar_budget.report.explain.explained_error import as_written, declaration, effect, missing, place
 from bisar_budget.report.explain.explained_full import at_the_allowable
 from bisar_budget.report.explain.formulas import Step, Sum, WorkedEquation, equation, number, step, with_unit
-from bisar_budget.report.formats.text_table import percent
 from bisar_budget.report.words.layout import wrapped
+from bisar_budget.report.words.sentences import percent
 from bisar_budget.units import format_quantity
 
 _DEEPER = 3  # a broken equation goes on; no symbol has the width that would put its equals sign there

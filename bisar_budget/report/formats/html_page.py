@@ -13,7 +13,7 @@ from bisar_budget.report import Style
 from bisar_budget.report.compliance.page import compliance
 from bisar_budget.report.explain import typeset
 from bisar_budget.report.explain.formulas import Sum, WorkedEquation
-from bisar_budget.report.formats.text_table import document_words
+from bisar_budget.report.words.missions import document_words
 from bisar_budget.resources import resource
 
 _AFTER = re.compile(r"([._/])(?=\w)")  # where a long name may break

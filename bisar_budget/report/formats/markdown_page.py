@@ -15,8 +15,8 @@ from bisar_budget.report.compliance.page import compliance, drawings, illustrati
 from bisar_budget.report.compliance.view import Compliance, ShownImage
 from bisar_budget.report.explain import typeset
 from bisar_budget.report.explain.formulas import Sum, WorkedEquation
-from bisar_budget.report.formats.text_table import document_words
 from bisar_budget.report.words.escapes import markdown_text, uri
+from bisar_budget.report.words.missions import document_words
 from bisar_budget.resources import resource
 
 _BAR = 20  # characters
