@@ -55,6 +55,12 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
+def shown(text: str) -> str:
+    """Say a value from a file so that it stays short and does nothing to a terminal."""
+    text = printable(text[:61])
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
 class Problem(NamedTuple):
     """Something wrong with a value, before anybody knows which file it stands in.
 

@@ -1,7 +1,8 @@
 """What there is to work with: files that travel with the package, `specs/` and `templates/`, and processors."""
 
 import os
-from typing import TYPE_CHECKING
+import sys
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -19,3 +20,17 @@ def resource(*parts: str) -> "Path":
 def cores() -> int:
     """Processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def docstring(documented: Any) -> str:
+    """Docstring of a class or function at the top of its module; from the source where Python dropped it (-OO)."""
+    if sys.flags.optimize < 2:
+        return documented.__doc__ or ""
+    import ast
+    from inspect import getsourcefile
+
+    with open(getsourcefile(documented) or "", encoding="utf-8") as source:
+        for node in ast.parse(source.read()).body:
+            if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name == documented.__name__:
+                return ast.get_docstring(node) or ""
+    return ""

@@ -6,6 +6,8 @@ import stat
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+from bisar_budget.errors import shown
+
 TABLE = "tool.bisar-budget"
 KEYS = {
     "format": str,
@@ -23,6 +25,7 @@ _CANDIDATE = re.compile(
     rb"""[.\s\[{,]bisar-budget|\.\s*["']bisar-budget|["']bisar-budget(?:["']?\s*[\].=]|\s)|\\[uUx]"""
 )
 _LARGEST = 1 << 20  # bytes
+_MOST_DOTS = 1000  # on a line: tomllib's time grows with the square of the parts of a key
 
 
 class SettingsError(Exception):
@@ -65,11 +68,13 @@ def _read(file: str) -> Settings | None:
         raise SettingsError(f"{file}: is not UTF-8: {error.reason} at byte {error.start}") from None
     if not _CANDIDATE.search(data) and "\0" not in text:  # UTF-16 has zeros
         return None
+    if max(line.count(".") for line in text.splitlines()) > _MOST_DOTS:
+        raise SettingsError(f"{file}: has a line with more than {_MOST_DOTS} dots")
     import tomllib
 
     try:
         document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except ValueError as error:  # a whole number of thousands of digits too
         raise SettingsError(f"{file}: is not valid TOML: {error}") from None
     except RecursionError:
         raise SettingsError(f"{file}: is nested too deep to be read") from None
@@ -109,9 +114,18 @@ def _hold_to_type(file: str, key: str, value: object) -> None:
     if kind is None:
         from difflib import get_close_matches
 
-        near = get_close_matches(key, KEYS, 1)
+        near = get_close_matches(key[:100], KEYS, 1)
         hint = f" Did you mean {near[0]!r}?" if near else ""
-        raise SettingsError(f"{file}: {TABLE}.{key}: is not a known key; accepted: {', '.join(KEYS)}.{hint}")
+        raise SettingsError(f"{file}: {TABLE}.{shown(key)}: is not a known key; accepted: {', '.join(KEYS)}.{hint}")
     is_right = type(value) is kind and (kind is not list or all(type(name) is str for name in value))  # type: ignore[attr-defined]
+    if type(value) is int:
+        is_right = is_right and abs(value) < 1 << 64  # beyond it, it could not even be said
     if not is_right:
-        raise SettingsError(f"{file}: {TABLE}.{key}: must be {_KINDS[kind]} (got {value!r})")
+        raise SettingsError(f"{file}: {TABLE}.{key}: must be {_KINDS[kind]} (got {_said(value)})")
+
+
+def _said(value: object) -> str:
+    try:
+        return shown(repr(value))
+    except (ValueError, RecursionError):  # digits without end, lists in lists
+        return "one too large to be shown"

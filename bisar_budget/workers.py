@@ -3,6 +3,7 @@
 import os
 import signal
 import threading
+import warnings
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -44,7 +45,8 @@ def worker_pool(count: int, start: str | None = None) -> Iterator[ProcessPoolExe
 
 
 def _begin() -> None:
-    """Leave interrupts to the parent, and end with it."""
+    """Leave interrupts to the parent, end with it, and keep to oneself what a library warns of."""
+    warnings.simplefilter("ignore")
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     for name in ("SIGTERM", "SIGHUP"):  # a fork has the handlers of the command
         if hasattr(signal, name):

@@ -1,18 +1,13 @@
 """Waivers: rows that may fail until a date. What is waived, expired or useless is always said."""
 
-from collections.abc import Sequence
+import re
+from collections.abc import Callable, Sequence
 from datetime import date
-from fnmatch import fnmatchcase
+from fnmatch import translate
 
-from bisar_budget.budget.findings import FileWarning, Row
+from bisar_budget.findings.mission import FileWarning
+from bisar_budget.findings.row import Row, Waiver
 from bisar_budget.mission.model import Mission
-
-_WORDS, _EXPIRED = "waiver of line", "expired "
-
-
-def waiver_notes(row: Row) -> tuple[str, ...]:
-    """Those of the notes of a row that are about waivers, valid or expired."""
-    return tuple(note for note in row.notes if note.removeprefix(_EXPIRED).startswith(_WORDS))
 
 
 def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> tuple[list[Row], list[FileWarning]]:
@@ -30,24 +25,26 @@ def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> tuple[l
     Returns
     -------
     rows : list of Row
-        Failing rows with a valid waiver are `waived`; one with an expired waiver keeps its status, with a note.
+        Failing rows with a valid waiver are `waived`; one with expired waivers keeps its status and has the last of
+        them.
     warnings : list of FileWarning
         Waivers that name no row, or none that fails.
     """
     result = list(rows)
     warnings = []
+    expired: dict[int, Waiver] = {}  # of each row the one that held longest: a thousand would fill a report
     for index, waiver in enumerate(mission.waivers):
         line = mission.line(("waivers", index, "id"))
-        named = [position for position, row in enumerate(rows) if _names(waiver.id, row.id)]
+        is_named = _matcher(waiver.id)
+        named = [position for position, row in enumerate(rows) if is_named(row.id)]
         failing = [position for position in named if rows[position].status == "fail"]
-        expired = today > waiver.until
+        applied = Waiver(line, waiver.until, waiver.reason, is_expired=today > waiver.until)
         for position in failing:
             row = result[position]
-            words = f"{_WORDS} {line}, until {waiver.until}: {waiver.reason}"
-            if expired:
-                result[position] = row._replace(notes=(*row.notes, f"{_EXPIRED}{words}"))
+            if applied.is_expired:
+                expired[position] = max(applied, expired.get(position, applied), key=lambda one: one.until)
             elif row.status == "fail":
-                result[position] = row._replace(status="waived", notes=(*row.notes, words))
+                result[position] = row._replace(status="waived", waivers=(*row.waivers, applied))
         if not named:
             warnings.append(FileWarning(line=line, message=f"waiver {waiver.id}: matches no row"))
         elif len(named) == len(rows):
@@ -58,8 +55,15 @@ def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> tuple[l
             warnings.append(
                 FileWarning(line=line, message=f"waiver {waiver.id}: not used: no row that it names fails")
             )
+    for position, last in expired.items():
+        row = result[position]
+        result[position] = row._replace(waivers=(*row.waivers, last))
     return result, warnings
 
 
-def _names(pattern: str, row_id: str) -> bool:
-    return pattern == row_id or fnmatchcase(row_id, pattern)  # an id may hold a bracket of its own
+def _matcher(pattern: str) -> Callable[[str], object]:
+    """Tell which ids a waiver names; an id may hold a bracket of its own."""
+    if not any(char in pattern for char in "*?["):
+        return pattern.__eq__
+    glob = re.compile(translate(pattern)).match
+    return lambda row_id: row_id == pattern or glob(row_id)

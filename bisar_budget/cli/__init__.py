@@ -4,8 +4,9 @@ import errno
 import os
 import signal
 import sys
-from contextlib import suppress
+import warnings
 from importlib import import_module
+from io import StringIO
 from typing import Any, NoReturn
 
 import click
@@ -13,6 +14,7 @@ import click
 from bisar_budget import __version__
 from bisar_budget.cli.streams import EXIT_INTERRUPTED, EXIT_OUR_FAULT, complain, drop_output, fail
 from bisar_budget.errors import WorkerLostError, printable
+from bisar_budget.resources import docstring
 
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
 # Each command to the module that has it, imported when it is asked for.
@@ -37,11 +39,14 @@ class _Commands(click.Group):
         if cmd_name not in _MODULES:
             return None
         command: click.Command = getattr(import_module(f"bisar_budget.cli.{_MODULES[cmd_name]}"), cmd_name)
+        command.help = command.help or docstring(command.callback)  # without one under -OO
         return command
 
     def main(self, *args: Any, **kwargs: Any) -> Any:
+        self.help = self.help or docstring(self.callback)
         output = sys.stdout
         kwargs["standalone_mode"] = False  # click would exit with 1 on an interrupt or a broken pipe
+        kwargs["prog_name"] = "bisar-budget"  # whatever name it was called by
         try:
             sys.exit(super().main(*args, **kwargs))
         except SystemExit:
@@ -49,8 +54,9 @@ class _Commands(click.Group):
                 sys.exit(0)
             raise
         except click.ClickException as error:
-            with suppress(OSError):  # standard error may be closed; the exit code still says it
-                error.show()
+            message = StringIO()
+            error.show(message)
+            complain(message.getvalue().rstrip("\n"))
             sys.exit(error.exit_code)
         except (click.Abort, KeyboardInterrupt):
             sys.exit(EXIT_INTERRUPTED)
@@ -60,11 +66,22 @@ class _Commands(click.Group):
                 fail(f"cannot write standard output: {error.strerror}")
             if error.errno in (errno.EMFILE, errno.ENFILE, errno.ENOMEM):
                 fail(f"the system refuses: {error.strerror}")
+            if not _has_folder():
+                fail("the current folder is gone; a name that does not start with / leads nowhere")
             _own_fault(error)
         except WorkerLostError as error:
             fail(f"{error}; fewer processes (--jobs 1) or a smaller simulation.memory_limit need less")
         except Exception as error:
             _own_fault(error)
+
+
+def _has_folder() -> bool:
+    """Whether the folder that relative names start from is still there."""
+    try:
+        os.getcwd()
+    except OSError:
+        return False
+    return True
 
 
 def _own_fault(error: Exception) -> NoReturn:
@@ -91,7 +108,11 @@ def cli() -> None:
 
 
 def main() -> None:
-    """Run the command; a signal that asks it to end leaves no worker and no temporary file."""
+    """Run the command; a signal that asks it to end leaves no worker and no temporary file.
+
+    What a library warns of nobody who runs this command can mend, and PYTHONWARNINGS can make it an error.
+    """
+    warnings.simplefilter("ignore")
     for name in ("SIGTERM", "SIGHUP"):
         asked = getattr(signal, name, None)
         if asked is not None and signal.getsignal(asked) is signal.SIG_DFL:

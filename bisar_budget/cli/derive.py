@@ -4,7 +4,7 @@ import sys
 
 import click
 
-from bisar_budget.cli.streams import EXIT_BROKEN, deliver, print_text, write_file
+from bisar_budget.cli.streams import EXIT_BROKEN, complain, deliver, write_file
 
 
 @click.command()
@@ -62,16 +62,16 @@ def _generated(write: bool) -> None:
         name, today = generated.TARGET.name, generated.source()
         if write:
             write_file(str(generated.TARGET), today)
-            click.echo(f"Wrote {name} {derived_with}.")
+            deliver(f"Wrote {name} {derived_with}.\n")
             continue
         committed = generated.TARGET.read_text(encoding="utf-8")
         if committed == today:
-            click.echo(f"{name} is what the derivation gives {derived_with}.")
+            deliver(f"{name} is what the derivation gives {derived_with}.\n")
             continue
         is_current = False
         pair = (committed.splitlines(), today.splitlines())
-        print_text("\n".join(difflib.unified_diff(*pair, "committed", "derived", lineterm="", n=1)) + "\n")
+        deliver("\n".join(difflib.unified_diff(*pair, "committed", "derived", lineterm="", n=1)) + "\n")
         differs = f"{name} differs from the derivation {derived_with}"
-        click.echo(f"{differs}; `bisar-budget derive --write` rewrites it.", err=True)
+        complain(f"{differs}; `bisar-budget derive --write` rewrites it.")
     if not is_current:
         sys.exit(EXIT_BROKEN)

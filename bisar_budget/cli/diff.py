@@ -90,14 +90,15 @@ def diff(
     from bisar_budget.errors import MissionError
     from bisar_budget.mission.load import load_mission, parse_mission
     from bisar_budget.mission.revision import RevisionError, file_at
-    from bisar_budget.report import difference
-    from bisar_budget.report.comparison import compare
+    from bisar_budget.report.change import difference
+    from bisar_budget.report.change.comparison import compare
 
     if base is None and len(files) != 2:
         raise click.UsageError("give two mission files, OLD and NEW, or mission files and --base REV.")
+    files = files if base is None else expand(files)
     spare(files, [output])
     day = today.date() if today else day_of_run()
-    pairs = [(files[0], files[1])] if base is None else [(file, file) for file in expand(files)]
+    pairs = [(files[0], files[1])] if base is None else [(file, file) for file in files]
     changes = []
     for before, after in pairs:
         try:

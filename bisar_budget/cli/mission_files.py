@@ -4,7 +4,7 @@ import os
 
 import click
 
-from bisar_budget.cli.streams import FILE, complain, deliver, fail, print_data, write_file
+from bisar_budget.cli.streams import FILE, complain, deliver, fail
 
 
 @click.command()
@@ -32,12 +32,11 @@ def init(file: str, name: str, force: bool) -> None:
         loader=FileSystemLoader(resource("templates")), undefined=StrictUndefined, keep_trailing_newline=True
     )
     text = environment.get_template("mission.yaml.j2").render(name=json.dumps(name, ensure_ascii=False))
-    if file == "-":
-        print_data(text)
-        return
-    if os.path.exists(file) and not force:
+    if file != "-" and os.path.exists(file) and not force:
         fail(f"{file} exists; --force replaces it")
-    write_file(file, text)
+    deliver(text, file, "yaml")
+    if file == "-":
+        return
     complain(f"Wrote {file}. Next: bisar-budget check {file}")
     complain("For completion and checks in an editor: bisar-budget schema -o mission.schema.json beside it.")
 

@@ -1,6 +1,8 @@
 """What the commands read and write: names of files, standard streams, files replaced whole, exit codes."""
 
+import io
 import os
+import re
 import sys
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
@@ -80,26 +82,46 @@ def load_all(files: Sequence[str], model: str | None = None) -> "list[Mission]":
     return loaded
 
 
-def spare(files: Sequence[str], targets: Iterable[str | None]) -> None:
-    """Refuse to write over a mission, standard input's file too, and to write two outputs to one file."""
+def spare(files: Sequence[str], targets: Iterable[str | None], folders: Iterable[str] = ()) -> None:
+    """Refuse to write over a mission, and to write two outputs to one file.
+
+    A mission may also be the file of standard input, and the output that of standard output. Nothing else may be in
+    `folders`, which an output fills with files of its own.
+    """
     written: dict[str, str] = {}
-    for target in targets:
+    for target in [*targets, *folders]:
         if target is None or target == "-":
             continue
-        place = os.path.realpath(target)
+        place = _place(target)
         if place in written:
             fail(f"two outputs would be written to one file: {written[place]} and {target}")
         written[place] = target
-    for file in files if written else ():
+    inside = tuple((os.path.join(_place(folder), ""), folder) for folder in folders)
+    for place, name in [*written.items(), *((_place(file), file) for file in files if inside)]:
+        for start, folder in inside:
+            if place.startswith(start):
+                fail(f"{name} is in the folder of a report's pictures, {folder}")
+    for file in files:
         for place, target in written.items():
-            if os.path.realpath(file) == place if file != "-" else _is_standard_input(place):
+            if _is_same(0 if file == "-" else file, place):
                 fail(f"{target} is a mission file; a report would replace it")
+        if file != "-" and _is_same(1, file):
+            fail(f"{file} is a mission file; standard output goes to it")
 
 
-def _is_standard_input(path: str) -> bool:
+def _place(path: str) -> str:
+    """Where a path leads to, links followed."""
     try:
-        return os.path.isfile(path) and os.path.samestat(os.fstat(0), os.stat(path))
-    except OSError:  # either is missing
+        return os.path.realpath(path)
+    except (OSError, ValueError) as error:  # a deleted working folder, a NUL in the name
+        fail(f"cannot write {path}: {getattr(error, 'strerror', None) or error}")
+
+
+def _is_same(one: str | int, other: str) -> bool:
+    """Whether a path, or an open stream, and another path are one regular file."""
+    try:
+        return os.path.isfile(one) and os.path.samestat(os.stat(one), os.stat(other))
+    except (OSError, ValueError):  # either is missing
         return False
 
 
@@ -131,24 +153,49 @@ def wants_color() -> bool:
     )
 
 
-def print_text(text: str) -> None:
-    """Write what a person reads to standard output, characters that its encoding lacks escaped."""
-    if hasattr(sys.stdout, "reconfigure"):
-        sys.stdout.reconfigure(errors="backslashreplace")
-    _print(text)
+# What does something to a terminal: controls but tabs and line ends, marks without width and those that turn the
+# reading direction.
+_ACTIVE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2066-\u2069\ufeff]")
+_COLOR = re.compile(r"\x1b\[[0-9;]*m")
+# What a CI runner takes for a command: `::error` at the start of a line, `##[group]` and `##vso[...]` anywhere.
+_COMMAND = re.compile(r"(?m)^([^\S\n]*):(?=:)")
+_COMMAND_WITHIN = re.compile(r"(?<=#)#(?=[\w.]*\[)")
+# How a format writes a character so that its readers read that character; the others show an escape.
+_ESCAPES = dict.fromkeys(("json", "sarif", "needs", "yaml"), "\\u{:04x}")
+_ESCAPES |= dict.fromkeys(("html", "markdown", "junit", "mathml"), "&#{};")
 
 
-def print_data(text: str) -> None:
-    """Write what a program reads to standard output: UTF-8, whatever a terminal would take."""
-    if hasattr(sys.stdout, "reconfigure"):
-        sys.stdout.reconfigure(encoding="utf-8", errors="backslashreplace", newline="\n")
-    _print(text)
+def harmless(text: str, format_name: str = "") -> str:
+    """Make text do nothing to a terminal, or to a CI runner that reads the log.
+
+    `github` keeps its own commands, `text` the colours of a report; a message has none.
+    """
+
+    def escaped(match: re.Match[str]) -> str:
+        is_color = format_name == "text" and _COLOR.match(text, match.start())
+        return match[0] if is_color else match[0].encode("unicode_escape").decode("ascii")
+
+    text = _ACTIVE.sub(escaped, text)
+    escape = _ESCAPES.get(format_name, "\\x{:02x}").format
+    if "##" in text:
+        text = _COMMAND_WITHIN.sub(lambda match: escape(ord("#")), text)
+    if "::" in text and format_name != "github":
+        text = _COMMAND.sub(lambda match: match[1] + escape(ord(":")), text)
+    return text
 
 
-def _print(text: str) -> None:
-    """Write to standard output; a reader that went away changes no exit code."""
+def _print(text: str, format_name: str) -> None:
+    """Write to standard output; a reader that went away changes no exit code.
+
+    A person reads the format `text`, characters that the terminal's encoding lacks escaped. Programs read the others:
+    those are UTF-8, whatever a terminal would take.
+    """
     if sys.stdout is None:
         fail("cannot write: standard output is closed")
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
+        if format_name != "text":
+            sys.stdout.reconfigure(encoding="utf-8", errors="backslashreplace", newline="\n")
     try:
         sys.stdout.write(text)
         sys.stdout.flush()
@@ -167,7 +214,7 @@ def drop_output() -> None:
 def complain(message: str) -> None:
     """Say something on standard error; that nobody listens changes no exit code."""
     with suppress(OSError):
-        click.echo(message, err=True)
+        click.echo(harmless(message), err=True)
 
 
 def fail(message: str) -> NoReturn:
@@ -176,35 +223,33 @@ def fail(message: str) -> NoReturn:
     sys.exit(EXIT_USAGE)
 
 
-def deliver(text: str, output: str | None, format_name: str = "text") -> None:
-    """Write to a file, else to standard output: for a person in the format `text`, else for a program."""
-    if output is None:
-        (print_text if format_name == "text" else print_data)(text)
+def deliver(text: str, output: str | None = None, format_name: str = "text") -> None:
+    """Write to a file, else, or if that is `-`, to standard output."""
+    text = harmless(text, format_name)
+    if output is None or output == "-":
+        _print(text, format_name)
     else:
         write_file(output, text)
 
 
 def write_file(path: str, content: str | bytes) -> None:
-    """Replace a file whole: written beside it under another name, then renamed. `-` is standard output.
+    """Replace a file whole: written beside it under another name, then renamed.
 
     A link keeps pointing where it does; what is no file, a device or a pipe, is written to as it is.
     """
     import tempfile
 
-    if path == "-" and isinstance(content, str):
-        print_data(content)
-        return
     data = content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
-    target = os.path.realpath(path)
-    folder, name = os.path.split(target)
     temporary = None
     try:
+        target = os.path.realpath(path)
+        folder = os.path.dirname(target)
         if os.path.exists(target) and not os.path.isfile(target):
             with open(target, "wb") as special:
                 special.write(data)
             return
         os.makedirs(folder, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=folder, prefix=f".{name}.", delete=False) as file:
+        with tempfile.NamedTemporaryFile(dir=folder, prefix=".bisar-budget.", delete=False) as file:
             temporary = file.name
             file.write(data)
         mask = os.umask(0)

@@ -7,18 +7,21 @@ every scalar stays the text that stands in the file: YAML 1.1 would read `9.6e9`
 
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from itertools import pairwise
 from typing import Any, BinaryIO, cast
 
 import yaml
 from yaml import AliasEvent, MappingEndEvent, ScalarEvent
 
-from bisar_budget.errors import Fault, KeyPath, MissionError, Problem, printable
+from bisar_budget.errors import Fault, KeyPath, MissionError, Problem, printable, shown
 from bisar_budget.mission.model import MISSION, Mission
 from bisar_budget.mission.readers import INVALID
 
 MAX_BYTES = 1 << 20  # a mission file has a few kilobytes
 MAX_DEPTH = 20  # containers inside each other; the schema needs 9
+MAX_VALUES = 100_000  # the longest lists that the schema takes come to a third
+MAX_FAULTS = 200  # nobody mends more at once, and each costs a line of every report
 
 _PARSER = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
 _NULLS = ("", "~", "null", "Null", "NULL")
@@ -78,7 +81,9 @@ def parse_mission(data: bytes | str, file: str = "-", model: str | None = None) 
     tree = _read_tree(_decoded(data, file), file)
     if model is not None and isinstance(tree.root.get("allocation"), dict):
         tree.root["allocation"]["model"] = model
-    mission = MISSION.read(tree.root, (), tree.report)
+    mission = INVALID
+    with suppress(_UnusableError):
+        mission = MISSION.read(tree.root, (), tree.report)
     if tree.faults:
         ordered = sorted(dict.fromkeys(tree.faults), key=lambda fault: (fault.line or 0, fault.column or 0))
         raise MissionError(file, tuple(ordered))
@@ -123,9 +128,12 @@ class _Tree:
         self.faults: list[Fault] = []
 
     def fault(self, mark: Any, path: KeyPath, problem: str, **more: str) -> None:
-        """Note a fault at a place of the file; without a mark, at its start."""
+        """Note a fault at a place of the file; without a mark, at its start. Of too many only the first are said."""
         line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
         self.faults.append(Fault(line=line, column=column, key=_dotted(path), problem=problem, **more))
+        if len(self.faults) >= MAX_FAULTS:
+            self.faults.append(_file_fault(f"has {MAX_FAULTS} faults or more; what follows them was not read"))
+            raise _UnusableError
 
     def report(self, path: KeyPath, problem: Problem) -> None:
         """Note what a reader found wrong, at the value's place, else at the nearest key's above it."""
@@ -144,7 +152,7 @@ class _Tree:
                 break
             place = self.keys.get(path[:length]) or self.values.get(path[:length])
         mark = None if place is None else place.start_mark
-        given = _shown(value) if isinstance(value, str) and not is_key else ""
+        given = shown(value) if isinstance(value, str) and not is_key else ""
         self.fault(mark, path, problem.problem, given=given, accepted=problem.accepted, hint=problem.hint)
 
     def read_document(self, next_event: Callable[[], Any]) -> None:
@@ -161,6 +169,9 @@ class _Tree:
     def _node(self, next_event: Callable[[], Any], event: Any, path: KeyPath) -> Any:
         """Read one value; the depth of the recursion is bounded by `MAX_DEPTH`."""
         self.values[path] = event
+        if len(self.values) > MAX_VALUES:
+            self.faults.append(_file_fault(f"has more than {MAX_VALUES} values, so no mission file"))
+            raise _UnusableError
         mark = event.start_mark
         kind = type(event)
         if kind is ScalarEvent:
@@ -185,7 +196,7 @@ class _Tree:
             if event.flow_style:
                 self._decimal_commas(items, path)
         if event.tag is not None and event.tag != "!":
-            self.fault(mark, path, "carries a YAML tag", given=_shown(event.tag), accepted="plain values")
+            self.fault(mark, path, "carries a YAML tag", given=shown(event.tag), accepted="plain values")
             return INVALID
         return value
 
@@ -204,7 +215,7 @@ class _Tree:
         for index, is_tight, before, item in commas:
             has_unit = any(char.isalpha() and char not in "eE" for char in item.value)
             if is_tight and has_unit and before.value.lstrip("+-").isdigit() and item.value[:1].isdigit():
-                given = _shown(f"{before.value},{item.value}")
+                given = shown(f"{before.value},{item.value}")
                 problem, accepted = (
                     "may be half of a number with a decimal comma",
                     "a point, or a blank behind commas",
@@ -264,10 +275,4 @@ def _dotted(path: KeyPath) -> str:
     text = ""
     for part in path:
         text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
-    return printable(text) if len(text) <= 200 else _shown(text)
-
-
-def _shown(text: str) -> str:
-    """Say a value from the file so that it cannot do anything to a terminal."""
-    text = printable(text)
-    return text if len(text) <= 60 else text[:57] + "..."
+    return printable(text) if len(text) <= 200 else shown(text)

@@ -21,6 +21,7 @@ from bisar_budget.geometry import (
 from bisar_budget.mission.readers import (
     Choice,
     Day,
+    Glob,
     Key,
     Label,
     Late,
@@ -459,7 +460,7 @@ class Simulation(NamedTuple):
 class Waiver(NamedTuple):
     """A row that may fail until a date, for a reason."""
 
-    id: Annotated[str, Key(Text(), "A row id or a glob of ids, such as receiver.*")]
+    id: Annotated[str, Key(Glob(), "A row id or a glob of ids, such as receiver.*")]
     until: Annotated[date, Key(Day(), "Last day on which it holds, UTC.")]
     reason: Annotated[str, Key(Text())]
 

@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from bisar_budget.errors import InvalidValueError, KeyPath, Problem
+from bisar_budget.resources import docstring
 from bisar_budget.units import Dimension, format_quantity, parse_quantity
 
 INVALID: Any = object()  # in place of a value that was reported
@@ -20,6 +21,8 @@ Report = Callable[[KeyPath, Problem], None]
 _POINT = "A decimal is written with a point, a comma separates"
 _MAX_TEXT = 500  # characters
 _MAX_ENTRIES = 1000  # of a list
+_MAX_IDS = 4000  # more rows than all lists together make
+_MAX_WILDCARDS = 20  # an id has four parts; patterns of hundreds take a second for each fifty
 # Controls, line separators, lone surrogates, byte order mark, and the marks that turn the reading direction.
 _UNPRINTABLE = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff\ufeff\u202a-\u202e\u2066-\u2069]")
 
@@ -165,6 +168,17 @@ class Label(Text):
         return {"type": ["string", "number"], "minLength": 1}
 
 
+class Glob(Text):
+    """An id, or a pattern of ids with `*`, `?` and `[...]`."""
+
+    def leaf(self, value: Any) -> str:
+        """Refuse a pattern that takes long to match."""
+        pattern = super().leaf(value)
+        if sum(map(pattern.count, "*?[")) > _MAX_WILDCARDS:
+            raise InvalidValueError(f"must have at most {_MAX_WILDCARDS} wildcards")
+        return pattern
+
+
 class Choice(Reader):
     """One of a few words; `refused` maps words that mean something elsewhere to why not here."""
 
@@ -269,12 +283,15 @@ class TextMap(Reader):
         if not isinstance(value, dict):
             report(path, Problem("must be a mapping of keys to values"))
             return INVALID
+        if len(value) > _MAX_IDS:
+            report(path, Problem(f"must have at most {_MAX_IDS} entries, has {len(value)}"))
+            return INVALID
         result = {key: _read(Text(), text, (*path, key), report) for key, text in value.items()}
         return INVALID if any(text is INVALID for text in result.values()) else result
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Object."""
-        return {"type": "object", "additionalProperties": Text().schema(definitions)}
+        return {"type": "object", "additionalProperties": Text().schema(definitions), "maxProperties": _MAX_IDS}
 
 
 class Section(Reader):
@@ -348,7 +365,7 @@ class Section(Reader):
                 accepted = {**accepted, "default": default}
             properties[name] = accepted
         return {
-            "description": (self.kind.__doc__ or "").partition("\n")[0],
+            "description": docstring(self.kind).partition("\n")[0],
             "type": "object",
             "properties": properties,
             **({"required": self.required} if self.required else {}),

@@ -70,6 +70,12 @@ def in_angles(expression: Expr, platforms: tuple[Platform, ...] = PLATFORMS) -> 
     return simplify(expression)
 
 
+@cache
+def far_field_in_angles(platforms: tuple[Platform, ...] = PLATFORMS) -> Expr:
+    """Return (6): (5) in azimuth and elevation. [m]"""
+    return in_angles(far_field_differential_range(platforms), platforms)
+
+
 def hold_range_constant(expression: Expr, platforms: tuple[Platform, ...] = PLATFORMS) -> Expr:
     """Put R_k for |r_k| and r_k + v_k·τ for r_k: the motion model of (17).
 
@@ -168,8 +174,7 @@ def displacement(beta_0: Expr, beta_1: Expr, platforms: tuple[Platform, ...] = P
 
 def look_vector(platforms: tuple[Platform, ...] = PLATFORMS) -> Matrix:
     """Sum of the unit vectors to the platforms on the ground, (2,): (8) without f/2. [-]"""
-    far_field = in_angles(far_field_differential_range(platforms), platforms)
-    return Matrix([-diff(far_field, x) for x in point[:2]])
+    return Matrix([-diff(far_field_in_angles(platforms), x) for x in point[:2]])
 
 
 def look_azimuth(platforms: tuple[Platform, ...] = PLATFORMS) -> Expr:

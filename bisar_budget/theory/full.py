@@ -180,6 +180,7 @@ def effective_coefficients() -> tuple[Expr, Expr, Expr]:
     return second, third, fourth
 
 
+@cache
 def table() -> Table:
     """Coefficients of the range error with every first-order term, before what the displacement adds."""
     beta = range_error()

@@ -1,6 +1,7 @@
 """The limits of Rigling & Moses: Table I, Table II, vibration, pull-in, derived row by row in print order."""
 
 from dataclasses import dataclass
+from functools import cache
 
 from sympy import Abs, Eq, Expr, Function, Rational, Symbol, diff, pi, solve
 
@@ -75,6 +76,7 @@ def single_error(expression: Expr, error: Symbol, platforms: tuple[Platform, ...
     return expression.subs({other: 0 for other in every if other != error})
 
 
+@cache
 def table_1(platforms: tuple[Platform, ...] = PLATFORMS) -> Table:
     """Table I: coefficients β̃₀ … β̃₃ of the range error, for the clock and each motion error alone."""
     beta = dr.coefficients(dr.range_error(platforms))
@@ -127,6 +129,7 @@ def limit(phase: Expr, error: Symbol, budget: Expr) -> Expr:
     return solution
 
 
+@cache
 def table_2(platforms: tuple[Platform, ...] = PLATFORMS, budget: Expr = EQUAL_SHARE_QPE) -> Table:
     """Table II: quadratic phase error and largest allowable error, with the bars that the print omits."""
     beta_2 = dr.coefficients(dr.range_error(platforms))[2]

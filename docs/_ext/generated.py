@@ -22,12 +22,11 @@ from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
-from bisar_budget.budget.findings import GATING, STATUSES
 from bisar_budget.catalogue import SYMBOLS
+from bisar_budget.findings.status import STATUS
 from bisar_budget.mission import readers
 from bisar_budget.mission.model import MISSION
-from bisar_budget.report import FORMATS, SUFFIXES
-from bisar_budget.report.text_table import WORDS
+from bisar_budget.report import FORMATS
 from bisar_budget.units import DIMENSIONS
 
 MISSIONS = ROOT / "specs" / "missions"
@@ -84,17 +83,20 @@ def _joined(names: Iterable[str], words: Mapping[str, str], what: str) -> list[t
 
 def statuses(directive: Generated) -> str:
     """Every status, worst first, with the words of the body."""
-    rows = _joined(STATUSES, directive.words(), "statuses")
-    heads = ("status", "in the text", "decides the result", "means")
-    return table(
-        heads, [(f"`{name}`", f"`{WORDS[name]}`", "yes" if name in GATING else "", text) for name, text in rows]
-    )
+    rows = []
+    for name, text in _joined(STATUS, directive.words(), "statuses"):
+        status = STATUS[name]
+        code = (
+            "2" if name == "error" else "1" if status.fails else "1 with `--strict`" if status.fails_strict else "0"
+        )
+        rows.append((f"`{name}`", f"`{status.text}`", code if status.gates else "", text))
+    return table(("status", "in the text", "exit code", "means"), rows)
 
 
 def formats(directive: Generated) -> str:
     """Every format of a report, with the names of files that choose it."""
     rows = _joined(FORMATS, directive.words(), "formats")
-    ends = {name: ", ".join(f"`{end}`" for end, of in SUFFIXES.items() if of == name) for name in FORMATS}
+    ends = {name: ", ".join(f"`{suffix}`" for suffix in one.suffixes) for name, one in FORMATS.items()}
     return table(("`--format`", "`--report` with", "is"), [(f"`{name}`", ends[name], text) for name, text in rows])
 
 
@@ -365,7 +367,7 @@ def missions(directive: Generated) -> str:
     rows = []
     for name, text in _joined([file.stem for file in sorted(MISSIONS.glob("*.yaml"))], directive.words(), "missions"):
         found = _found(name)[0]
-        rows.append((f"[{found['name']}]({name}.md)", f"`{WORDS[found['status']]}`", text))
+        rows.append((f"[{found['name']}]({name}.md)", f"`{STATUS[found['status']].text}`", text))
     return table(("mission", "result", "shows"), rows)
 
 
@@ -385,18 +387,6 @@ def derived(directive: Generated) -> str:
     if len(found) != 1:
         raise ValueError(f"{len(found)} headings of the derivation begin with this: {list(_derivation())}")
     return found[0]
-
-
-def tables_of_statuses(_: Generated) -> str:
-    """Modules that say something of most statuses: what a new one has to be written into."""
-    found = []
-    for file in sorted((ROOT / "bisar_budget").rglob("*.py")):
-        tree = ast.parse(file.read_text(encoding="utf-8"))
-        named = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant)} & set(STATUSES)
-        if len(named) > len(STATUSES) / 2:
-            says = (ast.get_docstring(tree) or "").partition("\n")[0]
-            found.append((f"`{file.relative_to(ROOT / 'bisar_budget')}`", says))
-    return table(("module", "is"), found)
 
 
 # A symbol of one platform along one axis stands for those of both, along all axes.
@@ -441,7 +431,6 @@ DIRECTIVES = {
     "missions": missions,
     "derived": derived,
     "symbols": symbols,
-    "tables-of-statuses": tables_of_statuses,
     "rooms": rooms,
 }
 

@@ -15,6 +15,7 @@ from bisar_budget.simulate.image_formation import backprojection, ground_grid, m
 from bisar_budget.simulate.phase_history import MotionError
 from tests.simulate.conftest import Collection, collection, measured_phase
 
+pytestmark = pytest.mark.extras
 needs_finufft = pytest.mark.skipif(
     importlib.util.find_spec("finufft") is None, reason="the NUFFT needs finufft, extra fast"
 )

@@ -11,6 +11,8 @@ from bisar_budget.simulate.impulse_response import impulse_response, upsampled
 from bisar_budget.simulate.phase_history import MotionError, Sinusoid, cell_centres, path, phase_history
 from tests.simulate.conftest import Collection, collection
 
+pytestmark = pytest.mark.extras
+
 
 def cut_through(c: Collection, history, centre, count: int = 96, oversampling: float = 2.5):
     """Image along y′ through a ground point, and its spacing."""

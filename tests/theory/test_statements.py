@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from bisar_budget import evaluators
-from bisar_budget.budget.effects import image_plane
-from bisar_budget.budget.exact_arrays import aperture_nodes
-from bisar_budget.budget.pieces import PRINTED, TRUE, Piece, gradients_of, indicated_point
+from bisar_budget.effects.effect import image_plane
+from bisar_budget.effects.exact_arrays import aperture_nodes
+from bisar_budget.effects.pieces import PRINTED, TRUE, Piece, gradients_of, indicated_point
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.mission.load import load_mission
 from bisar_budget.simulate.exact import exact_effect
@@ -201,7 +201,7 @@ def test_the_emitted_steps_are_the_derived_ones() -> None:
 
 def test_noise_of_first_principles_is_the_derived_root() -> None:
     """`spread_phase` needs a logarithm, which no emitted function has: its root is that of the derived row."""
-    from bisar_budget.budget.vibration import spread_phase
+    from bisar_budget.analysis.vibration_limits import spread_phase
 
     noise = full.vibration().rows[2].cells[1]
     want = float(noise.subs({islr: 0.2, share: 0.3, wavelength: 0.03}))

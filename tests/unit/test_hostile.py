@@ -1,7 +1,9 @@
 """What other people's machines, files and terminals do to a command that runs on every commit."""
 
 import codecs
+import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -10,7 +12,13 @@ from pathlib import Path
 
 import pytest
 
-from tests.conftest import ROOT, mission_text
+from bisar_budget.budget.check import check_mission
+from bisar_budget.cli.streams import harmless
+from bisar_budget.errors import MissionError
+from bisar_budget.findings.mission import Report
+from bisar_budget.mission.load import MAX_FAULTS, parse_mission
+from bisar_budget.report import FORMATS, Style, render
+from tests.conftest import ROOT, TODAY, findings, mission_text
 
 COMMAND = [sys.executable, "-m", "bisar_budget"]
 SECTION_V = ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml"
@@ -100,7 +108,11 @@ class TestWorkers:
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGTERM") or sys.platform == "win32", reason="needs POSIX signals")
-def test_a_report_that_is_interrupted_leaves_the_old_one_and_nothing_else(tmp_path) -> None:
+@pytest.mark.parametrize(
+    ("command", "option", "name"),
+    [("check", "-o", "report.html"), ("simulate", "-o", "images.npz"), ("simulate", "--plot", "sheet.png")],
+)
+def test_a_report_that_is_interrupted_leaves_the_old_one_and_nothing_else(tmp_path, command, option, name) -> None:
     """The signal comes while the temporary file is written, wherever that is."""
     script = (
         "import os, signal, sys\n"
@@ -110,11 +122,11 @@ def test_a_report_that_is_interrupted_leaves_the_old_one_and_nothing_else(tmp_pa
         "os.chmod = lambda *a: (os.kill(os.getpid(), signal.SIGTERM), chmod(*a))\n"
         "main()\n"
     )
-    report = tmp_path / "report.html"
+    report = tmp_path / name
     report.write_text("old")
-    done = subprocess.run([sys.executable, "-c", script, "check", str(SECTION_V), "-o", str(report)], cwd=ROOT)
+    done = subprocess.run([sys.executable, "-c", script, command, str(SECTION_V), option, str(report)], cwd=ROOT)
     assert done.returncode == 143
-    assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
+    assert [path.name for path in tmp_path.iterdir()] == [name]
     assert report.read_text() == "old"
 
 
@@ -205,6 +217,19 @@ class TestOutputs:
         assert b"cannot write standard output: No space left on device" in done.stderr
         assert b"Traceback" not in done.stderr
 
+    @pytest.mark.skipif(sys.platform == "win32", reason="descriptors are handles there")
+    @pytest.mark.parametrize(
+        ("arguments", "code"), [(["--help"], 0), (["--version"], 0), (["schema"], 2), (["--nonsense"], 2)]
+    )
+    @pytest.mark.parametrize("closed", [[1], [2], [1, 2], [0, 1, 2]])
+    def test_closed_streams_are_no_fault_of_the_tool(self, arguments, code: int, closed) -> None:
+        """A usage error went to standard output where standard error was closed."""
+        script = f"exec {' '.join(COMMAND)} {' '.join(arguments)} {' '.join(f'{number}>&-' for number in closed)}"
+        done = subprocess.run(["sh", "-c", script], capture_output=True, cwd=ROOT)
+        assert done.returncode == (0 if closed == [2] and code == 2 and arguments == ["schema"] else code)
+        assert b"Traceback" not in done.stderr
+        assert b"Usage" not in done.stdout or arguments == ["--help"]
+
     @pytest.mark.skipif(sys.platform == "win32", reason="pipes end otherwise there")
     @pytest.mark.parametrize("arguments", [["--help"], ["check", "--help"], ["schema"]])
     def test_a_reader_that_went_away_changes_nothing(self, arguments) -> None:
@@ -247,6 +272,58 @@ class TestTargets:
         assert b"is a mission file; a report would replace it" in done.stderr
         assert mission.read_bytes() == before
 
+    @pytest.mark.skipif(sys.platform == "win32", reason="needs inodes")
+    @pytest.mark.parametrize(
+        ("arguments", "message"),
+        [
+            (["--report", "r.md", "-o", "r.assets/1-geometry.svg"], b"is in the folder of a report's pictures"),
+            (["--report", "r.md", "--report", "r.markdown"], b"two outputs would be written to one file"),
+            (["r.assets/in.yaml", "--report", "r.md"], b"is in the folder of a report's pictures"),
+            (["-o", "link.json"], b"is a mission file; a report would replace it"),
+            (["-o", "hard.json"], b"is a mission file; a report would replace it"),
+        ],
+    )
+    def test_pictures_and_links_count(self, mission, arguments, message: bytes) -> None:
+        folder = mission.parent
+        (folder / "r.assets").mkdir()
+        (folder / "r.assets" / "in.yaml").write_bytes(mission.read_bytes())
+        (folder / "link.json").symlink_to(mission)
+        (folder / "hard.json").hardlink_to(mission)
+        before = mission.read_bytes()
+        done = run("check", mission.name, *arguments, cwd=folder)
+        assert done.returncode == 2
+        assert message in done.stderr
+        assert mission.read_bytes() == before
+        assert not (folder / "r.md").exists()
+
+    @pytest.mark.skipif(sys.platform == "win32", reason="needs inodes")
+    def test_neither_standard_output_nor_the_step_summary_goes_to_a_mission(self, mission) -> None:
+        before = mission.read_bytes()
+        with mission.open("ab") as file:
+            done = subprocess.run([*COMMAND, "check", mission], stdout=file, stderr=subprocess.PIPE, cwd=ROOT)
+        assert done.returncode == 2
+        assert b"standard output goes to it" in done.stderr
+        environment = {**os.environ, "GITHUB_STEP_SUMMARY": str(mission)}
+        assert run("check", mission, "--format", "github", env=environment).returncode == 2
+        assert mission.read_bytes() == before
+
+    def test_diff_with_a_pattern_spares_what_it_matches(self, mission, tmp_path) -> None:
+        done = run("diff", tmp_path / "*.yaml", "--base", "HEAD", "-o", mission)
+        assert done.returncode == 2
+        assert b"is a mission file; a report would replace it" in done.stderr
+
+    def test_a_name_as_long_as_the_system_takes(self, mission, tmp_path) -> None:
+        """The temporary file beside it had a longer one."""
+        name = "r" * 250 + ".json"
+        assert run("check", mission, "-o", tmp_path / name).returncode == 0
+        assert (tmp_path / name).exists()
+
+    def test_a_nul_in_the_name_of_a_report(self, mission) -> None:
+        (mission.parent / "pyproject.toml").write_text('[tool.bisar-budget]\nreport = ["a\\u0000.json"]\n')
+        done = run("check", mission.name, cwd=mission.parent)
+        assert done.returncode == 2
+        assert rb"a\x00.json: embedded null byte" in done.stderr
+
 
 class TestPlots:
     @pytest.fixture
@@ -273,3 +350,286 @@ class TestPlots:
         assert done.returncode == 0, done.stderr
         assert (folder / "X.NPZ").exists()
         assert not (folder / "X.NPZ.npz").exists()
+
+
+# Escape, C1's CSI, marks without width, those that turn the reading direction, isolates.
+ACTIVE = "\x1b[2J\x07\x9b31m\u061c\u200b\u200e\u200f\u202a\u202e\u2066\u2069"
+COMMANDS = "::error::x ##[group]y ##vso[task.complete]z"
+RAW = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u202a-\u202e\u2066-\u2069]")
+RUN = re.compile(r"(?m)^\s*::|##\[|##vso\[")
+
+
+def is_harmless(done: subprocess.CompletedProcess) -> bool:
+    streams = [stream.decode("utf-8") for stream in (done.stdout, done.stderr)]
+    return not any(RAW.search(stream) or RUN.search(stream) for stream in streams)
+
+
+class TestTerminal:
+    """What others write, whichever way it comes, does nothing to a terminal or to the runner that reads a log."""
+
+    HOSTILE = f"{COMMANDS}{ACTIVE}"
+
+    @pytest.mark.parametrize(
+        "arguments",
+        [
+            [f"--{HOSTILE}"],
+            [HOSTILE],
+            ["check", HOSTILE],
+            ["check", "m.yaml", f"--{HOSTILE}"],
+            ["check", "m.yaml", "--format", HOSTILE],
+            ["check", "m.yaml", "--report", HOSTILE],
+            ["check", "m.yaml", "--date", HOSTILE],
+            ["check", "m.yaml", "--monte-carlo", HOSTILE],
+            ["check", "m.yaml", "--explain", HOSTILE],
+            ["check", "m.yaml", "-o", f"m.yaml/{HOSTILE}"],
+            ["verify", "m.yaml", "--only", HOSTILE],
+            ["verify", HOSTILE],
+            ["simulate", HOSTILE],
+            ["simulate", "m.yaml", "--plot", HOSTILE],
+            ["simulate", "m.yaml", "--targets", HOSTILE],
+            ["diff", HOSTILE, HOSTILE],
+            ["diff", "m.yaml", "--base", HOSTILE],
+            ["diff", "m.yaml", "m.yaml", "--fail-on-erosion", HOSTILE],
+            ["derive", "--table", HOSTILE],
+            ["init", f"m.yaml/{HOSTILE}"],
+            ["init", "--name", HOSTILE, "-"],
+            ["schema", "-o", f"m.yaml/{HOSTILE}"],
+        ],
+        ids=lambda arguments: " ".join(arguments[:1] + arguments[-2:-1]).encode("ascii", "ignore").decode()[:40],
+    )
+    def test_arguments(self, mission, arguments) -> None:
+        done = run(*arguments, cwd=mission.parent, env={**os.environ, "PYTHONUTF8": "1"})
+        assert done.returncode == 2
+        assert is_harmless(done)
+
+    @pytest.mark.parametrize(
+        "name", ["BISAR_BUDGET_FORMAT", "BISAR_BUDGET_REPORT", "SOURCE_DATE_EPOCH", "BISAR_BUDGET_"]
+    )
+    def test_variables(self, mission, name: str) -> None:
+        name += self.HOSTILE if name.endswith("_") else ""
+        done = run("check", mission, env={**os.environ, "PYTHONUTF8": "1", name: self.HOSTILE})
+        assert done.returncode == 2
+        assert is_harmless(done)
+
+    @pytest.mark.parametrize("key", ["format", "model", "report", HOSTILE])
+    def test_settings(self, mission, key: str) -> None:
+        value = json.dumps([self.HOSTILE] if key == "report" else self.HOSTILE)
+        text = f"[tool.bisar-budget]\n{json.dumps(key)} = {value}\n"
+        (mission.parent / "pyproject.toml").write_text(text, encoding="utf-8")
+        done = run("check", mission.name, cwd=mission.parent)
+        assert done.returncode == 2
+        assert is_harmless(done)
+
+    @pytest.mark.skipif(sys.platform == "win32", reason="no such names there")
+    @pytest.mark.parametrize("format_name", FORMATS)
+    def test_names_and_content(self, tmp_path, format_name: str) -> None:
+        inert = f"{COMMANDS}\u200b\u200e\u061c"  # a mission file may have these, other controls are faults
+        content = {
+            "name": inert,
+            "document": {"number": inert, "author": inert},
+            "other_errors": [{"name": inert, "quadratic_phase_error": "90 deg", "source": inert}],
+            "requirement_ids": {f"other.{inert}": inert, inert: inert},
+            "waivers": [{"id": "nobody.*", "until": "2030-01-01", "reason": inert}],
+        }
+        # No slash: each of them is one name.
+        (tmp_path / f"{self.HOSTILE}.yaml").write_text(mission_text(**content), encoding="utf-8")
+        (tmp_path / f"{self.HOSTILE}2.yaml").write_text(json.dumps({self.HOSTILE: self.HOSTILE}), encoding="utf-8")
+        options = ["-v"] if format_name == "text" else ["--detail", "full"]
+        done = run("check", "*.yaml", "--format", format_name, *options, cwd=tmp_path)
+        assert done.returncode == 2
+        assert not RAW.search(done.stdout.decode("utf-8"))
+        if format_name == "github":  # its own commands are at the start of lines
+            lines = done.stdout.decode("utf-8").splitlines()
+            assert all(re.match("::(error|warning|notice) file=", line) for line in lines)
+            assert not re.search(r"##\[|##vso\[", "".join(lines))
+        else:
+            assert is_harmless(done)
+
+    def test_a_format_reads_back_what_was_escaped(self) -> None:
+        text = json.dumps({"a": COMMANDS})
+        assert json.loads(harmless(text, "json")) == {"a": COMMANDS}
+        assert harmless("::x ##[y]", "html") == "&#58;:x #&#35;[y]"
+        assert harmless(" ::x\n  ##vso[y]") == " \\x3a:x\n  #\\x23vso[y]"
+        assert harmless("a::b # ## [x] ##") == "a::b # ## [x] ##"
+        assert harmless("\x1b[1;31mFAIL\x1b[0m", "text") == "\x1b[1;31mFAIL\x1b[0m"
+        assert harmless("\x1b[1;31mFAIL") == "\\x1b[1;31mFAIL"
+
+    def test_our_own_reports_need_no_escape(self) -> None:
+        """A style sheet is not text: there an escape would be an error."""
+        for format_name in FORMATS:
+            text = render(format_name, Report(version="", missions=(findings(),)), Style(detail="full"))
+            assert harmless(text, format_name) == text
+
+
+class TestBounds:
+    """Files under 1 MiB that took up to 48 s, or gave up to 63 MB of messages."""
+
+    @pytest.mark.parametrize(
+        "more",
+        [
+            "".join(f"k{i:06d}: 1\n" for i in range(80_000)),
+            "requirements:\n" + "".join(f"  k{i:06d}: 1\n" for i in range(70_000)),
+            "x: 1\n" * 150_000,
+            "l: [" + "~," * 400_000 + "]\n",
+            "l: [" + "[]," * 300_000 + "]\n",
+            "q: &q 1\nl: [" + "*q," * 250_000 + "]\n",
+            "l: [" + "0,5 m, " * 120_000 + "]\n",
+            "l: [" + "!!int 1," * 100_000 + "]\n",
+            "requirements:\n  declare: [" + "x," * 400_000 + "]\n",
+            "waivers:\n" + "- {a: 1, b: 1, c: 1}\n" * 40_000,
+            "requirement_ids:\n" + "".join(f"  k{i:06d}: R\n" for i in range(70_000)),
+            "x: " + "[" * 400_000 + "]" * 400_000 + "\n",
+            "x: " + "{a: " * 150_000 + "}" * 150_000 + "\n",
+            "a: &a [x,x,x]\n" + "".join(f"b{i}: &b{i} [*a,*a,*a]\n" for i in range(30)),
+            "name: " + "9" * 900_000 + "\n",
+            "x" * 900_000 + ": 1\n",
+        ],
+        ids=lambda more: more[:16].encode("unicode_escape").decode(),
+    )
+    def test_the_faults_of_a_large_file(self, more: str) -> None:
+        start = time.process_time()
+        with pytest.raises(MissionError) as caught:
+            parse_mission(mission_text() + more)
+        assert len(caught.value.faults) <= MAX_FAULTS + 1
+        assert sum(map(len, caught.value.lines())) < 200_000
+        assert time.process_time() - start < 10  # about 1 s; before up to 15 s for its messages
+
+    def test_the_first_faults_are_said_and_that_there_are_more(self) -> None:
+        with pytest.raises(MissionError) as caught:
+            parse_mission(mission_text() + "".join(f"k{i:03d}: 1\n" for i in range(300)))
+        more, first, *_ = caught.value.lines()
+        assert more == f"-: has {MAX_FAULTS} faults or more; what follows them was not read"
+        assert "k000: is not a known key" in first
+
+    @pytest.mark.parametrize("until", ["2009-01-01", "2099-01-01"])
+    def test_waivers_by_errors(self, until: str) -> None:
+        """A thousand notes of 400 characters stood at each of 900 rows."""
+        errors = [{"name": f"e{i}", "quadratic_phase_error": "90 deg"} for i in range(900)]
+        waivers = [{"id": f"other.e{'*' * (i % 9 + 1)}", "until": until, "reason": "r" * 400} for i in range(1000)]
+        start = time.process_time()
+        found = check_mission(parse_mission(mission_text(other_errors=errors, waivers=waivers)), TODAY)
+        assert time.process_time() - start < 10
+        others = [row for row in found.rows if row.id.startswith("other.")]
+        assert {row.status for row in others} == {"fail" if until < "2026" else "waived"}
+        assert all(sum("waiver of line" in note for note in row.notes) == 1 for row in others)
+
+    def test_of_expired_waivers_the_last_is_noted(self) -> None:
+        waivers = [{"id": "other.x", "until": f"20{year}-01-01", "reason": f"reason {year}"} for year in (19, 21, 20)]
+        found = findings(other_errors=[{"name": "x", "quadratic_phase_error": "90 deg"}], waivers=waivers)
+        (notes,) = [row.notes for row in found.rows if row.id == "other.x"]
+        assert [note.rpartition(": ")[2] for note in notes if "waiver" in note] == ["reason 21"]
+
+    def test_a_pattern_of_hundreds_of_wildcards_is_refused(self) -> None:
+        waiver = {"id": "*a" * 21, "until": "2030-01-01", "reason": "r"}
+        with pytest.raises(MissionError, match="1 fault"):
+            findings(waivers=[waiver])
+        assert findings(waivers=[{**waiver, "id": "*a" * 20}]).warnings
+
+    @pytest.mark.parametrize(
+        ("text", "message"),
+        [
+            (".".join("a" * 400_000) + " = 1", "dots"),
+            ("[" + ".".join(['"a"'] * 200_000) + "]", "dots"),
+            ("[tool.bisar-budget]\nx = " + "{a=" * 50_000, "nested too deep"),
+            ("[tool.bisar-budget]\nseed = " + "9" * 900_000, "not valid TOML"),
+            ("[tool.bisar-budget]\nseed = 0x" + "f" * 900_000, "too large to be shown"),
+            ("[tool.bisar-budget]\nformat = " + "[" * 300 + "]" * 300, "must be text"),
+            ("[tool.bisar-budget]\n" + "a" * 900_000 + " = 1", "is not a known key"),
+        ],
+        ids=lambda text: text[:24],
+    )
+    def test_settings(self, tmp_path, text: str, message: str) -> None:
+        """A key of 400 000 parts took hours, a number of 5 000 digits ended in exit 3."""
+        from bisar_budget.settings import SettingsError, project_settings
+
+        (tmp_path / "pyproject.toml").write_text(f"{text}\n# .bisar-budget\n")
+        with pytest.raises(SettingsError, match=message) as caught:
+            project_settings(str(tmp_path))
+        assert len(str(caught.value)) < 1000
+
+    def test_junit_of_two_thousand_missions(self) -> None:
+        """Of the missions that come with the tool, which declare more than most."""
+        paths = sorted((ROOT / "specs" / "missions").glob("*.yaml"))
+        missions = [check_mission(parse_mission(path.read_bytes(), str(path)), TODAY) for path in paths]
+        sizes = [len(render("junit", Report(version="", missions=(one,)), Style()).encode()) for one in missions]
+        assert 2000 * sum(sizes) / len(sizes) < 40e6
+
+
+class TestSystem:
+    @pytest.mark.skipif(sys.platform == "win32", reason="no such limit there")
+    @pytest.mark.parametrize("count", [4, 5, 6, 9, 12])
+    @pytest.mark.parametrize(
+        "arguments",
+        [
+            ["check", SECTION_V, "--format", "html"],
+            ["verify", SECTION_V, "--only", "receiver.velocity.*", "--jobs", "2"],
+            ["diff", SECTION_V, "--base", "HEAD"],
+        ],
+        ids=["check", "verify", "diff"],
+    )
+    def test_few_descriptors(self, arguments, count: int) -> None:
+        import resource
+
+        def limit() -> None:
+            resource.setrlimit(resource.RLIMIT_NOFILE, (count, count))
+
+        done = run(*arguments, preexec_fn=limit, stdin=subprocess.DEVNULL)
+        assert done.returncode in (0, 1, 2), done.stderr
+        assert b"Traceback" not in done.stderr
+
+    @pytest.mark.skipif(sys.platform == "win32", reason="a folder in use cannot be deleted there")
+    @pytest.mark.parametrize(
+        "arguments",
+        [
+            ["check", SECTION_V, "-o", "r.json"],
+            ["check", SECTION_V, "--report", "r.md"],
+            ["check", "m.yaml"],
+            ["check", "*.yaml"],
+            ["diff", "a.yaml", "b.yaml"],
+            ["diff", "a.yaml", "--base", "HEAD"],
+            ["simulate", SECTION_V, "--plot", "p.png"],
+            ["init"],
+            ["schema", "-o", "s.json"],
+        ],
+        ids=lambda arguments: " ".join(map(str, [arguments[0], *arguments[-2:]]))[-24:],
+    )
+    def test_a_deleted_folder(self, tmp_path, arguments) -> None:
+        (tmp_path / "gone").mkdir()
+        script = "import os; os.rmdir(os.getcwd()); from bisar_budget.cli import main; main()"
+        environment = {**os.environ, "PYTHONPATH": str(ROOT), "GITHUB_WORKSPACE": "/x"}
+        done = subprocess.run(
+            [sys.executable, "-c", script, *map(str, arguments)],
+            capture_output=True,
+            cwd=tmp_path / "gone",
+            env=environment,
+        )
+        assert done.returncode == 2, done.stderr
+        assert b"Traceback" not in done.stderr
+
+    @pytest.mark.parametrize(
+        "arguments",
+        [["--help"], ["check", "--help"], ["schema"], ["check", SECTION_V, "--date", "2026-01-01", "-v"]],
+        ids=["help", "check help", "schema", "check"],
+    )
+    def test_the_same_without_docstrings_and_asserts(self, arguments) -> None:
+        """Help was empty, and the schema described its sections by their signatures."""
+        plain = run(*arguments)
+        optimized = run(*arguments, env={**os.environ, "PYTHONOPTIMIZE": "2"})
+        assert (optimized.returncode, optimized.stdout) == (plain.returncode, plain.stdout)
+
+    def test_what_a_library_warns_of_is_not_said(self, mission) -> None:
+        script = (
+            "import warnings, bisar_budget.budget.check as check\n"
+            "from bisar_budget.cli import main\n"
+            "real = check.check_mission\n"
+            "check.check_mission = lambda *a, **k: (warnings.warn('from a library'), real(*a, **k))[1]\n"
+            "import bisar_budget.budget.fleet as fleet\n"
+            "fleet.check_mission = check.check_mission\n"
+            "main()\n"
+        )
+        for setting in ("default", "error"):
+            environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONWARNINGS": setting}
+            done = subprocess.run(
+                [sys.executable, "-c", script, "check", str(mission)], capture_output=True, cwd=ROOT, env=environment
+            )
+            assert (done.returncode, done.stderr) == (0, b"")

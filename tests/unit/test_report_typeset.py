@@ -9,9 +9,9 @@ import pytest
 from bisar_budget.budget.check import check_mission
 from bisar_budget.catalogue import FORMULAS, SYMBOLS
 from bisar_budget.mission.load import load_mission
-from bisar_budget.report import typeset
-from bisar_budget.report.explanation import chain, collection_chain
-from bisar_budget.report.formulas import Equation, filled
+from bisar_budget.report.explain import typeset
+from bisar_budget.report.explain.explanation import chain, collection_chain
+from bisar_budget.report.explain.formulas import Equation, filled
 from tests.conftest import TODAY
 from tests.unit.test_report_explanation import MISSIONS
 
