@@ -100,7 +100,7 @@ class ScenePhases:
         ]
         self.nearest = min(self.geometry.transmitter.slant_range, self.geometry.receiver.slant_range)
         self.count = nodes_for(self.geometry, self.T)
-        self.nowhere = Place(self.centre, 0.0, (0.0, 0.0))  # without an image
+        self.nowhere = RimPlace(self.centre, 0.0, (0.0, 0.0))  # without an image
         self.turn = math.copysign(1.0, analysis.exact.gradient_sine)
 
     def geometry_at(self, point: GroundVector) -> BistaticGeometry:
@@ -120,11 +120,11 @@ class ScenePhases:
         """Exact ranges of a point of the ground."""
         return ExactRanges(self.geometry, self.wavelength, self.T, at(radius, azimuth), self.count)
 
-    def place(self, radius: float, azimuth: float) -> "Place":
+    def place(self, radius: float, azimuth: float) -> "RimPlace":
         """What there is at a point of the ground."""
         return self.place_of(self.ranges_at(radius, azimuth))
 
-    def place_of(self, there: ExactRanges) -> "Place":
+    def place_of(self, there: ExactRanges) -> "RimPlace":
         """What there is where exact ranges are taken."""
         if there.nearest < _NEAREST_M:
             return self.nowhere
@@ -134,7 +134,7 @@ class ScenePhases:
         except ZeroDivisionError:  # a gradient vanishes, or both are parallel to the last digit
             return self.nowhere
         clearances = (self.turn * sine / _MIN_SINE, there.range_gradient / MIN_GROUND_GRADIENT)
-        return Place(phases, self.combined(phases), clearances)
+        return RimPlace(phases, self.combined(phases), clearances)
 
     def differences(self, radius: float, azimuth: float, exact: Sequence[int] | None = None) -> list[float]:
         """Of each error, its phase there less that at the centre; by the worse sign of those taken exactly. [rad]
@@ -251,7 +251,7 @@ class ScenePhases:
         return Rim(azimuth % (2 * math.pi), size, phases, self.place(radius, azimuth).phases)
 
 
-class Place(NamedTuple):
+class RimPlace(NamedTuple):
     """A place of the scene: quadratic phase of each error there, signed; how far they are from the centre's. [rad]
 
     There is an image where both `clearances` are above 1: the sine between range and Doppler gradient, and the range

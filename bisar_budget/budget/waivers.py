@@ -6,7 +6,7 @@ from datetime import date
 from fnmatch import translate
 
 from bisar_budget.findings.mission import FileWarning
-from bisar_budget.findings.row import Row, Waiver
+from bisar_budget.findings.row import AppliedWaiver, Row
 from bisar_budget.mission.model import Mission
 
 
@@ -32,13 +32,13 @@ def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> tuple[l
     """
     result = list(rows)
     warnings = []
-    expired: dict[int, Waiver] = {}  # of each row the one that held longest: a thousand would fill a report
+    expired: dict[int, AppliedWaiver] = {}  # of each row the one that held longest: a thousand would fill a report
     for index, waiver in enumerate(mission.waivers):
         line = mission.line(("waivers", index, "id"))
         is_named = _matcher(waiver.id)
         named = [position for position, row in enumerate(rows) if is_named(row.id)]
         failing = [position for position in named if rows[position].status == "fail"]
-        applied = Waiver(line, waiver.until, waiver.reason, is_expired=today > waiver.until)
+        applied = AppliedWaiver(line, waiver.until, waiver.reason, is_expired=today > waiver.until)
         for position in failing:
             row = result[position]
             if applied.is_expired:

@@ -9,7 +9,7 @@ from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState
 PRINTED, TRUE = "v/R as printed, ranges held", "v⊥/R, lines of sight as they turn"
 
 
-class Piece(NamedTuple):
+class LinePiece(NamedTuple):
     """A piece of the range error: centre τ_i from mid-aperture [s], value (27) [m] and slope (28) [m/s] there."""
 
     time: float
@@ -23,7 +23,7 @@ def gradients_of(model: str) -> str:
 
 
 def indicated_point(
-    geometry: BistaticGeometry, piece: Piece, model: str, seen_from: GroundVector = (0.0, 0.0)
+    geometry: BistaticGeometry, piece: LinePiece, model: str, seen_from: GroundVector = (0.0, 0.0)
 ) -> GroundVector:
     """Ground point that a piece of range error indicates, (29), relative to the scatterer. [m]
 
@@ -31,7 +31,7 @@ def indicated_point(
     ----------
     geometry : BistaticGeometry
         Of the whole aperture.
-    piece : Piece
+    piece : LinePiece
         Of the range error; what the scatterer itself has is no part of it.
     model : str
         `published`: Q_i of (30) as printed, platforms where they are at τ_i, speeds over ranges held constant. Any

@@ -9,7 +9,7 @@ from bisar_budget.findings.status import RANK
 from bisar_budget.geometry import GroundVector
 
 
-class Waiver(NamedTuple):
+class AppliedWaiver(NamedTuple):
     """A waiver that names a failing row: line of the file, last day, reason; expired if that day is over."""
 
     line: int | None
@@ -61,7 +61,7 @@ class Row(NamedTuple):
     cubic_rad: float | None = None
     islr_db: float | None = None
     model: str | None = None
-    waivers: tuple[Waiver, ...] = ()
+    waivers: tuple[AppliedWaiver, ...] = ()
     refuted: tuple[str, ...] = ()
 
     @property

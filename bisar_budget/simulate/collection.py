@@ -15,8 +15,8 @@ from bisar_budget.simulate.image_formation import backprojection, bytes_held, ke
 from bisar_budget.simulate.phase_history import (
     Complexes,
     Floats,
-    MotionError,
     Path,
+    PathError,
     cell_centres,
     path,
     phase_history,
@@ -42,11 +42,11 @@ class MemoryLimitError(ValueError):
 class Errors(NamedTuple):
     """What is wrong in one image: both platforms, and the clock's t̃₀ … t̃₃ of (1). [s], [1], [1/s], [1/s²]"""
 
-    transmitter: MotionError = MotionError()
-    receiver: MotionError = MotionError()
+    transmitter: PathError = PathError()
+    receiver: PathError = PathError()
     clock: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
 
-    def of(self, platform: str, error: MotionError) -> "Errors":
+    def of(self, platform: str, error: PathError) -> "Errors":
         """Give one platform an error."""
         return self._replace(transmitter=error) if platform == "transmitter" else self._replace(receiver=error)
 
@@ -55,7 +55,7 @@ class Errors(NamedTuple):
         return Errors(_still(self.transmitter), _still(self.receiver), self.clock)
 
 
-def _still(error: MotionError) -> MotionError:
+def _still(error: PathError) -> PathError:
     return error._replace(sinusoids=(), wideband_rms=0.0)
 
 
@@ -71,13 +71,13 @@ def superposed(parts: Iterable[Errors]) -> Errors:
     return total
 
 
-def superposed_motion(a: MotionError, b: MotionError) -> MotionError:
+def superposed_motion(a: PathError, b: PathError) -> PathError:
     """Two polynomial errors of one platform at once; vibration is not added."""
 
     def add(u: tuple[float, float, float], v: tuple[float, float, float]) -> tuple[float, float, float]:
         return (u[0] + v[0], u[1] + v[1], u[2] + v[2])
 
-    return MotionError(
+    return PathError(
         position=add(a.position, b.position),
         velocity=add(a.velocity, b.velocity),
         acceleration=add(a.acceleration, b.acceleration),

@@ -63,7 +63,7 @@ class Former(Protocol):
         """About how long an image of so many pulses takes, measured with some of them. [s]"""
 
 
-class ExactRanges(NamedTuple):
+class ExactRangeFormer(NamedTuple):
     """Matched filter (4) or backprojection, which equals it."""
 
     flown: Flown

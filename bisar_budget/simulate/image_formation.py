@@ -104,8 +104,8 @@ def backprojection(history: PhaseHistory, points: Floats, kernel: Kernel = "auto
         Pixels, anywhere. [m]
     kernel : "auto", "numpy", "cubic" or "linear"
         NumPy does every job; cubic and linear are compiled by Numba (extra `fast`), by splines of these orders.
-        Linear is faster and good to -80 dB. Auto is cubic where Numba is installed, else NumPy. Few pixels far apart in
-        range are left to NumPy.
+        Linear is faster and good to -80 dB. Auto is cubic where Numba is installed, else NumPy. Few pixels far apart
+        in range are left to NumPy.
 
     Returns
     -------

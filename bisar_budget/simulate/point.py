@@ -12,7 +12,7 @@ from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.correlation import correlated_errors, likely_error
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.exact_arrays import aperture_nodes
-from bisar_budget.effects.pieces import Piece, gradients_of, indicated_point
+from bisar_budget.effects.pieces import LinePiece, gradients_of, indicated_point
 from bisar_budget.effects.vibration_lines import along_line_of_sight, lines_of
 from bisar_budget.geometry import BistaticGeometry, GroundVector, Vector
 from bisar_budget.mission.model import Mission, Simulation
@@ -20,16 +20,16 @@ from bisar_budget.mission.model import MotionError as DeclaredError
 from bisar_budget.simulate.autofocus import ALGORITHMS
 from bisar_budget.simulate.collection import superposed_motion
 from bisar_budget.simulate.exact import ExactEffect, exact_effect
-from bisar_budget.simulate.former import IMAGE_FORMERS, ExactRanges, Former, PlaneWaves
+from bisar_budget.simulate.former import IMAGE_FORMERS, ExactRangeFormer, Former, PlaneWaves
 from bisar_budget.simulate.image_formation import ground_grid, kernel_within, taylor_window
 from bisar_budget.simulate.impulse_response import ImpulseResponse, impulse_response
 from bisar_budget.simulate.phase_history import (
     Complexes,
     Floats,
-    MotionError,
     Path,
+    PathError,
+    PathSinusoid,
     PhaseHistory,
-    Sinusoid,
     cell_centres,
     path,
     phase_history,
@@ -312,7 +312,7 @@ def simulate_point(
     values, slopes = np.interp(times, fine, left), np.interp(times, fine, slope)
     cells = former.offsets(np.array(shown), _middle(shown))
     windows = [_window(plan, cells, index) for index in range(len(shown))]
-    pieces = [Piece(*map(float, one)) for one in zip(times, values, slopes, strict=True)]
+    pieces = [LinePiece(*map(float, one)) for one in zip(times, values, slopes, strict=True)]
     model = mission.allocation.model
     return PointImages(
         slow_time=fine,
@@ -351,7 +351,7 @@ def _formers(mission: Mission, image_former: str, flown: Flown, smooth: tuple[Pa
     """Of the rotated images, and of the one along (x, y)."""
     radar = mission.radar
     kernel = kernel_within((mission.simulation or Simulation()).memory_limit)
-    exact = ExactRanges(flown, radar.bandwidth, radar.wavelength, image_former == "matched_filter", kernel)
+    exact = ExactRangeFormer(flown, radar.bandwidth, radar.wavelength, image_former == "matched_filter", kernel)
     if image_former in ("backprojection", "matched_filter"):
         return exact, exact
     sight = sum(one.measured / np.linalg.norm(one.measured, axis=1, keepdims=True) for one in smooth)
@@ -474,7 +474,7 @@ def _paths(
         declared: DeclaredError = getattr(mission.platforms, name).motion_error
         state = getattr(geometry, name)
         axes = state.frame(declared.frame)
-        error = MotionError(
+        error = PathError(
             position=_vector(declared.position, axes, factor),
             velocity=_vector(declared.velocity, axes, factor),
             acceleration=_vector(declared.acceleration, axes, factor),
@@ -484,7 +484,7 @@ def _paths(
             error = error._replace(position=position, velocity=velocity)
         if common is not None:
             scene = state.frame("scene")
-            shared = MotionError(
+            shared = PathError(
                 position=_vector(common.position, scene, factor),
                 velocity=_vector(common.velocity, scene, factor),
                 acceleration=_vector(common.acceleration, scene, factor),
@@ -493,7 +493,7 @@ def _paths(
         if vibrating:
             wideband = declared.vibration.wideband
             error = error._replace(
-                sinusoids=tuple(Sinusoid(*line) for line in lines_of(mission, name)),
+                sinusoids=tuple(PathSinusoid(*line) for line in lines_of(mission, name)),
                 wideband_rms=along_line_of_sight(wideband.rms, declared, state, "islr") if wideband else 0.0,
             )
         flown.append(path(state, slow_time, error, rng))

@@ -16,7 +16,7 @@ from bisar_budget.geometry import GroundVector
 from bisar_budget.simulate.collection import CELLS, MAX_CELLS, OVERSAMPLING, RANGE_CELLS, Chip, Errors
 from bisar_budget.simulate.exact import ExactEffect, NoGroundPointError
 from bisar_budget.simulate.impulse_response import highest, impulse_response
-from bisar_budget.simulate.phase_history import MotionError, Sinusoid
+from bisar_budget.simulate.phase_history import PathError, PathSinusoid
 from bisar_budget.units import format_limit, format_quantity
 from bisar_budget.verify.aperture_reading import READ_CELLS, ApertureReading
 from bisar_budget.verify.shift import measured_shift
@@ -52,7 +52,7 @@ def slow_vibration(study: Study, row_id: str, name: str, line: Line) -> Verdict:
     blank = Verdict(id=row_id, model=study.model, boundary_error=size, unit="m", budget_rad=budget)
     try:
         both = [
-            Errors().of(name, MotionError(sinusoids=(Sinusoid(size, line.frequency, phase),)))
+            Errors().of(name, PathError(sinusoids=(PathSinusoid(size, line.frequency, phase),)))
             for phase in (math.pi / 2, -math.pi / 2)
         ]
         effects = [study.collection.effect(errors) for errors in both]

@@ -25,7 +25,7 @@ from bisar_budget.simulate.collection import (
     superposed,
 )
 from bisar_budget.simulate.exact import ExactEffect
-from bisar_budget.simulate.phase_history import Floats, MotionError
+from bisar_budget.simulate.phase_history import Floats, PathError
 from bisar_budget.verify.aperture_reading import READ_CELLS, ApertureReading, read_aperture
 from bisar_budget.verify.refocus import refocused
 
@@ -92,13 +92,13 @@ class Study:
             order = _CLOCK_TERMS.index(axis)
             return Errors(clock=tuple(size if index == order else 0.0 for index in range(4)))
         if kind == "terrain":  # a scene that is higher: both platforms measured too high
-            up = MotionError(position=(0.0, 0.0, size))
+            up = PathError(position=(0.0, 0.0, size))
             return Errors(transmitter=up, receiver=up)
         x, y, z = (size * component for component in source.direction)
         error = {
-            "position": MotionError(position=(x, y, z)),
-            "velocity": MotionError(velocity=(x, y, z)),
-            "acceleration": MotionError(acceleration=(x, y, z)),
+            "position": PathError(position=(x, y, z)),
+            "velocity": PathError(velocity=(x, y, z)),
+            "acceleration": PathError(acceleration=(x, y, z)),
         }[kind]
         return Errors(transmitter=error, receiver=error) if source.is_common else Errors().of(owner, error)
 

@@ -21,7 +21,7 @@ from bisar_budget.findings.images import Verdict
 from bisar_budget.mission.model import Mission
 from bisar_budget.simulate.collection import CELLS, Errors, PointCollection
 from bisar_budget.simulate.impulse_response import upsampled
-from bisar_budget.simulate.phase_history import MotionError, Sinusoid, cell_centres
+from bisar_budget.simulate.phase_history import PathError, PathSinusoid, cell_centres
 
 TOLERANCE_DB = 0.5
 
@@ -93,7 +93,7 @@ def _sinusoidal(
 ) -> Verdict:
     """Measure the paired echo on the difference from the error-free image, which its sidelobes would bury."""
     frequency = _UNDECLARED_CYCLES / collection.aperture_time if declared is None else declared
-    sinusoids = {name: (Sinusoid(amplitude=size, frequency=frequency),) for name, size in limits.items()}
+    sinusoids = {name: (PathSinusoid(amplitude=size, frequency=frequency),) for name, size in limits.items()}
     who = "one platform alone" if len(limits) == 1 else "both platforms in phase"
     assumed = ", a frequency assumed: the file declares no vibration" if declared is None else ""
     return _echo(collection, _blank(row_id, model, limits, requirement_db), sinusoids, who, assumed)
@@ -116,7 +116,7 @@ def _near(
         return blank._replace(reason="the lines have no amplitude")
     scale = limits[name] / worst.amplitude
     sinusoids = tuple(
-        Sinusoid(scale * line.amplitude, line.frequency, 0.0 if sinc(worst.cycles - n) >= 0 else math.pi)
+        PathSinusoid(scale * line.amplitude, line.frequency, 0.0 if sinc(worst.cycles - n) >= 0 else math.pi)
         for line, n in zip(lines, cycles, strict=True)
     )
     return _echo(collection, blank, {name: sinusoids}, "one platform's lines in their worst phases")
@@ -125,7 +125,7 @@ def _near(
 def _echo(
     collection: PointCollection,
     blank: Verdict,
-    sinusoids: Mapping[str, tuple[Sinusoid, ...]],
+    sinusoids: Mapping[str, tuple[PathSinusoid, ...]],
     who: str,
     assumed: str = "",
 ) -> Verdict:
@@ -136,7 +136,7 @@ def _echo(
     cells = 2 * math.ceil(min(cycles, 1e6)) + CELLS
     errors = Errors()
     for name, those in sinusoids.items():
-        errors = errors.of(name, MotionError(sinusoids=those))
+        errors = errors.of(name, PathError(sinusoids=those))
     try:
         clean = collection.chip((0.0, 0.0), Errors(), cells=cells).cut
         echo = collection.chip((0.0, 0.0), errors, cells=cells).cut - clean
@@ -172,7 +172,7 @@ def _wideband(
     clean = collection.paths(Errors(), slow_time)
     errors = Errors()
     for name, rms in limits.items():
-        errors = errors.of(name, MotionError(wideband_rms=rms))
+        errors = errors.of(name, PathError(wideband_rms=rms))
 
     def added(*, is_common: bool) -> tuple[float, float]:
         """Mean of the added ISLR over the ensemble, and its standard error."""

@@ -86,9 +86,8 @@ def statuses(directive: Generated) -> str:
     rows = []
     for name, text in _joined(STATUS, directive.words(), "statuses"):
         status = STATUS[name]
-        code = (
-            "2" if name == "error" else "1" if status.fails else "1 with `--strict`" if status.fails_strict else "0"
-        )
+        code = "1" if status.fails else "1 with `--strict`" if status.fails_strict else "0"
+        code = "2" if name == "error" else code
         rows.append((f"`{name}`", f"`{status.text}`", code if status.gates else "", text))
     return table(("status", "in the text", "exit code", "means"), rows)
 

@@ -12,7 +12,7 @@ from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import BistaticGeometry, PlatformState, state_from_angles
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.simulate import point
-from bisar_budget.simulate.phase_history import MotionError, PhaseHistory, cell_centres, path, phase_history
+from bisar_budget.simulate.phase_history import PathError, PhaseHistory, cell_centres, path, phase_history
 
 
 @dataclass(frozen=True)
@@ -38,13 +38,13 @@ class Collection:
     def cross_range_resolution(self) -> float:
         return self.geometry.cross_range_resolution(self.wavelength, self.aperture_time)
 
-    def paths(self, **errors: MotionError):
+    def paths(self, **errors: PathError):
         return [
             path(getattr(self.geometry, name), self.slow_time, errors.get(name))
             for name in ("transmitter", "receiver")
         ]
 
-    def record(self, scatterers, amplitudes=(1.0,), **errors: MotionError) -> PhaseHistory:
+    def record(self, scatterers, amplitudes=(1.0,), **errors: PathError) -> PhaseHistory:
         transmitter, receiver = self.paths(**errors)
         return phase_history(
             np.atleast_2d(np.asarray(scatterers, dtype=float)),

@@ -8,7 +8,7 @@ import pytest
 from bisar_budget.budget.check import check_mission
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.simulate.collection import Errors
-from bisar_budget.simulate.phase_history import MotionError
+from bisar_budget.simulate.phase_history import PathError
 from bisar_budget.verify.limits import Study, verify_mission
 from tests.conftest import TODAY, findings, mission_text, row
 from tests.simulate.conftest import images_of
@@ -19,7 +19,7 @@ STEP = np.array([0.5, 0.5, 0.5, 2e-3, 2e-3, 2e-3])  # m, m/s: small for the firs
 
 def exact(study: Study, *vectors) -> np.ndarray:
     """Quadratic and cubic phase and displacement, (4,), of position and velocity errors (6,) of the platforms."""
-    errors = [MotionError(position=tuple(v[:3]), velocity=tuple(v[3:6])) for v in vectors]
+    errors = [PathError(position=tuple(v[:3]), velocity=tuple(v[3:6])) for v in vectors]
     effect = study.collection.effect(Errors(transmitter=errors[0], receiver=errors[1]))
     return np.array([effect.quadratic, effect.cubic, *effect.displacement])
 

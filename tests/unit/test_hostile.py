@@ -19,6 +19,7 @@ from bisar_budget.findings.mission import Report
 from bisar_budget.mission.load import MAX_FAULTS, parse_mission
 from bisar_budget.report import FORMATS, Style, render
 from tests.conftest import ROOT, TODAY, findings, mission_text
+from tests.fuzz import RAW, RUN, case
 
 COMMAND = [sys.executable, "-m", "bisar_budget"]
 SECTION_V = ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml"
@@ -155,6 +156,8 @@ class TestSettings:
             (codecs.BOM_UTF8 + b"[tool.bisar-budget]\nstrict = true", b"is not valid TOML"),
             (b'name = "caf\xe9"\n[tool.bisar-budget]\nstrict = true', b"is not UTF-8"),
             (b"[tool.bisar-budget\nstrict = true", b"is not valid TOML"),
+            (b'tool = {"bisar-budget"\x1e= {strict = true}}', b"is not valid TOML"),
+            (b'tool = {"bisar-budget"-= {strict = true}}', b"is not valid TOML"),
             (b"x = " + b"[" * 5000 + b"]" * 5000 + b"\n[tool.bisar-budget]", b"pyproject.toml: is "),
             (b"# " + b"x" * (1 << 20) + b"\n[tool.bisar-budget]\nstrict = true", b"is larger than 1 MiB"),
         ],
@@ -355,8 +358,6 @@ class TestPlots:
 # Escape, C1's CSI, marks without width, those that turn the reading direction, isolates.
 ACTIVE = "\x1b[2J\x07\x9b31m\u061c\u200b\u200e\u200f\u202a\u202e\u2066\u2069"
 COMMANDS = "::error::x ##[group]y ##vso[task.complete]z"
-RAW = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u202a-\u202e\u2066-\u2069]")
-RUN = re.compile(r"(?m)^\s*::|##\[|##vso\[")
 
 
 def is_harmless(done: subprocess.CompletedProcess) -> bool:
@@ -633,3 +634,17 @@ class TestSystem:
                 [sys.executable, "-c", script, "check", str(mission)], capture_output=True, cwd=ROOT, env=environment
             )
             assert (done.returncode, done.stderr) == (0, b"")
+
+
+@pytest.mark.parametrize("seed", range(0, 400, 4))
+def test_a_fuzzed_file_is_a_mission_or_faults(seed: int) -> None:
+    """The first cases of the long round, `docs/prove_hostile.py`."""
+    hostile = case(seed)
+    assert case(seed) == hostile
+    try:
+        found = check_mission(parse_mission(hostile.data, "m.yaml"), TODAY)
+    except MissionError as error:
+        assert not any(RAW.search(line) for line in error.lines())
+    else:
+        assert not hostile.is_misspelt
+        assert not RAW.search(harmless(render("text", Report(version="", missions=(found,)), Style())))

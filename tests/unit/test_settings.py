@@ -137,10 +137,10 @@ def test_a_wrong_variable_is_2_and_named(run, project, name: str, value: str) ->
     assert name in result.stderr
 
 
-def test_tomllib_is_loaded_only_for_a_table(tmp_path, monkeypatch) -> None:
+def test_tomllib_is_loaded_only_where_the_tool_is_named(tmp_path, monkeypatch) -> None:
     code = f"import os\nfrom bisar_budget.settings import project_settings\nproject_settings({str(tmp_path)!r})"
     (tmp_path / "pyproject.toml").write_text(
-        '[project]\nname = "x"\ndependencies = ["bisar-budget", "bisar-budget[x]"]\n'
+        '[project]\nname = "x"\ndependencies = ["budget"]\n[tool.ruff]\nline-length = 118\n'
     )
     assert "tomllib" not in loaded_after(code)
     (tmp_path / "pyproject.toml").write_text(table("strict = true"))

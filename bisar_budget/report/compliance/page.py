@@ -21,7 +21,6 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import Style
 from bisar_budget.report.compliance.view import (
-    Chip,
     Compliance,
     Contribution,
     Derivation,
@@ -38,6 +37,7 @@ from bisar_budget.report.compliance.view import (
     Probability,
     Remark,
     Share,
+    ShownImage,
     Source,
     Undeclared,
 )
@@ -280,7 +280,9 @@ def illustrations(found: MissionFindings) -> tuple[Illustration, ...]:
                 id=row_id,
                 words=tuple(numbers_in_words(evidence)),
                 chips=tuple(
-                    Chip(f"chip-{number}-{name}.png", title, chip_caption(image), chip_png(image), _on_page(image))
+                    ShownImage(
+                        f"chip-{number}-{name}.png", title, chip_caption(image), chip_png(image), _on_page(image)
+                    )
                     for name, title, image in images
                 ),
                 cuts=Picture(f"cuts-{number}.svg", f"Cross-range cuts of {row_id}", impulse_response_cuts(evidence)),

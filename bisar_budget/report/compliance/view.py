@@ -168,7 +168,7 @@ class Picture(NamedTuple):
     svg: str
 
 
-class Chip(NamedTuple):
+class ShownImage(NamedTuple):
     """A small image: `name` of a file within the mission's, what it shows, the PNG, its size on a page. [px]"""
 
     name: str
@@ -183,7 +183,7 @@ class Illustration(NamedTuple):
 
     id: str
     words: tuple[str, ...]
-    chips: tuple[Chip, ...]
+    chips: tuple[ShownImage, ...]
     cuts: Picture
 
 

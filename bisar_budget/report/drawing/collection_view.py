@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from bisar_budget.geometry import PlatformState, norm
-from bisar_budget.report.drawing.svg import Box, Canvas, Label, Point, axis_number, round_step, text_width, ticks
+from bisar_budget.report.drawing.svg import Box, Canvas, DrawnLabel, Point, axis_number, round_step, text_width, ticks
 from bisar_budget.units import format_quantity
 
 Place = tuple[float, float]  # in the plane that is drawn: to the right, up [m]
@@ -249,7 +249,7 @@ def _draw_panel(canvas: Canvas, panel: _Panel, view: View, is_detail: bool, enla
         if _shows_path(panel, platform):
             canvas.polyline([panel.pixel(place) for place in platform.path], f"{platform.name} path", frame)
     has_scene = frame.holds(scene)
-    labels: list[Label] = []
+    labels: list[DrawnLabel] = []
     if is_detail and has_scene:
         if view.is_plan:
             labels += _directions(canvas, panel, view)
@@ -270,7 +270,7 @@ def _draw_panel(canvas: Canvas, panel: _Panel, view: View, is_detail: bool, enla
 
 def _labels(
     panel: _Panel, view: View, visible: Sequence[SeenPlatform], has_scene: bool, enlarged: _Panel | None
-) -> Iterator[Label]:
+) -> Iterator[DrawnLabel]:
     """What is written, and where it belongs; things on one spot share a label."""
     frame, scene = panel.frame, panel.pixel(_SCENE)
     # From the side, what is written of a platform stays above the ground.
@@ -281,27 +281,27 @@ def _labels(
         distance = math.dist(*(p.state.position for p in free))
         together = f"{_range(view, free[0])}, {format_quantity(distance, 'm')} apart"
         below = ("enlarged below",) if enlarged else ()
-        yield Label(panel.pixel(free[0].at), ("transmitter and receiver", together, *below), above)
+        yield DrawnLabel(panel.pixel(free[0].at), ("transmitter and receiver", together, *below), above)
     else:
         for platform in free:
             lines = platform.name, _range(view, platform) + (f", {platform.motion}" if view.is_plan else "")
-            yield Label(panel.pixel(platform.at), lines, above)
+            yield DrawnLabel(panel.pixel(platform.at), lines, above)
     if has_scene:
         if at_scene and enlarged:
             names = " and ".join(["scene", *(p.name for p in at_scene)])
-            yield Label(scene, (names, "enlarged below"), frame)
+            yield DrawnLabel(scene, (names, "enlarged below"), frame)
         elif at_scene:
             names = " and ".join(p.name for p in at_scene)
             ranges = ", ".join(f"{_range(view, p)}, {p.motion}" for p in at_scene)
-            yield Label(scene, (f"{names} over the scene", ranges), frame)
+            yield DrawnLabel(scene, (f"{names} over the scene", ranges), frame)
         else:
             radius = f", radius {format_quantity(view.radius, 'm')}" if view.radius else ""
-            yield Label(scene, (f"scene{radius}",), frame)
+            yield DrawnLabel(scene, (f"scene{radius}",), frame)
     for platform in view.platforms:
         if platform not in visible and (part := frame.clipped((scene, panel.pixel(platform.at)))):
-            yield Label(part[1], (f"to {platform.name}, {_range(view, platform)}",), above)
+            yield DrawnLabel(part[1], (f"to {platform.name}, {_range(view, platform)}",), above)
     if not has_scene and visible and (part := frame.clipped((panel.pixel(visible[0].at), scene))):
-        yield Label(part[1], ("to the scene",), frame)
+        yield DrawnLabel(part[1], ("to the scene",), frame)
 
 
 def _range(view: View, platform: SeenPlatform) -> str:
@@ -309,15 +309,15 @@ def _range(view: View, platform: SeenPlatform) -> str:
     return slant if view.is_plan else f"{slant} at {degrees(platform.state.elevation)}"
 
 
-def _directions(canvas: Canvas, panel: _Panel, view: View) -> Iterator[Label]:
+def _directions(canvas: Canvas, panel: _Panel, view: View) -> Iterator[DrawnLabel]:
     """φ_b of (11), and across it the line along which errors smear, (31)."""
     scene, look = panel.pixel(_SCENE), view.look_azimuth
     tip = _turned(scene, _LOOK, look)
     ends = [_turned(scene, sign * _SMEAR, look + math.pi / 2) for sign in (-1, 1)]
     canvas.arrow(scene, tip)
     canvas.arrow(ends[0], ends[1], both_ends=True)
-    yield Label(tip, (f"look φ_b {degrees(look)}",), panel.frame)
-    yield Label(max(ends, key=lambda end: end[1]), ("smear",), panel.frame)
+    yield DrawnLabel(tip, (f"look φ_b {degrees(look)}",), panel.frame)
+    yield DrawnLabel(max(ends, key=lambda end: end[1]), ("smear",), panel.frame)
 
 
 def _turned(origin: Point, length: float, azimuth: float) -> Point:

@@ -24,7 +24,7 @@ _NEAR = 1.0  # times a picture's larger side: a true place that far away is stil
 Limits = tuple[float, float, float, float]
 
 
-class Picture(NamedTuple):
+class ImagePanel(NamedTuple):
     """An image in dB over the error-free peak, on pixels given by their corners.
 
     `level_db` is (nx, ny), x or x′ along its first axis, NaN where no image was formed; `corners`
@@ -82,10 +82,10 @@ class Sheet(NamedTuple):
     segments: Floats
     points: Floats
     points_by: str
-    in_scene: Picture
-    rotated: Picture
-    focused: Picture
-    rotated_back: Picture
+    in_scene: ImagePanel
+    rotated: ImagePanel
+    focused: ImagePanel
+    rotated_back: ImagePanel
     cuts: tuple[Cut, ...]
 
 
@@ -105,15 +105,15 @@ def sheet(images: PointImages) -> Sheet:
     scene_crop = _bright([images.in_scene, back], peak, images.scene_spacing)
     crop = _bright([images.rotated, images.focused, images.error_free], peak, images.spacing)
 
-    def picture(title: str, image: Complexes, grid: Floats, part: tuple[slice, slice], at: Floats) -> Picture:
+    def picture(title: str, image: Complexes, grid: Floats, part: tuple[slice, slice], at: Floats) -> ImagePanel:
         level, corners = _drawn(image, grid[..., :2], part, peak)
         points = at[:, None] + images.points - images.points[middle]
-        return Picture(title, ("x [m]", "y [m]"), level, corners, true, at, points)
+        return ImagePanel(title, ("x [m]", "y [m]"), level, corners, true, at, points)
 
-    def turned(title: str, image: Complexes) -> Picture:
+    def turned(title: str, image: Complexes) -> ImagePanel:
         flat = picture(title, image, images.grid, crop, shown)
         axes = ("x′ [m]", "y′ [m]")
-        return Picture(title, axes, flat.level_db, *(one @ turn for one in flat[3:]))
+        return ImagePanel(title, axes, flat.level_db, *(one @ turn for one in flat[3:]))
 
     return Sheet(
         slow_time=images.slow_time,

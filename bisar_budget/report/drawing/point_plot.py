@@ -10,7 +10,7 @@ import numpy as np
 
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.mission.model import Mission
-from bisar_budget.report.drawing.point_figures import FLOOR_DB, Limits, Picture, Sheet, rotated_back, sheet
+from bisar_budget.report.drawing.point_figures import FLOOR_DB, ImagePanel, Limits, Sheet, rotated_back, sheet
 from bisar_budget.report.words.layout import wrapped
 from bisar_budget.simulate.impulse_response import ImpulseResponse
 from bisar_budget.simulate.phase_history import Floats
@@ -227,7 +227,7 @@ def _points(panel: Any, drawn: Sheet) -> None:
     panel.grid(color="#dddddd", lw=0.5)
 
 
-def _image(panel: Any, picture: Picture, *, with_points: bool = False) -> Any:
+def _image(panel: Any, picture: ImagePanel, *, with_points: bool = False) -> Any:
     """Draw each pixel between its own corners, which follow lines of equal range."""
     mesh = panel.pcolormesh(
         picture.corners[..., 0],

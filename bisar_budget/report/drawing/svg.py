@@ -90,7 +90,7 @@ class Box(NamedTuple):
         return (x + enter * dx, y + enter * dy), (x + leave * dx, y + leave * dy)
 
 
-class Label(NamedTuple):
+class DrawnLabel(NamedTuple):
     """Lines of text that belong to a point, to be written inside a box."""
 
     at: Point
@@ -172,7 +172,7 @@ class Canvas:
             f"{xml_text(line)}</text>"
         )
 
-    def labels(self, labels: Sequence["Label"]) -> None:
+    def labels(self, labels: Sequence["DrawnLabel"]) -> None:
         """Write texts near their points, where together they cover least of what is drawn and of each other.
 
         They are placed one after the other; the best of several orders counts, because who comes first may take
@@ -190,7 +190,7 @@ class Canvas:
             x = {"start": box.left + _MARGIN, "middle": (box.left + box.right) / 2, "end": box.right - _MARGIN}
             self.text((x[place.anchor], box.top + 0.8 * LINE_HEIGHT), label.lines, anchor=place.anchor)
 
-    def _options(self, label: "Label") -> list["_Place"]:
+    def _options(self, label: "DrawnLabel") -> list["_Place"]:
         """Places around the label's point with their costs, the cheapest first."""
         width = max(text_width(line) for line in label.lines) + 2 * _MARGIN
         height = LINE_HEIGHT * len(label.lines)

@@ -13,7 +13,7 @@ from bisar_budget.geometry import FRAME_AXES, PlatformState
 from bisar_budget.mission.model import Mission
 from bisar_budget.report.explain import formulas
 from bisar_budget.report.explain.explained_full import RATES, for_comparison, full_chain
-from bisar_budget.report.explain.formulas import Equation, Step, Sum, equation, number, step, with_unit
+from bisar_budget.report.explain.formulas import Step, Sum, WorkedEquation, equation, number, step, with_unit
 
 
 def declaration(mission: Mission, source: ErrorSource) -> Iterator[Step]:
@@ -232,7 +232,7 @@ def _displacement(analysis: Analysis, source: ErrorSource) -> Iterator[Step]:
         "β̃_1": by_table.linear * source.declared,
         "det Q": plane.determinant,
     }
-    lines: list[Equation] = []
+    lines: list[WorkedEquation] = []
     for symbol, (first, second), result in zip(("x̃", "ỹ"), plane.adjugate, moved, strict=True):
         entries = {"adj_0": first, "adj_1": second}
         lines += equation(symbol, "(adj_0*β̃_0 + adj_1*β̃_1)/(det Q)", values | entries, result, "m")

@@ -24,7 +24,7 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.report.explain import formulas
 from bisar_budget.report.explain.explained_error import as_written, declaration, effect, missing, place
 from bisar_budget.report.explain.explained_full import at_the_allowable
-from bisar_budget.report.explain.formulas import Equation, Step, Sum, equation, number, step, with_unit
+from bisar_budget.report.explain.formulas import Step, Sum, WorkedEquation, equation, number, step, with_unit
 from bisar_budget.report.formats.text_table import percent
 from bisar_budget.report.words.layout import wrapped
 from bisar_budget.units import format_quantity
@@ -239,8 +239,8 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[S
         title = "First principles; φ is the phase whose echoes have this level, J₁(φ)/J₀(φ) = l"
         powers = {"PSLR": ratio, "s_t": split.transmitter, "s_r": split.receiver}
         known = [
-            Equation("l", "sqrt(PSLR*(s_t + s_r))", powers, level, ""),
-            Equation("φ", "", {}, values["φ"], "rad"),
+            WorkedEquation("l", "sqrt(PSLR*(s_t + s_r))", powers, level, ""),
+            WorkedEquation("φ", "", {}, values["φ"], "rad"),
         ]
     else:
         title = "First principles, independent on both platforms; a phase of σ rad has the ISLR exp(σ²) − 1"

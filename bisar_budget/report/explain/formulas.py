@@ -55,7 +55,7 @@ def clock_coefficient(order: int) -> str:
     return f"c*t̃_{order}"
 
 
-class Equation(NamedTuple):
+class WorkedEquation(NamedTuple):
     """A formula as text, and what it gives for values of its symbols; an empty formula: the result is known."""
 
     symbol: str
@@ -84,24 +84,26 @@ class Step(NamedTuple):
     """One step of an explanation: what it is or where it stands, and the equations or texts under it."""
 
     title: str
-    parts: tuple[Equation | str, ...] = ()
+    parts: tuple[WorkedEquation | str, ...] = ()
 
     @property
     def lines(self) -> Iterator[str]:
         """The title, what belongs to it indented."""
         yield self.title
         for part in self.parts:
-            yield from (f"    {line}" for line in (part.lines if isinstance(part, Equation) else (part,)))
+            yield from (f"    {line}" for line in (part.lines if isinstance(part, WorkedEquation) else (part,)))
 
 
-def step(title: str, *parts: Equation | str) -> Iterator[Step]:
+def step(title: str, *parts: WorkedEquation | str) -> Iterator[Step]:
     """One step of an explanation, to be yielded from."""
     yield Step(title, parts)
 
 
-def equation(symbol: str, formula: str, values: Mapping[str, float], result: float, unit: str) -> tuple[Equation]:
+def equation(
+    symbol: str, formula: str, values: Mapping[str, float], result: float, unit: str
+) -> tuple[WorkedEquation]:
     """Make the one part of a step."""
-    return (Equation(symbol, formula, values, result, unit),)
+    return (WorkedEquation(symbol, formula, values, result, unit),)
 
 
 def filled(formula: str, values: Mapping[str, float]) -> str:

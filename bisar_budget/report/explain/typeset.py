@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from bisar_budget.catalogue import FORMULAS, SYMBOLS
-from bisar_budget.report.explain.formulas import Equation, filled, six_digits, with_unit
+from bisar_budget.report.explain.formulas import WorkedEquation, filled, six_digits, with_unit
 from bisar_budget.report.explain.notation import LATEX, MATHML, Language, is_mathematical, symbol, written
 from bisar_budget.report.words.escapes import xml_text
 
@@ -23,12 +23,12 @@ class Typeset(NamedTuple):
     numbers: str
 
 
-def is_formula(equation: Equation) -> bool:
+def is_formula(equation: WorkedEquation) -> bool:
     """Whether it is to be set as a formula: one of the derivation, or one in letters."""
     return not equation.formula or equation.formula in FORMULAS or is_mathematical(equation.formula)
 
 
-def as_text(equation: Equation) -> Typeset:
+def as_text(equation: WorkedEquation) -> Typeset:
     """For a reader: · between factors, no carets."""
     if not equation.formula:
         return Typeset(readable(equation.lines[0]), "")
@@ -41,7 +41,7 @@ def readable(text: str) -> str:
     return _MINUS.sub("−", text.replace("*", " · ").replace("^2", "²").replace("sqrt(", "√("))
 
 
-def as_mathml(equation: Equation) -> Typeset:
+def as_mathml(equation: WorkedEquation) -> Typeset:
     """Three `math` elements, so that a narrow page can break between them."""
     result = f"<mrow>{mathml_number(equation.result)}{_mathml_unit(equation.unit)}</mrow>"
     left = symbol(equation.symbol, MATHML)
@@ -106,7 +106,7 @@ def _mathml_unit(unit: str) -> str:
     return f'<mspace width="0.25em"/><mtext>{xml_text(unit.replace("^2", "²"))}</mtext>'
 
 
-def as_latex(equation: Equation) -> Typeset:
+def as_latex(equation: WorkedEquation) -> Typeset:
     """Without delimiters; both parts are aligned at their first `=`."""
     unit = rf"\,\mathrm{{{equation.unit.replace('^2', '^{2}')}}}" if equation.unit else ""
     result = f"{latex_number(equation.result)}{unit}"

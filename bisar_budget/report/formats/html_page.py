@@ -12,7 +12,7 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report.compliance.page import compliance
 from bisar_budget.report.explain import typeset
-from bisar_budget.report.explain.formulas import Equation, Sum
+from bisar_budget.report.explain.formulas import Sum, WorkedEquation
 from bisar_budget.report.formats.text_table import document_words
 from bisar_budget.resources import resource
 
@@ -68,9 +68,9 @@ def _sentence(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def _equation(part: Equation | str) -> Markup:
+def _equation(part: WorkedEquation | str) -> Markup:
     """One part of a step: a formula as MathML, words and text as text."""
-    if not isinstance(part, Equation):
+    if not isinstance(part, WorkedEquation):
         text = typeset.readable(part) if isinstance(part, Sum) else printable(part)
         return Markup("<p class=part>{}</p>").format(text)
     if typeset.is_formula(part):

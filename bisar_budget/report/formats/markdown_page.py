@@ -12,9 +12,9 @@ from bisar_budget.findings.mission import MissionFindings, Report
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report.compliance.page import compliance, drawings, illustrations
-from bisar_budget.report.compliance.view import Chip, Compliance
+from bisar_budget.report.compliance.view import Compliance, ShownImage
 from bisar_budget.report.explain import typeset
-from bisar_budget.report.explain.formulas import Equation, Sum
+from bisar_budget.report.explain.formulas import Sum, WorkedEquation
 from bisar_budget.report.formats.text_table import document_words
 from bisar_budget.report.words.escapes import markdown_text, uri
 from bisar_budget.resources import resource
@@ -75,9 +75,9 @@ def _bar(part: float | None) -> Markup:
     return Markup(filled.ljust(_BAR, "░") + ("▶" if part > 1 + 1e-9 else ""))
 
 
-def _equation(part: Equation | str) -> Markup:
+def _equation(part: WorkedEquation | str) -> Markup:
     """One part of a step: a formula as a block of LaTeX, words and text as a line."""
-    if not isinstance(part, Equation):
+    if not isinstance(part, WorkedEquation):
         return _sum(typeset.readable(part)) if isinstance(part, Sum) else Markup(f"- {markdown_text(part)}\n")
     if part.formula and typeset.is_formula(part):
         formula, numbers = typeset.as_latex(part)
@@ -92,7 +92,7 @@ def _sum(text: str) -> Markup:
     return Markup(f"- `{text}`\n")
 
 
-def _chip(chip: Chip, path: str) -> Markup:
+def _chip(chip: ShownImage, path: str) -> Markup:
     """An image at its size, which Markdown cannot say."""
     width, height = chip.size
     return Markup('<img src="{}" alt="{}" width="{}" height="{}">').format(

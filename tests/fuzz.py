@@ -1,0 +1,476 @@
+"""Mission and settings files as nobody should write them: what `docs/prove_hostile.py` feeds the tool.
+
+    python -m tests.fuzz 17 > hostile.yaml      # the same bytes each time, to reproduce a case
+
+A case starts from a mission that comes with the tool, or from a random one, and is changed in its structure or in its
+bytes. It is drawn from `random.Random` by its seed.
+"""
+
+import json
+import re
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from functools import cache
+from random import Random
+from typing import Any, NamedTuple
+
+import yaml
+
+from tests.conftest import ROOT
+from tests.families import FAMILIES, mission_text
+
+# What does something to a terminal, and what a runner takes for a command.
+RAW = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2066-\u2069]")
+RUN = re.compile(r"(?m)^\s*::|##\[|##vso\[")
+
+_TEXTS = (
+    "",
+    " ",
+    "~",
+    "null",
+    "true",
+    "no",
+    "0x10",
+    "010",
+    "1_000",
+    "1e400 m",
+    "-1e-400",
+    "nan",
+    ".inf",
+    "-inf km",
+    "9" * 400,
+    "1" + "0" * 5000,
+    "1 parsec",
+    "3 dBi",
+    "9**9**9 m",
+    "1,5 m",
+    "１２ m",
+    "½ m",
+    "1 µm",
+    "45°",
+    "- 5 m",
+    "\x1b[2J",
+    "\x9b31m",
+    "\u202e evil",
+    "\u2066x\u2069",
+    "\u200b",
+    "\u200f",
+    "\ufeff",
+    "\x00",
+    "\ud800",
+    "a\nb",
+    "\r\n",
+    "::error::x",
+    "##[group]x",
+    "##vso[task.complete]",
+    "=1+1",
+    "@SUM(A1)",
+    "<script>alert(1)</script>",
+    "]]>",
+    "&amp;",
+    "{{7*7}}",
+    "{% raw %}",
+    "$\\frac$",
+    "`x`",
+    "| a | b |",
+    "[x](javascript:1)",
+    ".. raw:: html",
+    "[[copy('id')]]",
+    "%0A",
+    "../../etc/passwd",
+    "-",
+    "--strict",
+    "*",
+    "receiver.*",
+    "other.[",
+    "2030-01-01",
+    "2019-13-45",
+    "9999-12-31",
+    "🛰️",
+    "e\u0301" * 50,
+    "x" * 499,
+    "x" * 501,
+    "\U000e0041",
+    "\u2028",
+)
+_UNITS = (
+    "m",
+    "km",
+    "m/s",
+    "mm/s",
+    "m/s^2",
+    "s",
+    "ns",
+    "Hz",
+    "GHz",
+    "MHz",
+    "deg",
+    "rad",
+    "dB",
+    "%",
+    "1/s",
+    "1/s^2",
+    "B",
+    "",
+)
+_WORDS = (
+    "scene",
+    "track",
+    "look",
+    "each",
+    "sum",
+    "rss",
+    "published",
+    "full",
+    "strictest",
+    "balanced",
+    "equal",
+    "normal",
+    "uniform",
+    "bound",
+    "pga",
+    "map_drift",
+    "uniform",
+    "taylor",
+)
+_BYTES = (
+    b"\x00",
+    b"\xff",
+    b"\xef\xbb\xbf",
+    b"\r",
+    b"\t",
+    b"\n",
+    b"\xc2\x85",
+    b"\xe2\x80\xae",
+    b"\xed\xa0\x80",
+    b"&a ",
+    b"*a",
+    b"!!int ",
+    b"---\n",
+    b"...\n",
+    b"%YAML 9\n",
+    b"#",
+    b"'",
+    b'"',
+    b"|\n",
+    b">\n",
+    b"? ",
+    b": ",
+    b"- ",
+    b"[",
+    b"]",
+    b"{",
+    b"}",
+    b",",
+    b"[" * 60,
+    b"{a: " * 30,
+    b"<<: ",
+    b"\\",
+    b"\x1b[31m",
+    b"::error::",
+    b"e308",
+    b"0",
+    b"-",
+)
+
+
+class Case(NamedTuple):
+    """A file, and whether a key of it was misspelt, which no reader may pass over."""
+
+    data: bytes
+    is_misspelt: bool = False
+
+
+@cache
+def _known() -> tuple[str, ...]:
+    folders = (ROOT / "specs" / "missions", ROOT / "examples")
+    return tuple(
+        path.read_text(encoding="utf-8")
+        for folder in folders
+        for path in sorted(folder.rglob("*.yaml"))
+        if "schema_version" in path.read_text(encoding="utf-8")
+    )
+
+
+def original(random: Random) -> str:
+    """A mission that can be used."""
+    if random.random() < 0.7:
+        return random.choice(_known())
+    return mission_text(random.choice(FAMILIES), random.randrange(10_000))
+
+
+def case(seed: int) -> Case:
+    """The hostile file of a seed."""
+    random = Random(f"hostile {seed}")
+    text = original(random)
+    kind = random.random()
+    if kind < 0.1:
+        return _misspelt(text, random)
+    if kind < 0.8:
+        tree = yaml.load(text, yaml.BaseLoader)
+        changes = (_scale, _section) if kind < 0.45 else _CHANGES  # many that can be used
+        for _ in range(random.choice((1, 1, 1, 2, 3, 8))):
+            _change(tree, random, changes)
+        text = _written(tree, random)
+        if kind < 0.75:
+            return Case(text.encode("utf-8", "surrogatepass"))
+    data = text.encode("utf-8", "surrogatepass")
+    for _ in range(random.choice((1, 1, 2, 4, 16))):
+        data = _damaged(data, random)
+    return Case(data)
+
+
+def _written(tree: Any, random: Random) -> str:
+    if random.random() < 0.1:
+        return json.dumps(tree, ensure_ascii=random.random() < 0.5)
+    style = {"default_flow_style": random.choice((None, True, False)), "allow_unicode": random.random() < 0.7}
+    return yaml.dump(tree, Dumper=_Plain, sort_keys=False, width=random.choice((40, 1000)), **style)
+
+
+class _Plain(yaml.SafeDumper):
+    """Writes no aliases; a lone surrogate is written as it is."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
+def _places(node: Any) -> Iterator[tuple[Any, Any]]:
+    """Every container with a key or index of it."""
+    items = list(node.items()) if isinstance(node, dict) else list(enumerate(node)) if isinstance(node, list) else []
+    for key, value in items:
+        yield node, key
+        yield from _places(value)
+
+
+def _misspelt(text: str, random: Random) -> Case:
+    """A key with one letter changed, in a section whose keys are known."""
+    tree = yaml.load(text, yaml.BaseLoader)
+    free = id(tree.get("requirement_ids"))
+    places = [(node, key) for node, key in _places(tree) if isinstance(node, dict) and id(node) != free]
+    node, key = random.choice(places)
+    known = {name for _, name in places}
+    wrong = key
+    while wrong in known:
+        at = random.randrange(len(key))
+        wrong = key[:at] + random.choice("abcdefghijklmnopqrstuvwxyz_-") + key[at + 1 :]
+    items = [(wrong if name == key else name, value) for name, value in node.items()]
+    node.clear()
+    node.update(items)
+    return Case(_written(tree, random).encode(), is_misspelt=True)
+
+
+def _change(tree: Any, random: Random, changes: Sequence[Callable[..., None]]) -> None:
+    """Change one place of the tree."""
+    node, key = random.choice(list(_places(tree)) or [(tree, None)])
+    if key is None:
+        return
+    random.choice(changes)(tree, node, key, random)
+
+
+def _replace(tree: Any, node: Any, key: Any, random: Random) -> None:
+    node[key] = _value(random)
+
+
+def _scale(tree: Any, node: Any, key: Any, random: Random) -> None:
+    """A number of any size in place of one that was there, with its unit: most give a mission that can be used."""
+    leaves = [
+        (one, name)
+        for one, name in _places(tree)
+        if isinstance(one[name], str) and re.match(r"-?\d", one[name]) and name != "schema_version"
+    ]
+    for one, name in random.sample(leaves, min(len(leaves), random.choice((1, 1, 2, 5, 20)))):
+        number, unit = re.match(r"(-?[\d.]+(?:[eE][-+]?\d+)?)(.*)", one[name], re.DOTALL).groups()
+        near = 10 ** random.uniform(-0.5, 0.5)
+        size = random.choice((*[near] * 12, 10 ** random.uniform(-3, 3), 10 ** random.uniform(-15, 15), 0.0, -1.0))
+        try:
+            one[name] = f"{float(number) * size:.6g}{unit}"
+        except ValueError:
+            one[name] = _value(random)
+
+
+def _delete(tree: Any, node: Any, key: Any, random: Random) -> None:
+    del node[key]
+
+
+def _swap(tree: Any, node: Any, key: Any, random: Random) -> None:
+    other, its_key = random.choice(list(_places(tree)))
+    node[key], other[its_key] = json.loads(json.dumps([other[its_key], node[key]]))
+
+
+def _insert(tree: Any, node: Any, key: Any, random: Random) -> None:
+    if isinstance(node, dict):
+        node[random.choice((*_TEXTS, "motion_error", "source", "waivers", "position"))] = _value(random)
+    else:
+        node.insert(key, _value(random))
+
+
+def _repeat(tree: Any, node: Any, key: Any, random: Random) -> None:
+    if isinstance(node, list):
+        node[key:key] = json.loads(json.dumps([node[key]] * random.choice((1, 3, 40, 1001))))
+    else:
+        node[key] = [node[key]] * random.choice((1, 2, 3, 6))
+
+
+def _bury(tree: Any, node: Any, key: Any, random: Random) -> None:
+    for _ in range(random.choice((1, 2, 12, 25))):
+        node[key] = [node[key]] if random.random() < 0.5 else {"x": node[key]}
+
+
+def _section(tree: Any, node: Any, key: Any, random: Random) -> None:
+    """A section that the mission may lack, with values in and out of bounds."""
+    if not isinstance(tree, dict):
+        return
+    number = abs(_number(random))
+    platforms = tree.get("platforms")
+    platform = random.choice(list(platforms.values())) if isinstance(platforms, dict) and platforms else {}
+    platform = platform if isinstance(platform, dict) else {}
+    errors = [
+        {
+            "name": _value(random) if random.random() < 0.2 else f"e{i}",
+            "quadratic_phase_error": f"{_number(random)} deg",
+        }
+        for i in range(random.choice((1, 3, 30)))
+    ]
+    ids = ("receiver.*", "*", "other.e1", "timing.quadratic", "nobody", "mission.*", random.choice(_TEXTS))
+    waivers = [
+        {"id": random.choice(ids), "until": random.choice(("2020-01-01", "2099-12-31")), "reason": "r"}
+        for _ in range(random.choice((1, 3, 30)))
+    ]
+    vibration = {
+        "sinusoidal": [
+            {
+                "amplitude": random.choice((f"{_number(random)} um", [f"{_number(random)} um"] * 3)),
+                "frequency": f"{_number(random)} Hz",
+            }
+            for _ in range(random.choice((1, 2, 20)))
+        ],
+        "wideband": {"rms": f"{_number(random)} um"},
+    }
+    covariance = {
+        "position": f"{number} m",
+        "velocity": f"{_number(random)} mm/s",
+        "correlation": {"position.x-velocity.x": str(random.uniform(-1.1, 1.1))},
+    }
+    choices: dict[str, Callable[[], Any]] = {
+        "other_errors": lambda: tree.update(other_errors=errors),
+        "waivers": lambda: tree.update(waivers=waivers),
+        "requirement_ids": lambda: tree.update(requirement_ids={one: random.choice(_TEXTS) for one in ids}),
+        "requirements": lambda: tree.update(
+            requirements={
+                "quadratic_phase_error": f"{number} deg",
+                "pslr": f"{-abs(_number(random)):.3g} dB",
+                "islr": "-20 dB",
+                "location_error": f"{_number(random)} m",
+                "cubic_phase_error": f"{_number(random)} deg",
+            }
+        ),
+        "allocation": lambda: tree.update(
+            allocation={
+                "split": random.choice(("equal", "balanced")),
+                "combine": random.choice(("each", "sum", "rss")),
+                "model": random.choice(("published", "full", "strictest")),
+                "coverage_factor": str(number),
+            }
+        ),
+        "autofocus": lambda: tree.update(autofocus={"n_pull": str(number)}),
+        "scene": lambda: tree.update(scene={"radius": f"{number} m", "height_error": f"{_number(random)} m"}),
+        "timing": lambda: tree.update(
+            timing_error={name: str(_number(random) * 1e-9) for name in ("constant", "linear", "quadratic", "cubic")}
+        ),
+        "common": lambda: tree.update(
+            common_motion_error={"position": f"{number} m", "velocity": f"{_number(random)} m/s"}
+        ),
+        "name": lambda: tree.update(name=random.choice(_TEXTS), document={"number": random.choice(_TEXTS)}),
+        "vibration": lambda: platform.update(motion_error={"vibration": vibration}),
+        "covariance": lambda: platform.update(motion_error={"covariance": covariance}),
+        "acceleration": lambda: platform.update(acceleration=[f"{_number(random)} m/s^2"] * 3),
+    }
+    choices[random.choice(list(choices))]()
+
+
+def _number(random: Random) -> float:
+    return float(f"{random.choice((1,) * 9 + (-1,)) * 10 ** random.uniform(-4, 4):.4g}")
+
+
+def _value(random: Random) -> Any:
+    kind = random.random()
+    if kind < 0.4:
+        return random.choice(_TEXTS)
+    if kind < 0.75:
+        return f"{_number(random)} {random.choice(_UNITS)}"
+    if kind < 0.85:
+        return random.choice(_WORDS)
+    if kind < 0.95:
+        return [_value(random) for _ in range(random.choice((0, 1, 3, 3, 6)))]
+    return {random.choice(_TEXTS): _value(random) for _ in range(random.choice((0, 1, 3)))}
+
+
+_CHANGES = (
+    _replace,
+    _replace,
+    _scale,
+    _scale,
+    _scale,
+    _scale,
+    _delete,
+    _swap,
+    _insert,
+    _repeat,
+    _bury,
+    _section,
+    _section,
+)
+
+
+def _damaged(data: bytes, random: Random) -> bytes:
+    """Change some bytes."""
+    start = random.randrange(len(data) + 1)
+    end = min(len(data), start + random.choice((1, 1, 4, 30)))
+    kind = random.randrange(6)
+    if kind == 0:
+        return data[:start] + random.randbytes(end - start) + data[end:]
+    if kind == 1:
+        return data[:start] + data[end:]
+    if kind == 2:
+        return data[:start] + random.choice(_BYTES) + data[start:]
+    if kind == 3:
+        return data[:start] + data[start:end] * random.choice((2, 5, 300)) + data[end:]
+    if kind == 4:
+        other = original(random).encode()
+        cut = random.randrange(len(other))
+        return data[:start] + other[cut : cut + 200] + data[start:]
+    return data[:start] if random.random() < 0.3 else data[:start] + bytes([random.randrange(256)]) + data[end:]
+
+
+_STRICT = (
+    "[tool.bisar-budget]\nstrict = true\n",
+    "[tool . bisar-budget]\nstrict=true\n",
+    '[tool."bisar-budget"]\n"strict" = true\n',
+    "[tool.'bisar-budget']\n'strict' = true\n",
+    "['tool'.\"bisar\\u002dbudget\"]\nstrict = true\n",
+    '["\\U00000074ool"]\nbisar-budget.strict = true\n',
+    "tool.bisar-budget.strict = true\n",
+    "tool = {bisar-budget = {strict = true}}\n",
+    'tool = { "bisar-budget" = { strict = true } }\n',
+    "[tool]\nbisar-budget = {strict = true}\n",
+    "[tool]\nbisar-budget.strict = true\n",
+    "[tool.ruff]\nx = 1\n[tool.bisar-budget] # ours\nstrict = true # yes\n",
+)
+
+
+def strict_settings(seed: int) -> bytes:
+    """A `pyproject.toml` that says `strict = true` in one of TOML's ways; every other one is damaged."""
+    random = Random(f"settings {seed}")
+    text = random.choice(_STRICT)
+    if text.startswith("["):
+        text = random.choice(("", '[project]\nname = "x"\n', "# a comment\n\n", "[[a]]\nb = [1,\n2]\n")) + text
+    data = text.replace("\n", random.choice(("\n", "\r\n"))).encode(
+        random.choice(("utf-8",) * 6 + ("utf-16", "utf-16-le"))
+    )
+    for _ in range(random.choice((0, 1, 2, 4)) if random.random() < 0.5 else 0):
+        data = _damaged(data, random)
+    return data
+
+
+if __name__ == "__main__":
+    sys.stdout.buffer.write(case(int(sys.argv[1])).data)
