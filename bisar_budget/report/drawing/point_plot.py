@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.errors import printable
 from bisar_budget.mission.model import Mission
 from bisar_budget.report.drawing.point_figures import FLOOR_DB, ImagePanel, Limits, Sheet, rotated_back, sheet
 from bisar_budget.report.words.layout import wrapped
@@ -52,7 +53,7 @@ def figure(drawn: Sheet, title: str) -> Any:
     ]
     key.add_artist(key.legend(handles=panels[0, 3].lines, loc="upper center", fontsize=10, frameon=False))
     key.legend(handles=marks, loc="lower center", facecolor=_NOT_FORMED, labelcolor="white", fontsize=10)
-    page.suptitle(title, parse_math=False)  # a name is no formula
+    page.suptitle(printable(title), parse_math=False)  # a name is no formula
     return page
 
 
@@ -71,6 +72,9 @@ def drawn_panel(name: str, drawn: Sheet) -> bytes:
 def _page(**settings: Any) -> Any:
     """Give a Matplotlib figure that looks the same whatever a user's matplotlibrc and MPLBACKEND say."""
     os.environ.pop("MPLBACKEND", None)  # a name that Matplotlib does not know would end its import
+    import logging
+
+    logging.getLogger("matplotlib").setLevel(logging.CRITICAL)  # of fonts and folders that it lacks
     import matplotlib
     from matplotlib.figure import Figure
 

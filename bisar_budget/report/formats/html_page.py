@@ -2,8 +2,9 @@
 
 import re
 from base64 import b64encode
+from functools import cache
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from markupsafe import Markup, escape
 
 from bisar_budget.errors import printable
@@ -21,6 +22,20 @@ _AFTER = re.compile(r"([._/])(?=\w)")  # where a long name may break
 
 def render(report: Report, style: Style) -> str:
     """Write the page; `resource("templates")` has its layout."""
+    return _template().render(
+        report=compliance(report, style),
+        words={name: status.words for name, status in STATUS.items()},
+        statuses=STATUS.values(),
+        equation=_equation,
+        general=_general,
+        inline=_inline,
+        data_uri=_data_uri,
+    )
+
+
+@cache
+def _template() -> Template:
+    """Layout of the page; compiling it takes longer than a mission does."""
     environment = Environment(
         loader=FileSystemLoader(resource("templates")),
         autoescape=True,
@@ -36,16 +51,7 @@ def render(report: Report, style: Style) -> str:
         "css_string": _css_string,
         "document_words": document_words,
     }
-    template = environment.get_template("report.html.j2")
-    return template.render(
-        report=compliance(report, style),
-        words={name: status.words for name, status in STATUS.items()},
-        statuses=STATUS.values(),
-        equation=_equation,
-        general=_general,
-        inline=_inline,
-        data_uri=_data_uri,
-    )
+    return environment.get_template("report.html.j2")
 
 
 def _harmless(value: object) -> object:

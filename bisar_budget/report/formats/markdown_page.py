@@ -2,9 +2,10 @@
 
 import re
 from collections.abc import Iterator, Mapping
+from functools import cache
 from html import unescape
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from markupsafe import Markup
 
 from bisar_budget.errors import printable
@@ -25,18 +26,8 @@ _DESCRIPTION = re.compile("<desc[^>]*>(.*?)</desc>", re.DOTALL)
 
 def render(report: Report, style: Style) -> str:
     """Write the report; drawings are linked where `style.assets` says that they lie."""
-    environment = Environment(
-        loader=FileSystemLoader(resource("templates")),
-        autoescape=True,
-        undefined=StrictUndefined,
-        finalize=lambda value: value if isinstance(value, Markup) else Markup(markdown_text(str(value))),
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    environment.filters["document_words"] = document_words
     page: Compliance = compliance(report, style)
-    text = environment.get_template("report.md.j2").render(
+    text = _template().render(
         report=page,
         words={name: status.words for name, status in STATUS.items()},
         assets=Markup(uri(style.assets)),
@@ -47,6 +38,22 @@ def render(report: Report, style: Style) -> str:
         chip=_chip,
     )
     return re.sub(r"\n{3,}", "\n\n", text).rstrip("\n") + "\n"
+
+
+@cache
+def _template() -> Template:
+    """Layout of the page; compiling it takes longer than a mission does."""
+    environment = Environment(
+        loader=FileSystemLoader(resource("templates")),
+        autoescape=True,
+        undefined=StrictUndefined,
+        finalize=lambda value: value if isinstance(value, Markup) else Markup(markdown_text(str(value))),
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.filters["document_words"] = document_words
+    return environment.get_template("report.md.j2")
 
 
 def pictures(report: Report, style: Style) -> Mapping[str, bytes]:
