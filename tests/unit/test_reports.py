@@ -8,7 +8,7 @@ import re
 
 import pytest
 
-from bisar_budget.errors import Fault
+from bisar_budget.faults import Fault
 from bisar_budget.findings.mission import Report, UnusableMission
 from bisar_budget.findings.row import worst_first
 from bisar_budget.report import FORMATS, Style, render

@@ -4,7 +4,7 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-from bisar_budget.errors import printable
+from bisar_budget.faults import printable
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report.change.comparison import Change, MissionChange, Moved

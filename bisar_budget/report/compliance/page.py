@@ -13,7 +13,7 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.catalogue import EQUATIONS
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.effect import MOTION_UNITS, ErrorSource
-from bisar_budget.errors import KeyPath
+from bisar_budget.faults import KeyPath
 from bisar_budget.findings.images import PointImage
 from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
 from bisar_budget.findings.row import Row, worst_first

@@ -15,7 +15,7 @@ from bisar_budget.effects.effect import ErrorSource, image_plane
 from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.slow_vibration import cubic_part, quadratic_part
 from bisar_budget.effects.vibration_lines import lines_of
-from bisar_budget.errors import KeyPath, printable
+from bisar_budget.faults import KeyPath, printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS

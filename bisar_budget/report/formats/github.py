@@ -6,7 +6,7 @@ The runner shows ten errors and ten warnings of a step, so the worst come first.
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from bisar_budget.errors import Fault, Place, Region
+from bisar_budget.faults import Fault, Place, Region
 from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
 from bisar_budget.findings.row import worst_first
 from bisar_budget.findings.status import STATUS

@@ -7,7 +7,7 @@ from functools import cache
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from markupsafe import Markup, escape
 
-from bisar_budget.errors import printable
+from bisar_budget.faults import printable
 from bisar_budget.findings.mission import Report
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style

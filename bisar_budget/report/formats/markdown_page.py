@@ -8,7 +8,7 @@ from html import unescape
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from markupsafe import Markup
 
-from bisar_budget.errors import printable
+from bisar_budget.faults import printable
 from bisar_budget.findings.mission import MissionFindings, Report
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style

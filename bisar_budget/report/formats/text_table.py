@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator, Sequence
 from functools import cache
 
-from bisar_budget.errors import printable
+from bisar_budget.faults import printable
 from bisar_budget.findings.mission import MissionFindings, UnusableMission
 from bisar_budget.findings.row import Row, worst_first
 from bisar_budget.findings.status import STATUS, worst
