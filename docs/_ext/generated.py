@@ -404,7 +404,7 @@ def symbols(directive: Generated) -> str:
 
 def rooms(_: Generated) -> str:
     """The rooms of the package from the lowest floor up, with the first line of what each says of itself."""
-    structure = ast.parse((ROOT / "tests" / "unit" / "test_structure.py").read_text(encoding="utf-8"))
+    structure = ast.parse((ROOT / "tests" / "house" / "test_structure.py").read_text(encoding="utf-8"))
     (floors,) = [
         ast.literal_eval(node.value)
         for node in structure.body
