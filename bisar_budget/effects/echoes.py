@@ -5,7 +5,8 @@ amplitude and of its shape: of a uniform aperture sinc(x) = sin(πx)/(πx), whos
 phases of vibrations are not known. At a place x the echoes of several are at their worst in phase, with
 Σ φ_k/2·|sinc(x − n_k)|, and what counts is the place where that is largest. Derived here; held within 0.5 dB to
 transforms of the phasor in the worst of its phases, from three cycles per aperture on
-(`tests/effects/test_echoes.py`). The echoes at −n_k are left out: they add up to 0.3 dB at three cycles, and less beyond.
+(`tests/effects/test_echoes.py`). The echoes at −n_k are left out: they add up to 0.3 dB at three cycles, and less
+beyond.
 """
 
 import math
