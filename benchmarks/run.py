@@ -267,10 +267,10 @@ def montecarlo(runs: int) -> None:
     """Every motion and clock error of both platforms, 22 normal variables; judged are phases, cubic and location."""
     import numpy as np
 
-    from bisar_budget.budget.analysis import Analysis
-    from bisar_budget.budget.draws import _stream
-    from bisar_budget.budget.monte_carlo import _variables, monte_carlo
+    from bisar_budget.analysis.analysis import Analysis
     from bisar_budget.mission.load import parse_mission
+    from bisar_budget.monte_carlo.draws import _stream
+    from bisar_budget.monte_carlo.probability import _variables, monte_carlo
 
     motion = "{position: 1 m, velocity: 5 mm/s, acceleration: 20 ug}"
     text = f"""{{schema_version: 1, name: m, radar: {{center_frequency: 10 GHz, bandwidth: 300 MHz}},
@@ -315,11 +315,11 @@ def montecarlo(runs: int) -> None:
 
     (ours,), (evaluated,), (both,) = in_turn(
         runs,
-        clock(lambda: monte_carlo(mission, n, seed)),
+        clock(lambda: monte_carlo(Analysis(mission), n, seed)),
         clock(lambda: formulas(drawn)),
         clock(lambda: formulas(draw())),
     )
-    got = [one.probability for one in monte_carlo(mission, n, seed).requirements]
+    got = [one.probability for one in monte_carlo(Analysis(mission), n, seed).requirements]
     want = formulas(drawn)
     off = max(abs(a - b) for a, b in zip(got, want, strict=True))
     print(

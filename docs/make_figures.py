@@ -92,7 +92,7 @@ def compliance_report() -> None:
 
     from bisar_budget import __version__
     from bisar_budget.budget.check import check_mission
-    from bisar_budget.budget.findings import Report
+    from bisar_budget.findings.mission import Report
     from bisar_budget.report import Style, render
 
     found = check_mission(load_mission(str(MISSION)), date(2026, 11, 21))
@@ -124,8 +124,8 @@ PICTURES = (
 
 def gallery() -> None:
     """Draw Figures 3 to 7 of the paper, one picture each, a displaced response, and a scene."""
-    from bisar_budget.report import point_plot
-    from bisar_budget.report.point_figures import sheet
+    from bisar_budget.report.drawing import point_plot
+    from bisar_budget.report.drawing.point_figures import sheet
     from bisar_budget.simulate.point import simulate_point
     from bisar_budget.simulate.targets import parse_targets
 

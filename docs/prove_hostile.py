@@ -32,14 +32,16 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.findings import MissionFindings, Report, UnusableMission, exit_code
 from bisar_budget.cli.streams import harmless
 from bisar_budget.errors import MissionError
+from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
+from bisar_budget.findings.status import exit_code
 from bisar_budget.mission.load import MAX_BYTES, load_mission
 from bisar_budget.mission.model import Mission
-from bisar_budget.report import FORMATS, Style, difference, pictures, render
-from bisar_budget.report.comparison import compare
-from bisar_budget.report.explanation import explain
+from bisar_budget.report import FORMATS, Style, pictures, render
+from bisar_budget.report.change import difference
+from bisar_budget.report.change.comparison import compare
+from bisar_budget.report.explain.explanation import explain
 from bisar_budget.settings import SettingsError, project_settings
 from tests.conftest import ROOT, TODAY
 from tests.fuzz import RAW, RUN, case, original, strict_settings

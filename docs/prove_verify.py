@@ -16,9 +16,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from bisar_budget.budget.images import Verdict
+from bisar_budget.findings.images import Verdict
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.simulate.verify import verify_mission
+from bisar_budget.verify.limits import verify_mission
 from tests.families import FAMILIES, mission_text
 
 SHARE, FLOOR_RAD = 0.05, 0.02  # of the phase by exact ranges

@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.findings import MissionFindings, Row
+from bisar_budget.findings.mission import MissionFindings
+from bisar_budget.findings.row import Row
 from bisar_budget.mission.model import Mission
 from tests import reference
 from tests.reference import Array, Error, Responses

@@ -4,6 +4,8 @@ import copy
 import math
 from collections.abc import Callable
 from datetime import date
+from functools import cache
+from importlib import import_module
 from inspect import signature
 from pathlib import Path
 from typing import Any
@@ -15,8 +17,9 @@ from click.testing import CliRunner, Result
 from hypothesis import settings
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.findings import MissionFindings, Row
 from bisar_budget.cli import cli
+from bisar_budget.findings.mission import MissionFindings
+from bisar_budget.findings.row import Row
 from bisar_budget.mission.load import parse_mission
 
 # Shared machines: how long an example takes says nothing.
@@ -96,6 +99,19 @@ def row(found: MissionFindings, row_id: str) -> Row:
     """Find a row by id."""
     (match,) = [row for row in found.rows if row.id == row_id]
     return match
+
+
+@cache
+def _derived(emitter: str) -> str:
+    return str(import_module(emitter).source())
+
+
+@pytest.fixture
+def one_derivation(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The generated texts, derived once for all tests: it takes ten seconds."""
+    for emitter in ("bisar_budget.theory.emit", "bisar_budget.theory.emit_catalogue"):
+        text = _derived(emitter)
+        monkeypatch.setattr(f"{emitter}.source", lambda text=text: text)
 
 
 @pytest.fixture

@@ -38,12 +38,12 @@ _TABLES = "bisar_budget/theory/published.py"
 _EVALUATORS = "bisar_budget/evaluators.py"
 _GEOMETRY = "bisar_budget/geometry.py"
 _POINT = "bisar_budget/simulate/point.py"
-_PIECES = "bisar_budget/budget/pieces.py"
-_PHASES = "bisar_budget/simulate/phase_cases.py"
-_VIBRATION = "bisar_budget/simulate/vibration.py"
+_PIECES = "bisar_budget/effects/pieces.py"
+_PHASES = "bisar_budget/verify/phase_cases.py"
+_VIBRATION = "bisar_budget/verify/vibration_cases.py"
 
-_PLOT = "bisar_budget/report/point_plot.py"
-_FIGURES = "bisar_budget/report/point_figures.py"
+_PLOT = "bisar_budget/report/drawing/point_plot.py"
+_FIGURES = "bisar_budget/report/drawing/point_figures.py"
 
 _FIGURES_3_TO_7 = "tests/simulate/test_figures.py::"
 _BORDERS = "tests/simulate/test_verdict_borders.py::"
@@ -92,7 +92,7 @@ MUTANTS = (
     ),
     Mutant(
         "share of the clock: the transmitter's",
-        "bisar_budget/budget/allocation.py",
+        "bisar_budget/analysis/allocation.py",
         "return self.receiver if self.clock is None else self.clock",
         "return self.transmitter if self.clock is None else self.clock",
         ("tests/unit/test_check.py::TestAllocation::test_without_a_share_the_clock_is_held_to_the_receivers",),

@@ -4,14 +4,15 @@
     …                                   # the change
     python -m tests.outputs after && diff -r before after
 
-Each file holds the exit code, both streams and the reports of one command. What depends on the day is fixed. Missions
-are those of `specs/missions` and `examples`, and some of each family of `tests.families`. `--images` forms images too,
-which takes minutes.
+Each file holds the exit code, both streams and the reports of one command. The day is fixed. Missions are those of
+`specs/missions` and `examples`, and some of each family of `tests.families`. `--images` forms images too, which takes
+minutes.
 """
 
 import argparse
 import json
 import os
+from itertools import pairwise
 from pathlib import Path
 
 from click.testing import CliRunner
@@ -25,21 +26,21 @@ RANDOM = 3  # missions of each family
 DRAWS = "2000"
 
 
-def missions(folder: Path) -> dict[str, Path]:
-    """Path of each mission by a name of its own; random ones are written into the folder."""
-    found = {path.stem: path for path in sorted((ROOT / "specs" / "missions").glob("*.yaml"))}
-    found |= {f"example-{path.stem}": path for path in sorted((ROOT / "examples").rglob("*.yaml"))}
-    for family in FAMILIES:
-        for seed in range(RANDOM):
-            path = folder / f"{family}-{seed}.yaml"
-            path.write_text(mission_text(family, seed), encoding="utf-8")
-            found[path.stem] = path
-    return found
+def missions() -> list[str]:
+    """Write every mission into the current folder; return their names."""
+    texts = {path.stem: path.read_text("utf-8") for path in sorted((ROOT / "specs" / "missions").glob("*.yaml"))}
+    examples = sorted((ROOT / "examples").rglob("missions/*.yaml"))
+    texts |= {f"example-{path.stem}": path.read_text("utf-8") for path in examples}
+    texts |= {f"{family}-{seed}": mission_text(family, seed) for family in FAMILIES for seed in range(RANDOM)}
+    for name, text in texts.items():
+        Path(f"{name}.yaml").write_text(text, encoding="utf-8")
+    return list(texts)
 
 
 def write(folder: Path, images: bool) -> int:
     """Write all outputs; return how many commands ran."""
     folder.mkdir(parents=True)
+    os.chdir(folder)  # outputs name files as they are given
     os.environ |= {"SOURCE_DATE_EPOCH": "1767225600", "COLUMNS": "120"}
     count = 0
 
@@ -48,32 +49,32 @@ def write(folder: Path, images: bool) -> int:
         count += 1
         done = CliRunner().invoke(cli, list(arguments), prog_name="bisar-budget")
         said = f"exit {done.exit_code}\n{done.stdout}\n--- stderr\n{done.stderr}"
-        (folder / name).write_text(said.replace(str(folder), "FOLDER"), encoding="utf-8")
+        Path(name).write_text(said, encoding="utf-8")
         return done.stdout
 
-    for name, path in (named := missions(folder)).items():
-        file = str(path)
+    for name in (names := missions()):
+        file = f"{name}.yaml"
         for format_name in FORMATS:
             run(f"{name}.{format_name}.out", "check", file, "--format", format_name)
         for option in ("--quiet", "--all", "--verbose", "--color=always", "--strict", "--model=full",
                        "--model=published", "--model=strictest", "--detail=full --format=html"):  # fmt: skip
             run(f"{name}.{option.replace(' ', '')}.out", "check", file, *option.split())
-        reports = [f"--report={folder / f'{name}.{suffix}'}" for suffix in ("md", "html")]
+        reports = [f"--report={name}.{suffix}" for suffix in ("md", "html")]
         run(f"{name}.monte-carlo.out", "check", file, "--monte-carlo", DRAWS, *reports)
         found = json.loads(run(f"{name}.json.out", "check", file, "--format", "json"))["missions"]
         ids = [row["id"] for mission in found for row in mission.get("rows", ())]
         explained = [run("explained", "check", file, "--explain", row_id) for row_id in ids]
-        (folder / f"{name}.explain.out").write_text("\n\n".join(explained), encoding="utf-8")
+        Path(f"{name}.explain.out").write_text("\n\n".join(explained), encoding="utf-8")
         if images:
             run(f"{name}.verify.out", "verify", file)
-            run(f"{name}.check-verify.out", "check", file, "--verify", f"--report={folder / f'{name}-v.md'}")
+            run(f"{name}.check-verify.out", "check", file, "--verify", f"--report={name}-v.md")
             run(f"{name}.simulate.out", "simulate", file)
-    files = [str(path) for path in named.values()]
+    files = [f"{name}.yaml" for name in names]
     for format_name in FORMATS:
         run(f"all.{format_name}.out", "check", *files, "--format", format_name)
-    for before, after in zip(files, files[1:], strict=False):
-        run(f"{Path(before).stem}-{Path(after).stem}.diff.out", "diff", before, after)
-    (folder / "explained").unlink()
+    for before, after in pairwise(files):
+        run(f"{before}-{after}.diff.out", "diff", before, after)
+    Path("explained").unlink()
     return count
 
 

@@ -1,1 +1,12 @@
-"""From a mission to findings: what each error does, what it may be, whether it is."""
+"""From an analysis to findings: each error and their sums held to what is allowed, waivers, many files."""
+
+# What other rooms may use.
+__all__ = [
+    "aggregates",
+    "check",
+    "collection_notes",
+    "error_rows",
+    "fleet",
+    "pull_in",
+    "verdicts",
+]

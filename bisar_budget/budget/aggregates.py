@@ -1,85 +1,30 @@
 """What the declared errors add up to: phases of platforms and mission, cubic phase, location, autofocus pull-in."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any
 
-from bisar_budget.budget.allocation import Allocation
-from bisar_budget.budget.analysis import Analysis, Model
-from bisar_budget.budget.correlation import (
+from bisar_budget.analysis.allocation import Allocation
+from bisar_budget.analysis.analysis import Analysis, Model
+from bisar_budget.analysis.together import Together
+from bisar_budget.budget.judgement import judged
+from bisar_budget.budget.pull_in import caps, needed_sentence
+from bisar_budget.constants import UTILIZATION_TOLERANCE
+from bisar_budget.effects.correlation import (
     combined_displacement,
     combined_phase,
     correlation_notes,
     displacement_parts,
     phase_parts,
 )
-from bisar_budget.budget.effects import ErrorSource
-from bisar_budget.budget.findings import Row
-from bisar_budget.budget.judgement import judged
-from bisar_budget.budget.models import CUBIC, LOCATION, QUADRATIC, Declared
-from bisar_budget.budget.pull_in import caps, needed_sentence
-from bisar_budget.budget.slow_vibration import slow_phases
-from bisar_budget.constants import UTILIZATION_TOLERANCE
-from bisar_budget.geometry import GroundVector
+from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
+from bisar_budget.effects.subject import subject
+from bisar_budget.findings.row import Row
 from bisar_budget.mission.model import Mission
 from bisar_budget.units import format_limit, format_quantity
 
 NO_REQUIREMENT = "no requirement in the file: computed, not judged"
-
-Phases = list[tuple[str, float]]
-Moves = list[tuple[str, GroundVector]]
-
-
-class Together:
-    """Declared errors of a mission by one model, along the axes that the file states them in."""
-
-    def __init__(self, analysis: Analysis, model: Model) -> None:
-        self.model, self.groups = model, analysis.groups
-        self.found: Mapping[str, Declared] = analysis.declared(model)
-        self.stated = analysis.stated
-        self.motion = [source for source in self.stated if source.is_motion]
-        self.slow = slow_phases(analysis.mission)
-
-    def members(self, allocation: Allocation, owner: str) -> list[ErrorSource]:
-        """Those that count against the share of an owner; against the mission's all."""
-        return [s for s in self.stated if owner == "mission" or allocation.qpe.includes(s.owner, owner)]
-
-    def phases(self, members: Sequence[ErrorSource]) -> Phases:
-        """Quadratic phase of each, signed. [rad]"""
-        return [(source.id, self.found[source.id].qpe) for source in members]
-
-    def owed(self, allocation: Allocation, owner: str) -> Phases:
-        """Quadratic phases that count against the share of an owner, those of slow vibrations too. [rad]"""
-        slow = [s for s in self.slow if owner == "mission" or allocation.qpe.includes(s.owner, owner)]
-        return [*self.phases(self.members(allocation, owner)), *((s.row_id, s.qpe_rad) for s in slow)]
-
-    def all_cubics(self) -> Phases:
-        """Cubic phases of motion, the clock and slow vibrations. [rad]"""
-        return [*self.cubics(), *((s.row_id, s.cubic_rad) for s in self.slow)]
-
-    def cubics(self) -> Phases:
-        """Cubic phase of each error that moves something, signed. [rad]"""
-        return [(source.id, self.found[source.id].cubic) for source in self.motion]
-
-    def moves(self, rule: str) -> Moves | None:
-        """Displacement of each, to be combined by a rule; None where one has none. [m]
-
-        By the sign that moves farther. For a sum over all signs half of what lies between the two signs, and once the
-        rest, which all signs have in common.
-        """
-        moves: Moves = []
-        rest = (0.0, 0.0)
-        for source in self.motion:
-            found = self.found[source.id]
-            if found.displacement is None or found.opposite is None or found.farthest is None:
-                return None
-            (x, y), (u, v) = found.displacement, found.opposite
-            moves.append((source.id, found.farthest if rule != "sum" else ((x - u) / 2, (y - v) / 2)))
-            rest = (rest[0] + (x + u) / 2, rest[1] + (y + v) / 2)
-        if rule == "sum" and any(rest):
-            moves.append(("whatever the signs", rest))
-        return moves or None
 
 
 def aggregate_rows(analysis: Analysis, model: Model, other: Model, allocation: Allocation) -> Iterator[Row]:
@@ -123,7 +68,7 @@ def _qpe_rows(analysis: Analysis, mine: Together, theirs: Together, allocation: 
                 over += f"; {needed_sentence(allocation.n_pull_needed(qpe, owner), caps(mission))}"
         yield _judged(
             mission,
-            id=f"{'timing' if owner == 'clock' else owner}.quadratic_phase_error",
+            subject=subject(owner, QUADRATIC),
             metric=QUADRATIC,
             unit="rad",
             declared=qpe,
@@ -154,7 +99,7 @@ def _qpe_of_all(analysis: Analysis, mine: Together, allocation: Allocation) -> I
         return  # its own row says so
     yield _judged(
         mission,
-        id="mission.quadratic_phase_error",
+        subject=subject("mission", QUADRATIC),
         metric=QUADRATIC,
         unit="rad",
         declared=largest,
@@ -178,7 +123,7 @@ def _cubic_row(analysis: Analysis, mine: Together, theirs: Together) -> Row:
         doubt = _of_all("cubic phase", combined_phase(phases, "rss", groups), limit, "rad") or doubt
     row = _judged(
         mission,
-        id="mission.cubic_phase_error",
+        subject=subject("mission", CUBIC),
         metric=CUBIC,
         unit="rad",
         declared=cubic,
@@ -206,7 +151,7 @@ def _location_row(analysis: Analysis, mine: Together, theirs: Together) -> Row:
     no_image = "with a declared error no ground point has the recorded range history: there is no image"
     return judged(
         mission,
-        id="mission.location_error",
+        subject=subject("mission", LOCATION),
         metric=LOCATION,
         unit="m",
         declared=moved,
@@ -236,7 +181,7 @@ def _pull_in_row(analysis: Analysis, mine: Together, theirs: Together, pull_in: 
     total, by_other = (math.fsum(abs(phase) for _, phase in of) if of else None for of in (phases, others))
     return _judged(
         analysis.mission,
-        id="mission.autofocus_pull_in",
+        subject=subject("mission", "autofocus_pull_in"),
         metric=QUADRATIC,
         unit="rad",
         declared=total,

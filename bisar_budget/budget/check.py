@@ -5,25 +5,28 @@ from collections.abc import Iterator, Sequence
 from datetime import date
 from typing import TYPE_CHECKING, NamedTuple
 
+from bisar_budget.analysis.allocation import Allocation
+from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.aggregates import aggregate_rows
-from bisar_budget.budget.allocation import Allocation
-from bisar_budget.budget.analysis import Analysis
 from bisar_budget.budget.collection_notes import collection_notes
-from bisar_budget.budget.correlation import unused_correlations
 from bisar_budget.budget.error_rows import error_rows
-from bisar_budget.budget.findings import READING, FileWarning, MissionFindings, Resolution, Row
 from bisar_budget.budget.judgement import judged
 from bisar_budget.budget.orbit import straight_orbits
 from bisar_budget.budget.pull_in import pull_in_caps
 from bisar_budget.budget.required import with_required
-from bisar_budget.budget.vibration import vibration_rows
+from bisar_budget.budget.vibration_rows import vibration_rows
 from bisar_budget.budget.waivers import apply_waivers
 from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
+from bisar_budget.effects.correlation import unused_correlations
+from bisar_budget.effects.subject import subject
+from bisar_budget.findings.mission import FileWarning, MissionFindings, Resolution
+from bisar_budget.findings.row import Row
+from bisar_budget.findings.status import RANK
 from bisar_budget.mission.model import Mission
 from bisar_budget.units import format_limit
 
 if TYPE_CHECKING:
-    from bisar_budget.budget.scene import SceneEdge
+    from bisar_budget.analysis.scene import SceneEdge
 
 
 def check_mission(mission: Mission, today: date, *, is_brief: bool = False) -> MissionFindings:
@@ -57,7 +60,7 @@ def check_mission(mission: Mission, today: date, *, is_brief: bool = False) -> M
         cross_range=geometry.cross_range_resolution(mission.radar.wavelength, mission.collection.aperture_time),
     )
     return MissionFindings(
-        mission=mission,
+        analysis=analysis,
         file=mission.file,
         name=mission.name,
         model=gating,
@@ -117,12 +120,12 @@ def stricter(published: _Checked, full: _Checked) -> _Checked:
 
 def _strictness(row: Row) -> tuple[int, float, float]:
     allowable = math.inf if row.allowable is None else row.allowable
-    return (-READING.index(row.status), row.utilization or 0.0, -allowable)
+    return (-RANK[row.status], row.utilization or 0.0, -allowable)
 
 
 def _scene_row(analysis: Analysis, model: str, allocation: Allocation) -> tuple["SceneEdge | None", Row]:
     """Row of the scene's edge; to the published model an error is the same all over the scene."""
-    from bisar_budget.budget.scene import scene_edge
+    from bisar_budget.analysis.scene import scene_edge
 
     mission, total = analysis.mission, allocation.qpe_total
     edge = scene_edge(analysis, allocation)
@@ -135,7 +138,7 @@ def _scene_row(analysis: Analysis, model: str, allocation: Allocation) -> tuple[
             doubt = f"the full model says fail: {difference:.3g} rad, {format_limit(total, 'rad')} allowed"
     row = judged(
         mission,
-        id="mission.spatial_variance",
+        subject=subject("mission", "spatial_variance"),
         metric="quadratic_phase_error",
         unit="rad",
         declared=difference,

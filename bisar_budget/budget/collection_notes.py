@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from bisar_budget.budget.analysis import Analysis
+from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import STRAIGHT, norm
 

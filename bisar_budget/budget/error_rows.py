@@ -4,14 +4,14 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from bisar_budget.budget.allocation import Allocation
-from bisar_budget.budget.analysis import Analysis, Model
-from bisar_budget.budget.effects import ErrorSource
-from bisar_budget.budget.findings import Row
+from bisar_budget.analysis.allocation import Allocation
+from bisar_budget.analysis.analysis import Analysis, Model
 from bisar_budget.budget.judgement import judgement
-from bisar_budget.budget.models import CUBIC, LOCATION, QUADRATIC, Declared
 from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.constants import UTILIZATION_TOLERANCE
+from bisar_budget.effects.effect import ErrorSource
+from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC, Declared
+from bisar_budget.findings.row import Row
 from bisar_budget.geometry import FRAME_AXES
 from bisar_budget.units import format_limit, format_quantity
 
@@ -77,47 +77,41 @@ def error_rows(analysis: Analysis, model: Model, other: Model, allocation: Alloc
                 if allowed.smallest is not None and declared > allowed.smallest:
                     over = _over(analysis, model, source, mine, allowed, limit, allocation)
                 doubt = _doubt(analysis, other, source, theirs, limit)
-        no_limit = model.no_limit(source) if allowed.smallest is None else ""
-        utilization, margin, status, reason, notes = judgement(
-            mission.allocation.warn_above, declared, allowed.smallest, 1.0, over, doubt, no_limit, "", info, True,
-            False, notes,
-        )  # fmt: skip
-        if status in ("pass", "warn") and not doubt and declared is not None and gain > 1:
-            # Over the limit without the gain: the phase says so, the size would not where it is no longer linear.
-            without = qpe / (limit / gain)
-            if without > 1 + UTILIZATION_TOLERANCE:
-                status, reason = "pass_with_autofocus", f"{without:.3g} times the limit without autofocus"
-                if utilization is not None and utilization > mission.allocation.warn_above:
-                    notes = (*notes, f"uses {100 * utilization:.3g} % of the limit with autofocus")
-        yield Row._make(  # twice as quick as by keyword, and there are two dozen in every mission
-            (
-                source.id,
-                QUADRATIC,
-                source.unit,
-                declared,
-                allowed.smallest,
-                published.quadratic,
-                full.quadratic,
-                qpe_published,
-                qpe_full,
-                displacement,
-                utilization,
-                margin,
-                status,
-                mission.line(source.path),
-                reason or None,
-                notes,
-                model.equation(source),
-                mission.requirement_ids.get(source.id),
-                source.evidence,
-                source.is_independent,
-                qpe_full,
-                None,
-                allowed.binding,
-                cubic,
-                None,
-                model.name,
-            )
+        found = judgement(
+            warn_above=mission.allocation.warn_above,
+            declared=declared,
+            allowable=allowed.smallest,
+            without_autofocus=qpe / (limit / gain) if gain > 1 else 0.0,
+            over=over,
+            doubt=doubt,
+            no_limit=model.no_limit(source) if allowed.smallest is None else "",
+            info=info,
+        )
+        yield Row(
+            subject=source.subject,
+            metric=QUADRATIC,
+            unit=source.unit,
+            declared=declared,
+            allowable=allowed.smallest,
+            allowable_published=published.quadratic,
+            allowable_full=full.quadratic,
+            qpe_published_rad=qpe_published,
+            qpe_full_rad=qpe_full,
+            displacement_m=displacement,
+            utilization=found.utilization,
+            margin=found.margin,
+            status=found.status,
+            line=mission.line(source.path),
+            reason=found.reason or None,
+            remarks=(*notes, *found.remarks),
+            equation=model.equation(source),
+            requirement_id=mission.requirement_ids.get(source.id),
+            evidence=source.evidence,
+            is_independent=source.is_independent,
+            qpe_exact_rad=qpe_full,
+            binding_requirement=allowed.binding,
+            cubic_rad=cubic,
+            model=model.name,
         )
 
 
@@ -207,7 +201,7 @@ def _doubt(analysis: Analysis, other: Model, source: ErrorSource, theirs: Declar
 def _unseen(analysis: Analysis, model: Model, source: ErrorSource, declared: float | None) -> Row:
     """Row of an error that a terminal counts and does not show."""
     return Row(
-        id=source.id,
+        subject=source.subject,
         metric=QUADRATIC,
         unit=source.unit,
         declared=declared,
@@ -222,7 +216,7 @@ def _unseen(analysis: Analysis, model: Model, source: ErrorSource, declared: flo
         status="not_declared" if declared is None else "info",
         line=analysis.mission.line(source.path),
         reason=None,
-        notes=(),
+        remarks=(),
         equation=model.equation(source),
         requirement_id=analysis.mission.requirement_ids.get(source.id),
         evidence=source.evidence,
@@ -233,7 +227,7 @@ def _unseen(analysis: Analysis, model: Model, source: ErrorSource, declared: flo
 
 def _cause(source: ErrorSource) -> str:
     """Say what the full model counts and the published one does not."""
-    if source.id == "mission.terrain":
+    if source.subject.kind == "terrain":
         return "a bistatic image defocuses on a wrong height"
     if source.unit == "m":
         return "the line of sight turns over a position error, and its displacement defocuses"

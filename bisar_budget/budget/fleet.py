@@ -7,11 +7,12 @@ nothing else is kept, or sent from one process to another: that is a quarter of 
 import gc
 from collections.abc import Callable, Sequence
 from datetime import date
+from functools import partial
 from typing import TypeVar
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.findings import MissionFindings, UnusableMission
 from bisar_budget.errors import MissionError
+from bisar_budget.findings.mission import MissionFindings, UnusableMission
 from bisar_budget.mission.load import load_mission
 from bisar_budget.resources import cores
 
@@ -21,13 +22,24 @@ Kept = TypeVar("Kept")
 MANY = 200  # files from which a second process pays: starting one costs what checking fifty does
 
 
-def without_mission(found: Found) -> Found:
-    """Keep all that is found, but not the mission: a thousand would fill memory."""
-    return found if isinstance(found, UnusableMission) else found._replace(mission=None)
+def without_analysis(found: Found) -> Found:
+    """Keep all that is found, but not the analysis: a thousand would fill memory."""
+    return found if isinstance(found, UnusableMission) else found._replace(analysis=None)
+
+
+def whole(found: Found) -> Found:
+    """Keep everything, in one process: an analysis is larger than what it takes to make it again."""
+    return found
 
 
 def check_files(
-    files: Sequence[str], today: date, model: str | None, keep: Callable[[Found], Kept], *, is_brief: bool = False
+    files: Sequence[str],
+    today: date,
+    model: str | None,
+    keep: Callable[[Found], Kept],
+    *,
+    is_brief: bool = False,
+    drawn: tuple[int, int | None] | None = None,
 ) -> list[Kept]:
     """Check files, in their order; many are shared out between the cores.
 
@@ -43,37 +55,50 @@ def check_files(
         Makes of the findings about a file what is wanted of them, in the process that found them.
     is_brief : bool
         Leave out what a terminal does not show.
+    drawn : tuple, optional
+        Number of draws of a Monte Carlo, and their seed; None: no draws.
 
     Returns
     -------
     list
         What `keep` made of each.
     """
+    one = partial(_kept, today=today, model=model, keep=keep, is_brief=is_brief, drawn=drawn)
     count = cores()
-    if len(files) < MANY or count == 1 or "-" in files:
-        return _checked(files, today, model, keep, is_brief)
+    if len(files) < MANY or count == 1 or "-" in files or keep is whole:
+        return _of(files, one)
     from bisar_budget.workers import worker_pool
 
     size = -(-len(files) // count)
     own, *others = (files[start : start + size] for start in range(0, len(files), size))
     with worker_pool(len(others)) as pool:
-        waiting = [pool.submit(_checked, part, today, model, keep, is_brief) for part in others]
-        kept = _checked(own, today, model, keep, is_brief)
+        waiting = [pool.submit(_of, part, one) for part in others]
+        kept = _of(own, one)
         for part in waiting:
             kept += part.result()
     return kept
 
 
-def _checked(
-    files: Sequence[str], today: date, model: str | None, keep: Callable[[Found], Kept], is_brief: bool
-) -> list[Kept]:
+def _of(files: Sequence[str], one: Callable[[str], Kept]) -> list[Kept]:
     # The findings of a thousand missions are 10⁵ tuples without a cycle: nothing to collect.
     gc.disable()
-    return [keep(_found(file, today, model, is_brief)) for file in files]
+    return [one(file) for file in files]
 
 
-def _found(file: str, today: date, model: str | None, is_brief: bool) -> Found:
+def _kept(
+    file: str,
+    today: date,
+    model: str | None,
+    keep: Callable[[Found], Kept],
+    is_brief: bool,
+    drawn: tuple[int, int | None] | None,
+) -> Kept:
     try:
-        return check_mission(load_mission(file, model), today, is_brief=is_brief)
+        found = check_mission(load_mission(file, model), today, is_brief=is_brief)
     except MissionError as error:
-        return UnusableMission(file=file, faults=error.faults, data=error.data)
+        return keep(UnusableMission(file=file, faults=error.faults, data=error.data))
+    if drawn is not None:
+        from bisar_budget.monte_carlo.probability import monte_carlo
+
+        found = found._replace(monte_carlo=monte_carlo(found.analysed(), *drawn))
+    return keep(found)

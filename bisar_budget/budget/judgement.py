@@ -1,9 +1,12 @@
 """How a row is judged: what is declared against what is allowed, and everything that may stand between them."""
 
-from bisar_budget.budget.findings import Row
-from bisar_budget.budget.models import quotient
+import math
+from typing import NamedTuple
+
 from bisar_budget.constants import UTILIZATION_TOLERANCE
+from bisar_budget.effects.subject import Subject
 from bisar_budget.errors import KeyPath
+from bisar_budget.findings.row import Row
 from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.model import Mission
 
@@ -11,7 +14,7 @@ from bisar_budget.mission.model import Mission
 def judged(
     mission: Mission,
     *,
-    id: str,
+    subject: Subject,
     metric: str,
     unit: str,
     declared: float | None,  # magnitude
@@ -36,69 +39,81 @@ def judged(
     published_margin_db: float | None = None,
 ) -> Row:
     """Judge one row; see `judgement`."""
-    utilization, margin, status, reason, notes = judgement(
-        mission.allocation.warn_above,
-        declared,
-        allowable,
-        gain,
-        over,
-        doubt,
-        no_limit,
-        not_evaluated,
-        info,
-        is_declared,
-        never_fails,
-        notes,
+    found = judgement(
+        warn_above=mission.allocation.warn_above,
+        declared=declared,
+        allowable=allowable,
+        without_autofocus=declared / allowable * gain if declared is not None and allowable is not None else 0.0,
+        over=over,
+        doubt=doubt,
+        no_limit=no_limit,
+        not_evaluated=not_evaluated,
+        info=info,
+        is_declared=is_declared,
+        never_fails=never_fails,
     )
-    return Row(  # in the order of its fields: keywords cost as much as the judgement
-        id,
-        metric,
-        unit,
-        declared,
-        allowable,
-        *(limits or (allowable, None)),
-        qpe,
-        qpe_full,
-        displacement,
-        utilization,
-        margin,
-        status,
-        mission.line(path),
-        reason or None,
-        notes,
-        equation,
-        mission.requirement_ids.get(id),
-        evidence,
-        is_independent,
-        None,
-        published_margin_db,
+    allowable_published, allowable_full = limits or (allowable, None)
+    return Row(
+        subject=subject,
+        metric=metric,
+        unit=unit,
+        declared=declared,
+        allowable=allowable,
+        allowable_published=allowable_published,
+        allowable_full=allowable_full,
+        qpe_published_rad=qpe,
+        qpe_full_rad=qpe_full,
+        displacement_m=displacement,
+        utilization=found.utilization,
+        margin=found.margin,
+        status=found.status,
+        line=mission.line(path),
+        reason=found.reason or None,
+        remarks=(*notes, *found.remarks),
+        equation=equation,
+        requirement_id=mission.requirement_ids.get(subject.id),
+        evidence=evidence,
+        is_independent=is_independent,
+        published_margin_db=published_margin_db,
     )
+
+
+class Judgement(NamedTuple):
+    """How a row stands; `reason` is empty where there is nothing to say."""
+
+    utilization: float | None
+    margin: float | None
+    status: str
+    reason: str
+    remarks: tuple[str, ...] = ()
 
 
 def judgement(
+    *,
     warn_above: float,
     declared: float | None,
     allowable: float | None,
-    gain: float,
-    over: str,
-    doubt: str,
-    no_limit: str,
-    not_evaluated: str,
-    info: str,
-    is_declared: bool,
-    never_fails: bool,
-    notes: tuple[str, ...],
-) -> tuple[float | None, float | None, str, str, tuple[str, ...]]:
-    """Judge what is declared against what is allowed: utilization, margin, status, reason and notes.
+    without_autofocus: float = 0.0,
+    over: str = "",
+    doubt: str = "",
+    no_limit: str = "",
+    not_evaluated: str = "",
+    info: str = "",
+    is_declared: bool = True,
+    never_fails: bool = False,
+) -> Judgement:
+    """Judge what is declared against what is allowed.
+
+    `without_autofocus` is the utilization that there would be without its gain; the other parameters are those of
+    `judged`.
 
     The status is the first that applies, in the order of the contract; waivers come after.
     """
     utilization = margin = None
-    reason = no_limit if allowable is None else ""
+    reason, remarks = no_limit if allowable is None else "", tuple[str, ...]()
     if declared is not None:
         utilization = 0.0 if allowable is None else declared / allowable
-        headroom = None if allowable is None else quotient(allowable, declared)
-        margin = None if headroom is None else headroom - 1
+        margin = None if allowable is None else _margin(allowable, declared)
     if declared is None and not (is_declared and not_evaluated):
         status = "not_declared"
     elif info:
@@ -109,12 +124,18 @@ def judgement(
         status, reason = ("warn" if never_fails else "fail"), over
     elif doubt:
         status, reason = "warn", doubt
-    elif utilization * gain > 1 + UTILIZATION_TOLERANCE:
-        status, reason = "pass_with_autofocus", f"{utilization * gain:.3g} times the limit without autofocus"
+    elif without_autofocus > 1 + UTILIZATION_TOLERANCE:
+        status, reason = "pass_with_autofocus", f"{without_autofocus:.3g} times the limit without autofocus"
         if utilization > warn_above:
-            notes = (*notes, f"uses {100 * utilization:.3g} % of the limit with autofocus")
+            remarks = (f"uses {100 * utilization:.3g} % of the limit with autofocus",)
     elif utilization > warn_above:
         status, reason = "warn", f"above {100 * warn_above:g} % of the limit"
     else:
         status = "pass"
-    return utilization, margin, status, reason, notes
+    return Judgement(utilization, margin, status, reason, remarks)
+
+
+def _margin(allowable: float, declared: float) -> float | None:
+    """Allowable over declared less one; None where that is not finite."""
+    headroom = allowable / declared if declared else math.inf
+    return headroom - 1 if math.isfinite(headroom) else None

@@ -5,10 +5,10 @@ Over an aperture T the missing acceleration a moves the true path by aT²/8 agai
 
 from collections.abc import Iterator
 
-from bisar_budget.budget.effects import PLATFORMS
-from bisar_budget.budget.findings import FileWarning
 from bisar_budget.constants import EARTH_GRAVITATIONAL_PARAMETER, EARTH_RADIUS
+from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.errors import KeyPath
+from bisar_budget.findings.mission import FileWarning
 from bisar_budget.geometry import Vector, norm
 from bisar_budget.mission.model import Mission, Platform
 

@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from bisar_budget.budget.findings import FileWarning, Resolution
+from bisar_budget.findings.mission import FileWarning, Resolution
 from bisar_budget.mission.model import Mission
 from bisar_budget.units import format_quantity
 

@@ -2,13 +2,13 @@
 
 from collections.abc import Iterator, Sequence
 
-from bisar_budget.budget.effects import PLATFORMS
-from bisar_budget.budget.findings import Row
+from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.findings.row import Row
 from bisar_budget.mission.model import Mission
 
 
-def missing_declarations(mission: Mission) -> Iterator[tuple[str, str]]:
-    """Say what is asked for and missing: the start of its rows' ids, and its key in the file.
+def missing_declarations(mission: Mission) -> Iterator[tuple[str, str, str]]:
+    """Say what is asked for and missing: owner and kind of its rows, and its key in the file.
 
     A covariance declares position and velocity. The clock is declared by any term of its error. An error that is
     common to both platforms says nothing of their own.
@@ -16,11 +16,11 @@ def missing_declarations(mission: Mission) -> Iterator[tuple[str, str]]:
     for kind in mission.requirements.declare:
         if kind == "timing":
             if all(term is None for term in mission.timing_error):
-                yield "timing.", "timing_error"
+                yield "clock", kind, "timing_error"
             continue
         for name in PLATFORMS:
             if getattr(mission.platforms, name).motion_error.stated(kind) is None:
-                yield f"{name}.{kind}.", f"platforms.{name}.motion_error.{kind}"
+                yield name, kind, f"platforms.{name}.motion_error.{kind}"
 
 
 def with_required(rows: Sequence[Row], mission: Mission) -> list[Row]:
@@ -31,10 +31,10 @@ def with_required(rows: Sequence[Row], mission: Mission) -> list[Row]:
     return [_required(row, missing) for row in rows]
 
 
-def _required(row: Row, missing: Sequence[tuple[str, str]]) -> Row:
+def _required(row: Row, missing: Sequence[tuple[str, str, str]]) -> Row:
     if row.status == "not_declared":
-        for start, key in missing:
-            if row.id.startswith(start):
+        for owner, kind, key in missing:
+            if row.subject.owner == owner and (row.subject.kind == kind or owner == "clock"):
                 reason = f"the file has no {key}, which requirements.declare asks for"
                 return row._replace(status="not_evaluated", reason=reason)
     return row

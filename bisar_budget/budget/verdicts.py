@@ -1,12 +1,14 @@
 """What follows from images for the rows of a check, and which of the images are worth showing."""
 
-from bisar_budget.budget.findings import OPTIMISTIC, READING, FileWarning, MissionFindings, Row
-from bisar_budget.budget.images import Verdict, VerifiedMission
 from bisar_budget.constants import UTILIZATION_TOLERANCE
+from bisar_budget.findings.images import Verdict, VerifiedMission
+from bisar_budget.findings.mission import FileWarning, MissionFindings
+from bisar_budget.findings.row import Row
+from bisar_budget.findings.status import RANK
 from bisar_budget.units import format_limit
 
+_OPTIMISTIC = "optimistic limit"  # how is said that an image refutes a limit
 _SHOWN = 4  # rows of a mission
-_RANK = {status: index for index, status in enumerate(READING)}
 
 
 def with_verdicts(findings: MissionFindings, verified: VerifiedMission) -> MissionFindings:
@@ -21,7 +23,7 @@ def with_verdicts(findings: MissionFindings, verified: VerifiedMission) -> Missi
     judged = tuple(_with_verdict(row, by_id[row.id]) if row.id in by_id else row for row in findings.rows)
     known = {row.id for row in findings.rows}
     warnings = tuple(
-        FileWarning(line=None, message=f"{verdict.id}: {OPTIMISTIC}: {_shown(verdict)}")
+        FileWarning(line=None, message=f"{verdict.id}: {_OPTIMISTIC}: {_shown(verdict)}")
         for verdict in rows
         if verdict.id not in known and verdict.verdict == "optimistic"
     )
@@ -37,24 +39,24 @@ def with_verdicts(findings: MissionFindings, verified: VerifiedMission) -> Missi
 
 
 def _with_verdict(row: Row, verdict: Verdict) -> Row:
-    notes = row.notes
+    refuted = row.refuted
     if verdict.verdict == "optimistic":
-        notes = (*notes, f"{OPTIMISTIC}: {_shown(verdict)}")
+        refuted = (*refuted, f"{_OPTIMISTIC}: {_shown(verdict)}")
     if verdict.verdict_autofocus == "optimistic":
-        notes = (*notes, f"{OPTIMISTIC} with autofocus: {verdict.reason_autofocus}")
+        refuted = (*refuted, f"{_OPTIMISTIC} with autofocus: {verdict.reason_autofocus}")
         if row.status == "pass_with_autofocus":
             reason = "passes only with autofocus, and the image at that limit shows that autofocus fails"
-            return row._replace(status="warn", reason=reason, notes=notes)
+            return row._replace(status="warn", reason=reason, refuted=refuted)
     if row.metric == "location_error" and row.status == "pass" and verdict.verdict == "optimistic":
-        return row._replace(status="warn", reason="the image is not where the gating model puts it", notes=notes)
+        return row._replace(status="warn", reason="the image is not where the gating model puts it", refuted=refuted)
     excess = _excess(verdict)
     if (
         row.status in ("pass", "pass_with_autofocus")
         and (row.utilization or 0.0) * excess > 1 + UTILIZATION_TOLERANCE
     ):
         reason = f"inside the limit, but {(row.utilization or 0.0) * excess:.3g} times what the image allows"
-        return row._replace(status="warn", reason=reason, notes=notes)
-    return row._replace(notes=notes)
+        return row._replace(status="warn", reason=reason, refuted=refuted)
+    return row._replace(refuted=refuted)
 
 
 def _excess(verdict: Verdict) -> float:
@@ -90,7 +92,7 @@ def rows_worth_showing(findings: MissionFindings, count: int = _SHOWN) -> tuple[
 
 def _urgency(row: Row, verdict: Verdict) -> tuple[int, bool, bool, float]:
     # Shown again along the scene's axes, an error has the same image as in its own frame.
-    return (_RANK[row.status], not _is_refuted(verdict), not row.is_independent, -(row.utilization or 0.0))
+    return (RANK[row.status], not _is_refuted(verdict), not row.is_independent, -(row.utilization or 0.0))
 
 
 def _is_refuted(verdict: Verdict) -> bool:

@@ -5,15 +5,9 @@ from collections.abc import Callable, Sequence
 from datetime import date
 from fnmatch import translate
 
-from bisar_budget.budget.findings import FileWarning, Row
+from bisar_budget.findings.mission import FileWarning
+from bisar_budget.findings.row import AppliedWaiver, Row
 from bisar_budget.mission.model import Mission
-
-_WORDS, _EXPIRED = "waiver of line", "expired "
-
-
-def waiver_notes(row: Row) -> tuple[str, ...]:
-    """Those of the notes of a row that are about waivers, valid or expired."""
-    return tuple(note for note in row.notes if note.removeprefix(_EXPIRED).startswith(_WORDS))
 
 
 def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> tuple[list[Row], list[FileWarning]]:
@@ -31,26 +25,26 @@ def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> tuple[l
     Returns
     -------
     rows : list of Row
-        Failing rows with a valid waiver are `waived`; one with expired waivers keeps its status, with a note on the
-        last of them.
+        Failing rows with a valid waiver are `waived`; one with expired waivers keeps its status and has the last of
+        them.
     warnings : list of FileWarning
         Waivers that name no row, or none that fails.
     """
     result = list(rows)
     warnings = []
-    expired: dict[int, tuple[date, str]] = {}  # of each row the one that held longest: a thousand would fill a report
+    expired: dict[int, AppliedWaiver] = {}  # of each row the one that held longest: a thousand would fill a report
     for index, waiver in enumerate(mission.waivers):
         line = mission.line(("waivers", index, "id"))
         is_named = _matcher(waiver.id)
         named = [position for position, row in enumerate(rows) if is_named(row.id)]
         failing = [position for position in named if rows[position].status == "fail"]
-        words = f"{_WORDS} {line}, until {waiver.until}: {waiver.reason}"
+        applied = AppliedWaiver(line, waiver.until, waiver.reason, is_expired=today > waiver.until)
         for position in failing:
             row = result[position]
-            if today > waiver.until:
-                expired[position] = max((waiver.until, words), expired.get(position, (date.min, "")))
+            if applied.is_expired:
+                expired[position] = max(applied, expired.get(position, applied), key=lambda one: one.until)
             elif row.status == "fail":
-                result[position] = row._replace(status="waived", notes=(*row.notes, words))
+                result[position] = row._replace(status="waived", waivers=(*row.waivers, applied))
         if not named:
             warnings.append(FileWarning(line=line, message=f"waiver {waiver.id}: matches no row"))
         elif len(named) == len(rows):
@@ -61,9 +55,9 @@ def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> tuple[l
             warnings.append(
                 FileWarning(line=line, message=f"waiver {waiver.id}: not used: no row that it names fails")
             )
-    for position, (_, words) in expired.items():
+    for position, last in expired.items():
         row = result[position]
-        result[position] = row._replace(notes=(*row.notes, f"{_EXPIRED}{words}"))
+        result[position] = row._replace(waivers=(*row.waivers, last))
     return result, warnings
 
 

@@ -28,10 +28,10 @@ from bisar_budget.cli.streams import (
 )
 from bisar_budget.constants import MAX_DRAWS
 from bisar_budget.errors import printable
+from bisar_budget.report import FORMATS
 
 if TYPE_CHECKING:
-    from bisar_budget.budget.findings import MissionFindings, Option, Report, UnusableMission
-    from bisar_budget.mission.model import Mission
+    from bisar_budget.findings.mission import MissionFindings, Option, Report, UnusableMission
     from bisar_budget.report import Style
 
 
@@ -100,11 +100,10 @@ class _Draws(ParamType[int]):
     "--format",
     "format_name",
     envvar="BISAR_BUDGET_FORMAT",
-    type=click.Choice(["text", "json", "csv", "junit", "sarif", "github", "needs", "html", "markdown"]),
+    type=click.Choice(list(FORMATS)),
     default="text",
     show_default=True,
-    help="Format of the report; github: annotations of a pull request, needs: for Sphinx-Needs, html and "
-    "markdown: a compliance report for a review board.",
+    help=f"Format of the report; {', '.join(f'{one.name}: {one.about}' for one in FORMATS.values() if one.about)}.",
 )
 @click.option(
     "-o", "--output", type=FILE, metavar="FILE", help="Write the report to FILE instead of standard output."
@@ -116,8 +115,8 @@ class _Draws(ParamType[int]):
     type=FILE,
     multiple=True,
     metavar="FILE",
-    help="Also write a report to FILE, in the format of its suffix: .html, .md, .txt, .json, .csv, .xml (JUnit), "
-    ".sarif or .needs.json. Repeatable.",
+    help="Also write a report to FILE, in the format of its suffix: "
+    f"{', '.join(one.suffixes[0] for one in FORMATS.values() if one.suffixes)}. Repeatable.",
 )
 @click.option(
     "--detail",
@@ -214,8 +213,8 @@ def check(
     Defaults of --format, --report, --strict, --exit-zero, --model, --monte-carlo, --seed and --color:
     [tool.bisar-budget] in the nearest pyproject.toml, and over it the variables BISAR_BUDGET_FORMAT and so on.
     """
-    from bisar_budget.budget.findings import exit_code
-    from bisar_budget.report import ILLUSTRATED, PIECEWISE, Style, joined, piece
+    from bisar_budget.findings.status import exit_code
+    from bisar_budget.report import Style, joined, piece
 
     written = [(name, _format_of(name)) for name in reports]
     files = expand(missions)
@@ -231,14 +230,14 @@ def check(
             )
         _explain(files, explain, today.date() if today else day_of_run(), model, output)
         return
-    illustrated = any(name in ILLUSTRATED for name in (format_name, *(name for _, name in written)))
+    illustrated = any(FORMATS[name].is_illustrated for name in (format_name, *(name for _, name in written)))
     drawn = None if draws is None else (draws, seed)
     day = today.date() if today else day_of_run()
     use_color = color == "always" or (color == "auto" and output is None and wants_color())
     verbosity = -1 if quiet else 1 if verbose else 0
     style = Style(color=use_color, verbosity=verbosity, root=_repository(), all_rows=all_rows, detail=detail)
     says_faults = format_name != "text" or output is not None or quiet or not is_terminal()
-    if format_name in PIECEWISE and not (written or verifying or drawn):
+    if FORMATS[format_name].is_piecewise and not (written or verifying or drawn):
         from bisar_budget.budget.fleet import check_files
 
         is_brief = format_name == "text" and verbosity <= 0 and not all_rows
@@ -266,16 +265,15 @@ def check(
 
 def _has_waivers(missions: "Iterable[MissionFindings | UnusableMission]") -> bool:
     """Whether the day decides anything."""
-    from bisar_budget.budget.findings import MissionFindings
-    from bisar_budget.budget.waivers import waiver_notes
+    from bisar_budget.findings.mission import MissionFindings
 
     usable = [mission for mission in missions if isinstance(mission, MissionFindings)]
-    return any(waiver_notes(row) for mission in usable for row in mission.rows)
+    return any(row.waivers for mission in usable for row in mission.rows)
 
 
 def _options(judged_on: date | None) -> "Iterator[Option]":
     """Say what the options that bear on the result are, and where each came from."""
-    from bisar_budget.budget.findings import Option
+    from bisar_budget.findings.mission import Option
 
     context = click.get_current_context()
     origins = {
@@ -318,58 +316,49 @@ def check_all(
     illustrated: bool = False,
     drawn: tuple[int, int | None] | None = None,
 ) -> "Report":
-    """Check every file; `verifying` adds verdicts of images. `illustrated` keeps the missions, and the images.
+    """Check every file; `verifying` adds verdicts of images. `illustrated` keeps the analyses, and the images.
 
     `drawn` is the number of draws of a Monte Carlo and their seed.
     """
-    from bisar_budget.budget.check import check_mission
-    from bisar_budget.budget.findings import Report, UnusableMission
-    from bisar_budget.errors import MissionError
-    from bisar_budget.mission.load import load_mission
+    from bisar_budget.budget.fleet import check_files, whole, without_analysis
+    from bisar_budget.findings.mission import Report
 
-    if not (verifying or illustrated or drawn):
-        from bisar_budget.budget.fleet import check_files, without_mission
-
-        return Report(version=__version__, missions=tuple(check_files(files, today, model, without_mission)))
-    missions: list[MissionFindings | UnusableMission] = []
-    usable: dict[int, Mission] = {}
-    for index, file in enumerate(files):
-        try:
-            mission = load_mission(file, model)
-            found = check_mission(mission, today)
-            if drawn is not None:
-                from bisar_budget.budget.monte_carlo import monte_carlo
-
-                found = found._replace(monte_carlo=monte_carlo(mission, *drawn))
-            missions.append(found if illustrated else found._replace(mission=None))
-            if verifying:
-                usable[index] = mission
-        except MissionError as error:
-            missions.append(UnusableMission(file=file, faults=error.faults, data=error.data))
-    if usable:
-        from bisar_budget.budget.verdicts import with_verdicts
-        from bisar_budget.cli.verify import verify_all
-
-        for index, verified in zip(usable, verify_all(list(usable.values()), "*", None), strict=True):
-            judged = missions[index]
-            if not isinstance(judged, UnusableMission):
-                judged = with_verdicts(judged, verified)
-                missions[index] = _illustrated(usable[index], judged) if illustrated else judged
+    keep = whole if verifying or illustrated else without_analysis
+    missions = check_files(files, today, model, keep, drawn=drawn)
+    if verifying:
+        missions = _with_images(missions, illustrated)
     return Report(version=__version__, missions=tuple(missions))
 
 
-def _illustrated(mission: "Mission", found: "MissionFindings") -> "MissionFindings":
-    """Add the images of the rows that decide most."""
-    from bisar_budget.simulate.image_evidence import form_image_evidence
+def _with_images(
+    missions: "Sequence[MissionFindings | UnusableMission]", illustrated: bool
+) -> "list[MissionFindings | UnusableMission]":
+    """Add the verdicts of images, and the images of the rows that decide most."""
+    from bisar_budget.budget.fleet import without_analysis
+    from bisar_budget.budget.verdicts import with_verdicts
+    from bisar_budget.cli.verify import verify_all
+    from bisar_budget.findings.mission import MissionFindings
 
-    return found._replace(image_evidence=form_image_evidence(mission, found))
+    usable = {place: found for place, found in enumerate(missions) if isinstance(found, MissionFindings)}
+    verified = verify_all([found.analysed().mission for found in usable.values()], "*", None) if usable else []
+    result = list(missions)
+    for (place, found), images in zip(usable.items(), verified, strict=True):
+        judged = with_verdicts(found, images)
+        if illustrated:
+            from bisar_budget.verify.evidence import form_image_evidence
+
+            shown = form_image_evidence(judged.analysed().mission, judged)
+            result[place] = judged._replace(image_evidence=shown)
+        else:
+            result[place] = without_analysis(judged)
+    return result
 
 
 def _explain(files: Sequence[str], row_id: str, today: date, model: str | None, output: str | None) -> None:
     """Explain a row in every mission that has it."""
     from bisar_budget.budget.check import check_mission
     from bisar_budget.mission.readers import did_you_mean
-    from bisar_budget.report.explanation import explain
+    from bisar_budget.report.explain.explanation import explain
 
     texts: list[str] = []
     known: dict[str, None] = {}
@@ -385,11 +374,12 @@ def _explain(files: Sequence[str], row_id: str, today: date, model: str | None, 
 
 
 def _format_of(name: str) -> str:
-    from bisar_budget.report import SUFFIXES, format_of
+    from bisar_budget.report import format_of
 
     format_name = format_of(name)
     if format_name is None:
-        raise click.UsageError(f"--report {name}: the suffix must be one of {', '.join(SUFFIXES)}")
+        suffixes = (suffix for one in FORMATS.values() for suffix in one.suffixes)
+        raise click.UsageError(f"--report {name}: the suffix must be one of {', '.join(suffixes)}")
     return format_name
 
 
@@ -407,7 +397,7 @@ def _step_summary(format_name: str) -> str | None:
 
 def _append_step_summary(path: str, report: "Report", style: "Style") -> None:
     """Add to the page of the run on GitHub; that it cannot be written changes no exit code."""
-    from bisar_budget.report.github import step_summary
+    from bisar_budget.report.formats.github import step_summary
 
     try:
         with open(path, "a", encoding="utf-8", errors="backslashreplace", newline="\n") as file:
@@ -418,8 +408,8 @@ def _append_step_summary(path: str, report: "Report", style: "Style") -> None:
 
 
 def _say_faults(missions: "Iterable[MissionFindings | UnusableMission | None]") -> None:
-    from bisar_budget.budget.findings import UnusableMission
     from bisar_budget.errors import MissionError
+    from bisar_budget.findings.mission import UnusableMission
 
     for mission in missions:
         if isinstance(mission, UnusableMission):
@@ -441,8 +431,6 @@ def _write_report(path: str, format_name: str, report: "Report", style: "Style")
 
 def _folder_of_pictures(path: str, format_name: str) -> str:
     """Folder beside a report for its pictures; empty if the format has none, or nothing can stand beside it."""
-    from bisar_budget.report import WITH_PICTURES
-
-    if format_name not in WITH_PICTURES or path == "-" or (os.path.exists(path) and not os.path.isfile(path)):
+    if not FORMATS[format_name].has_pictures or path == "-" or (os.path.exists(path) and not os.path.isfile(path)):
         return ""
     return f"{os.path.splitext(path)[0]}.assets"

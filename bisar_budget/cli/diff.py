@@ -90,8 +90,8 @@ def diff(
     from bisar_budget.errors import MissionError
     from bisar_budget.mission.load import load_mission, parse_mission
     from bisar_budget.mission.revision import RevisionError, file_at
-    from bisar_budget.report import difference
-    from bisar_budget.report.comparison import compare
+    from bisar_budget.report.change import difference
+    from bisar_budget.report.change.comparison import compare
 
     if base is None and len(files) != 2:
         raise click.UsageError("give two mission files, OLD and NEW, or mission files and --base REV.")

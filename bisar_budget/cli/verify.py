@@ -22,10 +22,12 @@ from bisar_budget.cli.streams import (
 from bisar_budget.errors import printable
 from bisar_budget.resources import cores
 
+LONG = 60.0  # s; what takes longer is announced
+
 if TYPE_CHECKING:
     from click._termui_impl import ProgressBar
 
-    from bisar_budget.budget.images import VerifiedMission
+    from bisar_budget.findings.images import VerifiedMission
     from bisar_budget.mission.model import Mission
 
 
@@ -55,7 +57,8 @@ def verify(missions: Sequence[str], only: str, format_name: str, output: str | N
     each limit is formed again with its gain and refocused. Exit code: 0, or 1 if a limit is optimistic, 2
     for wrong usage, an unusable file, or a mission on whose limits no image gave a verdict.
     """
-    from bisar_budget.report import Style, verification
+    from bisar_budget.report import Style
+    from bisar_budget.report.formats import verification
 
     files = expand(missions)
     spare(files, [output])
@@ -76,14 +79,32 @@ def verify(missions: Sequence[str], only: str, format_name: str, output: str | N
 def verify_all(missions: "Sequence[Mission]", only: str, jobs: int | None) -> "list[VerifiedMission]":
     """Verify missions, with a progress bar where somebody watches."""
     from bisar_budget.simulate.image_formation import is_compiled
-    from bisar_budget.simulate.verify import rows_to_verify, verify_mission
+    from bisar_budget.verify.limits import rows_to_verify, seconds_to_verify, verify_mission
 
     total = sum(len(rows_to_verify(mission, only)) for mission in missions)
     if not total and only != "*":
         raise click.UsageError(f"--only {printable(only)}: no row with a limit matches; nothing was verified.")
     jobs = jobs or (1 if is_compiled() else cores())
+    seconds = sum(seconds_to_verify(mission, only, jobs) for mission in missions)
+    announce(seconds, f"{total} rows", "--only looks at some of them" + faster(jobs))
     with progress_bar(total) as bar:
         return [verify_mission(mission, only, jobs, lambda row_id: bar.update(1)) for mission in missions]
+
+
+def announce(seconds: float, what: str, advice: str) -> None:
+    """Say on standard error that images will take long, and what to change."""
+    if seconds > LONG:
+        duration = f"{seconds:.0f} s" if seconds < 2 * LONG else f"{seconds / 60:.0f} minutes"
+        complain(f"Forming the images of {what} will take about {duration}; {advice}.")
+
+
+def faster(jobs: int | None = None) -> str:
+    """Say what would make image formation faster here."""
+    from bisar_budget.simulate.image_formation import is_compiled
+
+    if not is_compiled():
+        return ", and pip install 'bisar-budget[fast]' makes it tens of times faster"
+    return f", --jobs {cores()} uses all cores" if jobs is not None and 1 < jobs < cores() else ""
 
 
 def progress_bar(total: int = 1) -> "ProgressBar[int]":

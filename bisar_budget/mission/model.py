@@ -405,7 +405,7 @@ def _form_of_split(value: Any) -> Reader:
     return SHARES if value.keys().isdisjoint(METRIC_SPLITS.keys) else METRIC_SPLITS
 
 
-class Allocation(NamedTuple):
+class AllocationRules(NamedTuple):
     """How the budget is divided and which model gates."""
 
     split: Annotated[
@@ -486,7 +486,7 @@ class Mission(NamedTuple):
     other_errors: Annotated[tuple[OtherError, ...], Key(ListOf(OtherError))] = ()
     requirements: Annotated[Requirements, Key(Section(Requirements))] = Requirements()
     requirement_ids: Annotated[Mapping[str, str], Key(TextMap(), "Row id to the project's own requirement id.")] = {}
-    allocation: Annotated[Allocation, Key(Section(Allocation))] = Allocation()
+    allocation: Annotated[AllocationRules, Key(Section(AllocationRules))] = AllocationRules()
     autofocus: Annotated[Autofocus, Key(Section(Autofocus))] = Autofocus()
     simulation: Annotated[Simulation | None, Key(Section(Simulation))] = None
     waivers: Annotated[tuple[Waiver, ...], Key(ListOf(Waiver))] = ()

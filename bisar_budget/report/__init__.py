@@ -7,41 +7,43 @@ forgotten. One that has pictures beside its text has a function `pictures(report
 
 from collections.abc import Mapping, Sequence
 from importlib import import_module
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from bisar_budget.budget.findings import MissionFindings, Report, UnusableMission
+if TYPE_CHECKING:
+    from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
 
-# Format name to its module; imported when asked for, so that none costs the others anything.
-FORMATS = {
-    "text": "bisar_budget.report.text_table",
-    "json": "bisar_budget.report.json_document",
-    "csv": "bisar_budget.report.csv_table",
-    "junit": "bisar_budget.report.junit_xml",
-    "sarif": "bisar_budget.report.sarif_log",
-    "github": "bisar_budget.report.github",
-    "needs": "bisar_budget.report.needs_json",
-    "html": "bisar_budget.report.html_page",
-    "markdown": "bisar_budget.report.markdown_page",
-}
-# How the name of a file ends, to its format; the first that fits. GitHub's commands are no file.
-SUFFIXES = {
-    ".needs.json": "needs",
-    ".sarif.json": "sarif",
-    ".sarif": "sarif",
-    ".txt": "text",
-    ".json": "json",
-    ".csv": "csv",
-    ".xml": "junit",
-    ".html": "html",
-    ".htm": "html",
-    ".md": "markdown",
-    ".markdown": "markdown",
-}
 
-# Formats that show a mission itself, and images of verified limits; for the others neither is kept.
-ILLUSTRATED = frozenset({"html", "markdown"})
-WITH_PICTURES = ("markdown",)
-PIECEWISE = ("text", "json", "csv")
+class Format(NamedTuple):
+    """One format: its module here, and how the names of its files end, the usual ending first.
+
+    `about` is what `--help` says of it. `is_piecewise`, `has_pictures`: see above. `is_illustrated` is whether it
+    shows the mission itself, and images of verified limits; for the others neither is kept.
+    """
+
+    name: str
+    module: str
+    suffixes: tuple[str, ...] = ()
+    about: str = ""
+    is_piecewise: bool = False
+    is_illustrated: bool = False
+    has_pictures: bool = False
+
+
+_FORMATS = (
+    Format("text", "text_table", (".txt",), is_piecewise=True),
+    Format("json", "json_document", (".json",), is_piecewise=True),
+    Format("csv", "csv_table", (".csv",), is_piecewise=True),
+    Format("junit", "junit_xml", (".xml",), "test cases"),
+    Format("sarif", "sarif_log", (".sarif", ".sarif.json"), "code scanning"),
+    Format("github", "github", (), "annotations of a pull request"),
+    Format("needs", "needs_json", (".needs.json",), "Sphinx-Needs"),
+    Format("html", "html_page", (".html", ".htm"), "a compliance report for a review board", is_illustrated=True),
+    Format(
+        "markdown", "markdown_page", (".md", ".markdown"), "the same with its drawings beside it",
+        is_illustrated=True, has_pictures=True,
+    ),
+)  # fmt: skip
+FORMATS = {one.name: one for one in _FORMATS}
 
 
 def format_of(name: str) -> str | None:
@@ -50,7 +52,8 @@ def format_of(name: str) -> str | None:
     ending = "." + name.replace("\\", "/").rpartition("/")[2].lower()
     if ending.count(".") == 1:
         return None
-    return next((format_name for suffix, format_name in SUFFIXES.items() if ending.endswith(suffix)), None)
+    fitting = [(len(suffix), one.name) for one in _FORMATS for suffix in one.suffixes if ending.endswith(suffix)]
+    return max(fitting)[1] if fitting else None
 
 
 class Style(NamedTuple):
@@ -67,12 +70,17 @@ class Style(NamedTuple):
     detail: str = "summary"  # of a compliance report; full: formulas and undeclared rows too
 
 
-def render(format_name: str, report: Report, style: Style) -> str:
+def _module(format_name: str) -> Any:
+    """Imported when it is asked for, so that none costs the others anything."""
+    return import_module(f"bisar_budget.report.formats.{FORMATS[format_name].module}")
+
+
+def render(format_name: str, report: "Report", style: Style) -> str:
     """Write a report in a format of `FORMATS`; the text ends with a newline."""
-    if format_name in PIECEWISE:
+    if FORMATS[format_name].is_piecewise:
         pieces = [piece(mission, format_name, style) for mission in report.missions]
         return joined(format_name, pieces, report.version, style)
-    text: str = import_module(FORMATS[format_name]).render(report, style)
+    text: str = _module(format_name).render(report, style)
     return text
 
 
@@ -81,24 +89,26 @@ class Piece(NamedTuple):
 
     status: str
     text: str
-    unusable: UnusableMission | None
+    unusable: "UnusableMission | None"
 
 
-def piece(mission: MissionFindings | UnusableMission, format_name: str, style: Style) -> Piece:
-    """Write the part of one mission, in a format of `PIECEWISE`."""
-    text: str = import_module(FORMATS[format_name]).piece(mission, style)
+def piece(mission: "MissionFindings | UnusableMission", format_name: str, style: Style) -> Piece:
+    """Write the part of one mission, in a piecewise format."""
+    from bisar_budget.findings.mission import UnusableMission
+
+    text: str = _module(format_name).piece(mission, style)
     return Piece(mission.status, text, mission if isinstance(mission, UnusableMission) else None)
 
 
 def joined(format_name: str, pieces: Sequence[Piece], version: str, style: Style) -> str:
     """Write a report from its pieces: what `render` would."""
-    text: str = import_module(FORMATS[format_name]).joined(pieces, version, style)
+    text: str = _module(format_name).joined(pieces, version, style)
     return text
 
 
-def pictures(format_name: str, report: Report, style: Style) -> Mapping[str, bytes]:
+def pictures(format_name: str, report: "Report", style: Style) -> Mapping[str, bytes]:
     """Content of the files that belong beside a report, by their names within `style.assets`."""
-    if format_name not in WITH_PICTURES or not style.assets:
+    if not FORMATS[format_name].has_pictures or not style.assets:
         return {}
-    files: Mapping[str, bytes] = import_module(FORMATS[format_name]).pictures(report, style)
+    files: Mapping[str, bytes] = _module(format_name).pictures(report, style)
     return files

@@ -1,1 +1,14 @@
-"""Images of point scatterers with motion errors, from exact ranges: the referee of the limits. Needs NumPy."""
+"""Images of point scatterers with motion errors, from exact ranges. Needs NumPy."""
+
+# What other rooms may use.
+__all__ = [
+    "autofocus",
+    "collection",
+    "exact",
+    "image_formation",
+    "impulse_response",
+    "phase_history",
+    "point",
+    "resampling",
+    "targets",
+]

@@ -6,17 +6,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bisar_budget.budget.exact_arrays import aperture_nodes
 from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.effects.exact_arrays import aperture_nodes
 from bisar_budget.geometry import BistaticGeometry, GroundVector
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.simulate.exact import ExactEffect, exact_effect
-from bisar_budget.simulate.image_formation import backprojection, taylor_window
+from bisar_budget.simulate.image_formation import backprojection, bytes_held, kernel_within, taylor_window
 from bisar_budget.simulate.phase_history import (
     Complexes,
     Floats,
-    MotionError,
     Path,
+    PathError,
     cell_centres,
     path,
     phase_history,
@@ -28,19 +28,25 @@ CELLS = 48  # resolution cells of a cross-range cut; fewer blur the aperture by 
 RANGE_CELLS = 8  # of a chip
 _FREQUENCIES = 64  # at least; half of them for the response itself
 MAX_CELLS = 1024
-_BYTES_PER_PIXEL = 16 * 8  # the image, its grid, and what forming it holds at once
-_BYTES_PER_PULSE = 16 * 6 * _FREQUENCIES  # samples and oversampled range profile
+_BYTES_PER_PIXEL = 16 * 16  # two images, their grid, and what forming or refocusing one holds at once
+_BYTES_PER_SAMPLE = 16 * 5  # of the phase history; it is a product of terms of its own size
+CONTRIBUTIONS = 1 << 21  # of pulses to pixels, which the reading of an image holds at once
+_BYTES_PER_CONTRIBUTION = 8 + 2 * 16  # in single and in double precision
 _PULSES_PER_CELL, _LARGE_CELLS = 4, 128  # a response repeats after as many cells as there are pulses
+
+
+class MemoryLimitError(ValueError):
+    """An image beyond `simulation.memory_limit`."""
 
 
 class Errors(NamedTuple):
     """What is wrong in one image: both platforms, and the clock's t̃₀ … t̃₃ of (1). [s], [1], [1/s], [1/s²]"""
 
-    transmitter: MotionError = MotionError()
-    receiver: MotionError = MotionError()
+    transmitter: PathError = PathError()
+    receiver: PathError = PathError()
     clock: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
 
-    def of(self, platform: str, error: MotionError) -> "Errors":
+    def of(self, platform: str, error: PathError) -> "Errors":
         """Give one platform an error."""
         return self._replace(transmitter=error) if platform == "transmitter" else self._replace(receiver=error)
 
@@ -49,7 +55,7 @@ class Errors(NamedTuple):
         return Errors(_still(self.transmitter), _still(self.receiver), self.clock)
 
 
-def _still(error: MotionError) -> MotionError:
+def _still(error: PathError) -> PathError:
     return error._replace(sinusoids=(), wideband_rms=0.0)
 
 
@@ -65,13 +71,13 @@ def superposed(parts: Iterable[Errors]) -> Errors:
     return total
 
 
-def superposed_motion(a: MotionError, b: MotionError) -> MotionError:
+def superposed_motion(a: PathError, b: PathError) -> PathError:
     """Two polynomial errors of one platform at once; vibration is not added."""
 
     def add(u: tuple[float, float, float], v: tuple[float, float, float]) -> tuple[float, float, float]:
         return (u[0] + v[0], u[1] + v[1], u[2] + v[2])
 
-    return MotionError(
+    return PathError(
         position=add(a.position, b.position),
         velocity=add(a.velocity, b.velocity),
         acceleration=add(a.acceleration, b.acceleration),
@@ -117,6 +123,7 @@ class PointCollection:
         self.aperture_time = mission.collection.aperture_time
         self.pulses = mission.collection.pulses
         self.memory_limit = (mission.simulation or Simulation()).memory_limit
+        self.kernel = kernel_within(self.memory_limit)
         self.is_tapered = mission.simulation is not None and mission.simulation.window == "taylor"
         self.resolution = (
             geometry.range_resolution(mission.radar.bandwidth, SPEED_OF_LIGHT),
@@ -196,6 +203,8 @@ class PointCollection:
         ------
         ValueError
             The patch aliases with the mission's pulses, or is too large to be formed.
+        MemoryLimitError
+            Forming or reading it takes more than `memory_limit`. No data are formed before that is known.
         """
         grid, spacing = self._grid(centre, errors, cells, range_cells)
         slow_time = cell_centres(self.aperture_time, pulses_for(cells))
@@ -205,6 +214,7 @@ class PointCollection:
             transmitter, receiver = (Path(actual=p.measured, measured=p.measured) for p in (transmitter, receiver))
             clock = 0 * clock
         frequencies = self._frequencies(grid, transmitter, receiver, scatterer)
+        self._require_memory(grid.shape[0] * grid.shape[1], slow_time.size, frequencies)
         history = phase_history(
             np.array([[*scatterer, 0.0]]),
             np.ones(1, dtype=complex),
@@ -216,7 +226,7 @@ class PointCollection:
         )
         if self.is_tapered:
             history.samples[:] *= np.outer(taylor_window(slow_time.size), taylor_window(frequencies))
-        image = backprojection(history, grid) * baseband(self.flown(errors), grid, self.wavelength)
+        image = backprojection(history, grid, self.kernel) * baseband(self.flown(errors), grid, self.wavelength)
         return Chip(image, grid, spacing)
 
     def pair(
@@ -264,11 +274,19 @@ class PointCollection:
                 f"collection.pulses is {self.pulses}, but the patch with its echoes is {cells} resolution cells wide "
                 f"and aliases below {2 * cells} pulses; omit the key to get what it takes"
             )
-        pixels = max(1, range_cells * OVERSAMPLING) * cells * OVERSAMPLING
-        needed = pixels * _BYTES_PER_PIXEL + pulses_for(cells) * _BYTES_PER_PULSE
+        pixels = max(1, round(range_cells * OVERSAMPLING)) * round(cells * OVERSAMPLING)
+        self._require_memory(pixels, pulses_for(cells), _FREQUENCIES)
+
+    def _require_memory(self, pixels: int, pulses: int, frequencies: int) -> None:
+        """Refuse what is beyond the limit: forming an image and the one beside it, or reading both."""
+        forming = pulses * frequencies * _BYTES_PER_SAMPLE + bytes_held(self.kernel)
+        reading = _BYTES_PER_CONTRIBUTION * min(pulses * pixels, 2 * CONTRIBUTIONS) + bytes_held("numpy")
+        needed = pixels * _BYTES_PER_PIXEL + max(forming, reading)
         if needed > self.memory_limit:
-            limit = f"simulation.memory_limit is {self.memory_limit / 1e6:.0f} MB"
-            raise ValueError(f"the image needs about {needed / 1e6:.0f} MB, {limit}: raise it")
+            raise MemoryLimitError(
+                f"an image of {pixels} pixels from {pulses} pulses of {frequencies} frequencies needs about "
+                f"{needed / 1e6:.4g} MB, simulation.memory_limit is {self.memory_limit / 1e6:.4g} MB: raise it"
+            )
 
 
 def pulses_for(cells: int) -> int:

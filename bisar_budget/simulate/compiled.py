@@ -18,6 +18,7 @@ from numpy.polynomial import Chebyshev, Polynomial
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.simulate.phase_history import Complexes, Floats, PhaseHistory
 from bisar_budget.simulate.range_profile import (
+    PROFILE_BYTES,
     carrier_frequency,
     cells_per_metre,
     harmonics,
@@ -38,6 +39,7 @@ _REFINEMENT = {"linear": 16, "cubic": 8}  # samples per sample from the FFT
 _ORDER = {"linear": 1, "cubic": 3}
 _MARGIN = 8  # samples beyond the last pixel on each side
 _BLOCK_BYTES = 24e6  # of profiles held at once; about what a processor's last cache holds
+_WORTH = 4  # samples refined for a pixel; NumPy reads one in the time of about ten
 _PHASE_LIMIT = 1e-6  # rad, of the first neglected order of the expansion
 _OFF_LATTICE = 1e-8  # wavelengths
 
@@ -98,8 +100,11 @@ def lattice_of(points: Floats, tolerance: float) -> Lattice | None:
     return Lattice(origin, across, along, (lines, count))
 
 
-def backproject(history: PhaseHistory, points: Floats, spline: Spline) -> Complexes:
+def backproject(history: PhaseHistory, points: Floats, spline: Spline) -> Complexes | None:
     """Image by backprojection, see `image_formation.backprojection`; all inputs finite.
+
+    None where pixels are so few and so far apart in range that to refine what lies between them would take longer
+    than to read them one by one, or more memory than a block has.
 
     Parameters
     ----------
@@ -112,7 +117,7 @@ def backproject(history: PhaseHistory, points: Floats, spline: Spline) -> Comple
 
     Returns
     -------
-    (...) ndarray
+    (...) ndarray or None
         Complex image.
     """
     shape = points.shape[:-1]
@@ -124,21 +129,26 @@ def backproject(history: PhaseHistory, points: Floats, spline: Spline) -> Comple
         origin, across, along, (lines, count) = lattice  # long lines fill whole segments
         lattice = Lattice(origin, along, across, (count, lines))
         shape = shape[::-1]
+    within = None
     if lattice is not None and _neglected_phase(history, lattice) < _PHASE_LIMIT:
         centre, radius = lattice.disc()
-        padded = np.zeros((lattice.shape[0], -(-lattice.shape[1] // _LINE) * _LINE), dtype=complex)
         middle = np.linalg.norm(history.transmitter - centre, axis=1)
         middle = middle + np.linalg.norm(history.receiver - centre, axis=1)
         # Neither leg's range changes faster than the pixel moves.
-        for block in _profile_blocks(history, middle - 2 * radius, middle + 2 * radius, spline):
+        within = _needed(history, middle - 2 * radius, middle + 2 * radius, image.size)
+    if lattice is not None and within is not None:
+        padded = np.zeros((lattice.shape[0], -(-lattice.shape[1] // _LINE) * _LINE), dtype=complex)
+        for block in _profile_blocks(history, within, spline):
             _add_lattice(*block, lattice.origin, lattice.across, lattice.along, spline == "cubic", padded)
         image = padded[:, : lattice.shape[1]].reshape(shape)
         image = np.ascontiguousarray(image if shape == points.shape[:-1] else image.T)
     else:
-        flat = np.ascontiguousarray(points.reshape(-1, 3))
-        axes = np.ascontiguousarray(flat.T)
+        axes = np.ascontiguousarray(points.reshape(-1, 3).T)
         nearest, farthest = _reach(history.transmitter, history.receiver, axes)
-        for block in _profile_blocks(history, nearest, farthest, spline):
+        within = _needed(history, nearest, farthest, image.size)
+        if within is None:
+            return None
+        for block in _profile_blocks(history, within, spline):
             _add_points(*block, axes, spline == "cubic", image.reshape(-1))
     image /= history.samples.size
     return image
@@ -172,8 +182,36 @@ class _Block(NamedTuple):
     cycles_per_metre: float
 
 
-def _profile_blocks(history: PhaseHistory, nearest: Floats, farthest: Floats, spline: Spline) -> Iterator[_Block]:
-    """Cut from each profile what pixels between two range sums, (pulses,) [m], can need, and refine that.
+class _Needed(NamedTuple):
+    """Part of each profile that some pixels read: its first sample, (pulses,), and how many."""
+
+    first: np.ndarray[tuple[int], np.dtype[np.int64]]
+    samples: int
+
+
+def _needed(history: PhaseHistory, nearest: Floats, farthest: Floats, pixels: int) -> _Needed | None:
+    """What pixels between two range sums, (pulses,) [m], can need; None if it is too much for so few.
+
+    A profile repeats: where more is needed than it has, repeats are laid out.
+    """
+    length = profile_length(history, _OVERSAMPLING)
+    per_metre = cells_per_metre(history, length)
+    count = float((farthest - nearest).max()) * per_metre + 2 * _MARGIN + 1
+    if count > max(length + 4 * _MARGIN, min(_WORTH * pixels, _BLOCK_BYTES / (8 * max(_REFINEMENT.values())))):
+        return None
+    return _Needed(np.floor((nearest - _reference(history)) * per_metre).astype(np.int64) - _MARGIN, int(count))
+
+
+def _reference(history: PhaseHistory) -> Floats:
+    """Range sum of the scene centre at each pulse. [m]"""
+    total = np.zeros(history.slow_time.size)
+    for positions in (history.transmitter, history.receiver):
+        total += np.linalg.norm(positions, axis=1)
+    return total
+
+
+def _profile_blocks(history: PhaseHistory, needed: _Needed, spline: Spline) -> Iterator[_Block]:
+    """Take from each profile what is needed, and refine that.
 
     As many pulses as fit in a cache. Patches follow resolution cells, which may be a hundred times longer than wide:
     what a ball around one would need is not what its pixels need.
@@ -186,18 +224,20 @@ def _profile_blocks(history: PhaseHistory, nearest: Floats, farthest: Floats, sp
     # Weights of the taps for each of the places between two samples.
     offset = np.arange(factor) / factor - (np.arange(_TAPS)[:, None] - _TAPS // 2 + 1)
     weights = kernel(offset, _TAPS, _OVERSAMPLING).astype(np.float32)
-    reference = np.linalg.norm(history.transmitter, axis=1) + np.linalg.norm(history.receiver, axis=1)
-    first = np.floor((nearest - reference) * coarse).astype(np.int64) - _MARGIN
-    count = math.ceil(float((farthest - nearest).max()) * coarse) + 2 * _MARGIN
-    pulses = max(1, int(_BLOCK_BYTES / (count * factor * 8)))
+    reference = _reference(history)
+    first, count = needed
+    pulses = min(history.slow_time.size, max(1, int(_BLOCK_BYTES / (8 * count * factor + PROFILE_BYTES * length))))
+    room = np.empty(
+        (pulses, 2 * count * factor), dtype=np.float32
+    )  # for every block: it is read before the next is made
     for start in range(0, history.slow_time.size, pulses):
         part = slice(start, start + pulses)
         profiles = range_profiles(history, length, transform, part)
-        refined = np.empty((profiles.shape[0], 2 * count * factor), dtype=np.float32)
+        refined = room[: profiles.shape[0]]
         _refine(profiles, first[part], weights, refined)
         yield _Block(
             refined.view(np.int64),
-            first[part] * float(factor),
+            first[part].astype(np.float64) * factor,
             history.transmitter[part],
             history.receiver[part],
             reference[part],

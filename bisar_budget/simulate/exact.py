@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bisar_budget.budget.exact_arrays import located
 from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.effects.exact_arrays import located
 from bisar_budget.simulate.phase_history import Floats, Path
 
 _ORDER = 12  # of the fit to samples anywhere else

@@ -4,6 +4,8 @@ Both defocus and displace what lies away from the scene centre; that is the appr
 """
 
 import math
+from functools import cache
+from importlib.util import find_spec
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -14,6 +16,8 @@ from bisar_budget.simulate.image_formation import direct_sum
 from bisar_budget.simulate.phase_history import Complexes, Floats, PhaseHistory
 
 _TOLERANCE = 1e-8  # asked of the non-uniform FFT
+_FINE, _BESIDE = 2, 10  # samples per cell of the grid of a non-uniform FFT, along each axis; cells beyond the box
+_LARGEST_GRID = 1 << 22  # of those samples, some 40 bytes each
 _STENCIL = 12  # samples per interpolation
 
 
@@ -38,7 +42,8 @@ def far_field_filter(
         Pixels, anywhere. [m]
     method : "auto", "direct" or "nufft"
         Direct is the sum as printed. NUFFT is finufft's (extra `fast`), the same numbers to -120 dB and much
-        faster on images; auto takes it where it is installed.
+        faster on images; auto takes it where it is installed, but for points so far apart that its grid would not
+        fit into memory.
 
     Returns
     -------
@@ -58,20 +63,36 @@ def far_field_filter(
     sight = look_sum(history)
     if method != "direct" and flat.size:
         try:
-            image = _by_nufft(history, sight, flat)
-            return image.reshape(np.shape(points)[:-1])
+            image = _by_nufft(history, sight, flat, bounded=method == "auto")
         except ImportError:
             if method == "nufft":
                 raise ImportError("finufft is missing: pip install 'bisar-budget[fast]'") from None
+            image = None
+        if image is not None:
+            return image.reshape(np.shape(points)[:-1])
     image = direct_sum(history, flat, lambda part, pulse: -part @ sight[pulse])
     return image.reshape(np.shape(points)[:-1])
 
 
-def _by_nufft(history: PhaseHistory, sight: Floats, points: Floats) -> Complexes:
+@cache
+def is_nonuniform() -> bool:
+    """Whether finufft is there, for a non-uniform FFT."""
+    return find_spec("finufft") is not None
+
+
+def _by_nufft(history: PhaseHistory, sight: Floats, points: Floats, *, bounded: bool) -> Complexes | None:
+    """Sum of (7) by a non-uniform FFT; None where it is `bounded` and its grid would be beyond all measure.
+
+    The grid holds the box around the points times that around the wavenumbers, each along the look direction and
+    across it: along other axes the box of a patch, whose cells may be kilometres wide, would be millions of cells.
+    """
     import finufft
 
     wavenumber = 2 * math.pi * history.frequency / SPEED_OF_LIGHT
-    samples = history.samples.astype(complex)
+    samples: Complexes = history.samples
+    middle = sight[len(sight) // 2, :2] / float(np.hypot(*sight[len(sight) // 2, :2]))
+    turn = np.array([[middle[0], -middle[1], 0.0], [middle[1], middle[0], 0.0], [0.0, 0.0, 1.0]])
+    sight, points = sight @ turn, points @ turn
     height = points[0, 2]
     if (points[:, 2] == height).all():  # one dimension less to spread over
         samples = samples * np.exp(-1j * height * np.outer(sight[:, 2], wavenumber))
@@ -80,6 +101,9 @@ def _by_nufft(history: PhaseHistory, sight: Floats, points: Floats) -> Complexes
         axes, transform = 3, finufft.nufft3d3
     sources = [np.outer(sight[:, axis], wavenumber).ravel() for axis in range(axes)]
     targets = [np.ascontiguousarray(points[:, axis]) for axis in range(axes)]
+    cells = [float(np.ptp(k)) * float(np.ptp(x)) / (2 * math.pi) for k, x in zip(sources, targets, strict=True)]
+    if bounded and math.prod(_FINE * (one + _BESIDE) for one in cells) > _LARGEST_GRID:
+        return None
     image: Complexes = transform(*sources, samples.ravel(), *targets, isign=-1, eps=_TOLERANCE)
     return image / history.samples.size
 

@@ -6,6 +6,7 @@ lines along the axes (x′, y′) of (10).
 """
 
 import math
+import time
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
@@ -14,8 +15,8 @@ import numpy as np
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import GroundVector
 from bisar_budget.simulate.collection import baseband
-from bisar_budget.simulate.far_field import far_field_filter, polar_format
-from bisar_budget.simulate.image_formation import backprojection, ground_grid, matched_filter
+from bisar_budget.simulate.far_field import far_field_filter, is_nonuniform, polar_format
+from bisar_budget.simulate.image_formation import Kernel, backprojection, bytes_held, ground_grid, matched_filter
 from bisar_budget.simulate.phase_history import Complexes, Floats, PhaseHistory
 from bisar_budget.simulate.range_lines import Flown
 
@@ -23,6 +24,8 @@ IMAGE_FORMERS = ("backprojection", "polar_format", "matched_filter", "far_field"
 
 _ORDER = 8  # of the polynomials through range histories, whose two lowest parts are compared
 _BLOCK = 1 << 18  # pixels formed between two words on the progress
+_TRIED, _TRIED_QUICKLY = 1 << 10, 1 << 15  # pixels of which the time is taken; of compiled kernels more
+_SECONDS_PER_SAMPLE = 3e-6  # of polar format or a non-uniform FFT to 1e-8, one core of 2024
 _DIRECT_BYTES = 30e6  # what the sums over all pulses and frequencies hold of a block of pixels
 
 Told = Callable[[int], None]
@@ -56,19 +59,23 @@ class Former(Protocol):
     def image(self, history: PhaseHistory, grid: Floats, told: Told) -> Complexes:
         """Form the image at pixels (nx, ny, 3)."""
 
+    def seconds(self, some: PhaseHistory, pulses: int, grid: Floats) -> float:
+        """About how long an image of so many pulses takes, measured with some of them. [s]"""
 
-class ExactRanges(NamedTuple):
+
+class ExactRangeFormer(NamedTuple):
     """Matched filter (4) or backprojection, which equals it."""
 
     flown: Flown
     bandwidth: float
     wavelength: float
     is_direct: bool
+    kernel: Kernel = "auto"
 
     @property
     def bytes_held(self) -> float:
         """Beside the images and the phase history. [B]"""
-        return _DIRECT_BYTES if self.is_direct else 0.0
+        return _DIRECT_BYTES if self.is_direct else bytes_held(self.kernel)
 
     def place(self, displaced: GroundVector, recorded: Floats) -> GroundVector:
         """Where it puts a point."""
@@ -110,8 +117,18 @@ class ExactRanges(NamedTuple):
 
     def image(self, history: PhaseHistory, grid: Floats, told: Told) -> Complexes:
         """Form the image."""
-        form = matched_filter if self.is_direct else backprojection
-        return _in_blocks(lambda part: form(history, part) * baseband(self.flown, part, self.wavelength), grid, told)
+
+        return _in_blocks(lambda part: self._formed(history, part), grid, told)
+
+    def seconds(self, some: PhaseHistory, pulses: int, grid: Floats) -> float:
+        """About how long an image takes."""
+        is_quick = not self.is_direct and self.kernel != "numpy"
+        return _extrapolated(self._formed, some, pulses, grid, _TRIED_QUICKLY if is_quick else _TRIED)
+
+    def _formed(self, history: PhaseHistory, part: Floats) -> Complexes:
+        formed = matched_filter(history, part) if self.is_direct else backprojection(history, part, self.kernel)
+        formed *= baseband(self.flown, part, self.wavelength)
+        return formed
 
 
 class PlaneWaves(NamedTuple):
@@ -187,11 +204,31 @@ class PlaneWaves(NamedTuple):
         told(nx * ny)
         return formed * self._carrier(grid)
 
+    def seconds(self, some: PhaseHistory, pulses: int, grid: Floats) -> float:
+        """About how long an image takes: a Fourier transform touches every sample and every pixel a few times."""
+        if not self.is_polar and not is_nonuniform():
+            return _extrapolated(far_field_filter, some, pulses, grid, _TRIED)
+        pixels = grid.shape[0] * grid.shape[1]
+        blocks = 1 if self.is_polar else -(-pixels // _BLOCK)
+        return _SECONDS_PER_SAMPLE * float(blocks * pulses * some.frequency.size + pixels)
+
     def _carrier(self, points: Floats) -> Complexes:
         """Phase of the range at the midpoint, as `baseband` has it, for plane waves."""
         wavenumber = 2 * math.pi * self.center_frequency / SPEED_OF_LIGHT
         carrier: Complexes = np.exp(1j * wavenumber * (points[..., :2] @ self.middle))
         return carrier
+
+
+def _extrapolated(
+    form: Callable[[PhaseHistory, Floats], Complexes], some: PhaseHistory, pulses: int, grid: Floats, tried: int
+) -> float:
+    """Time for a grid and all pulses, from that for a few pixels and some pulses, on the second run. [s]"""
+    few = grid[: max(1, tried // grid.shape[1]), :tried]
+    form(some, few)
+    begun = time.perf_counter()
+    form(some, few)
+    took = time.perf_counter() - begun
+    return float(took * grid.size / few.size * pulses / len(some.slow_time))
 
 
 def _in_blocks(form: Callable[[Floats], Complexes], grid: Floats, told: Told) -> Complexes:

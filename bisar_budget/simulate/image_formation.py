@@ -16,16 +16,15 @@ from bisar_budget.simulate.range_profile import (
     carrier_frequency,
     cells_per_metre,
     harmonics,
-    kernel_transform,
     profile_length,
     range_profiles,
 )
-from bisar_budget.simulate.range_profile import kernel as interpolation_kernel
 
-_TAPS = 6
-_OVERSAMPLING = 4
+_SAMPLES = 16  # of a profile in a range cell: what lies between two of them is read to -119 dB
 _BLOCK = 1 << 20  # complex samples held at once
-_PIXELS = 1 << 16  # handled at once
+_PIXELS = 1 << 13  # handled at once: what they take stays in a processor's second cache
+_HELD = {"numpy": 30e6, "cubic": 110e6}  # bytes beside data and image: what works on them, and compiled code itself
+_SPACIOUS = 3 * _HELD["cubic"]
 
 Kernel = Literal["auto", "numpy", "cubic", "linear"]
 
@@ -93,8 +92,8 @@ def direct_sum(history: PhaseHistory, points: Floats, ranges: Callable[[Floats, 
 def backprojection(history: PhaseHistory, points: Floats, kernel: Kernel = "auto") -> Complexes:
     """Image by interpolation of range profiles: (4) to -120 dB at a fraction of its cost.
 
-    Each pulse's spectrum is divided by the transform of an interpolation kernel, taken to a range profile by
-    FFT, and read at the pixels' differential ranges. A profile repeats every c/Δf in range; pixels farther
+    Each pulse's spectrum is divided by the transform of a spline, taken to a range profile by FFT, and read at the
+    pixels' differential ranges. A profile repeats every c/Δf in range; pixels farther
     apart than that alias, and the caller sees to it.
 
     Parameters
@@ -104,8 +103,9 @@ def backprojection(history: PhaseHistory, points: Floats, kernel: Kernel = "auto
     points : (..., 3) ndarray
         Pixels, anywhere. [m]
     kernel : "auto", "numpy", "cubic" or "linear"
-        NumPy does every job; cubic and linear are compiled by Numba (extra `fast`) and read the profiles with
-        splines. Linear is faster and good to -80 dB. Auto is cubic where Numba is installed, else NumPy.
+        NumPy does every job; cubic and linear are compiled by Numba (extra `fast`), by splines of these orders.
+        Linear is faster and good to -80 dB. Auto is cubic where Numba is installed, else NumPy. Few pixels far apart
+        in range are left to NumPy.
 
     Returns
     -------
@@ -131,7 +131,18 @@ def backprojection(history: PhaseHistory, points: Floats, kernel: Kernel = "auto
         raise ImportError(f"kernel {kernel} needs Numba, which is missing: pip install 'bisar-budget[fast]'")
     from bisar_budget.simulate.compiled import backproject
 
-    return backproject(history, points, kernel)
+    image = backproject(history, points, kernel)
+    return _backprojection(history, points) if image is None else image
+
+
+def kernel_within(memory_limit: float) -> Kernel:
+    """Kernel for a limit of memory [B]: the compiled one, whose code takes 60 MB itself, only with room to spare."""
+    return "cubic" if is_compiled() and memory_limit >= _SPACIOUS else "numpy"
+
+
+def bytes_held(kernel: Kernel) -> float:
+    """What backprojection takes beside data and image. [B]"""
+    return _HELD["numpy" if kernel == "numpy" else "cubic"]
 
 
 @cache
@@ -145,29 +156,46 @@ def is_compiled() -> bool:
 
 
 def _backprojection(history: PhaseHistory, points: Floats) -> Complexes:
-    flat = np.reshape(points, (-1, 3))
-    length = profile_length(history, _OVERSAMPLING)
-    transform = kernel_transform(2 * math.pi * harmonics(history) / length, _TAPS, _OVERSAMPLING)
+    axes = np.ascontiguousarray(np.reshape(points, (-1, 3)).T)
+    length = profile_length(history, _SAMPLES)
+    transform = np.sinc(harmonics(history) / length) ** 4  # of a cubic B-spline
     per_metre = cells_per_metre(history, length)
     carrier = 2 * math.pi * carrier_frequency(history) / SPEED_OF_LIGHT
-    image: Complexes = np.zeros(flat.shape[0], dtype=complex)
+    image: Complexes = np.zeros(axes.shape[1], dtype=complex)
     for pulse in range(history.slow_time.size):
-        profile = range_profiles(history, length, transform, slice(pulse, pulse + 1))[0]
-        for start in range(0, flat.shape[0], _PIXELS):
+        spline = range_profiles(history, length, transform, slice(pulse, pulse + 1))[0]
+        spline = np.concatenate((spline[-1:], spline, spline[:2]))
+        for start in range(0, axes.shape[1], _PIXELS):
             part = slice(start, start + _PIXELS)
-            ranges = differential_range(history, flat[part], pulse)
-            image[part] += _read(profile, ranges * per_metre) * np.exp(1j * carrier * ranges)
+            ranges: Floats = np.zeros(())
+            for positions in (history.transmitter, history.receiver):
+                leg = axes[:, part] - positions[pulse, :, None]
+                ranges = ranges + (np.sqrt(np.einsum("ij,ij->j", leg, leg)) - np.linalg.norm(positions[pulse]))
+            formed = _read(spline, ranges * per_metre)
+            turn = np.empty_like(formed)
+            np.cos(carrier * ranges, out=turn.real)
+            np.sin(carrier * ranges, out=turn.imag)
+            image[part] += formed * turn
     image /= max(1, history.samples.size)
     return image.reshape(np.shape(points)[:-1])
 
 
-def _read(profile: Complexes, cell: Floats) -> Complexes:
-    first = np.floor(cell).astype(np.int64) - _TAPS // 2 + 1
-    total = np.zeros(cell.shape, dtype=complex)
-    for tap in range(_TAPS):
-        index = first + tap
-        total += profile[index % profile.size] * interpolation_kernel(cell - index, _TAPS, _OVERSAMPLING)
-    return total
+def _read(spline: Complexes, cell: Floats) -> Complexes:
+    """Value at any cells, (n,), of a cyclic cubic B-spline (samples + 3,), wrapped by one before and two behind."""
+    first = np.floor(cell)
+    beyond = cell - first
+    left = 1 - beyond
+    weights = (
+        left * left * left / 6,
+        2 / 3 - beyond * beyond * (1 - beyond / 2),
+        2 / 3 - left * left * (1 - left / 2),
+        beyond * beyond * beyond / 6,
+    )
+    index = first.astype(np.int64) % (spline.size - 3)
+    value: Complexes = np.zeros(cell.shape, dtype=complex)
+    for tap, weight in enumerate(weights):
+        value += spline[tap:].take(index) * weight
+    return value
 
 
 def ground_grid(

@@ -16,6 +16,7 @@ from bisar_budget.simulate.phase_history import Complexes, Floats
 
 _UPSAMPLING = 32
 _CHIP_UPSAMPLING = 8
+_COLUMNS = 512  # interpolated at once
 _ASCENTS = 50  # at most, along x′ and y′ in turn
 _SETTLED = 1e-4  # samples
 
@@ -209,7 +210,9 @@ def impulse_response_2d(
 
 def highest(chip: Complexes) -> float:
     """Largest magnitude of the interpolation of a chip (nx, ny)."""
-    return float(np.abs(upsampled(upsampled(chip, _CHIP_UPSAMPLING).T, _CHIP_UPSAMPLING)).max())
+    columns = upsampled(chip, _CHIP_UPSAMPLING).T
+    parts = (columns[start : start + _COLUMNS] for start in range(0, len(columns), _COLUMNS))
+    return max(float(np.abs(upsampled(part, _CHIP_UPSAMPLING)).max()) for part in parts)
 
 
 def _check(samples: Complexes) -> None:

@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 
-class Sinusoid(NamedTuple):
+class PathSinusoid(NamedTuple):
     """One vibration along the line of sight: amplitude 0 to peak [m], frequency [Hz], phase at τ = 0 [rad]."""
 
     amplitude: float
@@ -30,7 +30,7 @@ class Sinusoid(NamedTuple):
     phase: float = 0.0
 
 
-class MotionError(NamedTuple):
+class PathError(NamedTuple):
     """Measured minus actual position of one platform, r̃(τ): (22) and what is faster.
 
     Position [m], velocity [m/s] and acceleration [m/s²] are east-north-up; vibration is along the line of
@@ -41,7 +41,7 @@ class MotionError(NamedTuple):
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)
     velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
     acceleration: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    sinusoids: tuple[Sinusoid, ...] = ()
+    sinusoids: tuple[PathSinusoid, ...] = ()
     wideband_rms: float = 0.0
     wideband_band: tuple[float, float] | None = None
 
@@ -94,7 +94,7 @@ def split(wavenumber: Floats) -> tuple[Floats, Floats]:
 def path(
     state: PlatformState,
     slow_time: Floats,
-    error: MotionError | None = None,
+    error: PathError | None = None,
     rng: np.random.Generator | None = None,
 ) -> Path:
     """Fly one platform through its midpoint state, at its acceleration, and measure it with an error.
@@ -105,7 +105,7 @@ def path(
         At τ = 0.
     slow_time : (pulses,) ndarray
         [s]
-    error : MotionError, optional
+    error : PathError, optional
         None: the navigation is perfect.
     rng : numpy Generator, optional
         Needed for wideband vibration only.

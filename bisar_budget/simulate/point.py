@@ -1,34 +1,35 @@
 """Images of points with a mission's declared errors: Section V and VI of Rigling & Moses, Figures 3 to 7."""
 
 import math
+import time
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from bisar_budget.budget.analysis import Analysis
-from bisar_budget.budget.correlation import correlated_errors, likely_error
-from bisar_budget.budget.effects import PLATFORMS
-from bisar_budget.budget.exact_arrays import aperture_nodes
-from bisar_budget.budget.pieces import Piece, gradients_of, indicated_point
-from bisar_budget.budget.vibration_lines import along_line_of_sight, lines_of
+from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.effects.correlation import correlated_errors, likely_error
+from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.exact_arrays import aperture_nodes
+from bisar_budget.effects.pieces import LinePiece, gradients_of, indicated_point
+from bisar_budget.effects.vibration_lines import along_line_of_sight, lines_of
 from bisar_budget.geometry import BistaticGeometry, GroundVector, Vector
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.mission.model import MotionError as DeclaredError
 from bisar_budget.simulate.autofocus import ALGORITHMS
 from bisar_budget.simulate.collection import superposed_motion
 from bisar_budget.simulate.exact import ExactEffect, exact_effect
-from bisar_budget.simulate.former import IMAGE_FORMERS, ExactRanges, Former, PlaneWaves
-from bisar_budget.simulate.image_formation import ground_grid, taylor_window
+from bisar_budget.simulate.former import IMAGE_FORMERS, ExactRangeFormer, Former, PlaneWaves
+from bisar_budget.simulate.image_formation import ground_grid, kernel_within, taylor_window
 from bisar_budget.simulate.impulse_response import ImpulseResponse, impulse_response
 from bisar_budget.simulate.phase_history import (
     Complexes,
     Floats,
-    MotionError,
     Path,
+    PathError,
+    PathSinusoid,
     PhaseHistory,
-    Sinusoid,
     cell_centres,
     path,
     phase_history,
@@ -41,11 +42,12 @@ _MARGIN_CELLS = 16  # of the patch beyond the smear, each way
 _SAMPLES_PER_CELL = 3
 _MIN_PULSES, _MAX_PULSES = 256, 1 << 15
 _MIN_FREQUENCIES = 64
+_FEW_PULSES = 64  # with which the time is foreseen
 _ECHO_CELLS = 256  # from the peak; paired echoes farther away are said, not shown
 _SCENE_PIXELS = 1 << 18  # of the image in (x, y)
-_BYTES_PER_PIXEL = 16 * 4  # image, grid and what forming a block of them holds
+_BYTES_PER_PIXEL = 16 * 8  # in (x, y): image and grid, the image rotated back, and all of them in an archive
+_BYTES_PER_ROTATED = 16 * 16  # grid, three images, and what autofocus and interpolation hold of one
 _BYTES_PER_SAMPLE = 16 * 5  # of the phase history; it is a product of terms of its own size
-_BYTES_HELD = 40e6  # profiles of a block of pulses, and copies of a block of pixels
 _APART = 3.0  # range cells: what is nearer in range shares a line with a target's response
 _NEAREST = 6  # cells across that a response takes, at least
 _CLUTTER_STREAM = 1  # of the file's seed, so that clutter changes no noise
@@ -149,8 +151,8 @@ class Plan(NamedTuple):
     @property
     def memory(self) -> float:
         """At the peak. [B]"""
-        images = _BYTES_PER_PIXEL * (self.in_scene.pixels + 3 * self.rotated.pixels)
-        return images + _BYTES_PER_SAMPLE * self.pulses * self.frequencies + _BYTES_HELD + self.bytes_held
+        images = _BYTES_PER_PIXEL * self.in_scene.pixels + _BYTES_PER_ROTATED * self.rotated.pixels
+        return images + _BYTES_PER_SAMPLE * self.pulses * self.frequencies + self.bytes_held
 
     @property
     def work(self) -> int:
@@ -176,6 +178,7 @@ def simulate_point(
     *,
     image_former: str = "backprojection",
     targets: Targets = A_POINT,
+    foreseen: Callable[[float], None] = lambda seconds: None,
 ) -> PointImages:
     """Form the image of points with the declared errors, before and after autofocus.
 
@@ -196,6 +199,8 @@ def simulate_point(
         Figure 5 of the paper is by (4) and Figure 6 by (14).
     targets : Targets
         What stands in the scene. Clutter is one random scatterer for each resolution cell of the patch.
+    foreseen : callable
+        Told about how long it will take [s], measured on a few pulses and pixels, before the images are formed.
 
     Raises
     ------
@@ -268,8 +273,22 @@ def simulate_point(
     def image(by: Former, data: PhaseHistory, grid: Floats) -> Complexes:
         return by.image(data, grid, lambda pixels: progress(plan.pulses * pixels, plan.work))
 
-    flown_as_declared = _paths(mission, geometry, slow_time, vibrating=True, rng=rng)
     standing = [(one.east, one.north) for one in targets.points]
+    begun, few = time.perf_counter(), cell_centres(T, _FEW_PULSES)
+    still = _paths(mission, geometry, few, vibrating=False)
+    places = np.pad(np.concatenate((standing, clutter)), ((0, 0), (0, 1)))
+    some = phase_history(
+        places,
+        amplitudes.astype(complex),
+        slow_time=few,
+        frequency=frequency,
+        transmitter=still[0],
+        receiver=still[1],
+    )
+    recording = 2 * (time.perf_counter() - begun) * plan.pulses / few.size
+    rotating = 2 * former.seconds(some, plan.pulses, lines)
+    foreseen(recording + rotating + scene_former.seconds(some, plan.pulses, scene))
+    flown_as_declared = _paths(mission, geometry, slow_time, vibrating=True, rng=rng)
     data = history(
         flown_as_declared,
         _clock(mission, slow_time),
@@ -293,7 +312,7 @@ def simulate_point(
     values, slopes = np.interp(times, fine, left), np.interp(times, fine, slope)
     cells = former.offsets(np.array(shown), _middle(shown))
     windows = [_window(plan, cells, index) for index in range(len(shown))]
-    pieces = [Piece(*map(float, one)) for one in zip(times, values, slopes, strict=True)]
+    pieces = [LinePiece(*map(float, one)) for one in zip(times, values, slopes, strict=True)]
     model = mission.allocation.model
     return PointImages(
         slow_time=fine,
@@ -331,7 +350,8 @@ def simulate_point(
 def _formers(mission: Mission, image_former: str, flown: Flown, smooth: tuple[Path, Path]) -> tuple[Former, Former]:
     """Of the rotated images, and of the one along (x, y)."""
     radar = mission.radar
-    exact = ExactRanges(flown, radar.bandwidth, radar.wavelength, image_former == "matched_filter")
+    kernel = kernel_within((mission.simulation or Simulation()).memory_limit)
+    exact = ExactRangeFormer(flown, radar.bandwidth, radar.wavelength, image_former == "matched_filter", kernel)
     if image_former in ("backprojection", "matched_filter"):
         return exact, exact
     sight = sum(one.measured / np.linalg.norm(one.measured, axis=1, keepdims=True) for one in smooth)
@@ -454,7 +474,7 @@ def _paths(
         declared: DeclaredError = getattr(mission.platforms, name).motion_error
         state = getattr(geometry, name)
         axes = state.frame(declared.frame)
-        error = MotionError(
+        error = PathError(
             position=_vector(declared.position, axes, factor),
             velocity=_vector(declared.velocity, axes, factor),
             acceleration=_vector(declared.acceleration, axes, factor),
@@ -464,7 +484,7 @@ def _paths(
             error = error._replace(position=position, velocity=velocity)
         if common is not None:
             scene = state.frame("scene")
-            shared = MotionError(
+            shared = PathError(
                 position=_vector(common.position, scene, factor),
                 velocity=_vector(common.velocity, scene, factor),
                 acceleration=_vector(common.acceleration, scene, factor),
@@ -473,7 +493,7 @@ def _paths(
         if vibrating:
             wideband = declared.vibration.wideband
             error = error._replace(
-                sinusoids=tuple(Sinusoid(*line) for line in lines_of(mission, name)),
+                sinusoids=tuple(PathSinusoid(*line) for line in lines_of(mission, name)),
                 wideband_rms=along_line_of_sight(wideband.rms, declared, state, "islr") if wideband else 0.0,
             )
         flown.append(path(state, slow_time, error, rng))

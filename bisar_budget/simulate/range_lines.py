@@ -19,6 +19,7 @@ _STRIDE = 4  # pixels from one step along a line to the next; between them a cub
 _STRETCH = 4.0  # of a pixel, at most: where Doppler hardly changes along a line
 _SLANT = 60.0  # of the way from line to line, at most: where equal Doppler runs along equal range
 _CORRECTIONS = 3  # of each pixel's range sum
+_BLOCK = 1 << 14  # pixels corrected at once
 
 
 class Flown(NamedTuple):
@@ -99,13 +100,19 @@ class Flown(NamedTuple):
             return np.where(keeps, doppler_step / np.where(keeps, slope, 1.0), longest) * tangent
 
         start = _followed(across, middle, nx)
-        points = np.moveaxis(_followed(along, start, ny), 0, 1)
+        followed = np.moveaxis(_followed(along, start, ny), 0, 1)
         wanted = self.range_sum(middle) + range_step * (np.arange(nx) - nx // 2)
-        for _ in range(_CORRECTIONS):
-            g = self.gradients(points)[0]
-            off = (wanted[:, None] - self.range_sum(points)) / np.sum(g**2, axis=-1)
-            points = points + off[..., None] * g
-        return np.concatenate((points, np.zeros((nx, ny, 1))), axis=-1)
+        grid = np.zeros((nx, ny, 3))
+        lines = max(1, _BLOCK // ny)
+        for top in range(0, nx, lines):
+            part = slice(top, top + lines)
+            points = followed[part]
+            for _ in range(_CORRECTIONS):
+                g = self.gradients(points)[0]
+                off = (wanted[part, None] - self.range_sum(points)) / np.sum(g**2, axis=-1)
+                points = points + off[..., None] * g
+            grid[part, :, :2] = points
+        return grid
 
 
 def _followed(step: Callable[[Floats], Floats], start: Floats, count: int) -> Floats:

@@ -12,6 +12,8 @@ import numpy as np
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.simulate.phase_history import Complexes, Floats, PhaseHistory
 
+PROFILE_BYTES = 3 * 16  # of a sample while it is formed: spectrum, profile and what the FFT holds
+
 
 def kernel(offset: Floats, taps: int, oversampling: int) -> Floats:
     """Exponential of a semicircle over ±taps/2 cells, 1 at the centre.

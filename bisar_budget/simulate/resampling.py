@@ -9,6 +9,7 @@ from bisar_budget.simulate.phase_history import Complexes, Floats
 
 _STEPS = 8  # towards a pixel's place in a grid
 _CLOSE = 0.02  # pixels: found
+_BLOCK = 1 << 16  # points read at once
 _FINER = 2  # before the interpolation
 _TAPS = 6  # with these a response sampled three times per cell is read to -70 dB
 
@@ -62,11 +63,13 @@ def resampled(image: Complexes, grid: Floats, points: Floats) -> Complexes:
     (mx, my) ndarray
         Zero where the grid does not reach.
     """
-    row, column = places_in(grid[..., :2], points[..., :2].reshape(-1, 2))
-    inside = np.nonzero(np.isfinite(row))[0]
-    read = np.zeros(row.size, dtype=complex)
+    flat = points[..., :2].reshape(-1, 2)
+    read = np.zeros(len(flat), dtype=complex)
     fine = upsampled(upsampled(image, _FINER).T, _FINER).T
-    read[inside] = _interpolated(fine, _FINER * row[inside], _FINER * column[inside])
+    for start in range(0, len(flat), _BLOCK):
+        row, column = places_in(grid[..., :2], flat[start : start + _BLOCK])
+        inside = np.nonzero(np.isfinite(row))[0]
+        read[start + inside] = _interpolated(fine, _FINER * row[inside], _FINER * column[inside])
     return read.reshape(points.shape[:2])
 
 

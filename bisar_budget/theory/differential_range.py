@@ -22,7 +22,17 @@ from sympy import (
     zeros,
 )
 
-from bisar_budget.theory.symbols import AXES, PLATFORMS, Platform, c, clock_coefficients, point, real, scatterer, tau
+from bisar_budget.theory.symbols import (
+    AXES,
+    PLATFORMS,
+    PlatformSymbols,
+    c,
+    clock_coefficients,
+    point,
+    real,
+    scatterer,
+    tau,
+)
 
 # Size of all errors together, for the expansion to first order.
 _EPSILON = Symbol("epsilon", real=True)
@@ -33,7 +43,7 @@ def distance(one: Matrix, other: Matrix) -> Expr:
     return sqrt(sum((r - x) ** 2 for r, x in zip(one, other, strict=True)))
 
 
-def observed_differential_range(platforms: tuple[Platform, ...] = PLATFORMS) -> Expr:
+def observed_differential_range(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Expr:
     """Return ΔR̂_m of (1): true distances to a scatterer less measured ones to the scene centre, and the clock. [m]"""
     total = c * Function("ttilde")(tau)
     for platform in platforms:
@@ -42,26 +52,26 @@ def observed_differential_range(platforms: tuple[Platform, ...] = PLATFORMS) -> 
     return total
 
 
-def measured_error(platform: Platform) -> Matrix:
+def measured_error(platform: PlatformSymbols) -> Matrix:
     """Error of a platform's measured position at one slow time, r̃ of (1), (3,). [m]"""
     return ImmutableMatrix([real(f"{axis}tilde_{platform.subscript}") for axis in AXES])
 
 
-def exact_differential_range(platforms: tuple[Platform, ...] = PLATFORMS) -> Expr:
+def exact_differential_range(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Expr:
     """Differential range of a point (x, y, z) without errors: (1) with r̃ = 0 and t̃ = 0. [m]"""
     free = dict.fromkeys((e for platform in platforms for e in measured_error(platform)), 0)
     exact = observed_differential_range(platforms).subs(Function("ttilde")(tau), 0).subs(free)
     return exact.subs(dict(zip(scatterer, point, strict=True)))
 
 
-def far_field_differential_range(platforms: tuple[Platform, ...] = PLATFORMS) -> Expr:
+def far_field_differential_range(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Expr:
     """Return (5): the first-order Taylor expansion of (1) about the scene centre. [m]"""
     exact = exact_differential_range(platforms)
     at_origin = dict.fromkeys(point, 0)
     return sum(x * diff(exact, x).subs(at_origin) for x in point)
 
 
-def in_angles(expression: Expr, platforms: tuple[Platform, ...] = PLATFORMS) -> Expr:
+def in_angles(expression: Expr, platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Expr:
     """Write positions by slant range, azimuth and elevation, as (6) does."""
     for platform in platforms:
         R, phi, theta = platform.slant_range, platform.azimuth, platform.elevation
@@ -70,7 +80,13 @@ def in_angles(expression: Expr, platforms: tuple[Platform, ...] = PLATFORMS) -> 
     return simplify(expression)
 
 
-def hold_range_constant(expression: Expr, platforms: tuple[Platform, ...] = PLATFORMS) -> Expr:
+@cache
+def far_field_in_angles(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Expr:
+    """Return (6): (5) in azimuth and elevation. [m]"""
+    return in_angles(far_field_differential_range(platforms), platforms)
+
+
+def hold_range_constant(expression: Expr, platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Expr:
     """Put R_k for |r_k| and r_k + v_k·τ for r_k: the motion model of (17).
 
     This is the paper's key approximation: numerators move, ranges do not. The full model drops it.
@@ -82,7 +98,7 @@ def hold_range_constant(expression: Expr, platforms: tuple[Platform, ...] = PLAT
     return expand(expression)
 
 
-def linear_differential_range(platforms: tuple[Platform, ...] = PLATFORMS) -> tuple[Expr, Expr]:
+def linear_differential_range(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> tuple[Expr, Expr]:
     """Return β₀, β₁ of (17). [m], [m/s]
 
     The print lost the + between its two brackets.
@@ -99,7 +115,7 @@ def coefficients(expression: Expr, order: int = 3) -> tuple[Expr, ...]:
     return tuple(expand(polynomial.coeff_monomial(tau**n)) for n in range(order + 1))
 
 
-def error_polynomial(platform: Platform) -> Matrix:
+def error_polynomial(platform: PlatformSymbols) -> Matrix:
     """Return r̃(τ) of (22), (3,): p̃ + ṽτ + ãτ²/2. [m]"""
     return platform.position_error + platform.velocity_error * tau + platform.acceleration_error * tau**2 / 2
 
@@ -109,17 +125,17 @@ def clock_polynomial() -> Expr:
     return sum(coefficient * tau**n for n, coefficient in enumerate(clock_coefficients))
 
 
-def first_order_range_error(platform: Platform) -> Expr:
+def first_order_range_error(platform: PlatformSymbols) -> Expr:
     """Return |r| − |r + r̃| of one platform to first order in r̃ of (22): −r·r̃/|r|. [m]"""
     return _first_order(platform).subs(dict(zip(error_track(platform), error_polynomial(platform), strict=True)))
 
 
-def error_track(platform: Platform) -> Matrix:
+def error_track(platform: PlatformSymbols) -> Matrix:
     """Position error as any function of slow time, x̃_t(τ) …, (3,). [m]"""
     return ImmutableMatrix([Function(f"{axis}tilde_{platform.subscript}")(tau) for axis in AXES])
 
 
-def _first_order(platform: Platform) -> Expr:
+def _first_order(platform: PlatformSymbols) -> Expr:
     """What (1) holds of a platform for a scatterer at the scene centre, to first order in its error. [m]"""
     grown = dict(zip(measured_error(platform), _EPSILON * error_track(platform), strict=True))
     leg = observed_differential_range((platform,)).subs(dict.fromkeys(scatterer, 0)).subs(grown)
@@ -127,7 +143,7 @@ def _first_order(platform: Platform) -> Expr:
 
 
 @cache
-def range_error_of_tracks(platforms: tuple[Platform, ...] = PLATFORMS) -> Expr:
+def range_error_of_tracks(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Expr:
     """Return (23): error of the differential range for errors of any course. [m]
 
     The processor subtracts the measured distance |r + r̃| where the data hold |r|, so (1) leaves
@@ -140,7 +156,7 @@ def range_error_of_tracks(platforms: tuple[Platform, ...] = PLATFORMS) -> Expr:
 
 
 @cache
-def range_error(platforms: tuple[Platform, ...] = PLATFORMS) -> Expr:
+def range_error(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Expr:
     """Return (23) with (22) put in, a cubic in slow time. [m]"""
     total = range_error_of_tracks(platforms).subs(Function("ttilde")(tau), clock_polynomial())
     for platform in platforms:
@@ -148,37 +164,36 @@ def range_error(platforms: tuple[Platform, ...] = PLATFORMS) -> Expr:
     return expand(total)
 
 
-def ground_matrix(platforms: tuple[Platform, ...] = PLATFORMS) -> Matrix:
+def ground_matrix(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Matrix:
     """Q of (19), (2, 2): takes a ground point (x, y) to (β₀, β₁). [-], [1/s]"""
     ground = Matrix(point[:2])
     return Matrix(linear_differential_range(platforms)).subs(point[2], 0).jacobian(ground)
 
 
-def ground_inverse(platforms: tuple[Platform, ...] = PLATFORMS) -> tuple[Matrix, Expr]:
+def ground_inverse(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> tuple[Matrix, Expr]:
     """Adjugate (2, 2) and determinant of Q, so that Q⁻¹ of (30) is their quotient."""
     Q = ground_matrix(platforms)
     return Q.adjugate(), Q[0, 0] * Q[1, 1] - Q[0, 1] * Q[1, 0]
 
 
-def displacement(beta_0: Expr, beta_1: Expr, platforms: tuple[Platform, ...] = PLATFORMS) -> Matrix:
+def displacement(beta_0: Expr, beta_1: Expr, platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Matrix:
     """Return (x̃, ỹ) of (25), (2,): where constant and linear range errors move a response. [m]"""
     adjugate, determinant = ground_inverse(platforms)
     return adjugate * Matrix([beta_0, beta_1]) / determinant
 
 
-def look_vector(platforms: tuple[Platform, ...] = PLATFORMS) -> Matrix:
+def look_vector(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Matrix:
     """Sum of the unit vectors to the platforms on the ground, (2,): (8) without f/2. [-]"""
-    far_field = in_angles(far_field_differential_range(platforms), platforms)
-    return Matrix([-diff(far_field, x) for x in point[:2]])
+    return Matrix([-diff(far_field_in_angles(platforms), x) for x in point[:2]])
 
 
-def look_azimuth(platforms: tuple[Platform, ...] = PLATFORMS) -> Expr:
+def look_azimuth(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Expr:
     """Bistatic look angle φ_b of (11), by atan2: the printed arctan loses the quadrant. [rad]"""
     s_x, s_y = look_vector(platforms)
     return atan2(s_y, s_x)
 
 
-def smear_direction(platforms: tuple[Platform, ...] = PLATFORMS) -> Matrix:
+def smear_direction(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Matrix:
     """Return (31), (2,): direction of the second column of Q⁻¹, along which quadratic errors smear. [-]"""
     adjugate, _ = ground_inverse(platforms)
     return in_angles(adjugate[:, 1], platforms)

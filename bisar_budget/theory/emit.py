@@ -19,7 +19,7 @@ from bisar_budget.theory import full, published
 from bisar_budget.theory.symbols import (
     RECEIVER,
     TRANSMITTER,
-    Platform,
+    PlatformSymbols,
     T,
     c,
     clock_coefficients,
@@ -77,7 +77,7 @@ class _Printer(PythonCodePrinter):  # type: ignore[misc]
         return str(super()._print_Pow(expr, rational=rational))
 
 
-def platform_arguments(platform: Platform) -> tuple[tuple[Symbol, str], ...]:
+def platform_arguments(platform: PlatformSymbols) -> tuple[tuple[Symbol, str], ...]:
     """Return position, velocity and slant range of one platform as arguments without a subscript."""
     names = ("x", "y", "z", "v_x", "v_y", "v_z")
     motion = zip((*platform.position, *platform.velocity), names, strict=True)

@@ -81,14 +81,9 @@ def in_slow_time(expression: Expr, at: Expr = tau_k) -> Expr:
     return expression
 
 
-def far_field_in_angles() -> Expr:
-    """Return (6): the first-order differential range in azimuth and elevation. [m]"""
-    return dr.in_angles(dr.far_field_differential_range())
-
-
 def spatial_frequencies() -> Matrix:
     """Return (8), (3,): −f/2 times the gradient of (6). [Hz]"""
-    return Matrix([f_i / 2 * expand(-diff(far_field_in_angles(), x)) for x in point])
+    return Matrix([f_i / 2 * expand(-diff(dr.far_field_in_angles(), x)) for x in point])
 
 
 def rotation(x: Expr, y: Expr) -> Matrix:
@@ -230,7 +225,7 @@ def _images() -> tuple[Equation, ...]:
     return (
         Equation("(4)", "Matched filter", image(x, y, z), summed(received() * exp(-I * tested)), DEFINED),
         Equation("(5)", "First-order differential range", Function("DeltaR")(tau), dr.far_field_differential_range()),
-        Equation("(6)", "The same in angles", at_k, in_slow_time(far_field_in_angles())),
+        Equation("(6)", "The same in angles", at_k, in_slow_time(dr.far_field_in_angles())),
         Equation(
             "(7)",
             "Far-field filter: (4) with the phase (2) of (6)",

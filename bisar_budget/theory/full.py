@@ -36,11 +36,11 @@ from sympy.integrals.quadrature import gauss_legendre
 
 from bisar_budget.theory import differential_range as dr
 from bisar_budget.theory import published
-from bisar_budget.theory.published import Equation, Row, Table
+from bisar_budget.theory.published import Equation, Table, TableRow
 from bisar_budget.theory.symbols import (
     AXES,
     PLATFORMS,
-    Platform,
+    PlatformSymbols,
     c,
     islr,
     positive,
@@ -55,7 +55,7 @@ ORDER = 4  # of slow time: the quartic term of a long aperture is in part a quad
 DISPLACEMENT = ImmutableMatrix([real("xhat"), real("yhat")])
 
 
-def growth(platform: Platform) -> dict[Symbol, Expr]:
+def growth(platform: PlatformSymbols) -> dict[Symbol, Expr]:
     """d₁ … d₄ of |r|² = R²(1 + d₁τ + d₂τ² + d₃τ³ + d₄τ⁴) on a path of constant acceleration. [1/sⁿ]"""
     track = platform.position + platform.velocity * tau + platform.acceleration * tau**2 / 2
     square = Poly(expand(track.dot(track)), tau)
@@ -66,7 +66,7 @@ def growth(platform: Platform) -> dict[Symbol, Expr]:
 
 
 @cache
-def look_series(platform: Platform) -> tuple[Matrix, ...]:
+def look_series(platform: PlatformSymbols) -> tuple[Matrix, ...]:
     """Derivatives of the line of sight u = r/|r| at τ = 0, orders 0 to 4, (3,) each, in `growth`. [1/sⁿ]"""
     grown = 1 + sum(d * tau**n for n, d in enumerate(growth(platform), start=1))
     inverse = [diff(1 / sqrt(grown), tau, n).subs(tau, 0) / factorial(n) for n in range(ORDER + 1)]
@@ -92,7 +92,7 @@ def range_error() -> tuple[Expr, ...]:
     return tuple(polynomial.coeff_monomial(tau**n) for n in range(ORDER + 1))
 
 
-def range_error_at(platform: Platform) -> Expr:
+def range_error_at(platform: PlatformSymbols) -> Expr:
     """Range error of one platform at one slow time to first order, −u·r̃(τ), its position being that at τ. [m]"""
     first_order = dr.first_order_range_error(platform)
     return first_order.subs(platform.exact_slant_range(), platform.slant_range)
@@ -180,12 +180,13 @@ def effective_coefficients() -> tuple[Expr, Expr, Expr]:
     return second, third, fourth
 
 
+@cache
 def table() -> Table:
     """Coefficients of the range error with every first-order term, before what the displacement adds."""
     beta = range_error()
     motion_free = {e: 0 for platform in PLATFORMS for e in published.motion_errors(platform)}
     rows = [
-        Row(
+        TableRow(
             number=None,
             error=real("ttilde"),
             label=Eq(Function("ttilde")(tau), dr.clock_polynomial(), evaluate=False),
@@ -199,7 +200,7 @@ def table() -> Table:
             track = Function(f"{AXES[axis]}tilde_{platform.subscript}")(tau)
             label = Eq(track, published.single_error(polynomial[axis], error), evaluate=False)
             cells = tuple(published.single_error(cell, error) for cell in beta)
-            rows.append(Row(number=None, error=error, label=label, cells=cells))
+            rows.append(TableRow(number=None, error=error, label=label, cells=cells))
     return Table(
         number="Full model",
         title="Differential range errors with the line of sight turning as it does",
@@ -279,6 +280,8 @@ def vibration() -> Table:
         number="Vibration, first principles",
         title="Amplitude A (0 to peak) and rms σ along the line of sight, φ = 2πA/λ",
         columns=("Power beside the response", "Allowable"),
-        rows=tuple(Row(number=None, error=e, label=e, cells=(p, limit), note=note) for e, p, limit, note in rows),
+        rows=tuple(
+            TableRow(number=None, error=e, label=e, cells=(p, limit), note=note) for e, p, limit, note in rows
+        ),
         notes=("Derived here. The tool takes J₁(φ)/J₀(φ) as it is; a = √s_k/(√s_t + √s_r) of PSLR·(s_t + s_r).",),
     )

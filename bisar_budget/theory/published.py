@@ -1,6 +1,7 @@
 """The limits of Rigling & Moses: Table I, Table II, vibration, pull-in, derived row by row in print order."""
 
 from dataclasses import dataclass
+from functools import cache
 
 from sympy import Abs, Eq, Expr, Function, Rational, Symbol, diff, pi, solve
 
@@ -8,7 +9,7 @@ from bisar_budget.theory import differential_range as dr
 from bisar_budget.theory.symbols import (
     AXES,
     PLATFORMS,
-    Platform,
+    PlatformSymbols,
     T,
     c,
     center_frequency,
@@ -30,7 +31,7 @@ EQUAL_SHARE_QPE = pi / 8  # per platform, Section V
 
 
 @dataclass(frozen=True)
-class Row:
+class TableRow:
     """One row of a table: its number in print, the error it is about, its cells left to right."""
 
     number: int | None
@@ -47,7 +48,7 @@ class Table:
     number: str
     title: str
     columns: tuple[str, ...]
-    rows: tuple[Row, ...]
+    rows: tuple[TableRow, ...]
     notes: tuple[str, ...] = ()
 
 
@@ -63,24 +64,25 @@ class Equation:
     slip: str = ""
 
 
-def motion_errors(platform: Platform) -> tuple[Symbol, ...]:
+def motion_errors(platform: PlatformSymbols) -> tuple[Symbol, ...]:
     """Return the nine error symbols of a platform in the order of Table I: x p v a, y p v a, z p v a."""
     kinds = (platform.position_error, platform.velocity_error, platform.acceleration_error)
     return tuple(kind[axis] for axis in range(3) for kind in kinds)
 
 
-def single_error(expression: Expr, error: Symbol, platforms: tuple[Platform, ...] = PLATFORMS) -> Expr:
+def single_error(expression: Expr, error: Symbol, platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Expr:
     """Keep what one error alone does: every other error is set to zero."""
     every = [*clock_coefficients, *(e for platform in platforms for e in motion_errors(platform))]
     return expression.subs({other: 0 for other in every if other != error})
 
 
-def table_1(platforms: tuple[Platform, ...] = PLATFORMS) -> Table:
+@cache
+def table_1(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Table:
     """Table I: coefficients β̃₀ … β̃₃ of the range error, for the clock and each motion error alone."""
     beta = dr.coefficients(dr.range_error(platforms))
     motion_free = {e: 0 for platform in platforms for e in motion_errors(platform)}
     rows = [
-        Row(
+        TableRow(
             number=1,
             error=real("ttilde"),
             label=Eq(Function("ttilde")(tau), dr.clock_polynomial(), evaluate=False),
@@ -93,7 +95,7 @@ def table_1(platforms: tuple[Platform, ...] = PLATFORMS) -> Table:
             axis = index // 3
             track = Function(f"{AXES[axis]}tilde_{platform.subscript}")(tau)
             rows.append(
-                Row(
+                TableRow(
                     number=2 + index,
                     error=error,
                     label=Eq(track, single_error(polynomial[axis], error, platforms), evaluate=False),
@@ -127,7 +129,8 @@ def limit(phase: Expr, error: Symbol, budget: Expr) -> Expr:
     return solution
 
 
-def table_2(platforms: tuple[Platform, ...] = PLATFORMS, budget: Expr = EQUAL_SHARE_QPE) -> Table:
+@cache
+def table_2(platforms: tuple[PlatformSymbols, ...] = PLATFORMS, budget: Expr = EQUAL_SHARE_QPE) -> Table:
     """Table II: quadratic phase error and largest allowable error, with the bars that the print omits."""
     beta_2 = dr.coefficients(dr.range_error(platforms))[2]
     rows = []
@@ -141,7 +144,7 @@ def table_2(platforms: tuple[Platform, ...] = PLATFORMS, budget: Expr = EQUAL_SH
                 allowable = dr.in_angles(allowable, platforms)  # x/R is printed as cos φ̄ cos θ̄
             track = Function(f"{AXES[index % 3]}tilde_{platform.subscript}")(tau)
             rows.append(
-                Row(
+                TableRow(
                     number=1 + index,
                     error=error,
                     label=Eq(track, error * power, evaluate=False),
@@ -151,7 +154,7 @@ def table_2(platforms: tuple[Platform, ...] = PLATFORMS, budget: Expr = EQUAL_SH
     clock = clock_coefficients[2]
     clock_qpe = edge_phase(single_error(beta_2, clock, platforms), 2).subs(wavelength, c / center_frequency)
     rows.append(
-        Row(
+        TableRow(
             number=None,
             error=clock,
             label=Eq(Function("ttilde")(tau), clock * tau**2, evaluate=False),
@@ -181,10 +184,10 @@ def vibration() -> Table:
     """
     amplitude, rms = positive("A"), positive("sigma")
 
-    def bound(motion: Symbol, ratio: Symbol) -> Row:
+    def bound(motion: Symbol, ratio: Symbol) -> TableRow:
         phase = one_way_phase(motion)
         (allowable,) = solve(Eq(phase**2, ratio * share), motion)
-        return Row(
+        return TableRow(
             number=None,
             error=motion,
             label=motion,

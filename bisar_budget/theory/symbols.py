@@ -37,7 +37,7 @@ n_pull = positive("N_pull")  # autofocus corrects π·N_pull radians
 
 
 @dataclass(frozen=True)
-class Platform:
+class PlatformSymbols:
     """One platform at the aperture midpoint, with the error of its measured motion.
 
     Vectors are (3,) east-north-up. [m], [m/s], [m/s²]. `look` holds the unit vector to the platform and its
@@ -62,13 +62,13 @@ class Platform:
         return _norm(self.position)
 
 
-def platform(name: str, subscript: str) -> Platform:
+def platform(name: str, subscript: str) -> PlatformSymbols:
     """Return the symbols of one platform, subscripted as in the paper."""
 
     def vector(letter: str) -> Matrix:
         return ImmutableMatrix([real(f"{letter}_{axis}{subscript}") for axis in AXES])
 
-    return Platform(
+    return PlatformSymbols(
         name=name,
         subscript=subscript,
         position=ImmutableMatrix([real(f"{axis}_{subscript}") for axis in AXES]),

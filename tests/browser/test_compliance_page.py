@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from bisar_budget.budget.findings import Report, UnusableMission
+from bisar_budget.findings.mission import Report, UnusableMission
 from bisar_budget.report import Style, render
 from tests.conftest import ROOT, findings
 from tests.unit.test_report_compliance import EVERY_KEY, FAULT, SECTION_V, found_in, illustrated

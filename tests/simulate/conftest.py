@@ -2,13 +2,17 @@
 
 import math
 from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
 
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import BistaticGeometry, PlatformState, state_from_angles
-from bisar_budget.simulate.phase_history import MotionError, PhaseHistory, cell_centres, path, phase_history
+from bisar_budget.mission.load import parse_mission
+from bisar_budget.simulate import point
+from bisar_budget.simulate.phase_history import PathError, PhaseHistory, cell_centres, path, phase_history
 
 
 @dataclass(frozen=True)
@@ -34,13 +38,13 @@ class Collection:
     def cross_range_resolution(self) -> float:
         return self.geometry.cross_range_resolution(self.wavelength, self.aperture_time)
 
-    def paths(self, **errors: MotionError):
+    def paths(self, **errors: PathError):
         return [
             path(getattr(self.geometry, name), self.slow_time, errors.get(name))
             for name in ("transmitter", "receiver")
         ]
 
-    def record(self, scatterers, amplitudes=(1.0,), **errors: MotionError) -> PhaseHistory:
+    def record(self, scatterers, amplitudes=(1.0,), **errors: PathError) -> PhaseHistory:
         transmitter, receiver = self.paths(**errors)
         return phase_history(
             np.atleast_2d(np.asarray(scatterers, dtype=float)),
@@ -108,3 +112,20 @@ def collection(squint_deg: float = 0.0, **options) -> Collection:
 @pytest.fixture
 def broadside() -> Collection:
     return collection()
+
+
+@cache
+def images_of(text: str, model: str | None = None, *, rotated_only: bool = False, **how: Any) -> point.PointImages:
+    """Images of a mission file's text by `simulate_point`, formed once for all tests; nobody writes to them.
+
+    Forming takes pixels times pulses, most of them for the image along (x, y): a test that does not look at that one
+    asks for the rotated ones only, and gets a small middle of it.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        if rotated_only:
+            patch.setattr(point, "_SCENE_PIXELS", 1 << 10)
+        images = point.simulate_point(parse_mission(text, model=model), **how)
+    for one in images:
+        if isinstance(one, np.ndarray):
+            one.setflags(write=False)
+    return images

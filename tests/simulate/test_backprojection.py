@@ -19,12 +19,13 @@ from tests.conftest import ROOT
 from tests.simulate.conftest import Collection, collection, platform
 
 NUMBA = importlib.util.find_spec("numba") is not None
-compiled = pytest.mark.skipif(not NUMBA, reason="the compiled kernels need Numba, extra fast")
+pytestmark = pytest.mark.extras
+needs_numba = pytest.mark.skipif(not NUMBA, reason="the compiled kernels need Numba, extra fast")
 # Error promised, relative to the strongest scatterer. One pulse at the edge of the band has for the splines
 # (1/(2M - 1))ⁿ, M samples a cell: linear n = 2, M = 32 (-72 dB); cubic n = 4, M = 16 (-119 dB). A band filled evenly
 # has 1/√(2n + 1) of that (linear 7 dB less), and pulses average it.
 PROMISED = {"numpy": -118, "cubic": -119, "linear": -75}
-KERNELS = ["numpy", *(pytest.param(name, marks=compiled) for name in ("cubic", "linear"))]
+KERNELS = ["numpy", *(pytest.param(name, marks=needs_numba) for name in ("cubic", "linear"))]
 SCATTERERS, AMPLITUDES = np.array([[3.0, -2, 0], [-6, 5, 0], [0, 0, 4]]), (1, 0.5j, -0.7)
 
 
@@ -120,7 +121,7 @@ class TestAgainstTheMatchedFilter:
             backprojection(history, np.zeros((1, 3)), kernel)
 
 
-@compiled
+@needs_numba
 @given(
     at=st.tuples(st.floats(-2e3, 2e3), st.floats(-2e3, 2e3)),
     turn=st.floats(-4, 4),
@@ -137,7 +138,7 @@ def test_compiled_and_numpy_form_the_same_image(at, turn, spacing, shape, squint
         assert np.abs(backprojection(history, points, kernel) - want).max() < 10 ** (PROMISED[kernel] / 20) + 1e-6
 
 
-@compiled
+@needs_numba
 def test_a_pixel_on_a_platform_is_its_own_range() -> None:
     """No expansion holds there; the exact range is 0 on one leg."""
     c = collection(pulses=16)

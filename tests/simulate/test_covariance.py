@@ -8,10 +8,10 @@ import pytest
 from bisar_budget.budget.check import check_mission
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.simulate.collection import Errors
-from bisar_budget.simulate.phase_history import MotionError
-from bisar_budget.simulate.point import simulate_point
-from bisar_budget.simulate.verify import Study, verify_mission
+from bisar_budget.simulate.phase_history import PathError
+from bisar_budget.verify.limits import Study, verify_mission
 from tests.conftest import TODAY, findings, mission_text, row
+from tests.simulate.conftest import images_of
 from tests.simulate.test_full_model import random_missions
 
 STEP = np.array([0.5, 0.5, 0.5, 2e-3, 2e-3, 2e-3])  # m, m/s: small for the first order, large for the fit
@@ -19,7 +19,7 @@ STEP = np.array([0.5, 0.5, 0.5, 2e-3, 2e-3, 2e-3])  # m, m/s: small for the firs
 
 def exact(study: Study, *vectors) -> np.ndarray:
     """Quadratic and cubic phase and displacement, (4,), of position and velocity errors (6,) of the platforms."""
-    errors = [MotionError(position=tuple(v[:3]), velocity=tuple(v[3:6])) for v in vectors]
+    errors = [PathError(position=tuple(v[:3]), velocity=tuple(v[3:6])) for v in vectors]
     effect = study.collection.effect(Errors(transmitter=errors[0], receiver=errors[1]))
     return np.array([effect.quadratic, effect.cubic, *effect.displacement])
 
@@ -163,7 +163,7 @@ def test_simulated_is_the_most_probable_error_of_one_sigma_of_phase() -> None:
     )
     mission = parse_mission(text)
     one_sigma = row(check_mission(mission, TODAY), "receiver.quadratic_phase_error").declared
-    assert simulate_point(mission).effect.quadratic == pytest.approx(one_sigma, rel=0.01)
+    assert images_of(text, rotated_only=True).effect.quadratic == pytest.approx(one_sigma, rel=0.01)
 
 
 def test_simulated_common_errors_add_to_the_platforms_own() -> None:
@@ -171,6 +171,6 @@ def test_simulated_common_errors_add_to_the_platforms_own() -> None:
     common = {"common_motion_error": {"velocity": ["5 mm/s", 0, 0]}}
     twice = {"platforms__receiver__motion_error": {"velocity": ["10 mm/s", 0, 0]}}
     t = {"platforms__transmitter__motion_error": {"velocity": ["5 mm/s", 0, 0]}}
-    both = simulate_point(parse_mission(mission_text(**own, **common))).effect
-    same = simulate_point(parse_mission(mission_text(**twice, **t))).effect
+    both = images_of(mission_text(**own, **common), rotated_only=True).effect
+    same = images_of(mission_text(**twice, **t), rotated_only=True).effect
     assert (both.quadratic, *both.displacement) == pytest.approx((same.quadratic, *same.displacement))

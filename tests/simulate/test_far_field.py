@@ -12,9 +12,10 @@ from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.simulate.far_field import far_field_filter, look_sum, polar_format
 from bisar_budget.simulate.image_formation import backprojection, ground_grid, matched_filter
-from bisar_budget.simulate.phase_history import MotionError
+from bisar_budget.simulate.phase_history import PathError
 from tests.simulate.conftest import Collection, collection, measured_phase
 
+pytestmark = pytest.mark.extras
 needs_finufft = pytest.mark.skipif(
     importlib.util.find_spec("finufft") is None, reason="the NUFFT needs finufft, extra fast"
 )
@@ -174,13 +175,13 @@ class TestPolarFormat:
         c = collection(squint)
         look, n = c.geometry.look_azimuth, 192
         size = (60.0, c.cross_range_resolution / 2.5 * n)
-        error = MotionError(acceleration=tuple(1e-3 * u for u in c.geometry.receiver.look))
+        error = PathError(acceleration=tuple(1e-3 * u for u in c.geometry.receiver.look))
         measured = []
         for form in (
             lambda history: backprojection(history, ground_grid((0, 0), look, size, (160, n))[80]),
             lambda history: polar_format(history, look, size, (160, n)).image[80],
         ):
-            cuts = [form(c.record([0, 0, 0], receiver=e)) for e in (error, MotionError())]
+            cuts = [form(c.record([0, 0, 0], receiver=e)) for e in (error, PathError())]
             measured.append(measured_phase(c, *cuts, size[1] / n))
         assert measured[1] == pytest.approx(measured[0], rel=0.02)
         fine = polar_format(c.record([0, 0, 0]), look, (60.0, 400.0), (160, 1200)).frequency_y

@@ -3,36 +3,38 @@
 import math
 import re
 import tracemalloc
+from functools import cache
 
 import numpy as np
 import pytest
 
 from bisar_budget.cli.simulate import simulate
-from bisar_budget.mission.load import load_mission, parse_mission
-from bisar_budget.report import point_plot
-from bisar_budget.report.point_figures import Picture, rotated_back, sheet
+from bisar_budget.mission.load import parse_mission
+from bisar_budget.report.drawing import point_plot
+from bisar_budget.report.drawing.point_figures import ImagePanel, rotated_back, sheet
+from bisar_budget.simulate import point as point_module
 from bisar_budget.simulate.former import IMAGE_FORMERS
 from bisar_budget.simulate.image_formation import ground_grid
-from bisar_budget.simulate.point import simulate_point
+from bisar_budget.simulate.point import PointImages, simulate_point
 from bisar_budget.simulate.resampling import resampled
 from bisar_budget.simulate.targets import Target, Targets, parse_targets
 from tests.conftest import ROOT, mission_text
+from tests.simulate.conftest import images_of
 
 SECTION_V = ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml"
 # Nothing about these three is the same after a transposition, a mirror or a half turn.
 THREE = Targets((Target(0, 0, 0), Target(9, 2, -3), Target(-1, 6, -6)))
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def polar():
-    return simulate_point(load_mission(str(SECTION_V), "full"), image_former="polar_format")
+    return images_of(SECTION_V.read_text(encoding="utf-8"), "full", image_former="polar_format")
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def moved():
-    """The receiver is measured 5 m too far along its track, besides the acceleration."""
-    error = {"position": [1, 5, 2]}
-    return simulate_point(parse_mission(mission_text(platforms__transmitter__motion_error=error)))
+    """The transmitter is measured 5 m too far along its track, besides other errors."""
+    return images_of(mission_text(platforms__transmitter__motion_error={"position": [1, 5, 2]}))
 
 
 def indicated(mission, time: float, step: float = 1e-3):
@@ -77,8 +79,8 @@ class TestFigure4:
     @pytest.mark.parametrize("error", [{"acceleration": [5e-3, 0, 0]}, {"position": [1, 5, 2]}, {"velocity": 0.01}])
     def test_its_points_are_where_exact_ranges_have_value_and_slope(self, error) -> None:
         """First order in the way from the displaced point to them, at most a metre of 8 km: 1e-4 of it."""
-        mission = parse_mission(mission_text(platforms__transmitter__motion_error=error, allocation__model="full"))
-        images = simulate_point(mission)
+        text = mission_text(platforms__transmitter__motion_error=error, allocation__model="full")
+        mission, images = parse_mission(text), images_of(text, rotated_only=True)
         want = np.array([indicated(mission, tau) for tau in (-2.0, 0.0, 2.0)])
         assert images.points == pytest.approx(want, abs=1e-3)
 
@@ -99,13 +101,13 @@ class TestFigure3:
         assert drawn.range_error_mm == pytest.approx(-2.5 * 30.414 / 31.0 * drawn.slow_time**2, abs=0.02)
 
 
-def centres(picture: Picture):
+def centres(picture: ImagePanel):
     return (
         picture.corners[1:, 1:] + picture.corners[:-1, 1:] + picture.corners[1:, :-1] + picture.corners[:-1, :-1]
     ) / 4
 
 
-def summit(picture: Picture, near) -> tuple[np.ndarray, float]:
+def summit(picture: ImagePanel, near) -> tuple[np.ndarray, float]:
     """Place and level of the highest pixel within 1.5 m, between pixels by a parabola each way."""
     places = centres(picture)
     away = np.hypot(*np.moveaxis(places - near, -1, 0))
@@ -122,11 +124,14 @@ def summit(picture: Picture, near) -> tuple[np.ndarray, float]:
 
 class TestPictures:
     @pytest.mark.parametrize("image_former", ["backprojection", "polar_format", "far_field"])
-    def test_targets_stand_where_they_are_in_every_picture(self, image_former: str) -> None:
+    def test_targets_stand_where_they_are_in_every_picture(self, monkeypatch, image_former: str) -> None:
         """No error: places to a fifth of a drawn pixel, half of which the extents used to be off; levels to 0.5 dB.
 
         Far from the centre plane waves put a point |x|²/2R away: 5 mm at 9 m of 8 km.
         """
+        # A narrow margin: the sums of (12) take a microsecond a pixel and pulse.
+        monkeypatch.setattr(point_module, "_MARGIN_CELLS", 6)
+        monkeypatch.setattr(point_module, "_MIN_PULSES", 128)
         images = simulate_point(parse_mission(mission_text()), image_former=image_former, targets=THREE)
         drawn = sheet(images)
         look = math.atan2(6 / math.sqrt(76), 30 / math.sqrt(936) + 6 / math.sqrt(76))  # (11) of the base mission
@@ -177,8 +182,8 @@ class TestPictures:
     def test_rotated_back_is_the_image_without_error(self) -> None:
         """Autofocus in (x′, y′), then back to (x, y): within 3 % of the image that never had the error."""
         error = {"acceleration": [5e-3, 0, 0]}
-        images = simulate_point(parse_mission(mission_text(platforms__transmitter__motion_error=error)))
-        clean = simulate_point(parse_mission(mission_text()))
+        images = images_of(mission_text(platforms__transmitter__motion_error=error))
+        clean = images_of(mission_text())
         middle = clean.scene_grid[60:-60, 60:-60]
         want = np.abs(clean.in_scene[60:-60, 60:-60])
         # Autofocus keeps the place of the smear's centre of gravity, 4 mm from the true place, 1 % of a cell.
@@ -231,7 +236,7 @@ class TestDrawing:
 
     def test_a_target_that_is_far_away_is_pointed_at(self, tmp_path) -> None:
         error = {"position": [0, 400, 0]}
-        images = simulate_point(parse_mission(mission_text(platforms__transmitter__motion_error=error)))
+        images = images_of(mission_text(platforms__transmitter__motion_error=error))
         page = point_plot.figure(sheet(images), "title")
         said = [text.get_text() for panel in page.axes for text in panel.texts]
         away = np.hypot(*images.points[1])
@@ -245,30 +250,47 @@ class TestDrawing:
         assert (tmp_path / "one.png").stat().st_size > 1000
 
 
+SHORT = {"collection__aperture_time": "1 s", "radar__bandwidth": "20 MHz"}
+
+
+@cache
+def of_a_short_aperture(image_former: str) -> tuple[PointImages, int]:
+    """Images from as few pulses as the patch takes, once by each image former, and the peak of memory. [B]"""
+    mission = parse_mission(mission_text(**SHORT))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(point_module, "_MIN_PULSES", 64)
+        tracemalloc.start()
+        try:
+            images = simulate_point(mission, image_former=image_former)
+            peak = tracemalloc.get_traced_memory()[1]
+        finally:
+            tracemalloc.stop()
+    return images, peak
+
+
 class TestImageFormers:
     def test_all_of_them_show_section_v(self, polar) -> None:
         """The smear costs 5.7 dB and autofocus takes it back; polar format trims the aperture a little."""
         for name in IMAGE_FORMERS:
             if name == "matched_filter":
                 continue  # below, on fewer pixels
-            images = (
-                simulate_point(load_mission(str(SECTION_V)), image_former=name) if name != "polar_format" else polar
-            )
+            text = SECTION_V.read_text(encoding="utf-8")
+            images = images_of(text, image_former=name, rotated_only=True) if name != "polar_format" else polar
             clean = images.clean_response.peak
             assert 20 * math.log10(images.response.peak / clean) == pytest.approx(-5.7, abs=0.1)
             assert 20 * math.log10(images.focused_response.peak / clean) == pytest.approx(0, abs=0.1)
 
+    @pytest.mark.xdist_group("short_aperture")
     def test_the_matched_filter_is_backprojection(self) -> None:
-        short = {"collection__aperture_time": "1 s", "radar__bandwidth": "20 MHz"}
-        mission = parse_mission(mission_text(**short))
-        images = [simulate_point(mission, image_former=name) for name in ("matched_filter", "backprojection")]
+        images = [of_a_short_aperture(name)[0] for name in ("matched_filter", "backprojection")]
         for name in ("in_scene", "rotated"):
             assert np.abs(getattr(images[0], name) - getattr(images[1], name)).max() < 1e-5  # -100 dB
 
-    def test_plane_waves_put_a_far_point_elsewhere_and_it_is_there(self) -> None:
+    def test_plane_waves_put_a_far_point_elsewhere_and_it_is_there(self, monkeypatch) -> None:
         """What (5) drops, |x across the leg|²/2R, is range: it displaces along x′, and the image has it there."""
         east, north = -100.0, 200.0
         mission = parse_mission(mission_text())
+        monkeypatch.setattr(point_module, "_MIN_PULSES", 64)
         images = simulate_point(mission, image_former="far_field", targets=Targets((Target(east, north),)))
         (one,) = images.responses
         legs = [np.array(p.position) for p in (mission.geometry.transmitter, mission.geometry.receiver)]
@@ -298,20 +320,15 @@ class TestImageFormers:
         assert result.exit_code == 2
         assert "polar format cannot form this image: no rectangle" in result.stderr
 
+    @pytest.mark.xdist_group("short_aperture")
     @pytest.mark.parametrize("name", IMAGE_FORMERS)
-    def test_their_memory_is_estimated_and_the_estimate_holds(self, run, tmp_path, name: str) -> None:
+    def test_their_memory_is_estimated_and_the_estimate_holds(self, run, tmp_path, monkeypatch, name: str) -> None:
+        _, peak = of_a_short_aperture(name)
+        monkeypatch.setattr(point_module, "_MIN_PULSES", 64)
         small = tmp_path / "small.yaml"
-        short = {"collection__aperture_time": "1 s", "radar__bandwidth": "20 MHz"}
-        small.write_text(mission_text(simulation={"memory_limit": "1 MB"}, **short), encoding="utf-8")
+        small.write_text(mission_text(simulation={"memory_limit": "1 MB"}, **SHORT), encoding="utf-8")
         said = run("simulate", small, "--image-former", name).stderr
         estimate = 1e6 * float(re.search(r"need about ([\d.]+) MB", said)[1])
-        mission = parse_mission(mission_text(**short))
-        tracemalloc.start()
-        try:
-            simulate_point(mission, image_former=name)
-            peak = tracemalloc.get_traced_memory()[1]
-        finally:
-            tracemalloc.stop()
         assert peak < estimate
 
     def test_the_command_knows_all_of_them(self) -> None:
@@ -370,17 +387,17 @@ class TestTargets:
     def test_clutter_has_the_power_it_is_given(self) -> None:
         """Mean power of pixels over some 600 cells: 4 % rms, held to four of them."""
         weak = Targets((Target(0, 0, -60),), clutter_db=-20)
-        images = simulate_point(parse_mission(mission_text()), targets=weak)
+        images = images_of(mission_text(), targets=weak, rotated_only=True)
         inner = np.abs(images.error_free[15:-15, 15:-15]) ** 2
         assert inner.mean() == pytest.approx(1e-2, rel=0.16)
-        again = simulate_point(parse_mission(mission_text()), targets=weak)
+        again = images_of.__wrapped__(mission_text(), targets=weak, rotated_only=True)
         assert np.array_equal(images.rotated, again.rotated)
-        other = simulate_point(parse_mission(mission_text(simulation={"seed": 2})), targets=weak)
+        other = images_of(mission_text(simulation={"seed": 2}), targets=weak, rotated_only=True)
         assert not np.allclose(images.rotated, other.rotated)
 
     def test_targets_close_together_are_not_measured(self) -> None:
         """Half a cell apart they are one response; nothing is claimed that cannot be read."""
-        images = simulate_point(parse_mission(mission_text()), targets=parse_targets("0,0;0.1,0.1"))
+        images = images_of(mission_text(), targets=parse_targets("0,0;0.1,0.1"), rotated_only=True)
         assert len(images.responses) == 2
         text = point_plot.summary(images, parse_mission(mission_text()))
         assert all(len(line) <= 80 for line in text.splitlines())
@@ -389,6 +406,6 @@ class TestTargets:
 def test_a_smear_over_most_of_the_patch_is_measured() -> None:
     """Its peak lies at one end of 34 cells; the cut wrapped around, and the command ended with an error."""
     error = {"acceleration": [5e-3, 0, 0], "velocity": [2, 5, 2]}
-    images = simulate_point(parse_mission(mission_text(platforms__transmitter__motion_error=error)))
+    images = images_of(mission_text(platforms__transmitter__motion_error=error), rotated_only=True)
     assert abs(images.effect.quadratic) > 40
     assert images.response.peak < 0.2

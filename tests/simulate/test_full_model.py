@@ -6,14 +6,14 @@ import math
 import numpy as np
 import pytest
 
-from bisar_budget.budget.analysis import Analysis
+from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.check import check_mission
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.errors import MissionError
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.simulate.exact import exact_effect
 from bisar_budget.simulate.phase_history import cell_centres, path
-from bisar_budget.simulate.verify import Study, verify_mission
+from bisar_budget.verify.limits import Study, verify_mission
 from tests.conftest import ROOT, TODAY, findings, mission_text
 from tests.conftest import row as row_of
 from tests.simulate.conftest import collection, platform
@@ -44,7 +44,7 @@ def random_missions(count: int, seed: int, climbing: bool = True):
             yield mission
 
 
-@pytest.mark.parametrize("squint", [0, 15, 30, 45, 60])
+@pytest.mark.parametrize("squint", [0, 45])
 def test_images_at_the_full_limits_show_their_budgets(squint: float) -> None:
     """Each axis of velocity and acceleration, both platforms, each error at its full limit: within 5 %."""
     geometry = collection(squint).geometry

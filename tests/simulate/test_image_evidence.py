@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.findings import Report
-from bisar_budget.budget.images import FLOOR_DB, ImageEvidence, Verdict
 from bisar_budget.budget.verdicts import rows_worth_showing
 from bisar_budget.cli.check import check_all
+from bisar_budget.findings.images import FLOOR_DB, ImageEvidence, Verdict
+from bisar_budget.findings.mission import Report
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.report import Style, render
 from bisar_budget.simulate.collection import RANGE_CELLS, Errors
-from bisar_budget.simulate.image_evidence import _point_image, form_image_evidence
-from bisar_budget.simulate.verify import Study, verify_mission
+from bisar_budget.verify.evidence import _point_image, form_image_evidence
+from bisar_budget.verify.limits import Study, verify_mission
 from tests.conftest import ROOT, TODAY, findings, mission_text
 
 SECTION_V = ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml"

@@ -8,8 +8,10 @@ import pytest
 from bisar_budget.simulate.exact import exact_effect
 from bisar_budget.simulate.image_formation import backprojection, ground_grid, matched_filter, taylor_window
 from bisar_budget.simulate.impulse_response import impulse_response, upsampled
-from bisar_budget.simulate.phase_history import MotionError, Sinusoid, cell_centres, path, phase_history
+from bisar_budget.simulate.phase_history import PathError, PathSinusoid, cell_centres, path, phase_history
 from tests.simulate.conftest import Collection, collection
+
+pytestmark = pytest.mark.extras
 
 
 def cut_through(c: Collection, history, centre, count: int = 96, oversampling: float = 2.5):
@@ -25,7 +27,7 @@ class TestPhaseHistory:
 
     def test_phase_of_1_and_2_at_one_sample(self, broadside: Collection) -> None:
         """By hand for one pulse and frequency: −2πf(d_t + d_r − d̂_t − d̂_r)/c."""
-        error = MotionError(position=(0.3, -0.1, 0.2))
+        error = PathError(position=(0.3, -0.1, 0.2))
         history = broadside.record([5.0, -7.0, 1.0], [2j], transmitter=error)
         state, other = broadside.geometry.transmitter, broadside.geometry.receiver
         tau = broadside.slow_time[17]
@@ -65,14 +67,14 @@ class TestPhaseHistory:
 
     def test_vibration_is_along_the_line_of_sight(self, broadside: Collection) -> None:
         state = broadside.geometry.receiver
-        error = MotionError(sinusoids=(Sinusoid(amplitude=1e-3, frequency=2.0, phase=0.4),))
+        error = PathError(sinusoids=(PathSinusoid(amplitude=1e-3, frequency=2.0, phase=0.4),))
         flown = path(state, broadside.slow_time, error)
         along = np.linalg.norm(flown.measured, axis=1) - np.linalg.norm(flown.actual, axis=1)
         assert np.allclose(along, 1e-3 * np.sin(2 * math.pi * 2.0 * broadside.slow_time + 0.4), atol=1e-9)
 
     def test_wideband_vibration_needs_a_generator(self, broadside: Collection) -> None:
         with pytest.raises(ValueError, match="generator"):
-            path(broadside.geometry.receiver, broadside.slow_time, MotionError(wideband_rms=1e-3))
+            path(broadside.geometry.receiver, broadside.slow_time, PathError(wideband_rms=1e-3))
 
     @pytest.mark.parametrize("pulses", [255, 256])
     @pytest.mark.parametrize("band", [None, (0.0, 100.0), (3.0, 8.0), (20.0, 21.4)])
@@ -80,7 +82,7 @@ class TestPhaseHistory:
         """Frequencies are 1/6 Hz apart, up to 21.3 Hz; 200 draws know a variance to 1 % at the least."""
         c = collection(pulses=pulses)
         rng = np.random.default_rng(5)
-        error = MotionError(wideband_rms=1e-3, wideband_band=band)
+        error = PathError(wideband_rms=1e-3, wideband_band=band)
         power = np.zeros(pulses // 2 + 1)
         for _ in range(200):
             flown = path(c.geometry.receiver, c.slow_time, error, rng)
@@ -94,7 +96,7 @@ class TestPhaseHistory:
         assert outside.sum() < 1e-9 * power.sum()
 
     def test_a_band_between_the_frequencies_of_the_pulses_is_refused(self, broadside: Collection) -> None:
-        error = MotionError(wideband_rms=1e-3, wideband_band=(50.0, 60.0))
+        error = PathError(wideband_rms=1e-3, wideband_band=(50.0, 60.0))
         with pytest.raises(ValueError, match="holds no frequency of the pulses"):
             path(broadside.geometry.receiver, broadside.slow_time, error, np.random.default_rng(1))
 
@@ -233,7 +235,7 @@ class TestImpulseResponse:
 
 
 class TestExactEffect:
-    def effect(self, c: Collection, **errors: MotionError):
+    def effect(self, c: Collection, **errors: PathError):
         return exact_effect(c.slow_time, *c.paths(**errors), 0.0, c.wavelength, c.aperture_time)
 
     def test_no_error_has_no_effect(self, broadside: Collection) -> None:
@@ -243,7 +245,7 @@ class TestExactEffect:
 
     def test_acceleration_is_table_ii_row_4(self, broadside: Collection) -> None:
         state, size = broadside.geometry.transmitter, 1e-3
-        effect = self.effect(broadside, transmitter=MotionError(acceleration=(size, 0, 0)))
+        effect = self.effect(broadside, transmitter=PathError(acceleration=(size, 0, 0)))
         want = math.pi * size * state.position[0] * 36 / (4 * broadside.wavelength * state.slant_range)
         assert effect.quadratic == pytest.approx(-want, rel=2e-3)  # signed: a growing range error is negative
 
@@ -255,7 +257,7 @@ class TestExactEffect:
 
     def test_height_error_of_both_platforms_is_a_height_of_the_scene(self, broadside: Collection) -> None:
         """Platforms measured h too high see the scene h too high: |r| = |r̂ - h|, a scatterer up there."""
-        up = MotionError(position=(0.0, 0.0, 10.0))
+        up = PathError(position=(0.0, 0.0, 10.0))
         effect = self.effect(broadside, transmitter=up, receiver=up)
         history = broadside.record([0, 0, 10.0])
         there = backprojection(history, np.array([*effect.displacement, 0.0]))
@@ -263,7 +265,7 @@ class TestExactEffect:
 
 
 def test_displaced_points_peak_where_exact_ranges_say(broadside: Collection) -> None:
-    error = MotionError(velocity=(0.02, 0.01, 0.0), position=(1.0, -2.0, 0.5))
+    error = PathError(velocity=(0.02, 0.01, 0.0), position=(1.0, -2.0, 0.5))
     effect = exact_effect(broadside.slow_time, *broadside.paths(receiver=error), 0.0, broadside.wavelength, 6.0)
     grid = ground_grid(effect.displacement, broadside.geometry.look_azimuth, (2.0, 2.0), (21, 21))
     image = np.abs(backprojection(broadside.record([0, 0, 0], receiver=error), grid))

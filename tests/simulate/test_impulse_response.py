@@ -250,6 +250,7 @@ class TestChip:
             impulse_response_2d(image[0], (spacing, spacing))
 
 
+@pytest.mark.extras
 class TestAgainstPerseo:
     """perseo-quality 1.1 counts sidelobes to 5 (PSLR) and 10 (ISLR) half-power widths, outside the nulls it finds.
 

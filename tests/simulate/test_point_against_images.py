@@ -11,6 +11,7 @@ from bisar_budget.simulate import point as point_module
 from bisar_budget.simulate.impulse_response import upsampled
 from bisar_budget.simulate.point import simulate_point
 from tests.conftest import ROOT, mission_text
+from tests.simulate.conftest import images_of
 
 MISSIONS = ROOT / "specs" / "missions"
 
@@ -64,8 +65,8 @@ SQUINTED = {
 def test_points_of_29_are_where_each_third_of_the_aperture_puts_the_response(case: str) -> None:
     """An image from the pulses of a third alone, against that from the middle third: side, distance and direction."""
     text = (MISSIONS / "rigling_moses_section_v.yaml").read_text(encoding="utf-8")
-    mission = parse_mission(text if case == "Section V" else mission_text(**SQUINTED), model="full")
-    images = simulate_point(mission)
+    text = text if case == "Section V" else mission_text(**SQUINTED)
+    mission, images = parse_mission(text, model="full"), images_of(text, "full", rotated_only=True)
     T, moved = mission.collection.aperture_time, images.effect.displacement
     seen = np.array([peak_of_part(mission, -T / 2 + i * T / 3, -T / 2 + (i + 1) * T / 3, moved) for i in range(3)])
     assert np.hypot(*(seen[2] - seen[0])) > 1.0
@@ -77,9 +78,8 @@ def test_points_of_29_are_where_each_third_of_the_aperture_puts_the_response(cas
 def test_the_clock_of_a_simulated_image_has_the_coverage_factor() -> None:
     """π/4 by t̃₂ alone, π f₀ t̃₂ T²/2; twice that costs 0.97 dB and raises the sidelobes to -9.04 dB."""
     quadratic = (math.pi / 4) * 2 / (math.pi * 10e9 * 36)
-    images = simulate_point(
-        parse_mission(mission_text(timing_error={"quadratic": quadratic}, allocation={"coverage_factor": 2}))
-    )
+    text = mission_text(timing_error={"quadratic": quadratic}, allocation={"coverage_factor": 2})
+    images = images_of(text, rotated_only=True)
     assert abs(images.effect.quadratic) == pytest.approx(math.pi / 2, rel=0.01)
     loss = 20 * math.log10(images.response.peak / images.clean_response.peak)
     assert loss == pytest.approx(-0.97, abs=0.02)
@@ -105,7 +105,7 @@ def test_autofocus_never_beats_the_error_free_image_within_the_aperture(path) ->
 
     Close to a platform the image carries a chirp; taken for a phase error it gave 0.6 dB more than there is.
     """
-    images = simulate_point(load_mission(str(path)))
+    images = images_of(path.read_text(encoding="utf-8"), rotated_only=True)
     band = aperture_of(images.error_free)
     gain = in_band_peak(images.focused, band) / in_band_peak(images.error_free, band)
     assert 20 * math.log10(gain) < 0.005
@@ -119,6 +119,7 @@ def test_a_peak_above_the_error_free_one_is_what_the_patch_cuts_off(monkeypatch)
     loses 0.005 dB, and where the border is twice as far the excess is a quarter.
     """
     mission = load_mission(str(MISSIONS / "rigling_moses_section_v.yaml"))
+    monkeypatch.setattr(point_module, "_SCENE_PIXELS", 1 << 10)
     gains = []
     for margin in (16, 32):
         monkeypatch.setattr(point_module, "_MARGIN_CELLS", margin)

@@ -5,18 +5,18 @@ import math
 import numpy as np
 import pytest
 
-from bisar_budget.budget.analysis import Analysis
+from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.scene import ScenePhases, _where, at
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.models import QUADRATIC
-from bisar_budget.budget.scene import ScenePhases, _where, at
+from bisar_budget.effects.models import QUADRATIC
 from bisar_budget.errors import MissionError
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.simulate.aperture_reading import read_aperture
 from bisar_budget.simulate.collection import RANGE_CELLS
 from bisar_budget.simulate.exact import exact_effect
 from bisar_budget.simulate.phase_history import cell_centres, path
-from bisar_budget.simulate.verify import Study
+from bisar_budget.verify.aperture_reading import read_aperture
+from bisar_budget.verify.limits import Study
 from tests.conftest import TODAY, findings, mission_text, row
 from tests.simulate.conftest import collection
 

@@ -5,25 +5,33 @@ import json
 import math
 import re
 from datetime import date
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.images import Verdict, VerifiedMission
 from bisar_budget.budget.verdicts import with_verdicts
+from bisar_budget.cli import cli
+from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.simulate import collection as collection_module
 from bisar_budget.simulate.exact import NoGroundPointError
 from bisar_budget.simulate.image_formation import backprojection
-from bisar_budget.simulate.study import Study
-from bisar_budget.simulate.verify import rows_to_verify, verify_mission
+from bisar_budget.verify.limits import rows_to_verify, verify_mission
+from bisar_budget.verify.study import Study
 from tests import families
 from tests.conftest import ROOT, findings, mission_text
 from tests.conftest import row as row_of
 
 SECTION_V = ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml"
+
+
+@cache
+def verified_section_v() -> dict[str, Verdict]:
+    """Every row of the paper's example that has an image, by its id: verified once, by one process."""
+    return {row.id: row for row in verify_mission(load_mission(str(SECTION_V))).rows}
 
 
 def verdicts(only: str = "*", **changes):
@@ -48,7 +56,7 @@ def test_the_scenes_edge_has_a_reason() -> None:
 
 
 def test_acceleration_and_clock_limits_of_section_v() -> None:
-    rows = {row.id: row for row in verify_mission(load_mission(str(SECTION_V))).rows}
+    rows = verified_section_v()
     assert set(rows) == {
         "transmitter.velocity.y", "transmitter.acceleration.x", "transmitter.acceleration.z",
         "receiver.velocity.x", "receiver.velocity.y",
@@ -62,7 +70,7 @@ def test_acceleration_and_clock_limits_of_section_v() -> None:
 
 def test_acceleration_limits_are_true_and_the_receivers_velocity_limit_is_not() -> None:
     """At broadside the displacement adds 6 % for the receiver along y, and takes as much along x."""
-    rows = {row.id: row for row in verify_mission(load_mission(str(SECTION_V)), "receiver.*").rows}
+    rows = verified_section_v()
     assert rows["receiver.acceleration.x"].verdict == "confirmed"
     assert rows["receiver.velocity.y"].verdict == "optimistic"
     assert rows["receiver.velocity.x"].verdict == "conservative"
@@ -411,8 +419,9 @@ def test_verdicts_do_not_depend_on_the_number_of_processes() -> None:
     mission = load_mission(str(SECTION_V))
     seen: list[str] = []
     both = verify_mission(mission, "receiver.*", 2, seen.append)
-    assert both == verify_mission(mission, "receiver.*")
-    assert seen == [row.id for row in both.rows]
+    alone = verified_section_v()
+    assert both.rows == tuple(alone[row.id] for row in both.rows)
+    assert seen == [row.id for row in both.rows] == [row_id for row_id in alone if row_id.startswith("receiver.")]
 
 
 def _verified(*rows: Verdict) -> VerifiedMission:
@@ -460,10 +469,20 @@ class TestNothingVerified:
         assert with_verdicts(declared, confirmed).status == declared.status == "pass"
 
 
+@pytest.fixture(scope="module")
+def reports(tmp_path_factory):
+    """Section V checked with images once, in every format that is read here."""
+    folder = tmp_path_factory.mktemp("verified")
+    names = [folder / f"r.{suffix}" for suffix in ("txt", "csv", "json")]
+    options = [part for name in names for part in ("--report", str(name))]
+    CliRunner().invoke(cli, ["check", str(SECTION_V), "--verify", *options])
+    return [name.read_text(encoding="utf-8") for name in names]
+
+
+@pytest.mark.xdist_group("section_v_with_images")
 class TestCheckWithImages:
-    def test_json_carries_the_verdicts_and_a_row_says_when_its_limit_is_optimistic(self, run) -> None:
-        result = run("check", SECTION_V, "--verify", "--format", "json")
-        (mission,) = json.loads(result.stdout)["missions"]
+    def test_json_carries_the_verdicts_and_a_row_says_when_its_limit_is_optimistic(self, reports) -> None:
+        (mission,) = json.loads(reports[2])["missions"]
         verdict = {row["id"]: row["verdict"] for row in mission["verification"]}
         assert verdict["receiver.velocity.y"] == "optimistic"
         row = next(row for row in mission["rows"] if row["id"] == "receiver.velocity.y")
@@ -538,9 +557,9 @@ class TestCheckWithImages:
         ]
         assert "-17.0 dB" in warning.message
 
-    def test_text_and_csv_show_them(self, run) -> None:
-        assert "Images with each error at its limit" in run("check", SECTION_V, "--verify").stdout
-        table = csv.DictReader(run("check", SECTION_V, "--verify", "--format", "csv").stdout.splitlines())
+    def test_text_and_csv_show_them(self, reports) -> None:
+        assert "Images with each error at its limit" in reports[0]
+        table = csv.DictReader(reports[1].splitlines())
         (verdict,) = [row["verdict"] for row in table if row["id"] == "receiver.velocity.y"]
         assert verdict == "optimistic"
 
@@ -590,6 +609,7 @@ class TestCommand:
         assert json.loads((tmp_path / "v.json").read_text())["missions"]
 
 
+@pytest.mark.extras
 def test_compiled_and_numpy_images_give_the_same_verdicts(monkeypatch) -> None:
     pytest.importorskip("numba", reason="the extra `fast` is not installed")
     mission = load_mission(str(SECTION_V.with_name("rigling_moses_section_v_autofocus.yaml")))

@@ -5,9 +5,9 @@ import math
 import pytest
 
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.simulate.point import simulate_point
-from bisar_budget.simulate.verify import verify_mission
+from bisar_budget.verify.limits import verify_mission
 from tests.conftest import findings, mission_text, row
+from tests.simulate.conftest import images_of
 
 
 def lines(*amplitudes, cycles: float = 10.3):
@@ -72,7 +72,7 @@ def test_a_vector_is_in_the_data_as_its_part_along_the_line_of_sight() -> None:
     vector = {"frame": "track", **lines(["3 mm", "2 mm", "1 mm"])}
     projected = row(findings(platforms__receiver__motion_error=vector), "receiver.vibration.sinusoidal.0").declared
     images = [
-        simulate_point(parse_mission(mission_text(platforms__receiver__motion_error=error)))
+        images_of(mission_text(platforms__receiver__motion_error=error), rotated_only=True)
         for error in (vector, lines(projected))
     ]
     assert 1e-3 < projected < 3e-3

@@ -12,7 +12,7 @@ from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.simulate.far_field import far_field_filter
 from bisar_budget.simulate.image_formation import matched_filter
-from bisar_budget.simulate.phase_history import MotionError, PhaseHistory, path, phase_history
+from bisar_budget.simulate.phase_history import PathError, PhaseHistory, path, phase_history
 from bisar_budget.theory import differential_range as dr
 from bisar_budget.theory import equations as paper
 from bisar_budget.theory.symbols import PLATFORMS, c, clock_coefficients, point, scatterer, tau
@@ -24,8 +24,8 @@ GEOMETRY = BistaticGeometry(
 )
 STATES = (GEOMETRY.transmitter, GEOMETRY.receiver)
 ERRORS = (
-    MotionError(position=(1.0, -2.0, 0.5), velocity=(0.02, 0.03, -0.01), acceleration=(0.004, -0.003, 0.002)),
-    MotionError(position=(-0.4, 0.7, 1.1), velocity=(-0.01, 0.04, 0.02), acceleration=(0.001, 0.005, -0.002)),
+    PathError(position=(1.0, -2.0, 0.5), velocity=(0.02, 0.03, -0.01), acceleration=(0.004, -0.003, 0.002)),
+    PathError(position=(-0.4, 0.7, 1.1), velocity=(-0.01, 0.04, 0.02), acceleration=(0.001, 0.005, -0.002)),
 )
 CLOCK = (2e-9, 1e-11, 3e-12, -4e-13)  # s, 1, 1/s, 1/s²
 FREQUENCY = 9.7e9 + np.array([0.0, 1e8, 2e8, 3e8])

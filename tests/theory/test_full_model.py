@@ -5,7 +5,7 @@ import pytest
 from sympy import Matrix, Rational, diff, simplify, sqrt
 
 from bisar_budget import evaluators
-from bisar_budget.budget.exact_ranges import ExactRanges
+from bisar_budget.effects.exact_ranges import ExactRanges
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.theory import differential_range as dr
 from bisar_budget.theory import full, published

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from bisar_budget import evaluators
-from bisar_budget.budget.effects import image_plane
-from bisar_budget.budget.exact_arrays import aperture_nodes
-from bisar_budget.budget.pieces import PRINTED, TRUE, Piece, gradients_of, indicated_point
+from bisar_budget.effects.effect import image_plane
+from bisar_budget.effects.exact_arrays import aperture_nodes
+from bisar_budget.effects.pieces import PRINTED, TRUE, LinePiece, gradients_of, indicated_point
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.mission.load import load_mission
 from bisar_budget.simulate.exact import exact_effect
-from bisar_budget.simulate.phase_history import MotionError, Path, path
+from bisar_budget.simulate.phase_history import Path, PathError, path
 from bisar_budget.theory import full, published
 from bisar_budget.theory.symbols import TRANSMITTER, T, islr, pslr, share, total_qpe, wavelength
 from tests.conftest import ROOT, findings, row
@@ -44,7 +44,7 @@ def test_the_first_column_of_the_inverse_is_small_beside_the_second() -> None:
 def test_the_second_column_hardly_turns_over_the_aperture() -> None:
     directions = []
     for tau in (-3.0, 3.0):
-        x, y = indicated_point(SECTION_V.geometry, Piece(tau, 0.0, 1.0), "full")
+        x, y = indicated_point(SECTION_V.geometry, LinePiece(tau, 0.0, 1.0), "full")
         directions.append(math.atan2(y, x))
     turned = math.degrees(abs(directions[1] - directions[0]))
     assert turned == pytest.approx(stated("turns by {}° over the aperture")[0], abs=0.05)
@@ -77,7 +77,7 @@ def test_the_limits_of_one_platform_at_both_ends_are_the_monostatic_rules_with_a
             assert row(found, f"{platform}.{name}").allowable_published == pytest.approx(rule, rel=1e-9)
 
 
-def seen_from(place: tuple[float, float], errors: tuple[MotionError | None, ...]) -> tuple[float, float, float]:
+def seen_from(place: tuple[float, float], errors: tuple[PathError | None, ...]) -> tuple[float, float, float]:
     """Displacement and QPE of a scatterer somewhere, by exact ranges, the origin moved onto it. [m], [rad]"""
     nodes, offset = aperture_nodes(6.0), np.array([*place, 0.0])
     paths = []
@@ -91,8 +91,8 @@ def seen_from(place: tuple[float, float], errors: tuple[MotionError | None, ...]
 @pytest.mark.parametrize(
     ("sentence", "errors"),
     [
-        ("the acceleration of Section V", (MotionError(acceleration=(0.005, 0.0, 0.0)), None)),
-        ("a velocity error of the receiver of 4 cm/s along x", (None, MotionError(velocity=(0.04, 0.0, 0.0)))),
+        ("the acceleration of Section V", (PathError(acceleration=(0.005, 0.0, 0.0)), None)),
+        ("a velocity error of the receiver of 4 cm/s along x", (None, PathError(velocity=(0.04, 0.0, 0.0)))),
     ],
 )
 def test_defocus_and_displacement_are_spatially_invariant_up_to_an_end(sentence: str, errors) -> None:
@@ -129,13 +129,13 @@ def test_29_has_the_printed_gradients_by_the_published_model_and_the_true_ones_b
     state = SECTION_V.geometry.transmitter
     beta_2 = -0.005 * state.position[0] / (2 * state.slant_range)  # Table I
     for tau, name in ((-2.0, "−2 s"), (2.0, "2 s")):
-        point = indicated_point(SECTION_V.geometry, Piece(tau, beta_2 * tau**2, 2 * beta_2 * tau), model)
+        point = indicated_point(SECTION_V.geometry, LinePiece(tau, beta_2 * tau**2, 2 * beta_2 * tau), model)
         # Of the difference over a second the third order remains: (vT/R)² of 1e-4.
         by_differences = inverse_of_q(tau, model) @ [beta_2 * tau**2, 2 * beta_2 * tau]
         assert point == pytest.approx(by_differences, abs=2e-4)
         numbers = stated(f"| {name} | ({{}}, {{}}) m | ({{}}, {{}}) m |")
         assert point == pytest.approx(numbers[2 * column : 2 * column + 2], abs=0.0005)
-    assert indicated_point(SECTION_V.geometry, Piece(0.0, 0.0, 0.0), model) == (0.0, 0.0)
+    assert indicated_point(SECTION_V.geometry, LinePiece(0.0, 0.0, 0.0), model) == (0.0, 0.0)
     assert gradients_of(model) == (TRUE if column else PRINTED)
 
 
@@ -155,7 +155,7 @@ def test_29_by_the_full_model_is_the_point_whose_range_changes_so() -> None:
         return total
 
     for model in ("published", "full"):
-        point = indicated_point(geometry, Piece(tau, value, slope), model)
+        point = indicated_point(geometry, LinePiece(tau, value, slope), model)
         got = (change(point, tau), (change(point, tau + 0.01) - change(point, tau - 0.01)) / 0.02)
         if model == "full":
             # What is left is the curvature of the wave, |x|²/2R for each leg.
@@ -165,7 +165,7 @@ def test_29_by_the_full_model_is_the_point_whose_range_changes_so() -> None:
 
 
 def test_29_seen_from_a_place_is_29_with_the_origin_there() -> None:
-    geometry, piece = SECTION_V.geometry, Piece(1.0, -0.01, -0.02)
+    geometry, piece = SECTION_V.geometry, LinePiece(1.0, -0.01, -0.02)
     east, north = 300.0, -200.0
     moved = [
         PlatformState(position=(s.position[0] - east, s.position[1] - north, s.position[2]), velocity=s.velocity)
@@ -201,7 +201,7 @@ def test_the_emitted_steps_are_the_derived_ones() -> None:
 
 def test_noise_of_first_principles_is_the_derived_root() -> None:
     """`spread_phase` needs a logarithm, which no emitted function has: its root is that of the derived row."""
-    from bisar_budget.budget.vibration import spread_phase
+    from bisar_budget.analysis.vibration_limits import spread_phase
 
     noise = full.vibration().rows[2].cells[1]
     want = float(noise.subs({islr: 0.2, share: 0.3, wavelength: 0.03}))

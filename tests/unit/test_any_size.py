@@ -21,7 +21,7 @@ from tests.reference import Error
 
 ROOT = Path(__file__).resolve().parents[2]
 SPECS = ROOT / "specs" / "missions"
-SEEDS, STEPS = 12, 40
+SEEDS, STEPS = 6, 40
 TANDEM_X = """schema_version: 1
 name: TanDEM-X on its circular orbit
 radar: {{ center_frequency: 9.65 GHz, bandwidth: 100 MHz }}

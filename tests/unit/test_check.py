@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.findings import exit_code
+from bisar_budget.findings.status import exit_code
 from bisar_budget.mission.load import parse_mission
 from tests.conftest import TODAY, findings, mission_text, row
 

@@ -292,6 +292,7 @@ def test_help_fits_the_terminal(run, command) -> None:
     assert max(map(len, result.stdout.splitlines())) <= 80
 
 
+@pytest.mark.xdist_group("derivation")
 class TestDerive:
     @pytest.mark.parametrize("format_name", ["text", "latex", "markdown", "mathml"])
     @pytest.mark.parametrize("table", ["I", "II", "vibration", "equations"])
@@ -338,10 +339,10 @@ class TestDerive:
     def test_mathml_of_a_double_sum_has_both_indices(self, run) -> None:
         assert run("derive", "--equation", "4", "--format", "mathml").stdout.count("<munderover>") == 2
 
-    def test_check_passes_on_the_committed_file(self, run) -> None:
+    def test_check_passes_on_the_committed_file(self, run, one_derivation) -> None:
         assert run("derive", "--check").exit_code == 0
 
-    def test_check_fails_on_a_changed_file_and_shows_where(self, run, tmp_path, monkeypatch) -> None:
+    def test_check_fails_on_a_changed_file_and_shows_where(self, run, tmp_path, monkeypatch, one_derivation) -> None:
         from bisar_budget.theory import emit, emit_catalogue
 
         for generated, old, new in ((emit, "0.25*shared_1", "0.26*shared_1"), (emit_catalogue, "{4", "{5")):

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bisar_budget.budget.combine import combine_displacements, combine_phases, largest_signed_sum
+from bisar_budget.effects.combine import combine_displacements, combine_phases, largest_signed_sum
 
 
 @pytest.mark.parametrize(("rule", "value"), [("each", 4), ("sum", 7), ("rss", 5)])

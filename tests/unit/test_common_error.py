@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from bisar_budget.budget.correlation import correlated_errors, likely_error
-from bisar_budget.budget.sources import error_sources
+from bisar_budget.effects.correlation import correlated_errors, likely_error
+from bisar_budget.effects.sources import error_sources
 from bisar_budget.mission.load import parse_mission
 from tests import reference
 from tests.conftest import findings, mission_text, row

@@ -13,8 +13,8 @@ import threading
 
 import pytest
 
-from bisar_budget.budget.findings import Report
 from bisar_budget.errors import MissionError
+from bisar_budget.findings.mission import Report
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.report import Style, render

@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.findings import MissionFindings
+from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.mission.load import load_mission
-from bisar_budget.report.drawings import geometry_elevation, geometry_plan
-from bisar_budget.report.svg import LINE_HEIGHT, Box, text_width
+from bisar_budget.report.drawing.drawings import geometry_elevation, geometry_plan
+from bisar_budget.report.drawing.svg import LINE_HEIGHT, Box, text_width
 from tests.conftest import ROOT, TODAY, findings
 
 SVG = "{http://www.w3.org/2000/svg}"

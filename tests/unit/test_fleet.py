@@ -6,7 +6,7 @@ import pytest
 
 from bisar_budget.budget import fleet
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.findings import Report
+from bisar_budget.findings.mission import Report
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.report import Style, render
 from tests import families
@@ -31,10 +31,10 @@ def files(tmp_path):
 
 @pytest.mark.parametrize("cores", [2, 3, 16])
 def test_every_format_says_the_same_for_any_number_of_processes(files, monkeypatch, cores: int) -> None:
-    one = fleet.check_files(files, DAY, None, fleet.without_mission)
+    one = fleet.check_files(files, DAY, None, fleet.without_analysis)
     monkeypatch.setattr(fleet, "MANY", 2)
     monkeypatch.setattr(fleet, "cores", lambda: cores)
-    several = fleet.check_files(files, DAY, None, fleet.without_mission)
+    several = fleet.check_files(files, DAY, None, fleet.without_analysis)
     assert [found.file for found in several] == files
     assert [found.status for found in several].count("error") == 2
     for format_name in ("text", "json", "sarif", "junit", "csv"):  # SARIF knows each value's column
@@ -44,8 +44,8 @@ def test_every_format_says_the_same_for_any_number_of_processes(files, monkeypat
 
 def test_standard_input_is_read_once_by_one_process(monkeypatch) -> None:
     monkeypatch.setattr(fleet, "MANY", 1)
-    monkeypatch.setattr(fleet, "_checked", lambda files, *how: list(files))
-    assert fleet.check_files(["a", "-", "b"], DAY, None, fleet.without_mission) == ["a", "-", "b"]
+    monkeypatch.setattr(fleet, "_of", lambda files, one: list(files))
+    assert fleet.check_files(["a", "-", "b"], DAY, None, fleet.without_analysis) == ["a", "-", "b"]
 
 
 def test_the_command_checks_a_fleet(run, files, monkeypatch) -> None:

@@ -13,9 +13,9 @@ from pathlib import Path
 import pytest
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.findings import Report
 from bisar_budget.cli.streams import harmless
 from bisar_budget.errors import MissionError
+from bisar_budget.findings.mission import Report
 from bisar_budget.mission.load import MAX_FAULTS, parse_mission
 from bisar_budget.report import FORMATS, Style, render
 from tests.conftest import ROOT, TODAY, findings, mission_text
@@ -109,7 +109,11 @@ class TestWorkers:
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGTERM") or sys.platform == "win32", reason="needs POSIX signals")
-def test_a_report_that_is_interrupted_leaves_the_old_one_and_nothing_else(tmp_path) -> None:
+@pytest.mark.parametrize(
+    ("command", "option", "name"),
+    [("check", "-o", "report.html"), ("simulate", "-o", "images.npz"), ("simulate", "--plot", "sheet.png")],
+)
+def test_a_report_that_is_interrupted_leaves_the_old_one_and_nothing_else(tmp_path, command, option, name) -> None:
     """The signal comes while the temporary file is written, wherever that is."""
     script = (
         "import os, signal, sys\n"
@@ -119,11 +123,11 @@ def test_a_report_that_is_interrupted_leaves_the_old_one_and_nothing_else(tmp_pa
         "os.chmod = lambda *a: (os.kill(os.getpid(), signal.SIGTERM), chmod(*a))\n"
         "main()\n"
     )
-    report = tmp_path / "report.html"
+    report = tmp_path / name
     report.write_text("old")
-    done = subprocess.run([sys.executable, "-c", script, "check", str(SECTION_V), "-o", str(report)], cwd=ROOT)
+    done = subprocess.run([sys.executable, "-c", script, command, str(SECTION_V), option, str(report)], cwd=ROOT)
     assert done.returncode == 143
-    assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
+    assert [path.name for path in tmp_path.iterdir()] == [name]
     assert report.read_text() == "old"
 
 

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bisar_budget.budget.images import ImageEvidence, PointImage, Verdict
-from bisar_budget.report.image_evidence import chip_caption, chip_png, chip_size, impulse_response_cuts
+from bisar_budget.findings.images import ImageEvidence, PointImage, Verdict
+from bisar_budget.report.drawing.evidence_drawings import chip_caption, chip_png, chip_size, impulse_response_cuts
 
 SVG = "{http://www.w3.org/2000/svg}"
 

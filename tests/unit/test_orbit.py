@@ -4,8 +4,9 @@ import re
 
 import pytest
 
-from bisar_budget.budget.findings import Report, exit_code
 from bisar_budget.budget.orbit import orbital_acceleration
+from bisar_budget.findings.mission import Report
+from bisar_budget.findings.status import exit_code
 from bisar_budget.report import FORMATS, Style, render
 from tests.conftest import ROOT, findings
 

@@ -1,56 +1,85 @@
-"""What the README shows is what the software does."""
+"""What the README shows is what the software does. Pages of `docs` are held to the same when the site is built."""
 
 import re
-import shlex
+from pathlib import Path
 
 import pytest
 
 from bisar_budget.cli.check import check
-from bisar_budget.report import FORMATS, format_of
+from bisar_budget.report import FORMATS
+from docs._ext.blocks import EXECUTED, ExampleError, Page, blocks
+from docs._ext.links import broken_links
 from tests.conftest import ROOT
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 FIGURES = (ROOT / "docs" / "section-v-figures.md").read_text(encoding="utf-8")
+PAGES = sorted((ROOT / "docs").rglob("*.md"))
 
 
-def blocks(language: str, page: str = README) -> list[str]:
-    return re.findall(rf"(?ms)^```{language}\n(.*?)^```", page)
+@pytest.fixture
+def page(tmp_path: Path) -> Page:
+    return Page(tmp_path)
 
 
-def shown() -> list[tuple[str, str]]:
-    """Console blocks: each `$ command` with the output under it."""
-    pairs = []
-    for block in blocks("console") + blocks("console", FIGURES):
-        for part in re.split(r"(?m)^\$ ", block)[1:]:
-            command, _, output = part.partition("\n")
-            pairs.append((command, output))
-    return pairs
+def test_the_examples_of_the_readme_do_what_it_says(page: Page) -> None:
+    executed = [(language, text) for language, text in blocks(README) if language in EXECUTED]
+    assert {"console", "yaml"} == {language for language, _ in executed}
+    for language, text in executed:
+        page.run(language, text)
 
 
-@pytest.mark.parametrize(
-    ("command", "output"), shown(), ids=lambda value: value.splitlines()[0][:50] if value else "-"
-)
-def test_console_examples(run, monkeypatch, command: str, output: str) -> None:
-    monkeypatch.chdir(ROOT)
-    program, *arguments = shlex.split(command)
-    assert program == "bisar-budget"
-    got = run(*arguments).stdout.splitlines()
-    want = output.rstrip("\n").splitlines()
-    if "..." not in want:
-        assert got == want
-        return
-    # `...` stands for lines left out.
-    position = 0
-    for line in want:
-        if line == "...":
-            continue
-        position = got.index(line, position) + 1
+class TestExamples:
+    """What runs the examples of the README and of the site says so when one does something else."""
+
+    def test_an_example_that_is_right_is_shown_as_it_stands(self, page: Page) -> None:
+        text = "$ printf 'a\\nb\\nc\\n'\na\n...\nc\n$ false\n$ echo $?\n1\n"
+        assert page.run("console", text) == text.rstrip("\n")
+
+    def test_an_output_that_is_not_stated_is_filled_in(self, page: Page) -> None:
+        assert page.run("console", "$ echo a b\n") == "$ echo a b\na b"
+
+    @pytest.mark.parametrize(
+        "stated", ["b\n", "a\n", "a\nb\nc\n", "...\na\n", "b\n...\n", "a\n...\na\n"], ids=lambda text: repr(text)
+    )
+    def test_another_output(self, page: Page, stated: str) -> None:
+        with pytest.raises(ExampleError, match="prints something else"):
+            page.run("console", f"$ printf 'a\\nb\\n'\n{stated}")
+
+    @pytest.mark.parametrize("text", ["$ false\n", "$ false\n$ echo a\na\n"])
+    def test_an_exit_code_that_is_not_stated(self, page: Page, text: str) -> None:
+        with pytest.raises(ExampleError, match="exits with 1"):
+            page.run("console", text)
+
+    def test_another_exit_code(self, page: Page) -> None:
+        with pytest.raises(ExampleError, match=r"-1\n\+2"):
+            page.run("console", "$ bisar-budget check nothing.yaml\n...\n$ echo $?\n1\n")
+
+    @pytest.mark.parametrize("text", ["schema_version: 1\nname: nothing else\n", "autofocus: { n_pul: 2 }\n"])
+    def test_a_mission_file_that_cannot_be_used(self, page: Page, text: str) -> None:
+        with pytest.raises(ExampleError, match="cannot be used"):
+            page.run("yaml", text)
+
+    def test_a_part_of_a_mission_file(self, page: Page) -> None:
+        page.run("yaml", "platforms: { receiver: { motion_error: { velocity: 5 mm/s } } }\n", "part.yaml")
+        assert page.run("console", "$ cat part.yaml\n").endswith("5 mm/s } } }")
+
+    @pytest.mark.parametrize(("language", "text"), [("python", "assert 1 > 2\n"), ("pycon", ">>> 1 + 1\n3\n")])
+    def test_python_that_is_wrong(self, page: Page, language: str, text: str) -> None:
+        with pytest.raises(ExampleError):
+            page.run(language, text)
+
+    def test_the_blocks_of_a_page_share_names(self, page: Page) -> None:
+        page.run("python", "a = 2\n")
+        page.run("pycon", ">>> b = a + 1\n>>> b\n3\n")
+        page.run("python", "assert b == 3\n")
 
 
-@pytest.mark.parametrize("text", blocks("yaml"), ids=range(len(blocks("yaml"))))
-def test_yaml_examples_pass_the_loader(run, text: str) -> None:
-    result = run("check", "-", input=text)
-    assert result.exit_code in (0, 1), result.output
+def test_a_broken_link_of_the_site_is_found(tmp_path: Path) -> None:
+    (tmp_path / "a.html").write_text(
+        "<a href='b.html#there'></a><a href='#here'></a><a href='https://example.org/x'></a><h1 id='here'>"
+    )
+    (tmp_path / "b.html").write_text("<p id='there'></p><a href='a.html#gone'></a><img src='none.svg'>")
+    assert broken_links(tmp_path) == ["b.html: a.html#gone", "b.html: none.svg"]
 
 
 def test_the_page_of_figures_shows_every_picture_that_the_script_draws() -> None:
@@ -66,39 +95,12 @@ def test_the_page_of_figures_shows_every_picture_that_the_script_draws() -> None
     assert all(file.stat().st_size < 150e3 for file in folder.iterdir())
 
 
-def test_python_examples_run() -> None:
-    for text in blocks("python"):
-        exec(compile(text, "README.md", "exec"), {"__name__": "readme"})
-
-
-def test_ci_runs_the_readmes_test_command() -> None:
+def test_ci_runs_the_readmes_commands() -> None:
     script = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
     (command,) = [line for line in README.splitlines() if "pytest" in line and line.startswith("python3 -m venv")]
     assert command in script
-
-
-def test_every_option_of_check_is_in_the_readme(run) -> None:
-    options = re.findall(r"(?m)^\s+(?:-\w, )?(--[\w-]+)", run("check", "--help").stdout)
-    assert len(options) > 8
-    for option in options:
-        if option != "--help":
-            assert f"`{option}" in README or f"{option}`" in README, option
-
-
-def test_the_commands_of_the_readme_are_those_of_the_help(run) -> None:
-    listed = re.search(r"(?s)Commands:\n(.*)", run("--help").stdout)[1]
-    commands = re.findall(r"(?m)^  (\w+) ", listed)
-    assert commands
-    assert set(re.findall(r"(?m)^\| `bisar-budget (\w+)", README)) == set(commands)
-
-
-def test_the_formats_of_the_readme_are_those_of_check() -> None:
-    (row,) = re.findall(r"(?m)^\| `--format text`.*?\|", README)
-    assert set(re.findall(r"`(?:--format )?(\w+)`", row)) == FORMATS.keys()
-    (row,) = re.findall(r"(?m)^\| `--report FILE`.*$", README)
-    assert {format_of(f"a{suffix}") for suffix in re.findall(r"(?<=[( ])\.[\w.]+", row)} == FORMATS.keys() - {
-        "github"
-    }
+    (command,) = [line for line in README.splitlines() if "sphinx-build" in line]
+    assert command in script
 
 
 def test_the_formats_of_the_command_are_those_of_the_registry() -> None:
@@ -109,3 +111,30 @@ def test_the_formats_of_the_command_are_those_of_the_registry() -> None:
 def test_links_inside_the_repository_exist() -> None:
     for target in re.findall(r"\]\((?!https?:|#)([^)#]+)", README):
         assert (ROOT / target).exists(), target
+
+
+def test_the_readme_is_short() -> None:
+    assert len(README.splitlines()) <= 150
+
+
+def sentences(page: str) -> set[str]:
+    """Sentences of a page that are long enough to be somebody's own; examples may be the same."""
+    prose = " ".join(re.sub(r"(?ms)^(`{3,}).*?^\1", "", page).replace("|", ". ").split())
+    return {sentence for sentence in re.split(r"(?<=[.:;!?]) ", prose) if len(sentence) > 40}
+
+
+def test_no_sentence_stands_both_in_the_readme_and_on_a_page() -> None:
+    for file in PAGES:
+        assert sentences(README) & sentences(file.read_text(encoding="utf-8")) == set(), file
+
+
+def test_every_page_has_a_place_in_the_site() -> None:
+    listed = {
+        (index.parent / entry).resolve()
+        for index in PAGES
+        for language, text in blocks(index.read_text(encoding="utf-8"))
+        if language == "{toctree}"
+        for entry in text.splitlines()
+        if entry and not entry.startswith(":")
+    }
+    assert listed == {page.with_suffix("").resolve() for page in PAGES} - {(ROOT / "docs" / "index").resolve()}

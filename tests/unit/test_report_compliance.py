@@ -14,14 +14,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
+from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.findings import MissionFindings, Option, Report, UnusableMission
-from bisar_budget.budget.images import ImageEvidence, PointImage, Verdict
-from bisar_budget.budget.monte_carlo import monte_carlo
 from bisar_budget.errors import Fault, printable
+from bisar_budget.findings.images import ImageEvidence, PointImage, Verdict
+from bisar_budget.findings.mission import MissionFindings, Option, Report, UnusableMission
 from bisar_budget.mission.load import load_mission
+from bisar_budget.monte_carlo.probability import monte_carlo
 from bisar_budget.report import Style, pictures, render
-from bisar_budget.report.compliance import compliance
+from bisar_budget.report.compliance.page import compliance
 from tests.conftest import ROOT, TODAY, findings, mission_text
 from tests.page import Element, read_page
 
@@ -174,9 +175,9 @@ class TestView:
         assert origins["coverage factor"] == "default"
         assert origins["PSLR"] == "not in the file"
 
-    def test_findings_without_their_mission_are_refused(self) -> None:
-        with pytest.raises(ValueError, match="carry their mission"):
-            compliance(report(found_in(SECTION_V)._replace(mission=None)), Style())
+    def test_findings_without_their_analysis_are_refused(self) -> None:
+        with pytest.raises(ValueError, match="carry their analysis"):
+            compliance(report(found_in(SECTION_V)._replace(analysis=None)), Style())
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
@@ -242,7 +243,7 @@ class TestBothLanguages:
 
     def test_monte_carlo(self, language: str) -> None:
         path = ROOT / "specs" / "missions" / "drones_same_gnss.yaml"
-        drawn = monte_carlo(load_mission(str(path)), 2000, 1)
+        drawn = monte_carlo(Analysis(load_mission(str(path))), 2000, 1)
         page = page_of(language, found_in(path)._replace(monte_carlo=drawn))
         rows = {row[0]: row for row in table_with(page, "requirement", "limit", "sum", "rss", "sigma")}
         location = next(one for one in drawn.requirements if one.id == "mission.location_error")

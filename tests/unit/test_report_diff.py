@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bisar_budget.report.comparison import Change, compare
+from bisar_budget.report.change.comparison import Change, compare
 from tests.conftest import findings, mission_text, row
 
 LIMIT = findings().allocation.qpe_limit("mission")

@@ -8,8 +8,8 @@ import pytest
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.mission.load import load_mission, parse_mission
-from bisar_budget.report import formulas
-from bisar_budget.report.explanation import explain
+from bisar_budget.report.explain import formulas
+from bisar_budget.report.explain.explanation import explain
 from bisar_budget.theory import render
 from tests.conftest import ROOT, TODAY, mission_text
 

@@ -14,12 +14,13 @@ from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.findings import Report, UnusableMission
 from bisar_budget.cli.check import check
 from bisar_budget.errors import Fault
+from bisar_budget.findings.mission import Report, UnusableMission
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.report import FORMATS, SUFFIXES, Style, escapes, format_of, render
-from bisar_budget.report.github import step_summary
+from bisar_budget.report import FORMATS, Style, format_of, render
+from bisar_budget.report.formats.github import step_summary
+from bisar_budget.report.words import escapes
 from tests.conftest import ROOT, TODAY, findings, mission_text
 from tests.page import read_page
 
@@ -63,7 +64,7 @@ def needs(*missions):
 def test_the_command_knows_every_format() -> None:
     (choice,) = [p.type.choices for p in check.params if p.name == "format_name"]
     assert list(choice) == list(FORMATS)
-    assert set(SUFFIXES.values()) == set(FORMATS) - {"github"}
+    assert {one.name for one in FORMATS.values() if one.suffixes} == set(FORMATS) - {"github"}
 
 
 @pytest.mark.parametrize(

@@ -9,14 +9,14 @@ import pytest
 from bisar_budget.budget.check import check_mission
 from bisar_budget.catalogue import FORMULAS, SYMBOLS
 from bisar_budget.mission.load import load_mission
-from bisar_budget.report import typeset
-from bisar_budget.report.explanation import chain, collection_chain
-from bisar_budget.report.formulas import Equation, filled
+from bisar_budget.report.explain import typeset
+from bisar_budget.report.explain.explanation import chain, collection_chain
+from bisar_budget.report.explain.formulas import WorkedEquation, filled
 from tests.conftest import TODAY
 from tests.unit.test_report_explanation import MISSIONS
 
 
-def derived_equations(model: str = "published") -> list[tuple[str, Equation]]:
+def derived_equations(model: str = "published") -> list[tuple[str, WorkedEquation]]:
     found = []
     for path in MISSIONS:
         mission = load_mission(str(path), model)
@@ -27,7 +27,7 @@ def derived_equations(model: str = "published") -> list[tuple[str, Equation]]:
                 (f"{path.stem} {name}", part)
                 for step in steps
                 for part in step.parts
-                if isinstance(part, Equation) and part.formula in FORMULAS
+                if isinstance(part, WorkedEquation) and part.formula in FORMULAS
             ]
     return found
 
@@ -113,7 +113,7 @@ def test_numbers_in_latex_give_the_result() -> None:
 def test_a_small_number_as_base_of_a_power_stands_in_brackets() -> None:
     formula = "π*T^2*|v_xt*ṽ_xt|/(2*R_t*λ)"
     values = {"T": 2e-5, "v_xt": -7e3, "ṽ_xt": 1e-3, "R_t": 7e5, "λ": 0.03}
-    equation = Equation("QPE", formula, values, math.pi * 4e-10 * 7 / (2 * 7e5 * 0.03), "rad")
+    equation = WorkedEquation("QPE", formula, values, math.pi * 4e-10 * 7 / (2 * 7e5 * 0.03), "rad")
     root = ElementTree.fromstring(f"<p>{typeset.as_mathml(equation).numbers}</p>")
     assert value_of(python_of_mathml(root[0][0][1])) == pytest.approx(equation.result, rel=1e-12)
     numbers = typeset.as_latex(equation).numbers.split("= ")[1]
@@ -156,7 +156,7 @@ def test_formulas_that_no_table_has_are_typeset_from_their_text(formula: str) ->
     values |= {name: abs(value) for name, value in values.items() if name.startswith("s_")}
     text = re.sub(r"\|([^|]*)\|", r"abs(\1)", filled(formula, values)).replace("^", "**").replace("π", "pi")
     want = value_of(text)
-    equation = Equation("x", formula, values, want, "m")
+    equation = WorkedEquation("x", formula, values, want, "m")
     assert typeset.is_formula(equation)
     assert formula not in FORMULAS
     mathml = typeset.as_mathml(equation)
@@ -170,11 +170,13 @@ def test_formulas_that_no_table_has_are_typeset_from_their_text(formula: str) ->
 
 def test_words_stay_text() -> None:
     for formula in ("total*share*gain", "limit/(QPE/unit)", "min(published, full)", "10^(dB/10)"):
-        assert not typeset.is_formula(Equation("x", formula, {}, 0.0, ""))
+        assert not typeset.is_formula(WorkedEquation("x", formula, {}, 0.0, ""))
 
 
 def test_a_name_with_an_underscore_has_a_subscript() -> None:
     """`\\mathrm{QPE_full}` puts the f alone below the line."""
-    equation = Equation("QPE_full", "φ_turning + φ_displaced", {"φ_turning": 1.0, "φ_displaced": -2.0}, -1.0, "rad")
+    equation = WorkedEquation(
+        "QPE_full", "φ_turning + φ_displaced", {"φ_turning": 1.0, "φ_displaced": -2.0}, -1.0, "rad"
+    )
     assert typeset.as_latex(equation).formula.startswith(r"\mathrm{QPE}_{\mathrm{full}} &= \phi_{\mathrm{turning}}")
     assert "<msub><mi>QPE</mi><mi>full</mi></msub>" in typeset.as_mathml(equation).formula

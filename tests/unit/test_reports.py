@@ -8,10 +8,11 @@ import re
 
 import pytest
 
-from bisar_budget.budget.findings import Report, UnusableMission, worst_first
 from bisar_budget.errors import Fault
+from bisar_budget.findings.mission import Report, UnusableMission
+from bisar_budget.findings.row import worst_first
 from bisar_budget.report import FORMATS, Style, render
-from bisar_budget.report.text_table import percent
+from bisar_budget.report.formats.text_table import percent
 from tests.conftest import ROOT, findings
 
 ROW_KEYS = [
@@ -211,7 +212,7 @@ def test_every_format_ends_with_one_newline() -> None:
 def test_notes_that_decide_nothing_stand_in_the_verbose_text_only() -> None:
     """A pass needs no footnote: what qualifies it is in -v, --explain and the JSON."""
     found = findings(**FULL, collection={"aperture_time": 60, "pulses": 900})
-    noted = found._replace(rows=tuple(row._replace(notes=("holds by a hair",)) for row in found.rows))
+    noted = found._replace(rows=tuple(row._replace(remarks=("holds by a hair",)) for row in found.rows))
     short, long = (render("text", Report("1", (noted,)), Style(verbosity=verbosity)) for verbosity in (0, 1))
     assert "note: " not in short
     assert "by a hair" not in short

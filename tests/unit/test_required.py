@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from bisar_budget.budget.findings import Report
+from bisar_budget.findings.mission import Report
 from bisar_budget.mission.model import DECLARABLE, Document
 from bisar_budget.report import FORMATS, Style, render
 from tests.conftest import findings, row

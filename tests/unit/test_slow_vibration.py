@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.findings import Report
-from bisar_budget.budget.slow_vibration import slow_phases
+from bisar_budget.effects.slow_vibration import slow_phases
+from bisar_budget.findings.mission import Report
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.report import FORMATS, Style, render
-from bisar_budget.report.explanation import explain
+from bisar_budget.report.explain.explanation import explain
 from tests.conftest import TODAY, findings, mission_text, row
 from tests.unit.test_report_explanation import evaluated, sums
 

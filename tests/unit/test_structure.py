@@ -16,8 +16,13 @@ FLOORS = [
     {"geometry"},
     {"theory", "evaluators", "catalogue"},
     {"mission"},
+    {"effects"},
+    {"analysis"},
+    {"findings"},
+    {"monte_carlo"},
     {"budget"},
     {"simulate"},
+    {"verify"},
     {"report"},
     {"cli"},
     {"__main__"},
@@ -59,6 +64,30 @@ def test_imports_go_down(path: Path) -> None:
             there = there if any(there in rooms for rooms in FLOORS) else ""  # a name of the package itself
             is_ground = floor(here) == floor(there) == 0
             assert there == here or floor(there) < floor(here) or is_ground, f"{module_name(path)}: {imported}"
+
+
+def door(name: str) -> set[str]:
+    """What a room lets others use: names of its modules, or, of `report`, what its `__init__` defines."""
+    tree = ast.parse((PACKAGE / name / "__init__.py").read_text(encoding="utf-8"))
+    (named,) = [
+        node.value
+        for node in tree.body
+        if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", "") == "__all__"
+    ]
+    return set(ast.literal_eval(named))
+
+
+def test_a_room_is_entered_by_its_door() -> None:
+    """Each module that another room uses is named in `__all__` of its own room, and no other is."""
+    used: dict[str, set[str]] = {}
+    for path in MODULES:
+        for imported in imports(path):
+            parts = imported.split(".")
+            there = room(imported)
+            if len(parts) > 2 and (PACKAGE / there).is_dir() and there != room(module_name(path)):
+                used.setdefault(there, set()).add(parts[2])
+    rooms = {path.parent.name for path in PACKAGE.glob("*/__init__.py")} - {"cli", "report"}
+    assert {name: door(name) for name in rooms} == {name: used[name] for name in rooms}
 
 
 @pytest.mark.parametrize("path", MODULES, ids=module_name)
@@ -105,11 +134,11 @@ def test_a_check_loads_nothing_heavy(name: str, is_for_people: bool) -> None:
     code = f"""
 from bisar_budget.budget.check import check_mission
 from bisar_budget.mission.load import load_mission
-from bisar_budget.report import FORMATS, ILLUSTRATED, Style, render
-from bisar_budget.budget.findings import Report
+from bisar_budget.report import FORMATS, Style, render
+from bisar_budget.findings.mission import Report
 from datetime import date
 found = check_mission(load_mission({str(mission)!r}), date(2026, 1, 1))
-for name in ILLUSTRATED if {is_for_people} else FORMATS.keys() - ILLUSTRATED:
+for name in [one.name for one in FORMATS.values() if one.is_illustrated == {is_for_people}]:
     render(name, Report(version="", missions=(found,)), Style())
 """
     loaded = loaded_after(code)

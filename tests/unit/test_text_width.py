@@ -2,12 +2,12 @@
 
 import pytest
 
-from bisar_budget.budget.findings import Report
-from bisar_budget.budget.images import Verdict, VerifiedMission
+from bisar_budget.findings.images import Verdict, VerifiedMission
+from bisar_budget.findings.mission import Report
 from bisar_budget.mission.load import load_mission
 from bisar_budget.report import Style, render
-from bisar_budget.report.layout import WIDTH, table
-from bisar_budget.report.verification import as_text
+from bisar_budget.report.formats.verification import as_text
+from bisar_budget.report.words.layout import WIDTH, table
 from tests.conftest import ROOT, findings, mission_text
 
 NAME = "A mission whose name alone is longer than a line of a terminal was ever meant to be, with aircraft"

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bisar_budget.budget import vibration
-from bisar_budget.budget.allocation import Split
+from bisar_budget.analysis.allocation import Split
+from bisar_budget.budget import vibration_rows as vibration
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.slow_vibration import cubic_part, quadratic_part
-from bisar_budget.budget.vibration_lines import along_line_of_sight
+from bisar_budget.effects.slow_vibration import cubic_part, quadratic_part
+from bisar_budget.effects.vibration_lines import along_line_of_sight
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import MotionError

@@ -1,0 +1,94 @@
+"""What a mission's checks share: its geometry, every error it can have, and what the models say of them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from bisar_budget.analysis.allocation import Allocation, allocate
+from bisar_budget.effects.correlation import Correlated, correlated_errors
+from bisar_budget.effects.effect import ErrorSource
+from bisar_budget.effects.exact_ranges import ExactRanges
+from bisar_budget.effects.models import Declared, FullModel, PublishedModel
+from bisar_budget.effects.slow_vibration import slow_phases
+from bisar_budget.effects.sources import error_sources
+from bisar_budget.geometry import BistaticGeometry
+from bisar_budget.mission.model import Mission
+
+Model = PublishedModel | FullModel
+
+
+@dataclass(frozen=True, eq=False)
+class Analysis:
+    """One mission, analysed once.
+
+    `is_brief` leaves out what a terminal does not show: allowables of errors that nobody declared, and of the model
+    that does not gate. Nothing is judged by them.
+    """
+
+    mission: Mission
+    is_brief: bool = False
+
+    @cached_property
+    def geometry(self) -> BistaticGeometry:
+        """Both platforms at the aperture midpoint."""
+        return self.mission.geometry
+
+    @cached_property
+    def exact(self) -> ExactRanges:
+        """Exact ranges over the aperture."""
+        return ExactRanges(self.geometry, self.mission.radar.wavelength, self.mission.collection.aperture_time)
+
+    @cached_property
+    def sources(self) -> list[ErrorSource]:
+        """Every error the mission can have, declared or not, in the order of the contract."""
+        return error_sources(self.mission, self.geometry, self.exact)
+
+    @cached_property
+    def stated(self) -> list[ErrorSource]:
+        """Declared errors, along the axes that the file states them in."""
+        return [source for source in self.sources if source.declared is not None and source.is_independent]
+
+    @cached_property
+    def published(self) -> PublishedModel:
+        """Tables I and II, and (25)."""
+        return PublishedModel(self.geometry)
+
+    @cached_property
+    def full(self) -> FullModel:
+        """The full model."""
+        return FullModel(self.exact, self.geometry)
+
+    @cached_property
+    def groups(self) -> Sequence[Correlated]:
+        """Covariances of the mission."""
+        return correlated_errors(self.mission)
+
+    def models(self, gating: str) -> tuple[Model, Model]:
+        """The model that gates, `published` or `full`, and the other one."""
+        return (self.full, self.published) if gating == "full" else (self.published, self.full)
+
+    def does(self, model: Model, source: ErrorSource) -> Declared:
+        """What a declared error does by a model."""
+        key = (model.name, source.id)
+        if key not in self._does:
+            self._does[key] = model.declared(source)
+        return self._does[key]
+
+    @cached_property
+    def _does(self) -> dict[tuple[str, str], Declared]:
+        return {}
+
+    def declared(self, model: Model) -> dict[str, Declared]:
+        """What each declared error does by a model, by row id, along the axes that the file states it in."""
+        return {source.id: self.does(model, source) for source in self.stated}
+
+    @cached_property
+    def allocation(self) -> Allocation:
+        """Budgets as divided; `balanced` weighs phases by the gating model, under `strictest` the larger of both."""
+        gating = self.mission.allocation.model
+        both: tuple[Model, ...] = (self.published, self.full)
+        models = [model for model in both if gating in (model.name, "strictest")]
+        phases = {
+            source.id: max((self.does(model, source).qpe for model in models), key=abs) for source in self.stated
+        }
+        return allocate(self.mission, self.stated, phases, slow_phases(self.mission))

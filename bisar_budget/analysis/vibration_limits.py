@@ -1,0 +1,127 @@
+"""Vibration: what a platform's motion along the line of sight does, by the paper's rule and from first principles.
+
+A motion of amplitude A along the line of sight is a phase of peak φ = 2πA/λ. A sinusoid makes paired echoes of
+J₁(φ)/J₀(φ) of the response, about φ/2; Gaussian noise of rms σ leaves exp(-σ²) of the power in the response and
+spreads the rest, so that its ISLR is exp(σ²) - 1. Derived here, checked against the transform of the phase.
+
+What a platform may have, so that both within their shares meet the requirement: where both vibrate at one frequency
+their echoes add in amplitude in the worst phase, so that amplitudes are divided, in the ratio that the shares of
+power set; where the motions are noise, which is independent from platform to platform, variances add and powers are
+divided. The paper's rule, φ² ≤ PSLR·share and σ² ≤ ISLR·share, stays 3 dB inside the first at equal shares and equals
+the second where σ² is small; the same noise on both platforms would add 3 dB.
+
+Between one and three cycles per aperture a vibration is a quadratic phase as well, and counts as echoes; slower ones
+make none, see `slow_vibration`.
+"""
+
+import math
+from typing import NamedTuple
+
+from bisar_budget import evaluators
+from bisar_budget.analysis.allocation import Allocation, Split
+from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.models import CUBIC, QUADRATIC
+from bisar_budget.effects.slow_vibration import cubic_part, quadratic_part
+from bisar_budget.mission.model import Mission
+
+
+class VibrationLimits(NamedTuple):
+    """What one platform may have, by the paper's rule and from first principles, 0 to peak or rms. [m]"""
+
+    published: float
+    full: float
+
+    def by(self, model: str) -> float:
+        """The limit that gates."""
+        return min(self) if model == "strictest" else self.full if model == "full" else self.published
+
+    @property
+    def margin_db(self) -> float:
+        """How far the published rule stays inside first principles. [dB]"""
+        return 20 * math.log10(self.full / self.published)
+
+
+def echo_level(phase: float) -> float:
+    """Amplitude of a paired echo over that of the response, J₁(φ)/J₀(φ), of a sinusoid of peak φ up to 2 rad."""
+    square, term, j0, j1 = -((phase / 2) ** 2), 1.0, 0.0, 0.0
+    for k in range(1, 13):  # the series of both; the last terms are rounding
+        j0 += term
+        j1 += term / k
+        term *= square / (k * k)
+    return phase / 2 * j1 / j0
+
+
+def echo_phase(level: float) -> float:
+    """Peak phase of a sinusoid whose echoes have an amplitude of up to 1 times the response's. [rad]"""
+    phase = min(2 * level, 1.5)  # J₁/J₀ is above φ/2, convex, and 1 at 1.43: from here Newton's steps go down to it
+    for _ in range(8):
+        reached = echo_level(phase)
+        phase -= (reached - level) / (1 - reached / phase + reached**2)
+    return phase
+
+
+def spread_phase(ratio: float) -> float:
+    """Rms phase of noise that spreads so much power, over the response's: exp(σ²) - 1. [rad]"""
+    return math.sqrt(math.log1p(ratio))
+
+
+def vibration_limits(mission: Mission, allocation: Allocation, metric: str) -> dict[str, VibrationLimits]:
+    """Limits of each platform for `pslr` or `islr`; empty without a requirement."""
+    requirement_db = mission.requirements.pslr if metric == "pslr" else mission.requirements.islr
+    if requirement_db is None:
+        return {}
+    power = 10 ** (requirement_db / 10)  # -30 dB is 10⁻³: PSLR and ISLR are power ratios
+    split = allocation.pslr if metric == "pslr" else allocation.islr
+    wavelength = mission.radar.wavelength
+
+    if metric == "pslr":
+        all_of_it, part = echo_phase(math.sqrt(power * (split.transmitter + split.receiver))), amplitude_share
+    else:
+        all_of_it, part = spread_phase(power), power_share
+    found = {}
+    for name in PLATFORMS:
+        published = evaluators.vibration_limit(wavelength, power, split.of(name))
+        found[name] = VibrationLimits(
+            published, evaluators.motion_of_phase(wavelength, all_of_it * part(split, name))
+        )
+    return found
+
+
+def amplitude_share(split: Split, name: str) -> float:
+    """Part of a platform in the amplitude of both: they sum to 1, in the ratio of the roots of power."""
+    own, other = split.of(name), split.of(next(one for one in PLATFORMS if one != name))
+    return evaluators.amplitude_share(own, other)
+
+
+def power_share(split: Split, name: str) -> float:
+    """Part of a platform in the rms phase: their squares are the shares of power."""
+    return math.sqrt(split.of(name))
+
+
+class SlowLimits(NamedTuple):
+    """Amplitudes at which a slow vibration reaches a platform's quadratic and the required cubic phase. [m]"""
+
+    quadratic: float
+    cubic: float | None
+
+    @property
+    def smallest(self) -> float:
+        """The one that gates."""
+        return self.quadratic if self.cubic is None else min(self.quadratic, self.cubic)
+
+    @property
+    def binding(self) -> str:
+        """The requirement that sets it."""
+        return CUBIC if self.smallest < self.quadratic else QUADRATIC
+
+
+def slow_limits(mission: Mission, allocation: Allocation, name: str, cycles: float) -> SlowLimits:
+    """Largest amplitude of a vibration below one cycle per aperture, in its worst phase.
+
+    The quadratic phase is held to the platform's share, autofocus gain included; the cubic phase, where it is
+    required, to the whole requirement without gain.
+    """
+    wavenumber = 2 * math.pi / mission.radar.wavelength
+    quadratic = allocation.qpe_limit(name) * allocation.autofocus_gain / (wavenumber * quadratic_part(cycles))
+    required = mission.requirements.cubic_phase_error
+    return SlowLimits(quadratic, None if required is None else required / (wavenumber * cubic_part(cycles)))

@@ -1,0 +1,133 @@
+"""What one unit of an error does to the range history and the image, by the published and the full model.
+
+Effects are those of Rigling & Moses (Tables I and II), and of the full model, which lets the line of sight turn and
+counts what the displacement of the image adds (`exact_ranges`).
+"""
+
+import math
+from typing import NamedTuple
+
+from bisar_budget import evaluators
+from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG
+from bisar_budget.effects.subject import MOTION, Subject
+from bisar_budget.errors import KeyPath
+from bisar_budget.geometry import BistaticGeometry, GroundVector, Vector, angle_between_lines
+
+PLATFORMS = ("transmitter", "receiver")
+MOTION_UNITS = dict(zip(MOTION, ("m", "m/s", "m/s^2"), strict=True))
+CLOCK_UNITS = {"constant": "s", "linear": "s/s", "quadratic": "1/s", "cubic": "1/s^2"}
+NOWHERE: Vector = (0.0, 0.0, 0.0)  # direction of what is no motion
+
+
+class Effect(NamedTuple):
+    """What one unit of an error does, signed like the range error.
+
+    Constant [m/unit] and linear [(m/s)/unit] term of the range error; quadratic and cubic phase at the
+    aperture edge [rad/unit]. By the published model they are coefficients at the aperture midpoint. By the full
+    model they are fitted over the aperture, of an error too small for a second order, and its phases hold what the
+    displacement of the image adds.
+    """
+
+    constant: float
+    linear: float
+    qpe: float
+    cubic: float
+
+
+class ErrorSource(NamedTuple):
+    """One error: what it is, how large it is declared, what one unit of it does.
+
+    `declared` is signed and includes the
+    coverage factor; None where the file is silent. `is_independent` marks the errors as the file states
+    them: sums and root-sum-squares run over these alone, so that an error stated along the track is not
+    counted again by its components along the scene's axes. `direction` is a unit vector of the scene, zero for
+    what is no motion; of the mission's own it is that of both platforms.
+    """
+
+    subject: Subject
+    unit: str
+    declared: float | None
+    path: KeyPath
+    effect: Effect
+    full: Effect
+    direction: Vector
+    equation: str
+    no_limit: str
+    evidence: str | None = None
+    is_independent: bool = True
+    notes: tuple[str, ...] = ()
+
+    @property
+    def id(self) -> str:
+        """That of its row."""
+        return self.subject.id
+
+    @property
+    def owner(self) -> str:
+        """Whose share it counts against: transmitter, receiver, clock or mission."""
+        return self.subject.owner
+
+    @property
+    def is_motion(self) -> bool:
+        """Whether it moves platforms, or the clock: what only is a phase displaces nothing."""
+        return self.unit != "rad"
+
+    @property
+    def is_position(self) -> bool:
+        """Whether it is an error of a platform's measured path, or of both."""
+        return self.direction != NOWHERE
+
+    @property
+    def is_common(self) -> bool:
+        """Whether it is one error of the paths of both platforms."""
+        return self.owner == "mission" and self.subject.kind in MOTION
+
+    def moves(self, platform: str) -> bool:
+        """Whether it is an error of a platform's position; one of the mission's own is of both."""
+        return self.owner in (platform, "mission")
+
+
+class ImagePlane(NamedTuple):
+    """Q⁻¹: takes constant and linear range error to the displacement of the image."""
+
+    adjugate: tuple[tuple[float, ...], ...]
+    determinant: float
+    degeneracy: str
+
+    @property
+    def inverse(self) -> list[list[float]]:
+        """(2, 2) [m/m, m/(m/s)], where it is not degenerate."""
+        return [[element / self.determinant for element in row] for row in self.adjugate]
+
+    def displacement(self, effect: Effect, declared: float) -> GroundVector | None:
+        """Displacement on the ground, (2,), by (25) with the Q of a model; None where it has no inverse. [m]"""
+        if self.degeneracy:
+            return None
+        scale = declared / self.determinant
+        (a, b), (c, d) = self.adjugate
+        # Adding 0.0 turns -0.0, which reads as a claim about a sign, into 0.0.
+        return (
+            (a * effect.constant + b * effect.linear) * scale + 0.0,
+            (c * effect.constant + d * effect.linear) * scale + 0.0,
+        )
+
+
+def image_plane(geometry: BistaticGeometry) -> ImagePlane:
+    """Invert Q with the range held constant, (19) and (30).
+
+    That Q can be singular where the true gradients are not: its second row is v/R, theirs v⊥/R.
+    """
+    ground = []
+    for platform in (geometry.transmitter, geometry.receiver):
+        ground += [*platform.position[:2], *platform.velocity[:2], platform.slant_range]
+    first, second, (determinant,) = evaluators.published_ground_inverse(*ground)
+    # (30): the first column holds (-rate_y, rate_x), the second (s_y, -s_x).
+    range_gradient, doppler_gradient = (-second[1], first[1]), (second[0], -first[0])
+    degrees = math.degrees(angle_between_lines(range_gradient, doppler_gradient))
+    degeneracy = ""
+    if degrees < MIN_GRADIENT_ANGLE_DEG:
+        degeneracy = (
+            f"(25) has no displacement here: with the range held constant, range and Doppler gradients are "
+            f"{degrees:.2g} deg from parallel"
+        )
+    return ImagePlane((first, second), determinant, degeneracy)

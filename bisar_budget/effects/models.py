@@ -1,0 +1,249 @@
+"""The two models behind one interface: what a declared error does, and how large an error may be.
+
+The published model is linear. The full model is true for errors of any size: where the second order provably does
+not matter, its effects are proportional to the error, and everywhere else they are those of exact ranges. An error
+has two signs and a bound covers both, so that phases and allowables are those of the worse one.
+"""
+
+import math
+from typing import NamedTuple
+
+from bisar_budget import evaluators
+from bisar_budget.effects.effect import PLATFORMS, Effect, ErrorSource, ImagePlane, image_plane
+from bisar_budget.effects.exact_ranges import ExactPhases, ExactRanges
+from bisar_budget.effects.point_path import PointPath, Value
+from bisar_budget.geometry import BistaticGeometry, GroundVector
+
+QUADRATIC, CUBIC, LOCATION = "quadratic_phase_error", "cubic_phase_error", "location_error"
+
+# No navigation error: it takes the platform, within the aperture, farther than this part of its slant range.
+FARTHEST = 0.1
+_SHARE = 0.004  # what the second order may add, of a phase, a displacement or a limit; the aim is 1 %
+_FLOOR_RAD, _FLOOR_M = 1e-3, 2e-3  # and whatever the size
+
+_VALUES: dict[str, Value] = {
+    QUADRATIC: lambda phases: phases.quadratic,
+    CUBIC: lambda phases: phases.cubic,
+    LOCATION: lambda phases: math.hypot(*phases.displacement),
+}
+
+
+class Declared(NamedTuple):
+    """What one declared error does.
+
+    Quadratic and cubic phase at the aperture edge, of the worse sign, signed like the first order of the declared
+    one [rad]; displacement by the declared sign, and by the opposite one [m]. None where there is none: a plane
+    without an inverse, or no ground point that has the range history, which makes phases infinite.
+    """
+
+    qpe: float
+    cubic: float
+    displacement: GroundVector | None
+    opposite: GroundVector | None
+
+    @property
+    def farthest(self) -> GroundVector | None:
+        """Displacement by the sign that moves farther, turned to the declared one's side. [m]"""
+        if self.displacement is None or self.opposite is None:
+            return None
+        back = (-self.opposite[0], -self.opposite[1])
+        return max(self.displacement, back, key=lambda move: math.hypot(*move))
+
+
+NOTHING = Declared(0.0, 0.0, None, None)
+
+
+class PublishedModel:
+    """Tables I and II and (25) of Rigling & Moses, linear in every error."""
+
+    name = "published"
+
+    def __init__(self, geometry: BistaticGeometry) -> None:
+        self.plane = image_plane(geometry)
+
+    def effect(self, source: ErrorSource) -> Effect:
+        """Effect of a unit of an error."""
+        return source.effect
+
+    def equation(self, source: ErrorSource) -> str:
+        """Where it comes from."""
+        return source.equation
+
+    def no_limit(self, source: ErrorSource) -> str:
+        """Say why an error has no limit from its quadratic phase."""
+        return source.no_limit
+
+    def small(self, source: ErrorSource, requirement: str, limit: float) -> float:
+        """Size at which an error would reach a limit, were its effects those of a small one; infinite: never."""
+        found = _size(limit, _per_unit(source.effect, self.plane, requirement))
+        return math.inf if found is None else found
+
+    def declared(self, source: ErrorSource) -> Declared:
+        """What the declared error does."""
+        size = source.declared
+        if not size:
+            return NOTHING if size is None or not source.is_motion else _still(self.plane)
+        moved = self.plane.displacement(source.effect, size) if source.is_motion else None
+        return Declared(source.effect.qpe * size, source.effect.cubic * size, moved, _back(moved))
+
+    def allowable(self, source: ErrorSource, requirement: str, limit: float, upto: float = math.inf) -> float | None:
+        """Largest size of an error within a limit [rad], or [m] for the location; None: no limit, or none `upto`."""
+        found = _size(limit, _per_unit(source.effect, self.plane, requirement))
+        return found if found is not None and found <= upto else None
+
+
+class FullModel:
+    """The full model of one collection, for errors of any size."""
+
+    name = "full"
+
+    def __init__(self, exact: ExactRanges, geometry: BistaticGeometry) -> None:
+        self.exact, self.plane = exact, exact.plane
+        self._nearest = min(min(exact.ranges[name]) for name in PLATFORMS)
+        self._slant_ranges = {
+            "transmitter": geometry.transmitter.slant_range,
+            "receiver": geometry.receiver.slant_range,
+        }
+        half = exact.half
+        self._edge = {"m": 1.0, "m/s": half, "m/s^2": half**2 / 2}
+        (a, b), (c, d) = self.plane.inverse
+        (q_0, q_1), (c_0, c_1) = exact.phases_per_term
+        # A range error of a metre at most, whatever its course: its fit has a value of 1 at most, a slope of 1.5, a
+        # quadratic and a cubic of 2.5 and 4 at most; so much displacement and phase follow.
+        self._metres = math.hypot(a, c) + 1.5 / half * math.hypot(b, d)
+        self._radians = 2.5 * exact.k + abs(q_0) + 1.5 / half * abs(q_1)
+        self._cubic_radians = 4 * exact.k + abs(c_0) + 1.5 / half * abs(c_1)
+        self._paths: dict[tuple[str, float], PointPath] = {}
+
+    def effect(self, source: ErrorSource) -> Effect:
+        """Effect of a unit of an error too small for a second order."""
+        return source.full
+
+    def equation(self, source: ErrorSource) -> str:
+        """Where it comes from."""
+        return "full model" if source.is_motion else source.equation
+
+    def no_limit(self, source: ErrorSource) -> str:
+        """Say why an error has no limit from its quadratic phase."""
+        return (
+            "no error up to a tenth of the slant range reaches the limit"
+            if source.is_motion
+            else "no quadratic phase"
+        )
+
+    def small(self, source: ErrorSource, requirement: str, limit: float) -> float:
+        """Size at which an error would reach a limit, were its effects those of a small one; infinite: never."""
+        found = _size(limit, _per_unit(source.full, self.plane, requirement))
+        return math.inf if found is None else found
+
+    def declared(self, source: ErrorSource) -> Declared:
+        """What the declared error does."""
+        size, full = source.declared, source.full
+        if not size:
+            return NOTHING if size is None or not source.is_motion else _still(self.plane)
+        if not source.is_motion:
+            return Declared(full.qpe * size, full.cubic * size, None, None)
+        if self.is_small(source, abs(size)):
+            moved = self.plane.displacement(full, size)
+            return Declared(full.qpe * size, full.cubic * size, moved, _back(moved))
+        ahead, back = self.at(source, size), self.at(source, -size)
+        if ahead is None or back is None:
+            return Declared(math.inf, math.inf, ahead and ahead.displacement, back and back.displacement)
+        qpe, cubic = max(abs(ahead.quadratic), abs(back.quadratic)), max(abs(ahead.cubic), abs(back.cubic))
+        signs = math.copysign(qpe, full.qpe * size), math.copysign(cubic, full.cubic * size)
+        return Declared(*signs, ahead.displacement, back.displacement)
+
+    def allowable(self, source: ErrorSource, requirement: str, limit: float, upto: float = math.inf) -> float | None:
+        """Smallest size, of either sign, at which an error reaches a limit [rad], or [m] for the location.
+
+        None where none does that takes its platform no farther than a tenth of the slant range, or `upto`.
+        """
+        per_unit = _per_unit(source.full, self.plane, requirement)
+        linear = _size(limit, per_unit)
+        if not source.is_motion:
+            return linear
+        farthest = min(upto, self.farthest(source))
+        first = farthest if linear is None else min(linear, farthest)
+        if self._adds(source, first, requirement) <= _SHARE * limit:
+            return None if linear is None or linear > farthest else linear
+        signed = {QUADRATIC: source.full.qpe, CUBIC: source.full.cubic}.get(requirement)
+        return self._smallest(source, requirement, limit, per_unit if signed is None else signed, first, farthest)
+
+    def is_linear_at(self, source: ErrorSource, requirement: str, limit: float) -> bool:
+        """Whether effects of an error are proportional to its size up to a limit."""
+        linear, farthest = _size(limit, _per_unit(source.full, self.plane, requirement)), self.farthest(source)
+        first = farthest if linear is None else min(linear, farthest)
+        return self._adds(source, first, requirement) <= _SHARE * limit
+
+    def farthest(self, source: ErrorSource) -> float:
+        """Size beyond which an error is none of navigation. [unit]"""
+        if source.owner == "clock":
+            return FARTHEST * min(self._slant_ranges.values()) / max(map(abs, self.exact.shape(source)))
+        reached = [R for name, R in self._slant_ranges.items() if source.moves(name)]
+        return FARTHEST * min(reached) / self._edge[source.unit]
+
+    def is_small(self, source: ErrorSource, size: float) -> bool:
+        """Whether effects of an error are proportional to its size, as far as anybody can see."""
+        for requirement, floor in ((QUADRATIC, _FLOOR_RAD), (CUBIC, _FLOOR_RAD), (LOCATION, _FLOOR_M)):
+            of_it = _per_unit(source.full, self.plane, requirement) * size
+            if self._adds(source, size, requirement) > max(floor, _SHARE * of_it):
+                return False
+        return True
+
+    def _adds(self, source: ErrorSource, size: float, requirement: str) -> float:
+        """Bound of what the second order adds to a phase [rad] or a displacement [m].
+
+        Of two platforms it is Σ|P⊥(r̃ − x̂)|²/2R, at most |r̃ − x̂|²/R of the nearer one.
+        """
+        reach = size * (self._edge.get(source.unit, 0.0) + _per_unit(source.full, self.plane, LOCATION))
+        per_metre = {QUADRATIC: self._radians, CUBIC: self._cubic_radians, LOCATION: self._metres}[requirement]
+        return per_metre * reach * reach / self._nearest
+
+    def at(self, source: ErrorSource, size: float) -> ExactPhases | None:
+        """Phases and displacement of an error of a size, with its sign, by exact ranges; None: no ground point."""
+        return self._path(source, math.copysign(1.0, size)).to(abs(size))
+
+    def _path(self, source: ErrorSource, sign: float) -> PointPath:
+        key = (source.id, sign)
+        if key not in self._paths:
+            per_unit = self.plane.displacement(source.full, 1.0) or (0.0, 0.0)
+            self._paths[key] = PointPath(self.exact, source, sign, per_unit)
+        return self._paths[key]
+
+    def _smallest(
+        self, source: ErrorSource, requirement: str, limit: float, per_unit: float, first: float, farthest: float
+    ) -> float | None:
+        """Search for the size from a first guess, by both signs."""
+        smallest = None
+        for sign in (1.0, -1.0):
+            found = self._path(source, sign).first_reaching(
+                _VALUES[requirement], limit, sign * per_unit, first, farthest
+            )
+            if found is not None:
+                smallest, farthest, first = found, found, min(first, found)
+        return smallest
+
+
+def _still(plane: ImagePlane) -> Declared:
+    """An error of no size."""
+    place = None if plane.degeneracy else (0.0, 0.0)
+    return Declared(0.0, 0.0, place, place)
+
+
+def _back(move: GroundVector | None) -> GroundVector | None:
+    return None if move is None else (-move[0], -move[1])
+
+
+def _per_unit(effect: Effect, plane: ImagePlane, requirement: str) -> float:
+    """What a small unit of an error does: magnitude of a phase [rad], or displacement [m]."""
+    if requirement == QUADRATIC:
+        return abs(effect.qpe)
+    if requirement == CUBIC:
+        return abs(effect.cubic)
+    return math.hypot(*(plane.displacement(effect, 1.0) or (0.0, 0.0)))
+
+
+def _size(limit: float, per_unit: float) -> float | None:
+    """Size at which an effect of so much per unit reaches a limit; None: it has no effect."""
+    size = evaluators.allowable_error(limit, per_unit) if per_unit else math.inf
+    return size if math.isfinite(size) else None

@@ -1,0 +1,57 @@
+"""Vibration below one cycle per aperture: a quadratic and a cubic phase, as large as in the worst of its phases.
+
+A vibration of peak phase φ and n cycles per aperture has the Legendre parts 5·j₂(πn)·φ and 7·j₃(πn)·φ over the
+aperture where they are largest; 3/2 and 5/2 of them stand at its edge. It makes no echoes. Its sign and phase are not
+known, so that it counts like any other error: alone against a limit, and in sums and root-sum-squares.
+"""
+
+import math
+from typing import NamedTuple
+
+from bisar_budget.effects.echoes import SLOWEST
+from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.subject import subject
+from bisar_budget.effects.vibration_lines import lines_of
+from bisar_budget.mission.model import Mission
+
+
+def quadratic_part(cycles: float) -> float:
+    """Worst quadratic phase at the aperture edge of a sinusoid, over its peak phase: 7.5·j₂(π·cycles).
+
+    The least-squares quadratic of cos(πnx) over the aperture; half of it is a Taylor term where n is small.
+    """
+    k = math.pi * cycles
+    if k < 0.5:
+        return 7.5 * k**2 / 15 * (1 - k**2 / 14 + k**4 / 504)
+    return 7.5 * abs((3 / k**2 - 1) * math.sin(k) - 3 * math.cos(k) / k) / k
+
+
+def cubic_part(cycles: float) -> float:
+    """Worst cubic phase likewise: 17.5·j₃(π·cycles), of the least-squares cubic of sin(πnx)."""
+    k = math.pi * cycles
+    if k < 0.5:
+        return 17.5 * k**3 / 105 * (1 - k**2 / 18 + k**4 / 792)
+    return 17.5 * abs((15 / k**3 - 6 / k) * math.sin(k) - (15 / k**2 - 1) * math.cos(k)) / k
+
+
+class SlowPhase(NamedTuple):
+    """A vibration below one cycle per aperture: row id, platform, worst-phase QPE and cubic phase. [rad]"""
+
+    row_id: str
+    owner: str
+    qpe_rad: float
+    cubic_rad: float
+
+
+def slow_phases(mission: Mission) -> list[SlowPhase]:
+    """Phases of the declared vibrations below one cycle per aperture, which count with those of other errors."""
+    T = mission.collection.aperture_time
+    found = []
+    for name in PLATFORMS:
+        for index, line in enumerate(lines_of(mission, name)):
+            cycles = line.frequency * T
+            if cycles < SLOWEST:
+                phase = 2 * math.pi * line.amplitude / mission.radar.wavelength
+                row_id = subject(name, "vibration", "sinusoidal", entry=index).id
+                found.append(SlowPhase(row_id, name, phase * quadratic_part(cycles), phase * cubic_part(cycles)))
+    return found

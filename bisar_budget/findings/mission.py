@@ -1,0 +1,139 @@
+"""What was found about one mission file, and about all of a run."""
+
+from datetime import date
+from typing import TYPE_CHECKING, NamedTuple
+
+from bisar_budget.analysis.allocation import Allocation
+from bisar_budget.errors import Fault
+from bisar_budget.findings.row import Row
+from bisar_budget.findings.status import STATUSES, worst
+from bisar_budget.geometry import BistaticGeometry
+from bisar_budget.mission.model import Document, Mission
+
+if TYPE_CHECKING:
+    from bisar_budget.analysis.analysis import Analysis
+    from bisar_budget.analysis.scene import SceneEdge
+    from bisar_budget.findings.images import ImageEvidence, Verdict
+    from bisar_budget.findings.monte_carlo import MonteCarlo
+
+
+class FileWarning(NamedTuple):
+    """Something about the mission file that should not go unsaid.
+
+    Most change no verdict. One that `is_doubt` puts in doubt what was checked: the status is `warn` at least.
+    """
+
+    line: int | None
+    message: str
+    is_doubt: bool = False
+
+
+class Resolution(NamedTuple):
+    """Peak to first null on the ground. [m]"""
+
+    range: float
+    cross_range: float
+
+
+class MissionFindings(NamedTuple):
+    """What was found about one mission file that can be used.
+
+    `analysis` is that of the check, for whoever goes on from it; None where a thousand would fill memory.
+    """
+
+    analysis: "Analysis | None"
+    file: str
+    name: str
+    model: str
+    combine: str
+    coverage_factor: float
+    wavelength: float
+    geometry: BistaticGeometry
+    aperture_time: float
+    scene_radius: float | None
+    resolution: Resolution
+    allocation: Allocation
+    rows: tuple[Row, ...]
+    warnings: tuple[FileWarning, ...]
+    notes: tuple[str, ...]
+    scene: "SceneEdge | None" = None  # of missions with a scene.radius and declared errors
+    verdicts: "tuple[Verdict, ...] | None" = None  # of images, if any were formed
+    is_unverified: bool = False  # images were asked for, and none gave a verdict
+    image_evidence: "tuple[ImageEvidence, ...]" = ()  # a few of those images, where a report shows them
+    monte_carlo: "MonteCarlo | None" = None  # if errors were drawn
+    document: Document = Document()
+
+    @property
+    def mission(self) -> Mission | None:
+        """What was checked, with its analysis or not at all."""
+        return None if self.analysis is None else self.analysis.mission
+
+    def analysed(self) -> "Analysis":
+        """Return the analysis of the check.
+
+        Raises
+        ------
+        ValueError
+            It was left out.
+        """
+        if self.analysis is None:
+            raise ValueError("these findings do not carry their analysis")
+        return self.analysis
+
+    @property
+    def is_empty(self) -> bool:
+        """The file declares no error at all: nothing was judged."""
+        return all(row.status == "not_declared" for row in self.rows)
+
+    @property
+    def status(self) -> str:
+        """Worst status of the rows and of what is doubtful about the whole.
+
+        No better than `not_evaluated` if nothing was judged, or if images were formed and verified nothing; no better
+        than `warn` if a warning doubts what was checked.
+        """
+        doubts = ["not_evaluated"] if self.is_unverified or self.is_empty else []
+        doubts += ["warn" for warning in self.warnings if warning.is_doubt]
+        return worst([*(row.status for row in self.rows), *doubts])
+
+    @property
+    def summary(self) -> dict[str, int]:
+        """Number of rows of each status that occurs."""
+        found: dict[str, int] = {}
+        for row in self.rows:
+            found[row.status] = found.get(row.status, 0) + 1
+        return {status: found[status] for status in STATUSES if status in found}
+
+
+class UnusableMission(NamedTuple):
+    """A mission file that cannot be used, with its faults; `data` is the file as read, where it was."""
+
+    file: str
+    faults: tuple[Fault, ...]
+    status: str = "error"
+    data: bytes | None = None
+
+
+class Option(NamedTuple):
+    """An option of the run that bears on what is found, and where its value came from."""
+
+    name: str
+    value: str
+    origin: str
+
+
+class Report(NamedTuple):
+    """The findings about every mission file of a run.
+
+    `day` is the date that somebody gave it, or on which its waivers were judged; None where it decides nothing.
+    """
+
+    version: str
+    missions: tuple[MissionFindings | UnusableMission, ...]
+    options: tuple[Option, ...] = ()
+    day: date | None = None
+
+    @property
+    def status(self) -> str:
+        """Worst status of the missions."""
+        return worst(mission.status for mission in self.missions)

@@ -1,0 +1,47 @@
+"""What the draws of a Monte Carlo say."""
+
+from typing import NamedTuple
+
+
+class Requirement(NamedTuple):
+    """How often one requirement holds.
+
+    `sum` and `rss` are what these rules of `allocation.combine` would hold to the limit, by the full model with the
+    coverage factor; None where a declared error leaves no image. `sigma_rss` is the standard uncertainty by
+    root-sum-square, `sigma` that of the draws that have an image, None where none has; of displacements, rms lengths.
+    `probability` is of the draws, with the ends of its Wilson interval; `probability_normal` is that of a normal
+    distribution with `sigma_rss`. `dominant` is the error with the largest share of the variance.
+    """
+
+    id: str
+    unit: str
+    limit: float
+    sum: float | None
+    rss: float | None
+    sigma_rss: float
+    sigma: float | None
+    probability: float
+    probability_low: float
+    probability_high: float
+    probability_normal: float
+    dominant: str
+    dominant_share: float
+    warnings: tuple[str, ...]
+
+
+class MonteCarlo(NamedTuple):
+    """What the draws say. `probability` is that all requirements hold at once; None without a requirement.
+
+    `is_exact` says that every draw went through exact ranges: the errors are too large for sums of effects.
+    """
+
+    draws: int
+    seed: int
+    model: str
+    confidence: float
+    requirements: tuple[Requirement, ...]
+    probability: float | None
+    probability_low: float | None
+    probability_high: float | None
+    is_exact: bool
+    notes: tuple[str, ...]

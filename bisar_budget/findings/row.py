@@ -1,0 +1,93 @@
+"""One row of a budget: what it is about, its numbers, its status."""
+
+from collections.abc import Sequence
+from datetime import date
+from typing import NamedTuple
+
+from bisar_budget.effects.subject import Subject
+from bisar_budget.findings.status import RANK
+from bisar_budget.geometry import GroundVector
+
+
+class AppliedWaiver(NamedTuple):
+    """A waiver that names a failing row: line of the file, last day, reason; expired if that day is over."""
+
+    line: int | None
+    until: date
+    reason: str
+    is_expired: bool
+
+    @property
+    def words(self) -> str:
+        """The waiver in a sentence."""
+        return f"{'expired ' if self.is_expired else ''}waiver of line {self.line}, until {self.until}: {self.reason}"
+
+
+class Row(NamedTuple):
+    """One line of the budget. Numbers in SI and radians; None where a value does not exist.
+
+    `is_independent` marks the rows that sums run over: errors as the file states them. Along the scene's axes an
+    error stated in another frame is shown again, but not counted again. `qpe_exact_rad` is `qpe_full_rad`, which is
+    that of exact ranges; `published_margin_db` how far the published rule of a vibration stays inside first
+    principles. `binding_requirement` is the requirement that sets `allowable`, `cubic_rad` the magnitude of the
+    declared error's cubic phase at the aperture edge, `islr_db` the ISLR that a declared random error adds, `model`
+    the one whose numbers these are. `waivers` name the row while it fails, valid or expired; `refuted` says by which
+    images its limit does not hold.
+    """
+
+    subject: Subject
+    metric: str
+    unit: str
+    declared: float | None
+    allowable: float | None
+    allowable_published: float | None
+    allowable_full: float | None
+    qpe_published_rad: float | None
+    qpe_full_rad: float | None
+    displacement_m: GroundVector | None
+    utilization: float | None
+    margin: float | None
+    status: str
+    line: int | None
+    reason: str | None
+    remarks: tuple[str, ...]
+    equation: str
+    requirement_id: str | None
+    evidence: str | None
+    is_independent: bool
+    qpe_exact_rad: float | None = None
+    published_margin_db: float | None = None
+    binding_requirement: str | None = None
+    cubic_rad: float | None = None
+    islr_db: float | None = None
+    model: str | None = None
+    waivers: tuple[AppliedWaiver, ...] = ()
+    refuted: tuple[str, ...] = ()
+
+    @property
+    def id(self) -> str:
+        """Its name in reports, waivers and the mission file's `requirement_ids`."""
+        return self.subject.id
+
+    @property
+    def owner(self) -> str:
+        """Whose share it counts against: transmitter, receiver, clock or mission."""
+        return self.subject.owner
+
+    @property
+    def decisive(self) -> tuple[str, ...]:
+        """What decides its status: the reason, waivers, and what images say against its limit."""
+        reason = (self.reason,) if self.reason else ()
+        return (*reason, *(waiver.words for waiver in self.waivers), *self.refuted)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """All there is to say besides the reason."""
+        if not (self.waivers or self.refuted):
+            return self.remarks
+        return (*self.remarks, *(waiver.words for waiver in self.waivers), *self.refuted)
+
+
+def worst_first(rows: Sequence[Row]) -> list[Row]:
+    """Sort rows by status, then by utilization, the highest first; equals keep their order."""
+    return sorted(rows, key=lambda row: (RANK[row.status], -(row.utilization or 0.0)))

@@ -1,0 +1,4 @@
+"""Errors drawn from their distributions, and how often the requirements hold. Needs NumPy."""
+
+# What other rooms may use.
+__all__ = ["probability"]

@@ -1,0 +1,283 @@
+"""Monte Carlo: errors drawn from their declared distributions, and how often each requirement then holds.
+
+The referee of root-sum-square and worst case. All declared errors are drawn at once, their effects by the full model
+add, and the magnitude of the sum is held to the requirement. Of small errors a draw is a sum of standard variables
+times effects, of large ones it goes through exact ranges (`draws`); a covariance is six variables, along the axes of
+its correlation matrix.
+
+Draws come from the distributions themselves: the coverage factor, which makes bounds of sigmas, has no part in them.
+Vibration is not drawn: its amplitude is declared and its limits are those of echoes.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+
+from bisar_budget.analysis.allocation import Allocation
+from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.together import Together
+from bisar_budget.constants import MAX_DRAWS
+from bisar_budget.effects.correlation import combined_displacement, combined_phase
+from bisar_budget.effects.effect import PLATFORMS, ErrorSource, ImagePlane
+from bisar_budget.findings.monte_carlo import MonteCarlo, Requirement
+from bisar_budget.mission.model import Mission, Simulation
+from bisar_budget.mission.symmetric import eigensystem
+from bisar_budget.monte_carlo.draws import Judged, Variable, count
+
+CONFIDENCE = 0.95
+DOMINANT = 0.5  # of the variance: beyond, a sum has the shape of that one error, whatever the others are
+_QUANTILE = 1.959963984540054  # of the standard normal at 97.5 %
+_SURE_QUANTILE = 3.2905267314919255  # at 99.95 %: a warning is not to be chance
+_MATERIAL = 0.1  # of the probability to fail: a difference that is sure but smaller changes nobody's mind
+
+_DIGITS = 9  # of sampled sigmas: further ones differ between processors, and mean nothing
+_ANGLES = 4096  # of a mean over a circle of a smooth function
+
+
+def monte_carlo(analysis: Analysis, draws: int, seed: int | None = None) -> MonteCarlo:
+    """Draw the declared errors of a mission and count how often each requirement holds.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        Of the mission.
+    draws : int
+        From 1 to `MAX_DRAWS`; memory does not grow with it.
+    seed : int, optional
+        None: `simulation.seed` of the file. The same seed gives the same result.
+
+    Raises
+    ------
+    ValueError
+        `draws` out of range.
+    """
+    if not 1 <= draws <= MAX_DRAWS:
+        raise ValueError(f"the number of draws must be from 1 to {MAX_DRAWS}, not {draws}")
+    mission = analysis.mission
+    if seed is None:
+        seed = (mission.simulation or Simulation()).seed
+    variables = list(_variables(analysis))
+    judged = list(_requirements(mission, analysis.allocation, analysis.stated))
+    counted = count(analysis, variables, judged, draws, seed)
+    predictions = _Predictions(analysis, variables)
+    requirements = tuple(
+        _requirement(one, holds, mean_square, draws, predictions)
+        for one, holds, mean_square in zip(judged, counted.holds, counted.mean_squares, strict=True)
+    )
+    low, high = _wilson(counted.all_hold, draws, _QUANTILE) if judged else (None, None)
+    return MonteCarlo(
+        draws=draws,
+        seed=seed,
+        model="full",
+        confidence=CONFIDENCE,
+        requirements=requirements,
+        probability=counted.all_hold / draws if judged else None,
+        probability_low=low,
+        probability_high=high,
+        is_exact=counted.is_exact,
+        notes=tuple(_notes(mission, analysis.stated, counted.is_exact)),
+    )
+
+
+def _distribution(mission: Mission, source: ErrorSource) -> str:
+    if source.owner in PLATFORMS:
+        return str(getattr(mission.platforms, source.owner).motion_error.distribution)
+    if source.is_common and mission.common_motion_error is not None:
+        return mission.common_motion_error.distribution
+    # A clock's values are one sigma, as the coverage factor on them says; what has none is a bound.
+    return "normal" if source.owner == "clock" else "bound"
+
+
+def _variables(analysis: Analysis) -> Iterator[Variable]:
+    mission, plane = analysis.mission, analysis.full.plane
+    factor = mission.allocation.coverage_factor
+    left = {source.id: source for source in analysis.stated}
+    for group in analysis.groups:
+        members = [left.pop(row_id) for row_id in group.ids]
+        values, vectors = eigensystem(group.correlation)
+        for index, value in enumerate(values):
+            # To six decimals a correlation matrix may have an eigenvalue just below zero.
+            scale = math.sqrt(max(0.0, value)) / factor
+            parts = [(s, (s.declared or 0.0) * vectors[i][index] * scale) for i, s in enumerate(members)]
+            yield _variable(f"{group.id}.{index}", group.platform, "normal", parts, plane)
+    for source in left.values():
+        distribution = _distribution(mission, source)
+        is_covered = source.owner != "mission" or source.is_common
+        size = abs(source.declared or 0.0) / (factor if is_covered else 1.0)
+        if distribution == "uniform":
+            size /= math.sqrt(3)  # the standard uncertainty of ±a, GUM 4.3.7
+        yield _variable(source.id, source.owner, distribution, [(source, size)], plane)
+
+
+def _variable(
+    id: str, owner: str, distribution: str, parts: Sequence[tuple[ErrorSource, float]], plane: ImagePlane
+) -> Variable:
+    moves = [plane.displacement(source.full, size) or (0.0, 0.0) for source, size in parts]
+    effects = (
+        math.fsum(source.full.qpe * size for source, size in parts),
+        math.fsum(source.full.cubic * size for source, size in parts),
+        math.fsum(move[0] for move in moves),
+        math.fsum(move[1] for move in moves),
+    )
+    return Variable(id, owner, distribution, tuple(parts), effects)
+
+
+def _requirements(mission: Mission, allocation: Allocation, declared: Sequence[ErrorSource]) -> Iterator[Judged]:
+    """Those of `check` that declared errors count against."""
+    present = {source.owner for source in declared}
+    every = ("transmitter", "receiver", "clock", "mission")
+    wanted = {
+        "transmitter": ("transmitter",),
+        "receiver": ("receiver",) if allocation.qpe.clock is not None else ("receiver", "clock"),
+        "timing": ("clock",) if allocation.qpe.clock is not None else (),
+        "mission": every,
+    }
+    for name, owners in wanted.items():
+        if present.intersection(owners):
+            limit = allocation.qpe_limit("clock" if name == "timing" else name) * allocation.autofocus_gain
+            yield Judged(f"{name}.quadratic_phase_error", "rad", limit, owners, (0,))
+    if any(source.is_motion for source in declared):
+        requirements = mission.requirements
+        if requirements.cubic_phase_error is not None:
+            yield Judged("mission.cubic_phase_error", "rad", requirements.cubic_phase_error, every, (1,))
+        if requirements.location_error is not None:
+            yield Judged("mission.location_error", "m", requirements.location_error, every, (2, 3))
+
+
+class _Predictions:
+    """What needs no draws: combinations by the rules of `check`, standard uncertainties, the normal distribution."""
+
+    def __init__(self, analysis: Analysis, variables: Sequence[Variable]) -> None:
+        self.together, self.variables = Together(analysis, analysis.full), variables
+
+    def combined(self, judged: Judged, rule: str) -> float | None:
+        """What a rule of `allocation.combine` holds to the limit, coverage factor included; None: no image."""
+        together = self.together
+        if judged.columns == (0,):
+            members = [source for source in together.stated if source.owner in judged.owners]
+            phase = combined_phase(together.phases(members), rule, together.groups)
+        elif judged.columns == (1,):
+            phase = combined_phase(together.cubics(), rule, together.groups)
+        else:
+            moves = together.moves(rule)
+            return None if moves is None else combined_displacement(moves, rule, together.groups)
+        return phase if math.isfinite(phase) else None
+
+    def variances(self, judged: Judged) -> dict[str, float]:
+        """Variance that each error, or each covariance, brings."""
+        found: dict[str, float] = {}
+        for variable in self.variables:
+            if variable.owner in judged.owners:
+                name = variable.id.rsplit(".", 1)[0] if len(variable.parts) > 1 else variable.id
+                square = math.fsum(variable.effects[column] ** 2 for column in judged.columns)
+                found[name] = found.get(name, 0.0) + square
+        return found
+
+    def is_normal(self, name: str) -> bool:
+        """Whether an error has a normal distribution; a covariance, which is no single variable, always has."""
+        return all(v.distribution == "normal" for v in self.variables if v.id == name)
+
+    def probability_normal(self, judged: Judged) -> float:
+        """Probability that a normal distribution with these variances stays within the limit."""
+        members = [variable.effects for variable in self.variables if variable.owner in judged.owners]
+        covariance = [
+            math.fsum(effects[a] * effects[b] for effects in members)
+            for a, b in ((judged.columns[0],) * 2, (judged.columns[-1],) * 2, (judged.columns[0], judged.columns[-1]))
+        ]
+        return (
+            _within(judged.limit, *covariance) if len(judged.columns) == 2 else _between(judged.limit, covariance[0])
+        )
+
+
+def _between(limit: float, variance: float) -> float:
+    """Probability that a normal variable about zero lies within ±limit."""
+    return math.erf(limit / math.sqrt(2 * variance)) if variance else 1.0
+
+
+def _within(radius: float, xx: float, yy: float, xy: float) -> float:
+    """Probability that a normal vector about zero, (2,), is no longer than a radius.
+
+    With its principal sigmas a and b and z in polar form, |(a z₁, b z₂)| ≤ r is ρ² ≤ r²/(a²cos²θ + b²sin²θ), and
+    ρ² is exponential: a mean over θ of a smooth periodic function, which equal steps sum to rounding. For b = 0 it
+    is Craig's form of erf.
+    """
+    middle, spread = (xx + yy) / 2, math.hypot((xx - yy) / 2, xy)
+    large, small = middle + spread, max(0.0, middle - spread)
+    if not large:
+        return 1.0
+    total = 0.0
+    for step in range(_ANGLES):
+        angle = math.pi * (step + 0.5) / _ANGLES
+        square = large * math.cos(angle) ** 2 + small * math.sin(angle) ** 2
+        total += math.exp(-(radius**2) / (2 * square)) if square else 0.0
+    return 1 - total / _ANGLES
+
+
+def _wilson(successes: int, draws: int, quantile: float) -> tuple[float, float]:
+    """Confidence interval of a probability by Wilson's score: closed, and right for 0 and for all of few draws."""
+    p, z = successes / draws, quantile
+    middle = p + z**2 / (2 * draws)
+    half = z * math.sqrt(p * (1 - p) / draws + (z / (2 * draws)) ** 2)
+    low, high = (middle - half) / (1 + z**2 / draws), (middle + half) / (1 + z**2 / draws)
+    return (low if successes else 0.0, high if successes < draws else 1.0)
+
+
+def _requirement(
+    judged: Judged, holds: int, mean_square: float, draws: int, predictions: _Predictions
+) -> Requirement:
+    variances = predictions.variances(judged)
+    variance = math.fsum(variances.values())
+    dominant = max(variances, key=lambda name: variances[name])
+    low, high = _wilson(holds, draws, _QUANTILE)
+    found = Requirement(
+        id=judged.id,
+        unit=judged.unit,
+        limit=judged.limit,
+        sum=predictions.combined(judged, "sum"),
+        rss=predictions.combined(judged, "rss"),
+        sigma_rss=math.sqrt(variance),
+        sigma=float(f"{math.sqrt(mean_square):.{_DIGITS}g}") if math.isfinite(mean_square) else None,
+        probability=holds / draws,
+        probability_low=low,
+        probability_high=high,
+        probability_normal=predictions.probability_normal(judged),
+        dominant=dominant,
+        dominant_share=variances[dominant] / variance if variance else 0.0,
+        warnings=(),
+    )
+    return found._replace(warnings=tuple(_doubts(found, holds, draws, predictions)))
+
+
+def _doubts(found: Requirement, holds: int, draws: int, predictions: _Predictions) -> Iterator[str]:
+    """Say where root-sum-square and the normal distribution do not describe the sum."""
+    if found.dominant_share > DOMINANT and not predictions.is_normal(found.dominant):
+        yield (
+            f"{found.dominant}, which is not normal, has {100 * found.dominant_share:.3g} % of the variance: the "
+            "sum has its shape, and no multiple of sigma is the bound it would be of a normal distribution"
+        )
+    low, high = _wilson(holds, draws, _SURE_QUANTILE)
+    normal, drawn = found.probability_normal, found.probability
+    fails = max(1 - normal, 1 - drawn)
+    if not low <= normal <= high and abs(normal - drawn) > _MATERIAL * fails:
+        kind = "optimistic" if normal > drawn else "pessimistic"
+        yield (
+            f"root-sum-square is {kind}: a normal distribution would fail in {100 * (1 - normal):.3g} %, the draws "
+            f"fail in {100 * (1 - drawn):.3g} %"
+        )
+
+
+def _notes(mission: Mission, declared: Sequence[ErrorSource], is_exact: bool) -> Iterator[str]:
+    """Say what is drawn by a rule of ours, and what is not drawn."""
+    if is_exact:
+        yield "every draw goes through exact ranges: the declared errors are too large for sums of their effects"
+    if mission.allocation.model != "full":
+        yield f"drawn by the full model; the rows are judged by allocation.model, {mission.allocation.model}"
+    if mission.allocation.combine == "each":
+        yield "a draw is the sum of all errors at once; the rows are judged one by one, allocation.combine being each"
+    bounds = [source.id for source in declared if source.owner == "mission" and not source.is_common]
+    if bounds:
+        yield f"{', '.join(bounds)}: drawn as plus or minus the declared value, which has no distribution"
+    vibrations = [getattr(mission.platforms, name).motion_error.vibration for name in PLATFORMS]
+    if any(one.sinusoidal or one.wideband for one in vibrations):
+        yield "vibration is not drawn; the phase of a slow vibration is not included"
+    if mission.allocation.coverage_factor != 1:
+        yield "the coverage factor is in sum and rss, not in the draws"

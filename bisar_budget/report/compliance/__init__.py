@@ -1,0 +1,1 @@
+"""The compliance report: what it shows, as plain data for the templates."""

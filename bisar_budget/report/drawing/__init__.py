@@ -1,0 +1,1 @@
+"""Drawings of missions (SVG) and of images."""

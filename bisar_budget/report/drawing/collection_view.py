@@ -1,0 +1,390 @@
+"""One view of a collection on the page: panels to scale, markers, arrows, labels, and what is too close enlarged."""
+
+import math
+import textwrap
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+from bisar_budget.geometry import PlatformState, norm
+from bisar_budget.report.drawing.svg import Box, Canvas, DrawnLabel, Point, axis_number, round_step, text_width, ticks
+from bisar_budget.units import format_quantity
+
+Place = tuple[float, float]  # in the plane that is drawn: to the right, up [m]
+
+_WIDTH = 520.0  # px, of a drawing
+_AXIS, _EDGE = (54.0, 34.0), 8.0  # px, beside and below a panel for its axes; elsewhere
+_APART = 30.0  # px; nearer than this two things are one spot of the drawing
+_CLOSE = 60.0  # px; what is nearer than this in space too deserves an enlargement
+_SPREAD = 0.15  # of a distance: an enlargement shows at least this much each way, however things line up
+_ENLARGED = 2.0  # times; less is not worth a panel
+_VELOCITY, _LOOK, _SMEAR = 44.0, 62.0, 40.0  # px, lengths of arrows
+_SHORT = 0.3  # of an arrow; less of it in the plane of the drawing is drawn as seen from its end
+_SEEN_PATH = 20.0  # px; shorter paths are hidden by marker and arrow
+_NOTE_COLUMNS = 88
+_SCENE: Place = (0.0, 0.0)
+
+
+class SeenPlatform(NamedTuple):
+    """One platform in one view. `heading` is the unit velocity in the plane, `toward` its part to the viewer."""
+
+    name: str
+    state: PlatformState
+    at: Place
+    heading: Place
+    toward: float
+    path: tuple[Place, ...]
+
+    @property
+    def is_still(self) -> bool:
+        """Say whether it is fixed to the ground."""
+        return norm(self.state.velocity) == 0
+
+    @property
+    def motion(self) -> str:
+        """Speed in words."""
+        return "fixed" if self.is_still else format_quantity(norm(self.state.velocity), "m/s")
+
+
+class View(NamedTuple):
+    """What one drawing shows; `margins` are left and right, above, and below the things in a panel. [px]"""
+
+    is_plan: bool
+    axes: tuple[str, str]
+    platforms: tuple[SeenPlatform, SeenPlatform]
+    radius: float
+    look_azimuth: float
+    aperture_time: float
+    heights: tuple[float, float]
+    margins: tuple[float, float, float]
+
+
+class _Panel(NamedTuple):
+    """A part of the page and what it shows: `centre` lies in its middle, at `scale`. [px], [m], [px/m]"""
+
+    frame: Box
+    centre: Place
+    scale: float
+
+    def pixel(self, place: Place) -> Point:
+        middle = ((self.frame.left + self.frame.right) / 2, (self.frame.top + self.frame.bottom) / 2)
+        return (
+            middle[0] + (place[0] - self.centre[0]) * self.scale,
+            middle[1] - (place[1] - self.centre[1]) * self.scale,
+        )
+
+
+def draw(view: View, *, key: str, title: str, description: str, notes: Sequence[str] = ()) -> str:
+    """Draw a view as SVG, what is too close to tell apart enlarged below.
+
+    Parameters
+    ----------
+    view : View
+        What is where.
+    key : str
+        What tells this drawing from all others of a page.
+    title, description : str
+        Its name, and its numbers in words.
+    notes : sequence of str
+        Sentences that stand below; those that explain the symbols are added.
+    """
+    canvas = Canvas()
+    main = _whole(view)
+    enlarged = _enlargement(view, main)
+    of_scene = enlarged is not None and bool(_beside_the_scene(view, main))
+    _axes(canvas, main, view)
+    _draw_panel(canvas, main, view, is_detail=not of_scene, enlarged=enlarged)
+    bottom = main.frame.bottom + _AXIS[1]
+    if enlarged:
+        what = (
+            f"Around the {'scene' if of_scene else 'platforms'}, enlarged {_times(enlarged.scale / main.scale)} times"
+        )
+        canvas.text((enlarged.frame.left, enlarged.frame.top - 8), [what], "small")
+        _outline(canvas, enlarged)
+        _draw_panel(canvas, enlarged, view, is_detail=of_scene, enlarged=None)
+        bottom = enlarged.frame.bottom
+    symbols = _symbols(view, [main, enlarged] if enlarged else [main])
+    lines = textwrap.wrap(" ".join([*notes, *symbols]), _NOTE_COLUMNS)
+    for index, line in enumerate(lines):
+        canvas.text((main.frame.left, bottom + 18 + 13 * index), [line], "small")
+    return canvas.document((_WIDTH, bottom + 18 + 13 * len(lines)), key, title, description)
+
+
+def _whole(view: View) -> _Panel:
+    """Panel that shows scene and platforms; a scene far larger than the collection is cut off."""
+    places = [_SCENE, *(p.at for p in view.platforms), *(place for p in view.platforms for place in p.path)]
+    if view.radius <= 2 * max(math.hypot(*place) for place in places):
+        places += _extent(view, _SCENE, view.radius)
+    return _fitted(view, places, _EDGE)
+
+
+def _beside_the_scene(view: View, main: _Panel) -> list[SeenPlatform]:
+    return [p for p in view.platforms if p.state.slant_range * main.scale < _CLOSE]
+
+
+def _enlargement(view: View, main: _Panel) -> _Panel | None:
+    """Panel below for platforms beside the scene, or beside each other; None where it would show no more."""
+    smaller = view._replace(heights=(view.heights[0], 0.75 * view.heights[1]))
+    top = main.frame.bottom + _AXIS[1] + 26
+    first, second = view.platforms
+    separation = math.dist(first.state.position, second.state.position)
+    if beside := _beside_the_scene(view, main):
+        reach = max(p.state.slant_range for p in beside)
+        places = [_SCENE, *(place for p in beside for place in (p.at, *p.path))]
+        places += _extent(view, _SCENE, view.radius if view.radius <= 2 * reach else 0.0)
+    elif 0 < separation * main.scale < _CLOSE and _pixels_apart(main, first, second) < _APART:
+        reach = separation
+        places = [first.at, second.at]
+    else:
+        return None
+    east, north = ((min(values) + max(values)) / 2 for values in zip(*places, strict=True))
+    middle = _SCENE if beside else (east, north)
+    panel = _fitted(smaller, [*places, *_extent(view, middle, _SPREAD * reach)], top)
+    is_still_one_spot = not beside and _pixels_apart(panel, first, second) < _APART
+    return None if is_still_one_spot or panel.scale < _ENLARGED * main.scale else panel
+
+
+def _symbols(view: View, panels: Sequence[_Panel]) -> Iterator[str]:
+    """What is not written beside the symbols themselves."""
+    if any(not p.is_still and not _is_end_on(p) for p in view.platforms):
+        yield "Arrows at the platforms: direction of flight, not speed."
+    if any(_shows_path(panel, p) for panel in panels for p in view.platforms):
+        yield f"Broad line: path in the aperture of {format_quantity(view.aperture_time, 's')}."
+    if any(_is_end_on(p) for p in view.platforms):
+        yield "Circle with dot: flight towards the viewer; with cross: away."
+
+
+def _extent(view: View, centre: Place, reach: float) -> list[Place]:
+    """Ends of what reaches so far from a point: all round from above, along the ground from the side."""
+    x, y = centre
+    ends = [(x - reach, y), (x + reach, y)]
+    return [*ends, (x, y - reach), (x, y + reach)] if view.is_plan else ends
+
+
+def _fitted(view: View, places: Sequence[Place], top: float) -> _Panel:
+    """Panel at the largest scale that shows all places and leaves room for what is written beside them."""
+    (lowest, highest), (side, above, below) = view.heights, view.margins
+    xs, ys = zip(*places, strict=True)
+    wide, tall = max(xs) - min(xs), max(ys) - min(ys)
+    width = _WIDTH - _AXIS[0] - _EDGE
+    scale = min(
+        (width - 2 * side) / wide if wide else math.inf,
+        (highest - above - below) / tall if tall else math.inf,
+    )
+    height = min(max(lowest, tall * scale + above + below), highest)
+    slack = (height - tall * scale - above - below) / 2 if view.is_plan else 0.0
+    # The middle of the frame is not that of the places where the margins differ; the ground stays down.
+    low = min(ys) - (below + slack) / scale
+    centre = ((max(xs) + min(xs)) / 2, low + height / 2 / scale)
+    return _Panel(Box(_AXIS[0], top, _AXIS[0] + width, top + height), centre, scale)
+
+
+def _axes(canvas: Canvas, panel: _Panel, view: View) -> None:
+    """Grid, ticks and names of the axes; the same step both ways, because both are to scale."""
+    frame, scale = panel.frame, panel.scale
+    step = round_step(62 / scale)
+    far = max(abs(panel.centre[0]), abs(panel.centre[1])) + (frame.right - frame.left) / scale
+    unit, name = (1e3, "km") if far >= 2e3 else (1.0, "m")
+    half = ((frame.right - frame.left) / 2 / scale, (frame.bottom - frame.top) / 2 / scale)
+    for value in ticks(panel.centre[0] - half[0], panel.centre[0] + half[0], step):
+        x, _ = panel.pixel((value, 0.0))
+        if frame.left + 1 < x < frame.right - 1:
+            canvas.polyline([(x, frame.top), (x, frame.bottom)], "grid", is_obstacle=False)
+        shown = value if view.is_plan else abs(value)
+        text = axis_number(shown / unit)
+        if x + text_width(text) / 2 < _WIDTH:
+            canvas.text((x, frame.bottom + 13), [text], "axis", "middle")
+    for value in ticks(panel.centre[1] - half[1], panel.centre[1] + half[1], step):
+        _, y = panel.pixel((0.0, value))
+        if not view.is_plan and value < 0:
+            continue
+        if frame.top + 1 < y < frame.bottom - 1:
+            canvas.polyline([(frame.left, y), (frame.right, y)], "grid", is_obstacle=False)
+        canvas.text((frame.left - 5, y + 3.5), [axis_number(value / unit)], "axis", "end")
+    middle = (frame.left + frame.right) / 2
+    canvas.text((middle, frame.bottom + 28), [f"{view.axes[0]} [{name}]"], "axis", "middle")
+    canvas.upright_text((11, (frame.top + frame.bottom) / 2), f"{view.axes[1]} [{name}]", "axis")
+    _frame(canvas, frame)
+
+
+def _outline(canvas: Canvas, panel: _Panel) -> None:
+    """Frame of an enlargement, with a bar for its scale."""
+    frame = panel.frame
+    _frame(canvas, frame)
+    length = round_step(40 / panel.scale)
+    right, y = frame.right - 10, frame.top + 22
+    left = right - length * panel.scale
+    for line in ([(left, y), (right, y)], *([(x, y - 3), (x, y + 3)] for x in (left, right))):
+        canvas.polyline(line, "line")
+    canvas.text(((left + right) / 2, y - 6), [format_quantity(length, "m")], "axis", "middle")
+    canvas.obstacles.append(Box(left - 4, frame.top, frame.right, y + 4))
+
+
+def _frame(canvas: Canvas, frame: Box) -> None:
+    corners = [
+        (frame.left, frame.top),
+        (frame.right, frame.top),
+        (frame.right, frame.bottom),
+        (frame.left, frame.bottom),
+    ]
+    canvas.polyline([*corners, corners[0]], "grid", is_obstacle=False)
+
+
+def _draw_panel(canvas: Canvas, panel: _Panel, view: View, is_detail: bool, enlarged: _Panel | None) -> None:
+    """Lines first, then markers, then labels, which look for what space is left."""
+    frame, scene = panel.frame, panel.pixel(_SCENE)
+    if view.is_plan:
+        if view.radius * panel.scale >= 3:
+            circle = [_on_circle(_SCENE, view.radius, 2 * math.pi * index / 96) for index in range(97)]
+            canvas.polyline([panel.pixel(place) for place in circle], "thin", frame)
+    else:
+        ground = [(frame.left, scene[1]), (frame.right, scene[1])]
+        canvas.polyline(ground, "line", frame)
+        if view.radius * panel.scale >= 3:
+            ends = [panel.pixel((sign * view.radius, 0.0)) for sign in (-1, 1)]
+            canvas.polyline(ends, "line path", frame)
+    for platform in view.platforms:
+        dashes = "dashed" if platform.name == "transmitter" else "dotted"
+        canvas.polyline([scene, panel.pixel(platform.at)], f"{platform.name} {dashes}", frame)
+        if _shows_path(panel, platform):
+            canvas.polyline([panel.pixel(place) for place in platform.path], f"{platform.name} path", frame)
+    has_scene = frame.holds(scene)
+    labels: list[DrawnLabel] = []
+    if is_detail and has_scene:
+        if view.is_plan:
+            labels += _directions(canvas, panel, view)
+        else:
+            for platform, radius in zip(view.platforms, (30.0, 42.0), strict=True):
+                _arc(canvas, panel, platform, radius)
+    visible = [p for p in view.platforms if frame.holds(panel.pixel(p.at))]
+    for platform in visible:
+        _velocity(canvas, panel, platform)
+    for platform in visible:
+        _marker(canvas, panel.pixel(platform.at), platform)
+    if has_scene:
+        for x, y in ((5, 0), (0, 5)):
+            canvas.polyline([(scene[0] - x, scene[1] - y), (scene[0] + x, scene[1] + y)], "marker line")
+        canvas.obstacles.append(Box(scene[0] - 5, scene[1] - 5, scene[0] + 5, scene[1] + 5))
+    canvas.labels([*_labels(panel, view, visible, has_scene, enlarged), *labels])
+
+
+def _labels(
+    panel: _Panel, view: View, visible: Sequence[SeenPlatform], has_scene: bool, enlarged: _Panel | None
+) -> Iterator[DrawnLabel]:
+    """What is written, and where it belongs; things on one spot share a label."""
+    frame, scene = panel.frame, panel.pixel(_SCENE)
+    # From the side, what is written of a platform stays above the ground.
+    above = frame if view.is_plan else frame._replace(bottom=min(frame.bottom, scene[1]))
+    at_scene = [p for p in visible if has_scene and math.dist(panel.pixel(p.at), scene) < _APART]
+    free = [p for p in visible if p not in at_scene]
+    if len(free) == 2 and _pixels_apart(panel, *free) < _APART:
+        distance = math.dist(*(p.state.position for p in free))
+        together = f"{_range(view, free[0])}, {format_quantity(distance, 'm')} apart"
+        below = ("enlarged below",) if enlarged else ()
+        yield DrawnLabel(panel.pixel(free[0].at), ("transmitter and receiver", together, *below), above)
+    else:
+        for platform in free:
+            lines = platform.name, _range(view, platform) + (f", {platform.motion}" if view.is_plan else "")
+            yield DrawnLabel(panel.pixel(platform.at), lines, above)
+    if has_scene:
+        if at_scene and enlarged:
+            names = " and ".join(["scene", *(p.name for p in at_scene)])
+            yield DrawnLabel(scene, (names, "enlarged below"), frame)
+        elif at_scene:
+            names = " and ".join(p.name for p in at_scene)
+            ranges = ", ".join(f"{_range(view, p)}, {p.motion}" for p in at_scene)
+            yield DrawnLabel(scene, (f"{names} over the scene", ranges), frame)
+        else:
+            radius = f", radius {format_quantity(view.radius, 'm')}" if view.radius else ""
+            yield DrawnLabel(scene, (f"scene{radius}",), frame)
+    for platform in view.platforms:
+        if platform not in visible and (part := frame.clipped((scene, panel.pixel(platform.at)))):
+            yield DrawnLabel(part[1], (f"to {platform.name}, {_range(view, platform)}",), above)
+    if not has_scene and visible and (part := frame.clipped((panel.pixel(visible[0].at), scene))):
+        yield DrawnLabel(part[1], ("to the scene",), frame)
+
+
+def _range(view: View, platform: SeenPlatform) -> str:
+    slant = format_quantity(platform.state.slant_range, "m")
+    return slant if view.is_plan else f"{slant} at {degrees(platform.state.elevation)}"
+
+
+def _directions(canvas: Canvas, panel: _Panel, view: View) -> Iterator[DrawnLabel]:
+    """φ_b of (11), and across it the line along which errors smear, (31)."""
+    scene, look = panel.pixel(_SCENE), view.look_azimuth
+    tip = _turned(scene, _LOOK, look)
+    ends = [_turned(scene, sign * _SMEAR, look + math.pi / 2) for sign in (-1, 1)]
+    canvas.arrow(scene, tip)
+    canvas.arrow(ends[0], ends[1], both_ends=True)
+    yield DrawnLabel(tip, (f"look φ_b {degrees(look)}",), panel.frame)
+    yield DrawnLabel(max(ends, key=lambda end: end[1]), ("smear",), panel.frame)
+
+
+def _turned(origin: Point, length: float, azimuth: float) -> Point:
+    return (origin[0] + length * math.cos(azimuth), origin[1] - length * math.sin(azimuth))
+
+
+def _on_circle(centre: Place, radius: float, angle: float) -> Place:
+    return (centre[0] + radius * math.cos(angle), centre[1] + radius * math.sin(angle))
+
+
+def _arc(canvas: Canvas, panel: _Panel, platform: SeenPlatform, radius: float) -> None:
+    """Elevation angle at the scene."""
+    scene = panel.pixel(_SCENE)
+    end = math.atan2(platform.at[1], platform.at[0])
+    start = 0.0 if end <= math.pi / 2 else math.pi
+    steps = [start + (end - start) * index / 16 for index in range(17)]
+    canvas.polyline([_turned(scene, radius, angle) for angle in steps], f"{platform.name}", panel.frame)
+
+
+def _velocity(canvas: Canvas, panel: _Panel, platform: SeenPlatform) -> None:
+    if platform.is_still:
+        return
+    x, y = panel.pixel(platform.at)
+    if _is_end_on(platform):
+        side = 14 if platform.name == "transmitter" else -14  # of two on one spot both are seen
+        centre = (x + math.copysign(side, side * platform.at[0]), y - 13)
+        canvas.circle(centre, 5.5, f"{platform.name}")
+        if platform.toward > 0:
+            canvas.circle(centre, 1.6, f"solid {platform.name}")
+        else:
+            for slope in (1, -1):
+                canvas.polyline(
+                    [(centre[0] - 3.9, centre[1] - 3.9 * slope), (centre[0] + 3.9, centre[1] + 3.9 * slope)],
+                    platform.name,
+                )
+        return
+    tip = (x + _VELOCITY * platform.heading[0], y - _VELOCITY * platform.heading[1])
+    canvas.arrow((x, y), tip, platform.name)
+
+
+def _is_end_on(platform: SeenPlatform) -> bool:
+    return not platform.is_still and math.hypot(*platform.heading) < _SHORT
+
+
+def _marker(canvas: Canvas, at: Point, platform: SeenPlatform) -> None:
+    """Triangle for the transmitter, square for the receiver; hollow if it does not move."""
+    x, y = at
+    style = f"marker {'hollow line' if platform.is_still else 'solid'} {platform.name}"
+    if platform.name == "transmitter":
+        canvas.polygon([(x, y - 7), (x + 6, y + 3.5), (x - 6, y + 3.5)], style)  # its centroid is the place
+    else:
+        canvas.polygon([(x - 5, y - 5), (x + 5, y - 5), (x + 5, y + 5), (x - 5, y + 5)], style)
+
+
+def _pixels_apart(panel: _Panel, first: SeenPlatform, second: SeenPlatform) -> float:
+    return math.dist(panel.pixel(first.at), panel.pixel(second.at))
+
+
+def _shows_path(panel: _Panel, platform: SeenPlatform) -> bool:
+    length = math.fsum(math.dist(*pair) for pair in pairwise(platform.path))
+    return panel.frame.holds(panel.pixel(platform.at)) and length * panel.scale >= _SEEN_PATH
+
+
+def degrees(angle: float) -> str:
+    """Angle in degrees, to a hundredth."""
+    return f"{axis_number(round(math.degrees(angle), 2))}°"
+
+
+def _times(factor: float) -> str:
+    return f"{float(f'{factor:.2g}'):,.10g}"

@@ -1,0 +1,313 @@
+"""Figures 3 to 7 of Rigling & Moses for a mission of one's own: drawn, saved, and said in a few lines."""
+
+import math
+import os
+from collections.abc import Callable, Mapping
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+
+from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.errors import printable
+from bisar_budget.mission.model import Mission
+from bisar_budget.report.drawing.point_figures import FLOOR_DB, ImagePanel, Limits, Sheet, rotated_back, sheet
+from bisar_budget.report.words.layout import wrapped
+from bisar_budget.simulate.impulse_response import ImpulseResponse
+from bisar_budget.simulate.phase_history import Floats
+from bisar_budget.simulate.point import PointImages
+
+_RESTORED_DB = 1.0  # below the error-free peak; a focused response is within a fraction of it
+_EQUAL = 8.0  # an image that is not longer for its width than this has equal scales
+_NOT_FORMED = "#3a3a3a"  # beside a patch that is narrower than the panel
+_ERROR, _TRUE, _AT = "#c1502e", "#5fd3f3", "#7CFC9A"
+_CUT_STYLES: tuple[Mapping[str, Any], ...] = (
+    {"color": "#888888", "lw": 3},
+    {"color": _ERROR},
+    {"color": "#1f5fa8", "ls": "--"},
+)
+
+
+def drawn(images: PointImages, title: str, kind: str) -> bytes:
+    """Draw the figures on one sheet, as a `png`, `svg` or `pdf` file."""
+    return _file(figure(sheet(images), title), kind)
+
+
+def figure(drawn: Sheet, title: str) -> Any:
+    """Lay all panels on one Matplotlib figure."""
+    page = _page(figsize=(16.5, 8))
+    panels = page.subplots(2, 4)
+    for name, panel in zip(("fig3", "fig4", "fig5", "cuts", "fig6", "fig7", "fig7_back"), panels.flat, strict=False):
+        artist = PANELS[name](panel, drawn)
+    key = panels[1, 3]
+    key.axis("off")
+    bar = page.colorbar(artist, ax=key, orientation="horizontal", location="bottom", fraction=0.5, pad=0.02)
+    bar.set_label("dB to the error-free peak")
+    marks = [
+        key.plot([], [], label=label, **style)[0]
+        for style, label in (
+            (_stands(_TRUE), "where the target stands"),
+            (_put(_AT), "where (25) puts it"),
+            ({"ls": "none", "marker": "o", "color": _ERROR, "ms": 5}, "points of (29)"),
+        )
+    ]
+    key.add_artist(key.legend(handles=panels[0, 3].lines, loc="upper center", fontsize=10, frameon=False))
+    key.legend(handles=marks, loc="lower center", facecolor=_NOT_FORMED, labelcolor="white", fontsize=10)
+    page.suptitle(printable(title), parse_math=False)  # a name is no formula
+    return page
+
+
+def drawn_panel(name: str, drawn: Sheet) -> bytes:
+    """Draw a single panel, small, for a page, as a PNG file; `name` is one of `PANELS`."""
+    page = _page(figsize=(4.4, 3.6))
+    panel = page.subplots()
+    artist = PANELS[name](panel, drawn)
+    if name == "cuts":
+        panel.legend(fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.06), frameon=False)  # above the data
+    if artist is not None:
+        page.colorbar(artist, ax=panel, pad=0.02).set_label("dB to the error-free peak")
+    return _file(page, "png", dpi=80)
+
+
+def _page(**settings: Any) -> Any:
+    """Give a Matplotlib figure that looks the same whatever a user's matplotlibrc and MPLBACKEND say."""
+    os.environ.pop("MPLBACKEND", None)  # a name that Matplotlib does not know would end its import
+    import logging
+
+    logging.getLogger("matplotlib").setLevel(logging.CRITICAL)  # of fonts and folders that it lacks
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    matplotlib.rcdefaults()
+    matplotlib.rcParams["svg.hashsalt"] = "bisar-budget"
+    return Figure(**settings, layout="constrained")
+
+
+def _file(page: Any, kind: str, dpi: int = 110) -> bytes:
+    """Give the file of a figure: of the same input the same bytes."""
+    undated = {"png": {"Software": None}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
+    file = BytesIO()
+    page.savefig(file, format=kind, dpi=dpi, metadata=undated[kind])
+    return file.getvalue()
+
+
+def archive(images: PointImages) -> bytes:
+    """Give the images, complex, and what explains them, as an NPZ file."""
+    file = BytesIO()
+    np.savez_compressed(
+        file,
+        in_scene=images.in_scene,
+        rotated=images.rotated,
+        focused=images.focused,
+        rotated_back=rotated_back(images),
+        error_free=images.error_free,
+        spacing_m=images.spacing,
+        scene_spacing_m=images.scene_spacing,
+        look_azimuth_rad=images.look_azimuth,
+        displacement_m=images.effect.displacement,
+        slow_time_s=images.slow_time,
+        range_error_m=images.range_error,
+        points_m=images.points,
+        grid_m=images.grid,
+        scene_grid_m=images.scene_grid,
+        image_former=images.image_former,
+        targets_m=[[one.east, one.north] for one in images.targets.points],
+        targets_db=[one.level_db for one in images.targets.points],
+        shown_m=[one.shown for one in images.responses],
+    )
+    return file.getvalue()
+
+
+def _flown(mission: Mission) -> str:
+    factor = mission.allocation.coverage_factor
+    times = f", {factor:g} times the file's values" if factor != 1 else ""
+    errors = (getattr(mission.platforms, name).motion_error for name in PLATFORMS)
+    likely = "; of a covariance its most probable one" if any(error.covariance for error in errors) else ""
+    return (
+        f"the declared ones together, with the signs of the file{times}{likely}. Some may cancel: the worst case is "
+        "that of check"
+    )
+
+
+def summary(images: PointImages, mission: Mission) -> str:
+    """Say in a few lines what the errors do to the targets and what autofocus brings back."""
+    clean = images.clean_response
+    east, north = (round(float(moved), 3) for moved in images.effect.displacement)
+    is_point = len(images.responses) == 1 and images.targets.clutter_db is None
+    lines = [
+        mission.name,
+        "",
+        *wrapped(f"errors         {_flown(mission)}", " " * 15),
+        f"displacement   {east + 0.0:.3f} m east, {north + 0.0:.3f} m north",
+        f"phase          quadratic {abs(images.effect.quadratic):.2f} rad, cubic {abs(images.effect.cubic):.2f} rad",
+    ]
+    if images.image_former != "backprojection":
+        lines += wrapped(f"image former   {_formed_by(images)}", " " * 15)
+    if images.targets.clutter_db is not None:
+        lines.append(f"clutter        {images.targets.clutter_db:g} dB per pixel")
+    lines += ["", *(_of_the_point(images) if is_point else _of_targets(images))]
+    if images.outside:
+        lines += ["", *wrapped(images.outside, "")]
+    left = 20 * np.log10(images.focused_response.peak / clean.peak)
+    if left < -_RESTORED_DB:
+        lines += [
+            "",
+            f"autofocus does not restore the response: its peak stays {-left:.1f} dB below the error-free one",
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def _formed_by(images: PointImages) -> str:
+    words = {
+        "polar_format": "polar format (14) in (x′, y′), backprojection in (x, y)",
+        "matched_filter": "matched filter (4)",
+        "far_field": "far-field filter (12)",
+    }[images.image_former]
+    response = images.responses[0]
+    exact = np.array([response.target.east, response.target.north]) + response.effect.displacement
+    off = float(np.hypot(*(np.asarray(response.shown) - exact)))
+    plane = f"; plane waves put the response {off:.2g} m from where exact ranges do" if off else ""
+    return words + plane
+
+
+def _of_the_point(images: PointImages) -> list[str]:
+    lines = [f"{'':<14} {'peak':>9} {'width':>8} {'PSLR':>9} {'ISLR':>9}"]
+    for label, response in (
+        ("without error", images.clean_response),
+        ("with errors", images.response),
+        ("autofocused", images.focused_response),
+    ):
+        peak = 20 * math.log10(response.peak / images.clean_response.peak)
+        ratios = f"{response.pslr_db:>6.1f} dB {response.islr_db:>6.1f} dB"
+        lines.append(f"{label:<14} {peak:>+6.2f} dB {response.irw_m:>6.3f} m {ratios}")
+    return lines
+
+
+def _of_targets(images: PointImages) -> list[str]:
+    """One line for each target; peaks are over its own without error, and widths in its own cut."""
+    lines = [
+        f"{'target [m]':>17} {'level':>7} {'moved by [m]':>15} {'phase':>8} {'with errors':>14} {'autofocused':>14}",
+        f"{'east':>8} {'north':>8} {'[dB]':>7} {'east':>7} {'north':>7} {'[rad]':>8} "
+        f"{'[dB]':>7} {'[m]':>6} {'[dB]':>7} {'[m]':>6}",
+    ]
+    for one in images.responses:
+        moved = np.round(one.effect.displacement, 3) + 0.0
+        lines.append(
+            f"{one.target.east:>8.6g} {one.target.north:>8.6g} {one.target.level_db:>7.4g} "
+            f"{moved[0]:>7.3f} {moved[1]:>7.3f} {one.effect.quadratic:>+8.3f} "
+            f"{_peak_and_width(one.smeared, one.clean)} {_peak_and_width(one.focused, one.clean)}"
+        )
+    return lines
+
+
+def _peak_and_width(response: ImpulseResponse | None, clean: ImpulseResponse | None) -> str:
+    if response is None or clean is None:
+        return f"{'-':>7} {'-':>6}"
+    return f"{20 * math.log10(response.peak / clean.peak):>+7.2f} {response.irw_m:>6.3f}"
+
+
+def _range_error(panel: Any, drawn: Sheet) -> None:
+    panel.plot(drawn.slow_time, drawn.range_error_mm, color="black")
+    for segment in drawn.segments:
+        panel.plot(*segment.T, "--", color=_ERROR)
+    panel.set(title="Fig. 3: range error, three segments", xlabel="slow time [s]", ylabel="range error [mm]")
+    panel.grid(color="#dddddd", lw=0.5)
+
+
+def _points(panel: Any, drawn: Sheet) -> None:
+    panel.plot(*drawn.points.T, "o-", color=_ERROR, zorder=3)
+    panel.plot(0, 0, **_stands("#1b7fa3"))
+    panel.plot(*drawn.points[1], **_put("#2a8f4f"))
+    panel.set(title=f"Fig. 4: points of the segments, (29)\nby {drawn.points_by}", xlabel="x [m]", ylabel="y [m]")
+    span = float(np.ptp(drawn.points, axis=0).max()) or 1.0
+    low, high = drawn.points.min(axis=0), drawn.points.max(axis=0)
+    if float(np.hypot(*drawn.points[1])) < 10 * span:  # else the three would be one
+        low, high = np.minimum(low, 0), np.maximum(high, 0)
+    else:
+        _point_to(panel, np.zeros(2), (low + high) / 2, "black")
+    half = 0.65 * max(float((high - low).max()), span)
+    (x, y) = (low + high) / 2
+    panel.set(xlim=(x - half, x + half), ylim=(y - half, y + half), aspect="equal")
+    panel.grid(color="#dddddd", lw=0.5)
+
+
+def _image(panel: Any, picture: ImagePanel, *, with_points: bool = False) -> Any:
+    """Draw each pixel between its own corners, which follow lines of equal range."""
+    mesh = panel.pcolormesh(
+        picture.corners[..., 0],
+        picture.corners[..., 1],
+        picture.level_db,
+        vmin=FLOOR_DB,
+        vmax=0,
+        cmap="magma",
+        shading="flat",
+        rasterized=True,
+    )
+    panel.set(title=picture.title, xlabel=picture.axes[0], ylabel=picture.axes[1])
+    left, right, bottom, top = limits = picture.limits
+    if 1 / _EQUAL < (right - left) / (top - bottom) < _EQUAL:
+        x, y, half = (left + right) / 2, (bottom + top) / 2, max(right - left, top - bottom) / 2
+        left, right, bottom, top = limits = (x - half, x + half, y - half, y + half)
+        panel.set_aspect("equal")
+    panel.set(xlim=(left, right), ylim=(bottom, top), facecolor=_NOT_FORMED)
+    if with_points:
+        for three in picture.points:
+            panel.plot(*three.T, "o-", color=_ERROR, ms=4, lw=0.8)
+    panel.plot(*picture.shown_places.T, **_put(_AT))
+    panel.plot(*picture.true_places.T, **_stands(_TRUE))
+    for true in picture.true_places:
+        if not _is_within(true, limits):
+            _point_to(panel, true, np.array([(left + right) / 2, (bottom + top) / 2]), _TRUE)
+            break
+    return mesh
+
+
+def _stands(color: str) -> dict[str, Any]:
+    """Mark of a target's own place: a cross that leaves the middle free."""
+    from matplotlib.path import Path
+
+    arms = [(x * r, y * r) for x, y in ((1, 0), (0, 1), (-1, 0), (0, -1)) for r in (0.5, 1.0)]
+    cross = Path(arms, [Path.MOVETO, Path.LINETO] * 4)
+    return {"ls": "none", "marker": cross, "color": color, "ms": 17, "mew": 1.5, "mfc": "none"}
+
+
+def _put(color: str) -> dict[str, Any]:
+    """Mark of where a response is."""
+    return {"ls": "none", "marker": "o", "color": color, "ms": 12, "mfc": "none", "mew": 1.2}
+
+
+def _is_within(place: Floats, limits: Limits) -> bool:
+    return bool(limits[0] <= place[0] <= limits[1] and limits[2] <= place[1] <= limits[3])
+
+
+def _point_to(panel: Any, place: Floats, middle: Floats, color: str) -> None:
+    """Say how far away a true place is, and where, that the panel does not show."""
+    away = place - middle
+    distance = float(np.hypot(*away))
+    panel.text(
+        0.04, 0.04, f"the target stands {distance:.3g} m away", color=color, fontsize=8, transform=panel.transAxes
+    )
+    start, tip = (0.5 + part * away / distance for part in (0.36, 0.47))
+    arrow = {"arrowstyle": "-|>", "color": color, "lw": 1.5}
+    panel.annotate("", tuple(tip), tuple(start), "axes fraction", "axes fraction", arrowprops=arrow)
+
+
+def _cuts(panel: Any, drawn: Sheet) -> None:
+    for cut, style in zip(drawn.cuts, _CUT_STYLES, strict=True):
+        panel.plot(cut.place, cut.level_db, label=cut.label, **style)
+    places = [cut.place for cut in drawn.cuts]
+    panel.set(xlabel="y′ [m]", ylabel="dB to the error-free peak", ylim=(-40, 2))
+    panel.set(xlim=(min(float(one.min()) for one in places), max(float(one.max()) for one in places)))
+    panel.grid(color="#dddddd", lw=0.5)
+    panel.set_title("Cross-range cuts")
+
+
+PANELS: dict[str, Callable[[Any, Sheet], Any]] = {
+    "fig3": _range_error,
+    "fig4": _points,
+    "fig5": lambda panel, drawn: _image(panel, drawn.in_scene, with_points=True),
+    "fig6": lambda panel, drawn: _image(panel, drawn.rotated),
+    "fig7": lambda panel, drawn: _image(panel, drawn.focused),
+    "fig7_back": lambda panel, drawn: _image(panel, drawn.rotated_back),
+    "cuts": _cuts,
+}

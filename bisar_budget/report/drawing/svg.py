@@ -1,0 +1,311 @@
+"""A small SVG canvas: lines, markers, arrows, and labels that find a free place. Text out, the same bytes each time.
+
+Colours are custom properties with a fallback, so that a page which inlines a drawing can set them: --ink, --muted,
+--grid, --paper, --transmitter, --receiver. A drawing that is a file of its own brings light and dark itself.
+Nothing but the title and its description has an id, made of `key`: drawings of many missions fit into one page.
+"""
+
+import math
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from hashlib import sha256
+from itertools import pairwise
+from typing import NamedTuple
+
+from bisar_budget.report.words.escapes import xml_text
+
+Point = tuple[float, float]  # x to the right, y down [px]
+Segment = tuple[Point, Point]
+
+FONT = 12.0  # px
+LINE_HEIGHT = 14.5  # px
+_DARK = "--ink:#e6e6e6;--muted:#a9adb3;--grid:#3a3f46;--paper:#16191d;--transmitter:#7db4f2;--receiver:#f0a06a"
+STYLE = (
+    "svg.drawing{max-width:100%;height:auto;font:12px system-ui,'Segoe UI',Roboto,'DejaVu Sans',sans-serif}"
+    "svg.drawing text{fill:var(--ink,#222);paint-order:stroke}"
+    "svg.drawing text{stroke:var(--paper,#fff);stroke-width:3px;stroke-linejoin:round}"
+    "svg.drawing .small,svg.drawing .axis{font-size:10.5px;fill:var(--muted,#595f66)}"
+    "svg.drawing .name{font-weight:600}"
+    "svg.drawing .sub{font-size:9px}"
+    "svg.drawing :is(.line,.transmitter,.receiver){fill:none;stroke:var(--ink,#222);stroke-width:1.4}"
+    "svg.drawing .transmitter{stroke:var(--transmitter,#1f5fa8)}"
+    "svg.drawing .receiver{stroke:var(--receiver,#a8471a)}"
+    "svg.drawing .path{stroke-width:4;stroke-opacity:.45;stroke-linecap:round}"
+    "svg.drawing .solid{fill:var(--ink,#222);stroke:none}"
+    "svg.drawing .solid.transmitter{fill:var(--transmitter,#1f5fa8)}"
+    "svg.drawing .solid.receiver{fill:var(--receiver,#a8471a)}"
+    "svg.drawing .hollow{fill:var(--paper,#fff)}"
+    "svg.drawing .thin{stroke:var(--muted,#595f66);stroke-width:1;fill:none}"
+    "svg.drawing .grid{stroke:var(--grid,#e2e5e9);stroke-width:1;fill:none}"
+    "svg.drawing .dashed{stroke-dasharray:6 4}"
+    "svg.drawing .dotted{stroke-dasharray:1.5 3}"
+    "svg:root.drawing{background:var(--paper,#fff)}"
+    f"@media (prefers-color-scheme:dark){{svg:root.drawing{{{_DARK}}}}}"
+)
+
+_NARROW, _WIDE = "fijlrtI.,:;'|!()[] ", "mwMW%@"
+_MARGIN = 2.0  # px around a label
+_OUTSIDE, _COVERED, _CROSSED, _AWAY, _ORDER = 1e4, 60.0, 2.0, 0.6, 0.15  # what a place for a label costs
+# Right of the point first, then above, below, left, as maps are lettered; x and y of the label's middle.
+_DIRECTIONS = [
+    (math.cos(math.radians(angle)), -math.sin(math.radians(angle)))
+    for angle in (0, 30, -30, 60, -60, 90, -90, 180, 150, -150, 120, -120)
+]
+_GAPS = (8.0, 15.0, 24.0, 36.0, 52.0)  # px from the point to the label
+
+
+class Box(NamedTuple):
+    """A rectangle. [px]"""
+
+    left: float
+    top: float
+    right: float
+    bottom: float
+
+    def covered_by(self, other: "Box") -> float:
+        """Area shared with another. [px²]"""
+        width = min(self.right, other.right) - max(self.left, other.left)
+        height = min(self.bottom, other.bottom) - max(self.top, other.top)
+        return width * height if width > 0 and height > 0 else 0.0
+
+    def holds(self, point: Point) -> bool:
+        """Say whether a point lies inside."""
+        return self.left <= point[0] <= self.right and self.top <= point[1] <= self.bottom
+
+    def clipped(self, segment: Segment) -> Segment | None:
+        """Part of a line that lies inside (Liang-Barsky)."""
+        (x, y), (u, v) = segment
+        dx, dy = u - x, v - y
+        enter, leave = 0.0, 1.0
+        for step, room in ((-dx, x - self.left), (dx, self.right - x), (-dy, y - self.top), (dy, self.bottom - y)):
+            if step == 0:
+                if room < 0:
+                    return None
+            elif step < 0:
+                enter = max(enter, room / step)
+            else:
+                leave = min(leave, room / step)
+        if enter > leave:
+            return None
+        return (x + enter * dx, y + enter * dy), (x + leave * dx, y + leave * dy)
+
+
+class DrawnLabel(NamedTuple):
+    """Lines of text that belong to a point, to be written inside a box."""
+
+    at: Point
+    lines: tuple[str, ...]
+    within: Box
+
+
+class _Place(NamedTuple):
+    """Where a label could stand, the side its text is aligned to, and what that costs."""
+
+    box: Box
+    anchor: str
+    cost: float
+
+
+class Canvas:
+    """Collects the elements of one drawing, and knows what is taken when labels look for a place."""
+
+    def __init__(self) -> None:
+        self._elements: list[str] = []
+        self._texts: list[str] = []  # drawn last, above all lines
+        self.obstacles: list[Box] = []
+        self.segments: list[Segment] = []
+
+    def polyline(
+        self, points: Sequence[Point], style: str, within: Box | None = None, is_obstacle: bool = True
+    ) -> None:
+        """Draw a line through points, cut at the edges of a box."""
+        for run in _runs(points, within):
+            data = "M" + "L".join(f"{_number(x)} {_number(y)}" for x, y in run)
+            self._elements.append(f'<path class="{style}" d="{data}"/>')
+            if is_obstacle:
+                self.segments += pairwise(run)
+
+    def polygon(self, points: Sequence[Point], style: str, is_obstacle: bool = True) -> None:
+        """Draw a filled or hollow shape."""
+        data = "M" + "L".join(f"{_number(x)} {_number(y)}" for x, y in points) + "Z"
+        self._elements.append(f'<path class="{style}" d="{data}"/>')
+        if is_obstacle:
+            xs, ys = zip(*points, strict=True)
+            self.obstacles.append(Box(min(xs), min(ys), max(xs), max(ys)))
+
+    def circle(self, centre: Point, radius: float, style: str) -> None:
+        """Draw a circle around a point."""
+        x, y = centre
+        self._elements.append(f'<circle class="{style}" cx="{_number(x)}" cy="{_number(y)}" r="{_number(radius)}"/>')
+        self.obstacles.append(Box(x - radius, y - radius, x + radius, y + radius))
+
+    def arrow(self, tail: Point, tip: Point, colour: str = "", both_ends: bool = False) -> None:
+        """Draw a line with a head at its tip."""
+        self.polyline([tail, tip], f"line {colour}".rstrip())
+        for end, start in ((tip, tail), (tail, tip)) if both_ends else ((tip, tail),):
+            length = math.dist(end, start)
+            if length == 0:
+                continue
+            x, y = (end[0] - start[0]) / length, (end[1] - start[1]) / length
+            back = (end[0] - 8 * x, end[1] - 8 * y)
+            sides = [(back[0] - 3.2 * y * s, back[1] + 3.2 * x * s) for s in (1, -1)]
+            self.polygon([end, *sides], f"solid {colour}".rstrip(), is_obstacle=False)
+
+    def text(self, at: Point, lines: Sequence[str], style: str = "", anchor: str = "start") -> None:
+        """Write lines of text; `at` is the baseline of the first. The first of several is the name of a thing."""
+        x, y = at
+        spans = []
+        for index, line in enumerate(lines):
+            name = ' class="name"' if index == 0 and len(lines) > 1 else ""
+            dy = f' dy="{LINE_HEIGHT}"' if index else ""
+            spans.append(f'<tspan x="{_number(x)}"{dy}{name}>{_with_subscripts(line)}</tspan>')
+        attributes = (f' class="{style}"' if style else "") + (
+            f' text-anchor="{anchor}"' if anchor != "start" else ""
+        )
+        self._texts.append(f'<text x="{_number(x)}" y="{_number(y)}"{attributes}>{"".join(spans)}</text>')
+
+    def upright_text(self, at: Point, line: str, style: str) -> None:
+        """Write a line that runs upwards, its middle at a point."""
+        x, y = (_number(part) for part in at)
+        self._texts.append(
+            f'<text class="{style}" text-anchor="middle" transform="translate({x} {y}) rotate(-90)">'
+            f"{xml_text(line)}</text>"
+        )
+
+    def labels(self, labels: Sequence["DrawnLabel"]) -> None:
+        """Write texts near their points, where together they cover least of what is drawn and of each other.
+
+        They are placed one after the other; the best of several orders counts, because who comes first may take
+        the only place of another.
+        """
+        options = [self._options(label) for label in labels]
+        indices = range(len(labels))
+        orders = [[*indices[first:], *indices[:first]] for first in indices]
+        trials = [_chosen(options, order) for order in (*orders, *(order[::-1] for order in orders))]
+        _, best = min(trials, key=lambda trial: trial[0]) if trials else (0.0, {})
+        for index, label in enumerate(labels):
+            place = best[index]
+            box = place.box
+            self.obstacles.append(box)
+            x = {"start": box.left + _MARGIN, "middle": (box.left + box.right) / 2, "end": box.right - _MARGIN}
+            self.text((x[place.anchor], box.top + 0.8 * LINE_HEIGHT), label.lines, anchor=place.anchor)
+
+    def _options(self, label: "DrawnLabel") -> list["_Place"]:
+        """Places around the label's point with their costs, the cheapest first."""
+        width = max(text_width(line) for line in label.lines) + 2 * _MARGIN
+        height = LINE_HEIGHT * len(label.lines)
+        places = list(_places(label.at, width, height))
+        costed = [place._replace(cost=place.cost + self._cost(place.box, label.within)) for place in places]
+        return sorted(costed, key=lambda place: place.cost)
+
+    def _cost(self, box: Box, within: Box) -> float:
+        over = (within.left - box.left, within.top - box.top, box.right - within.right, box.bottom - within.bottom)
+        outside = sum(max(0.0, one) for one in over)
+        if outside > 0:
+            return _OUTSIDE + outside * _COVERED
+        cost = math.fsum(_overlap(box, obstacle) for obstacle in self.obstacles)
+        for (x, y), (u, v) in self.segments:
+            if (x < box.left and u < box.left) or (x > box.right and u > box.right):
+                continue  # most lines are far away
+            if (part := box.clipped(((x, y), (u, v)))) is not None:
+                cost += 2 + _CROSSED * math.dist(*part)
+        return cost
+
+    def document(self, size: tuple[float, float], key: str, title: str, description: str) -> str:
+        """Return the drawing as SVG, with its name and the text that stands for it where it cannot be seen."""
+        name = "d" + sha256(key.encode("utf-8", "surrogatepass")).hexdigest()[:10]
+        width, height = (_number(side) for side in size)
+        body = "\n".join((*self._elements, *self._texts))
+        return (
+            f'<svg xmlns="http://www.w3.org/2000/svg" class="drawing" role="img" viewBox="0 0 {width} {height}" '
+            f'width="{width}" height="{height}" aria-labelledby="{name}-title" aria-describedby="{name}-desc">\n'
+            f'<title id="{name}-title">{xml_text(title)}</title>\n'
+            f'<desc id="{name}-desc">{xml_text(description)}</desc>\n'
+            f"<style>{STYLE}</style>\n{body}\n</svg>\n"
+        )
+
+
+def text_width(line: str) -> float:
+    """Width of a text, rather too large: whose font it will be is not known. [px]"""
+    return FONT * math.fsum(
+        0.36 if c in _NARROW else 0.95 if c in _WIDE else 0.74 if c.isupper() else 0.62 for c in line
+    )
+
+
+def _places(at: Point, width: float, height: float) -> Iterator["_Place"]:
+    """Places for a label around a point; farther ones, and the left of it, cost a little."""
+    for gap in _GAPS:
+        for order, (x, y) in enumerate(_DIRECTIONS):
+            # The nearest point of the box is `gap` away; above and below it is centred.
+            left = at[0] + gap * x + (0.0 if x > 0.1 else -width if x < -0.1 else -width / 2)
+            top = at[1] + gap * y + (-height / 2 if abs(y) < 0.1 else -height if y < 0 else 0.0)
+            anchor = "start" if x > 0.1 else "end" if x < -0.1 else "middle"
+            yield _Place(Box(left, top, left + width, top + height), anchor, _AWAY * gap + _ORDER * order)
+
+
+def _chosen(options: Sequence[Sequence["_Place"]], order: Sequence[int]) -> tuple[float, dict[int, "_Place"]]:
+    """Take the cheapest place for one label after the other; what it costs in all, and the places."""
+    total, taken = 0.0, dict[int, _Place]()
+    for index in order:
+        best, least = options[index][0], math.inf
+        for place in options[index]:
+            if place.cost >= least:
+                break  # sorted: the rest costs more
+            cost = place.cost + math.fsum(_overlap(place.box, other.box) for other in taken.values())
+            if cost < least:
+                best, least = place, cost
+        taken[index], total = best, total + least
+    return total, taken
+
+
+def _overlap(box: Box, other: Box) -> float:
+    area = box.covered_by(other)
+    return _COVERED + area if area else 0.0
+
+
+def _runs(points: Sequence[Point], within: Box | None) -> Iterator[list[Point]]:
+    """Pieces of a line that lie inside a box."""
+    if within is None:
+        yield list(points)
+        return
+    run: list[Point] = []
+    for segment in pairwise(points):
+        part = within.clipped(segment)
+        if part is None or math.dist(*part) == 0:
+            continue
+        if run and run[-1] != part[0]:
+            yield run
+            run = []
+        run = [*run, part[1]] if run else list(part)
+    if run:
+        yield run
+
+
+_SUBSCRIPT = re.compile(r"([φθ])_(\w)(.*)")
+
+
+def _with_subscripts(line: str) -> str:
+    return _SUBSCRIPT.sub(r'\1<tspan class="sub" dy="3">\2</tspan><tspan dy="-3">\3</tspan>', xml_text(line))
+
+
+def _number(value: float) -> str:
+    """A coordinate to a hundredth of a pixel, without trailing zeros; never -0."""
+    text = f"{value:.2f}".rstrip("0").rstrip(".")
+    return "0" if text == "-0" else text
+
+
+def axis_number(value: float) -> str:
+    """Number at an axis, with a minus sign."""
+    return f"{value + 0.0:.6g}".replace("-", "−")
+
+
+def ticks(lower: float, upper: float, step: float) -> Iterable[float]:
+    """Multiples of a step from one value to another."""
+    first, last = math.ceil(lower / step - 1e-9), math.floor(upper / step + 1e-9)
+    return [index * step for index in range(first, last + 1)]
+
+
+def round_step(least: float) -> float:
+    """Smallest of 1, 2, 5 times a power of ten that is not below a value."""
+    power = 10.0 ** math.floor(math.log10(least))
+    return next(factor * power for factor in (1, 2, 5, 10) if factor * power >= least * (1 - 1e-9))

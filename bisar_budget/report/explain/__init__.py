@@ -1,0 +1,1 @@
+"""How a row comes to its status: equations with their numbers, and how they are set."""

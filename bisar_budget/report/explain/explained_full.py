@@ -1,0 +1,132 @@
+"""How the full model comes to its phases and allowables: exact ranges over the aperture, node by node.
+
+What an error leaves of the range history at the displaced point is listed at the nodes of the fit, with the weights
+of the fit: every phase is a sum that a reader can repeat.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+
+from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.effects.effect import ErrorSource
+from bisar_budget.effects.exact_ranges import ExactRanges
+from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
+from bisar_budget.geometry import GroundVector
+from bisar_budget.report.explain.formulas import Step, Sum, number, step, with_unit
+
+RATES = ("m", "m/s", "m/s²", "m/s³")  # units of the range error's coefficients
+_, _, _QUADRATIC, _CUBIC = range(4)  # rows of a fit
+
+
+class Left:
+    """What an error of a signed size leaves at the point that it moves the scene centre to."""
+
+    def __init__(self, analysis: Analysis, source: ErrorSource, size: float) -> None:
+        full = analysis.full
+        self.exact: ExactRanges = analysis.exact
+        self.size = size
+        self.place: GroundVector | None = full.plane.displacement(source.full, size)
+        self.is_small = not source.is_motion or full.is_small(source, abs(size))
+        if self.is_small:
+            self.ranges = self.exact.left_over_small(source, size)
+            return
+        found = full.at(source, size)
+        self.place = None if found is None else found.displacement
+        self.ranges = [] if found is None else self.exact.left_over(source, size, found.displacement)
+
+    def phase(self, which: int) -> float:
+        """Quadratic or cubic phase at the aperture edge, signed. [rad]"""
+        return self.exact.k * math.fsum(w * m for w, m in zip(self.exact.fit[which], self.ranges, strict=True))
+
+    def sum(self, symbol: str, which: int) -> Sum:
+        """The sum that gives a phase."""
+        terms = " + ".join(
+            f"{number(w)}*{number(m)}" for w, m in zip(self.exact.fit[which], self.ranges, strict=True)
+        )
+        return Sum(
+            f"{symbol} = 2*π/{number(self.exact.wavelength)}*({terms}) = {with_unit(self.phase(which), 'rad')}"
+        )
+
+
+def worse(analysis: Analysis, source: ErrorSource, size: float, which: int = _QUADRATIC) -> Left:
+    """What is left by the sign that leaves more."""
+    signs = [Left(analysis, source, signed) for signed in (size, -size)]
+    if signs[0].is_small or not signs[1].ranges:
+        return signs[0]
+    return max(signs, key=lambda left: abs(left.phase(which)) if left.ranges else math.inf)
+
+
+def full_chain(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
+    """From a signed error to its phases by the full model.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        Of the mission.
+    source : ErrorSource
+        The error.
+    size : float
+        With its sign; of what is not declared, one unit. [unit]
+    each : str
+        Said of what is not declared.
+    """
+    left = worse(analysis, source, size)
+    each = each.replace(" of ", ", for ")
+    if not left.ranges:
+        yield from step(f"Full model{each}: no ground point has the range history that this error leaves")
+        return
+    sign = "" if left.is_small or left.size == size else ", with the other sign, which leaves more"
+    yield from step(
+        f"Full model{each}{sign}: the ground point at which nothing is left of P₀ and P₁ over the aperture",
+        *_placed(left),
+    )
+    times = [node * analysis.exact.half for node in analysis.exact.nodes]
+    yield from step(
+        "Range error left there, |r_t| + |r_r| + c·t̃ − |r̂_t − x̂| − |r̂_r − x̂|, at the nodes of the fit",
+        *(f"{time:+.6g} s: {metres:.6g} m" for time, metres in zip(times, left.ranges, strict=True)),
+    )
+    yield from step(
+        "Quadratic phase at the aperture edge, 3/2 of P₂: weights of the fit times what is left",
+        left.sum("QPE_full", _QUADRATIC),
+    )
+    if source.is_motion and analysis.mission.requirements.cubic_phase_error is not None:
+        by_cubic = worse(analysis, source, size, _CUBIC)
+        yield from step("Cubic phase there, 5/2 of P₃", by_cubic.sum("cubic_full", _CUBIC))
+
+
+def for_comparison(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
+    """What the full model makes of an error that the published one judges."""
+    left = worse(analysis, source, size)
+    if not left.ranges:
+        yield from step(f"Full model{each}, for comparison: no ground point has the range history")
+        return
+    yield from step(
+        f"Full model{each}, for comparison: weights of the fit times the range error left (--model full lists it)",
+        left.sum("QPE_full", _QUADRATIC),
+    )
+
+
+def at_the_allowable(
+    analysis: Analysis, source: ErrorSource, allowable: float, requirement: str = QUADRATIC
+) -> Iterator[Step]:
+    """Show that an allowable that was searched for is at its limit."""
+    sizes = [Left(analysis, source, signed) for signed in (allowable, -allowable)]
+    if not all(left.ranges for left in sizes):
+        return
+    if requirement == LOCATION:
+        left = max(sizes, key=lambda one: math.hypot(*(one.place or (0.0, 0.0))))
+        x, y = left.place or (0.0, 0.0)
+        moved = Sum(f"moved = sqrt({number(x)}^2 + {number(y)}^2) = {with_unit(math.hypot(x, y), 'm')}")
+    else:
+        which, symbol = (_CUBIC, "cubic_there") if requirement == CUBIC else (_QUADRATIC, "QPE_there")
+        left = max(sizes, key=lambda one: abs(one.phase(which)))
+        moved = left.sum(symbol, which)
+    size = f"{number(left.size)} {source.unit.replace('^2', '²')}"
+    yield from step(f"At {size}, the smallest size of either sign that reaches the limit, exact ranges give", moved)
+
+
+def _placed(left: Left) -> Sequence[str]:
+    if left.place is None or left.place == (0.0, 0.0):
+        return ("the scene centre itself",)
+    east, north = left.place
+    return (f"x̂ = {with_unit(east, 'm')} east", f"ŷ = {with_unit(north, 'm')} north")

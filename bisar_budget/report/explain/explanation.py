@@ -1,0 +1,402 @@
+"""How a row comes to its status: from the line of the mission file through the equations to the verdict."""
+
+import math
+from collections.abc import Iterator, Sequence
+
+from bisar_budget.analysis.allocation import Allocation
+from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.scene import ScenePhases, at
+from bisar_budget.analysis.together import Together
+from bisar_budget.analysis.vibration_limits import amplitude_share, echo_phase, slow_limits
+from bisar_budget.constants import ROUNDING
+from bisar_budget.effects.correlation import displacement_parts, phase_parts
+from bisar_budget.effects.echoes import near_lines, sinc, worst_phases
+from bisar_budget.effects.effect import ErrorSource, image_plane
+from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
+from bisar_budget.effects.slow_vibration import cubic_part, quadratic_part
+from bisar_budget.effects.vibration_lines import lines_of
+from bisar_budget.errors import KeyPath, printable
+from bisar_budget.findings.mission import MissionFindings
+from bisar_budget.findings.row import Row
+from bisar_budget.findings.status import STATUS
+from bisar_budget.geometry import dot, without_rounding
+from bisar_budget.mission.model import Mission
+from bisar_budget.report.explain import formulas
+from bisar_budget.report.explain.explained_error import as_written, declaration, effect, missing, place
+from bisar_budget.report.explain.explained_full import at_the_allowable
+from bisar_budget.report.explain.formulas import Step, Sum, WorkedEquation, equation, number, step, with_unit
+from bisar_budget.report.formats.text_table import percent
+from bisar_budget.report.words.layout import wrapped
+from bisar_budget.units import format_quantity
+
+_DEEPER = 3  # a broken equation goes on; no symbol has the width that would put its equals sign there
+_LONGEST_UNIT = 16  # letters, of what may follow a number
+_RULES = {"each": "the largest", "sum": "the sum", "rss": "the root-sum-square"}
+
+
+def explain(mission: Mission, found: MissionFindings, row_id: str) -> str:
+    """Write the chain of equations of one row of a mission, with the numbers put in.
+
+    Parameters
+    ----------
+    mission : Mission
+        As loaded.
+    found : MissionFindings
+        What the check of it found.
+    row_id : str
+        Id of one of its rows.
+    """
+    row = next(row for row in found.rows if row.id == row_id)
+    own_id = f" [{printable(row.requirement_id)}]" if row.requirement_id else ""
+    lines = [f"{STATUS[row.status].text} {printable(row.id)}{own_id} of {printable(mission.name)}", ""]
+    lines += [line for step in chain(mission, found, row) for line in step.lines]
+    lines += _verdict(row)
+    return "\n".join(part for line in lines for part in _fitted(line)) + "\n"
+
+
+def _fitted(line: str) -> list[str]:
+    """Break a line, an equation deeper than any begins, and never between a result, its sign and its unit."""
+    start = len(line) - len(line.lstrip())
+    if not start:
+        return wrapped(line, "  ")
+    joined = line.replace("= ", "=\u00a0")
+    body, _, unit = joined.rpartition(" ")
+    if body.strip() and len(unit) < _LONGEST_UNIT:
+        joined = f"{body}\u00a0{unit}"
+    return [part.replace("\u00a0", " ") for part in wrapped(joined, " " * (start + _DEEPER))]
+
+
+def chain(mission: Mission, found: MissionFindings, row: Row) -> Iterator[Step]:
+    """Steps from the line of the mission file to how much of the allowable a row uses."""
+    analysis = found.analysed()
+    together = Together(analysis, analysis.full if row.model == "full" else analysis.published)
+    source = next((source for source in analysis.sources if source.id == row.id), None)
+    if source is not None:
+        yield from declaration(mission, source)
+        yield from effect(analysis, found, source, row.model)
+        yield from _budget(analysis, source, row)
+    elif row.subject.kind == "vibration":
+        yield from _vibration(mission, found.allocation, row)
+    elif row.subject.kind in (QUADRATIC, "autofocus_pull_in"):
+        yield from _phase_aggregate(together, found, row)
+    elif row.subject.kind == CUBIC:
+        yield from _cubic_aggregate(together, found, row)
+    elif row.subject.kind == "spatial_variance":
+        yield from _spatial_variance(analysis, found, row)
+    elif row.subject.kind == LOCATION:
+        yield from _location_aggregate(mission, together, found, row)
+    if row.declared is not None and row.allowable is not None and row.utilization is not None:
+        values = {"declared": row.declared, "allowable": row.allowable}
+        yield from step("Utilization", *equation("utilization", "declared/allowable", values, row.utilization, ""))
+
+
+def collection_chain(found: MissionFindings) -> Iterator[Step]:
+    """Steps to what is true of the collection whatever the errors are: look and smear direction, determinant of Q."""
+    values: dict[str, float] = {}
+    for name, state in (("t", found.geometry.transmitter), ("r", found.geometry.receiver)):
+        (x, y, _), (v_x, v_y, _) = state.position, state.velocity
+        values |= {f"φ̄_{name}": state.azimuth, f"θ̄_{name}": state.elevation, f"R_{name}": state.slant_range}
+        values |= {f"x_{name}": x, f"y_{name}": y, f"v_x{name}": v_x, f"v_y{name}": v_y}
+    look, s = found.geometry.look_azimuth, found.geometry.range_gradient
+    yield from step("(11), bistatic look direction", *equation("φ_b", formulas.LOOK_AZIMUTH, values, look, "rad"))
+    east, north = formulas.SMEAR
+    yield from step(
+        "(31), smear direction",
+        *equation("east", east, values, s[1], ""),
+        *equation("north", north, values, -s[0], ""),
+    )
+    determinant = image_plane(found.geometry).determinant
+    yield from step("(30), range held constant", *equation("det Q", formulas.DETERMINANT, values, determinant, "1/s"))
+
+
+def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]:
+    """From the requirements to the smallest size that one of them allows."""
+    allocation, requirements = analysis.allocation, analysis.mission.requirements
+    limit = allocation.qpe_limit(source.owner) * allocation.autofocus_gain
+    yield from _limit(allocation, source.owner, limit)
+    model = analysis.full if row.model == "full" else analysis.published
+    by_quadratic = row.allowable_full if row.model == "full" else row.allowable_published
+    sizes: dict[str, float] = {}
+    if by_quadratic is not None:
+        sizes["by_QPE"] = by_quadratic
+        if row.model == "full" and source.is_motion and not analysis.full.is_linear_at(source, QUADRATIC, limit):
+            yield from at_the_allowable(analysis, source, by_quadratic)
+        else:
+            values = {"limit": limit, "QPE/unit": abs(model.effect(source).qpe)}
+            yield from step(
+                "Allowable by the quadratic phase",
+                *equation("by_QPE", "limit/(QPE/unit)", values, by_quadratic, row.unit),
+            )
+    others = (
+        (CUBIC, "by_cubic", requirements.cubic_phase_error, "rad"),
+        (LOCATION, "by_location", requirements.location_error, "m"),
+    )
+    for name, symbol, required, unit in others if source.is_motion else ():
+        size = None if required is None else model.allowable(source, name, required)
+        if name == row.binding_requirement:
+            size = row.allowable  # the search of the check began elsewhere: in the last digits it may differ
+        if required is None or size is None:
+            continue
+        sizes[symbol] = size
+        title = f"Allowable by requirements.{name}, {with_unit(required, unit)}, without share and gain"
+        if row.model == "full" and not analysis.full.is_linear_at(source, name, required):
+            yield from step(title, f"{symbol} = {with_unit(size, row.unit)}")
+            yield from at_the_allowable(analysis, source, size, name)
+        else:
+            values = {"limit": required, "effect/unit": required / model.small(source, name, required)}
+            yield from step(title, *equation(symbol, "limit/(effect/unit)", values, size, row.unit))
+    if row.allowable is None:
+        yield from step("Allowable: no limit", printable(row.reason or "no requirement limits this error"))
+        return
+    text = f"min({', '.join(number(size) for size in sizes.values())})" if len(sizes) > 1 else number(row.allowable)
+    yield from step(
+        f"Allowable: the smallest, by {', '.join(sizes)}",
+        Sum(f"allowable = {text} = {with_unit(row.allowable, row.unit)}"),
+    )
+
+
+def _limit(allocation: Allocation, owner: str, limit: float) -> Iterator[Step]:
+    """Budget times share times gain."""
+    total, share, gain = allocation.qpe_total, allocation.qpe.of(owner), allocation.autofocus_gain
+    whose = {
+        "clock": "the receiver’s share" if allocation.qpe.clock is None else "the clock’s share",
+        "mission": "all of it: it belongs to no platform",
+    }
+    yield from _autofocus_gain(allocation)
+    values = {"total": total, "share": share, "gain": gain}
+    title = f"Budget requirements.quadratic_phase_error, {whose.get(owner, f'the {owner}’s share')}"
+    yield from step(title, *equation("limit", "total*share*gain", values, limit, "rad"))
+
+
+def _autofocus_gain(allocation: Allocation) -> Iterator[Step]:
+    if allocation.n_pull is None:
+        yield from step("No autofocus (autofocus.n_pull): gain = 1")
+        return
+    values = {"N_pull": allocation.n_pull, "q": allocation.qpe_total}
+    raw = math.pi * allocation.n_pull / allocation.qpe_total
+    lines = equation("gain", formulas.AUTOFOCUS_GAIN, values, raw, "")
+    yield from step("Autofocus, Section VI" + (", never below 1" if raw < 1 else ""), *lines)
+
+
+def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
+    """From the file to the limits of both models, for one line, lines near each other, or noise."""
+    platform, entry = row.owner, row.subject.entry or 0
+    is_sinusoid, is_sum = row.metric != "islr", row.subject.axis == "sinusoidal.sum"
+    path: KeyPath = ("platforms", platform, "motion_error", "vibration", "sinusoidal" if is_sinusoid else "wideband")
+    if row.declared is None:
+        yield Step(missing(mission, path))
+    elif is_sum:
+        yield from _near_lines(mission, platform, entry, row.declared)
+    else:
+        path = (*path, entry, "amplitude") if is_sinusoid else (*path, "rms")
+        yield from step(f"Declared in {place(mission, path)}", as_written(mission, path))
+        yield from _line_of_sight(mission, platform, is_sinusoid, entry, row.declared)
+    if row.evidence:
+        yield from step("Evidence", printable(row.evidence))
+    wavelength = mission.radar.wavelength
+    if row.qpe_full_rad is not None and row.declared is not None:
+        line = lines_of(mission, platform)[entry]
+        values = {
+            "A": row.declared,
+            "λ": wavelength,
+            "q": quadratic_part(line.frequency * mission.collection.aperture_time),
+        }
+        lines = equation("QPE_full", "2*π*A*q/λ", values, row.qpe_full_rad, "rad")
+        if row.metric == QUADRATIC:  # the same by both models
+            yield from step("By either model", *equation("QPE", "2*π*A*q/λ", values, row.qpe_full_rad, "rad"))
+        yield from step("Quadratic phase in the worst phase, q = 7.5·j₂(π·f·T)", *lines)
+        if row.metric == QUADRATIC:
+            yield from _slow_vibration(mission, allocation, row, line.frequency * mission.collection.aperture_time)
+            return
+    requirement = mission.requirements.pslr if is_sinusoid else mission.requirements.islr
+    if requirement is None or row.allowable_published is None or row.allowable_full is None:
+        return
+    name = row.metric.upper()
+    ratio = 10 ** (requirement / 10)
+    yield from step(
+        f"requirements.{row.metric} as a power ratio",
+        *equation(name, "10^(dB/10)", {"dB": requirement}, ratio, ""),
+    )
+    split = allocation.pslr if is_sinusoid else allocation.islr
+    share = split.of(platform)
+    values = {name: ratio, "λ": wavelength, "s": share}
+    lines = equation("published", formulas.VIBRATION[row.metric], values, row.allowable_published, "m")
+    kind = "sinusoidal" if is_sinusoid else "wideband"
+    yield from step(f"Section V, {kind}, s is the {platform}’s share of power", *lines)
+    if is_sinusoid:
+        part = amplitude_share(split, platform)
+        shares = {"s_k": share, "s_t": split.transmitter, "s_r": split.receiver}
+        yield from step(
+            "Both platforms at one frequency: echoes add in amplitude, its part a",
+            *equation("a", formulas.AMPLITUDE_SHARE, shares, part, ""),
+        )
+        level = math.sqrt(ratio * (split.transmitter + split.receiver))
+        values = {
+            "a": part,
+            "λ": wavelength,
+            "φ": echo_phase(level),
+        }
+        title = "First principles; φ is the phase whose echoes have this level, J₁(φ)/J₀(φ) = l"
+        powers = {"PSLR": ratio, "s_t": split.transmitter, "s_r": split.receiver}
+        known = [
+            WorkedEquation("l", "sqrt(PSLR*(s_t + s_r))", powers, level, ""),
+            WorkedEquation("φ", "", {}, values["φ"], "rad"),
+        ]
+    else:
+        title = "First principles, independent on both platforms; a phase of σ rad has the ISLR exp(σ²) − 1"
+        known = []
+    lines = equation("full", formulas.FULL_VIBRATION[row.metric], values, row.allowable_full, "m")
+    yield from step(title, *known, *lines)
+    limits = {"published": row.allowable_published, "full": row.allowable_full}
+    model = mission.allocation.model
+    chosen = "min(published, full)" if model == "strictest" else model
+    yield from step(
+        f"Allowable, allocation.model {model}", *equation("allowable", chosen, limits, row.allowable or 0.0, "m")
+    )
+
+
+def _slow_vibration(mission: Mission, allocation: Allocation, row: Row, cycles: float) -> Iterator[Step]:
+    """From the phases of a vibration below one cycle per aperture to the amplitude that they allow."""
+    platform, wavelength = row.owner, mission.radar.wavelength
+    values = {"A": row.declared or 0.0, "λ": wavelength, "c": cubic_part(cycles)}
+    lines = equation("cubic", "2*π*A*c/λ", values, row.cubic_rad or 0.0, "rad")
+    yield from step("Cubic phase in the worst phase, c = 17.5·j₃(π·f·T)", *lines)
+    limit = allocation.qpe_limit(platform) * allocation.autofocus_gain
+    yield from _limit(allocation, platform, limit)
+    limits, required = slow_limits(mission, allocation, platform, cycles), mission.requirements.cubic_phase_error
+    values = {"limit": limit, "λ": wavelength, "q": quadratic_part(cycles)}
+    lines = equation("by_QPE", "limit*λ/(2*π*q)", values, limits.quadratic, "m")
+    yield from step("Allowable by the quadratic phase", *lines)
+    sizes = {"by_QPE": limits.quadratic}
+    if required is not None and limits.cubic is not None:
+        values = {"required": required, "λ": wavelength, "c": cubic_part(cycles)}
+        lines = equation("by_cubic", "required*λ/(2*π*c)", values, limits.cubic, "m")
+        yield from step("Allowable by requirements.cubic_phase_error", *lines)
+        sizes["by_cubic"] = limits.cubic
+    smallest = "by_cubic" if limits.binding == CUBIC else "by_QPE"
+    yield from step("Allowable, the smallest", *equation("allowable", smallest, sizes, limits.smallest, "m"))
+
+
+def _line_of_sight(mission: Mission, platform: str, is_sinusoid: bool, entry: int, declared: float) -> Iterator[Step]:
+    """What of a vibration along three axes is along the line of sight."""
+    body = getattr(mission.platforms, platform)
+    vibration = body.motion_error.vibration
+    value = vibration.sinusoidal[entry].amplitude if is_sinusoid else vibration.wideband.rms
+    if not isinstance(value, tuple):
+        return
+    u, v, w = (dot(axis, body.state.look) for axis in body.state.frame(body.motion_error.frame))
+    axes = without_rounding((u, v, w))
+    parts = [f"{number(size)}*{number(along)}" for size, along in zip(value, axes, strict=True)]
+    if is_sinusoid:
+        text, how = " + ".join(f"|{part}|" for part in parts), "axes may vibrate in any phase: projections add"
+    else:
+        text, how = "sqrt(" + " + ".join(f"({part})^2" for part in parts) + ")", "independent axes: squares add"
+    yield from step(f"Along the line of sight, {how}", Sum(f"declared = {text} = {with_unit(declared, 'm')}"))
+
+
+def _near_lines(mission: Mission, platform: str, index: int, total: float) -> Iterator[Step]:
+    """Lines near each other: what each adds where the echoes together are highest."""
+    lines, T = lines_of(mission, platform), mission.collection.aperture_time
+    members = near_lines([line.frequency * T for line in lines])[index]
+    near = [lines[member] for member in members]
+    worst = worst_phases([line.amplitude for line in near], [line.frequency * T for line in near])
+    sizes = " + ".join(
+        f"{number(line.amplitude)}*{number(abs(sinc(worst.cycles - line.frequency * T)))}" for line in near
+    )
+    entries = ", ".join(map(str, members))
+    title = (
+        f"Entries {entries} lie near each other: at x = {number(worst.cycles)} cells each adds A·|sinc(x − f·T)|, "
+        "sinc(x) = sin(πx)/(πx), in the worst phases"
+    )
+    yield from step(title, f"declared = {sizes} = {total:.6g} m")
+
+
+def _phase_aggregate(together: Together, found: MissionFindings, row: Row) -> Iterator[Step]:
+    owner, is_pull_in = row.owner, row.subject.kind == "autofocus_pull_in"
+    rule = "sum" if is_pull_in else found.combine
+    phases = together.owed(found.allocation, owner)
+    parts = phase_parts(phases, rule, together.groups)
+    yield from _combined("QPE", rule, [(name, abs(size)) for name, size in parts], row)
+    if is_pull_in:
+        values = {"N_pull": found.allocation.n_pull or 0.0}
+        lines = equation("allowable", "π*N_pull", values, row.allowable or 0.0, "rad")
+        yield from step("What autofocus corrects, Section VI", *lines)
+    else:
+        yield from _limit(found.allocation, owner, row.allowable or 0.0)
+
+
+def _cubic_aggregate(together: Together, found: MissionFindings, row: Row) -> Iterator[Step]:
+    parts = phase_parts(together.all_cubics(), found.combine, together.groups)
+    yield from _combined("Cubic phase", found.combine, [(name, abs(size)) for name, size in parts], row)
+    if row.allowable is not None:
+        yield from step("Allowable", f"requirements.cubic_phase_error = {row.allowable:.6g} rad")
+
+
+def _spatial_variance(analysis: Analysis, found: MissionFindings, row: Row) -> Iterator[Step]:
+    """Phases at the centre and at the worst place of the scene's edge, and the largest difference."""
+    scene = found.scene
+    if scene is None or scene.degeneracy or row.declared is None:
+        return
+    edge = ScenePhases(analysis)
+    east, north = at(scene.radius, scene.azimuth)
+    sizes = [(name, abs(phase)) for name, phase in edge.parts(edge.differences(scene.radius, scene.azimuth))]
+    yield from step(
+        f"Full model at the scene’s edge, {east:.6g} m east, {north:.6g} m north of the centre, less at the centre"
+    )
+    yield from _combined("Difference of QPE", found.combine, sizes, row)
+    yield from step("Budget of what one autofocus correction leaves", f"total = {found.allocation.qpe_total:.6g} rad")
+
+
+def _location_aggregate(mission: Mission, together: Together, found: MissionFindings, row: Row) -> Iterator[Step]:
+    rule = "the longest sum over all signs of the vectors" if found.combine == "sum" else _RULES[found.combine]
+    parts = displacement_parts(together.moves(found.combine) or [], found.combine, together.groups)
+    title = "(25), (30)" if row.model == "published" else "Full model, each by the sign that moves farther"
+    if found.combine == "sum":
+        vectors = [
+            f"{printable(name)}: {with_unit(x, 'm')} east, {with_unit(y, 'm')} north" for name, (x, y) in parts
+        ]
+        combined = [] if row.declared is None else [f"combined = {row.declared:.6g} m"]
+        yield from step(f"{title}: displacements, {rule}", *(vectors or ["none"]), *combined)
+    else:
+        yield from _combined(
+            f"{title}: displacement", found.combine, [(n, math.hypot(*m)) for n, m in parts], row, "m"
+        )
+    if row.allowable is not None:
+        where = place(mission, ("requirements", "location_error"))
+        yield from step("Allowable", f"requirements.location_error = {row.allowable:.6g} m, {where}")
+
+
+def _combined(
+    symbol: str, rule: str, members: Sequence[tuple[str, float]], row: Row, unit: str = "rad"
+) -> Iterator[Step]:
+    title = f"{symbol} of the declared errors, {_RULES[rule]}"
+    # What is left of terms that cancel exactly is rounding.
+    largest = max((size for _, size in members), default=0.0)
+    members = [(name, size if size > ROUNDING * largest else 0.0) for name, size in members]
+    if row.declared is None or not members:
+        yield from step(title, *_listed(members, unit))
+        return
+    sizes = [number(size) for _, size in members if size] or ["0"]
+    if rule == "sum":
+        text = " + ".join(sizes)
+    elif rule == "rss":
+        text = "sqrt(" + " + ".join(f"{size}^2" for size in sizes) + ")"
+    else:
+        text = f"max(0, {', '.join(sizes)})"
+    yield from step(title, *_listed(members, unit), Sum(f"combined = {text} = {row.declared:.6g} {unit}"))
+
+
+def _listed(members: Sequence[tuple[str, float]], unit: str) -> list[str]:
+    width = max((len(name) for name, _ in members), default=0)
+    return [f"{printable(name):<{width}}  {size:.6g} {unit}" for name, size in members if size] or ["none"]
+
+
+def _verdict(row: Row) -> Iterator[str]:
+    if row.declared is not None and row.allowable is not None and row.utilization is not None:
+        yield f"                = {percent(row.utilization)}"  # under the sum of the last step
+    yield ""
+    texts = [text for text in (row.reason, *row.notes) if text]
+    declared = "" if row.declared is None else f", declared {format_quantity(row.declared, row.unit)}"
+    allowable = "" if row.allowable is None else f", allowable {format_quantity(row.allowable, row.unit, 3, 'down')}"
+    yield f"{STATUS[row.status].text}{declared}{allowable}"
+    yield from (f"    {printable(text)}" for text in texts)

@@ -1,0 +1,1 @@
+"""A module for each format; `bisar_budget.report` finds it by name."""

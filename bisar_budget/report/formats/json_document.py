@@ -1,0 +1,160 @@
+"""The report as JSON, `bisar-budget/check/1`. Keys may be added, never changed or removed."""
+
+import json
+from collections.abc import Callable, Sequence
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+from bisar_budget.analysis.allocation import Split
+from bisar_budget.findings.mission import MissionFindings, UnusableMission
+from bisar_budget.findings.row import Row
+from bisar_budget.findings.status import worst
+from bisar_budget.geometry import PlatformState
+from bisar_budget.report import Piece, Style
+
+if TYPE_CHECKING:
+    from bisar_budget.findings.monte_carlo import MonteCarlo
+
+FORMAT = "bisar-budget/check/1"
+
+
+def piece(mission: MissionFindings | UnusableMission, style: Style) -> str:
+    """Write the part of one mission, a row to a line; a number that is not finite is never written."""
+    found = _unusable(mission) if isinstance(mission, UnusableMission) else _mission(mission)
+    return _indented(found, _LEVELS, _MARGIN)
+
+
+def joined(pieces: Sequence[Piece], version: str, style: Style) -> str:
+    """Write the one JSON document."""
+    document = {"format": FORMAT, "version": version, "status": worst(piece.status for piece in pieces)}
+    head = _indented(document, 1).removesuffix("\n}")
+    missions = f",\n{_MARGIN}".join(piece.text for piece in pieces)
+    return f'{head},\n  "missions": [\n{_MARGIN}{missions}\n  ]\n}}\n'
+
+
+# Names of a row's values in the contract, in the order of its fields; what follows them is in `notes`.
+_RENAMED = {"subject": "id", "remarks": "notes"}
+_ROW = tuple(_RENAMED.get(name, name) for name in Row._fields[: Row._fields.index("waivers")])
+_LEVELS, _MARGIN = 2, "    "  # of a mission: itself and its rows; what is inside a row stays on its line
+
+
+@cache
+def _encoder(separator: str) -> Callable[[Any], str]:
+    return json.JSONEncoder(allow_nan=False, separators=(separator, ": ")).encode
+
+
+def _indented(value: Any, levels: int, margin: str = "") -> str:
+    """Indent the upper levels. json.dumps(indent=…) runs in Python and costs as much as the check itself."""
+    if levels == 0 or not value or not isinstance(value, dict | list | tuple):
+        return _encoder(", ")(value)
+    inner = margin + "  "
+    between = f",\n{inner}"
+    if isinstance(value, dict):
+        opening, closing = "{", "}"
+        if any(isinstance(item, dict | list | tuple) for item in value.values()):
+            items = [f'"{key}": {_indented(item, levels - 1, inner)}' for key, item in value.items()]
+            content = between.join(items)
+        else:
+            content = _encoder(between)(value)[1:-1]
+    else:
+        opening, closing = "[", "]"
+        if levels == 1:
+            # Within a string the quote before `id` would stand behind a backslash: this cuts between rows only.
+            content = _encoder(", ")(value)[1:-1].replace('}, {"id": ', f'}}{between}{{"id": ')
+        else:
+            content = between.join([_indented(item, levels - 1, inner) for item in value])
+    return f"{opening}\n{inner}{content}\n{margin}{closing}"
+
+
+def _unusable(mission: UnusableMission) -> dict[str, Any]:
+    return {
+        "file": mission.file,
+        "name": None,
+        "status": mission.status,
+        "errors": [
+            {
+                "line": fault.line,
+                "column": fault.column,
+                "key": fault.key,
+                "message": fault.problem,
+                "given": fault.given or None,
+                "accepted": fault.accepted or None,
+                "hint": fault.hint or None,
+            }
+            for fault in mission.faults
+        ],
+    }
+
+
+def _mission(mission: MissionFindings) -> dict[str, Any]:
+    allocation = mission.allocation
+    return {
+        "file": mission.file,
+        "name": mission.name,
+        "document": mission.document._asdict(),
+        "status": mission.status,
+        "model": mission.model,
+        "combine": mission.combine,
+        "coverage_factor": mission.coverage_factor,
+        "geometry": {
+            "wavelength_m": mission.wavelength,
+            "bistatic_angle_rad": mission.geometry.bistatic_angle,
+            "look_azimuth_rad": mission.geometry.look_azimuth,
+            "gradient_angle_rad": mission.geometry.gradient_angle,
+            "range_resolution_m": mission.resolution.range,
+            "cross_range_resolution_m": mission.resolution.cross_range,
+            "transmitter": _platform(mission.geometry.transmitter),
+            "receiver": _platform(mission.geometry.receiver),
+        },
+        "budget": {
+            "qpe_rad": {
+                "total": allocation.qpe_total,
+                "transmitter": allocation.qpe_limit("transmitter"),
+                "receiver": allocation.qpe_limit("receiver"),
+                "clock": allocation.qpe_limit("clock"),
+                "reserve": allocation.qpe.reserve * allocation.qpe_total,
+            },
+            "autofocus_gain": allocation.autofocus_gain,
+            "pslr_share": _shares(allocation.pslr),
+            "islr_share": _shares(allocation.islr),
+        },
+        "scene": None
+        if mission.scene is None
+        else {
+            "radius_m": mission.scene.radius,
+            "autofocus_radius_m": mission.scene.autofocus_radius,
+            "searched_radius_m": mission.scene.searched,
+        },
+        "summary": mission.summary,
+        "rows": [_row(row) for row in mission.rows],
+        "warnings": [{"line": warning.line, "message": warning.message} for warning in mission.warnings],
+        "notes": mission.notes,
+        "errors": [],
+        "monte_carlo": None if mission.monte_carlo is None else _monte_carlo(mission.monte_carlo),
+        "verification": None if mission.verdicts is None else [verdict._asdict() for verdict in mission.verdicts],
+    }
+
+
+def _row(row: Row) -> dict[str, Any]:
+    found = dict(zip(_ROW, row, strict=False))
+    found["id"] = row.id
+    if row.waivers or row.refuted:
+        found["notes"] = row.notes
+    return found
+
+
+def _monte_carlo(drawn: "MonteCarlo") -> dict[str, Any]:
+    return {**drawn._asdict(), "requirements": [requirement._asdict() for requirement in drawn.requirements]}
+
+
+def _platform(state: PlatformState) -> dict[str, float | None]:
+    return {
+        "slant_range_m": state.slant_range,
+        "azimuth_rad": state.azimuth,
+        "elevation_rad": state.elevation,
+        "squint_rad": state.squint,
+    }
+
+
+def _shares(split: Split) -> dict[str, float]:
+    return {"transmitter": split.transmitter, "receiver": split.receiver}

@@ -1,0 +1,132 @@
+"""The rows as JUnit XML, which GitLab, Jenkins and requirements tools read: a suite per mission, a case per row.
+
+What breaks a requirement is a failure, what judges nothing is skipped, a file that cannot be used is an
+error; a warning passes and says so in its output. There are no times: a report is the same in every run.
+
+Nothing is indented, and a row without verdict has no properties but its values: a fleet has 10⁵ rows.
+"""
+
+from collections import Counter
+from collections.abc import Iterator
+from functools import cache
+from os.path import splitext
+
+from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
+from bisar_budget.findings.row import Row
+from bisar_budget.findings.status import STATUS
+from bisar_budget.report import Style
+from bisar_budget.report.words.escapes import source_path, xml_text
+from bisar_budget.report.words.sentences import cause, measure
+
+
+def render(report: Report, style: Style) -> str:
+    """Write one document; the shape is that of Jenkins' junit-10, with properties of cases as pytest writes them."""
+    counts: Counter[str] = Counter()
+    suites: list[str] = []
+    for mission in report.missions:
+        suites += _unusable(mission, style, counts) if isinstance(mission, UnusableMission) else ()
+        suites += _mission(mission, style, counts) if isinstance(mission, MissionFindings) else ()
+    head = f'<testsuites name="bisar-budget" tests="{counts["tests"]}" failures="{counts["failures"]}"'
+    lines = ['<?xml version="1.0" encoding="UTF-8"?>', f'{head} errors="{counts["errors"]}" time="0">', *suites]
+    return "\n".join([*lines, "</testsuites>"]) + "\n"
+
+
+def _unusable(mission: UnusableMission, style: Style, counts: Counter[str]) -> Iterator[str]:
+    counts.update(tests=1, errors=1)
+    file = source_path(mission.file, style.root)
+    yield _suite(file, tests=1, failures=0, errors=1, skipped=0)
+    yield f'<testcase classname="{_class_name(mission.file, style)}" name="mission file" time="0">'
+    count = len(mission.faults)
+    message = f"cannot be used, {count} fault{'s' if count != 1 else ''}: {mission.faults[0]}"
+    places = [f"{file}:{f.line or '-'}:{f.column or '-'}: {f}" for f in mission.faults]
+    text = "\n".join(map(xml_text, places))
+    yield f'<error message="{xml_text(message)}" type="error">{text}</error>'
+    yield "</testcase>"
+    yield "</testsuite>"
+
+
+def _mission(mission: MissionFindings, style: Style, counts: Counter[str]) -> Iterator[str]:
+    failures = sum(STATUS[row.status].junit == "failure" for row in mission.rows)
+    skipped = sum(STATUS[row.status].junit == "skipped" for row in mission.rows)
+    counts.update(tests=len(mission.rows), failures=failures)
+    yield _suite(mission.name, tests=len(mission.rows), failures=failures, errors=0, skipped=skipped)
+    yield "<properties>"
+    yield _property("file", source_path(mission.file, style.root))
+    yield _property("model", mission.model)
+    yield _property("combine", mission.combine)
+    said = mission.document._asdict().items()
+    yield from [_property(f"document_{name}", value) for name, value in said if value is not None]
+    yield "</properties>"
+    class_name, file = _class_name(mission.file, style), xml_text(source_path(mission.file, style.root))
+    for row in mission.rows:
+        yield from _case(row, class_name, file)
+    if mission.warnings:
+        texts = "\n".join(f"{file}:{w.line or '-'}: {xml_text(w.message)}" for w in mission.warnings)
+        yield f"<system-out>{texts}</system-out>"
+    yield "</testsuite>"
+
+
+def _suite(name: str, *, tests: int, failures: int, errors: int, skipped: int) -> str:
+    return (
+        f'<testsuite name="{xml_text(name)}" tests="{tests}" failures="{failures}" errors="{errors}" '
+        f'skipped="{skipped}" time="0">'
+    )
+
+
+def _case(row: Row, class_name: str, file: str) -> Iterator[str]:
+    yield f'<testcase classname="{class_name}" name="{xml_text(row.id)}" time="0">'
+    yield "<properties>"
+    values: tuple[tuple[str, object], ...] = (
+        ("requirement_id", row.requirement_id),
+        ("unit", row.unit),
+        ("declared", row.declared),
+        ("allowable", row.allowable),
+    )
+    if STATUS[row.status].is_judged:
+        values += (
+            ("budget_status", row.status),
+            ("metric", row.metric),
+            ("binding_requirement", row.binding_requirement),
+            ("utilization", row.utilization),
+            ("margin", row.margin),
+            ("equation", row.equation),
+            ("evidence", row.evidence),
+            ("line", row.line),
+        )
+    yield from [_property(name, value) for name, value in values if value is not None]
+    yield "</properties>"
+    status = STATUS[row.status]
+    if status.junit == "failure":
+        place = f"{file}:{row.line}: " if row.line is not None else ""
+        text = f"{place}{xml_text(measure(row))}\n{xml_text(cause(row))}\n{xml_text(row.equation)}"
+        yield f'<failure message="{xml_text(_remark(row))}" type="{status.name}">{text}</failure>'
+    elif status.junit == "skipped":
+        why = cause(row)
+        message = f"{status.junit_words}{f': {why}' if why else ''}"
+        yield f'<skipped message="{xml_text(message)}" type="{status.name}"/>'
+    elif status.junit == "remark":
+        yield f"<system-out>{xml_text(f'{status.name}: {_remark(row)}')}</system-out>"
+    yield "</testcase>"
+
+
+def _remark(row: Row) -> str:
+    why = cause(row)
+    return f"{measure(row)}{f'. {why}' if why else ''}"
+
+
+def _property(name: str, value: object) -> str:
+    text = _escaped(value) if isinstance(value, str) else repr(value)
+    return f'<property name="{name}" value="{text}"/>'
+
+
+@cache
+def _escaped(text: str) -> str:
+    """The same few texts (units, equations, sources) stand in every mission."""
+    return xml_text(text)
+
+
+def _class_name(file: str, style: Style) -> str:
+    """Path as a dotted name, as test tools group by: `missions/a.yaml` is missions.a."""
+    stem, suffix = splitext(source_path(file, style.root))
+    stem = stem if suffix in (".yaml", ".yml") else stem + suffix
+    return xml_text(stem.strip("/").replace(".", "_").replace("/", "."))

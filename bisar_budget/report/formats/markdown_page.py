@@ -1,0 +1,122 @@
+"""The compliance report as Markdown for GitHub, which can be read as it is; its drawings are files beside it."""
+
+import re
+from collections.abc import Iterator, Mapping
+from functools import cache
+from html import unescape
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
+from markupsafe import Markup
+
+from bisar_budget.errors import printable
+from bisar_budget.findings.mission import MissionFindings, Report
+from bisar_budget.findings.status import STATUS
+from bisar_budget.report import Style
+from bisar_budget.report.compliance.page import compliance, drawings, illustrations
+from bisar_budget.report.compliance.view import Compliance, ShownImage
+from bisar_budget.report.explain import typeset
+from bisar_budget.report.explain.formulas import Sum, WorkedEquation
+from bisar_budget.report.formats.text_table import document_words
+from bisar_budget.report.words.escapes import markdown_text, uri
+from bisar_budget.resources import resource
+
+_BAR = 20  # characters
+_DESCRIPTION = re.compile("<desc[^>]*>(.*?)</desc>", re.DOTALL)
+
+
+def render(report: Report, style: Style) -> str:
+    """Write the report; drawings are linked where `style.assets` says that they lie."""
+    page: Compliance = compliance(report, style)
+    text = _template().render(
+        report=page,
+        words={name: status.words for name, status in STATUS.items()},
+        assets=Markup(uri(style.assets)),
+        bar=_bar,
+        equation=_equation,
+        general=_general,
+        description=_description,
+        chip=_chip,
+    )
+    return re.sub(r"\n{3,}", "\n\n", text).rstrip("\n") + "\n"
+
+
+@cache
+def _template() -> Template:
+    """Layout of the page; compiling it takes longer than a mission does."""
+    environment = Environment(
+        loader=FileSystemLoader(resource("templates")),
+        autoescape=True,
+        undefined=StrictUndefined,
+        finalize=lambda value: value if isinstance(value, Markup) else Markup(markdown_text(str(value))),
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.filters["document_words"] = document_words
+    return environment.get_template("report.md.j2")
+
+
+def pictures(report: Report, style: Style) -> Mapping[str, bytes]:
+    """Return the drawings of every mission, named by its place in the report."""
+    return {
+        f"{number}-{name}": content
+        for number, mission in enumerate(report.missions, start=1)
+        if isinstance(mission, MissionFindings)
+        for name, content in _pictures(mission)
+    }
+
+
+def _pictures(mission: MissionFindings) -> Iterator[tuple[str, bytes]]:
+    shown = illustrations(mission)
+    yield from (
+        (picture.name, picture.svg.encode()) for picture in (*drawings(mission), *(one.cuts for one in shown))
+    )
+    yield from ((chip.name, chip.png) for one in shown for chip in one.chips)
+
+
+def _bar(part: float | None) -> Markup:
+    """A bar of text; what goes beyond its end has an arrow."""
+    if part is None:
+        return Markup("")
+    filled = "█" * round(_BAR * min(1.0, part))
+    return Markup(filled.ljust(_BAR, "░") + ("▶" if part > 1 + 1e-9 else ""))
+
+
+def _equation(part: WorkedEquation | str) -> Markup:
+    """One part of a step: a formula as a block of LaTeX, words and text as a line."""
+    if not isinstance(part, WorkedEquation):
+        return _sum(typeset.readable(part)) if isinstance(part, Sum) else Markup(f"- {markdown_text(part)}\n")
+    if part.formula and typeset.is_formula(part):
+        formula, numbers = typeset.as_latex(part)
+        block = f"\\begin{{aligned}}\n{formula} \\\\\n{numbers}\n\\end{{aligned}}"
+        return Markup(f"\n{_math(block)}\n\n")
+    formula, numbers = typeset.as_text(part)
+    return _sum(f"{formula} {numbers}".rstrip())
+
+
+def _sum(text: str) -> Markup:
+    """Arithmetic as code, in which nothing needs escaping; there is nothing of the user's in it."""
+    return Markup(f"- `{text}`\n")
+
+
+def _chip(chip: ShownImage, path: str) -> Markup:
+    """An image at its size, which Markdown cannot say."""
+    width, height = chip.size
+    return Markup('<img src="{}" alt="{}" width="{}" height="{}">').format(
+        Markup(path), printable(chip.title), width, height
+    )
+
+
+def _general(left: str, right: str) -> Markup:
+    return Markup(_math(f"{typeset.latex_of(left)} = {typeset.latex_of(right)}"))
+
+
+def _math(latex: str) -> str:
+    """A block of LaTeX, as GitHub takes it."""
+    return f"```math\n{latex}\n```"
+
+
+def _description(svg: str) -> str:
+    """What a drawing says of itself, for who cannot see it."""
+    match = _DESCRIPTION.search(svg)
+    return unescape(match[1]) if match else ""

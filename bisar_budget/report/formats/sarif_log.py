@@ -1,0 +1,223 @@
+"""What needs attention as SARIF 2.1.0, which code scanning and editors show at the value in the mission file.
+
+Only findings are results: rows that pass, judge nothing or are not declared are not in it. A waived row is
+a result with a suppression, a file that cannot be used gives notifications of the tool.
+"""
+
+import json
+from functools import cache
+from hashlib import sha256
+from typing import Any
+
+from bisar_budget.errors import Fault, Place, printable
+from bisar_budget.findings.mission import FileWarning, MissionFindings, Report, UnusableMission
+from bisar_budget.findings.row import Row
+from bisar_budget.findings.status import STATUS
+from bisar_budget.report import Style
+from bisar_budget.report.words.escapes import source_path, uri
+from bisar_budget.report.words.sentences import finding
+
+SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
+SRCROOT = "%SRCROOT%"
+
+# Rule id to what is held to what, and what to do about it.
+RULES = {
+    "quadratic_phase_error": (
+        "Quadratic phase error within its share of the budget",
+        "An error of motion or clock may add at most its owner's share of requirements.quadratic_phase_error at the "
+        "aperture edge (Rigling & Moses, Tables I and II). Declare a smaller error, give its owner a larger share, "
+        "shorten the aperture, or let autofocus correct it (autofocus.n_pull).",
+    ),
+    "pslr": (
+        "Paired echoes of a vibration within the platform's share of PSLR",
+        "A sinusoidal vibration along the line of sight makes paired echoes, which requirements.pslr bounds "
+        "(Rigling & Moses, Section V). Damp the vibration or allow higher echoes; autofocus does not help.",
+    ),
+    "islr": (
+        "Power spread by a vibration within the platform's share of ISLR",
+        "A wideband vibration along the line of sight spreads power, which requirements.islr bounds "
+        "(Rigling & Moses, Section V). Damp the vibration or allow more power; autofocus does not help.",
+    ),
+    "cubic_phase_error": (
+        "Cubic phase error within its requirement",
+        "The cubic phase error at the aperture edge may be at most requirements.cubic_phase_error (Rigling & Moses, "
+        "Table I, cubic column). Declare smaller errors or shorten the aperture; autofocus gain does not apply.",
+    ),
+    "location_error": (
+        "Displacement of the image within its requirement",
+        "Errors displace the image on the ground, by equation (25) of Rigling & Moses or by exact ranges. "
+        "The displacement may be at most requirements.location_error. Declare smaller position, velocity or clock "
+        "errors; autofocus does not help.",
+    ),
+    "autofocus_pull_in": (
+        "All errors together within what autofocus corrects",
+        "Autofocus corrects one total of n_pull·π radians, not each error separately (Rigling & Moses, Section VI). "
+        "Raise autofocus.n_pull if the algorithm allows, or declare smaller errors.",
+    ),
+    "other": (
+        "Declared value within its limit",
+        "A declared value is held to a limit; the message says to which and from where.",
+    ),
+    "mission_file": (
+        "Warnings about the mission file itself",
+        "An entry of the mission file has no effect or is in doubt: a waiver or a requirement id that names no row, "
+        "a file that declares no error, an n_pull beyond range walk. Correct the entry or remove it.",
+    ),
+}
+_RULE_INDEX = {rule: index for index, rule in enumerate(RULES)}
+
+
+def render(report: Report, style: Style) -> str:
+    """Write one log with one run."""
+    results: list[dict[str, Any]] = []
+    notifications = []
+    artifacts: dict[str, dict[str, Any]] = {}  # by URI: a file may be named in two ways
+    for mission in report.missions:
+        location = _artifact_location(mission.file, style)
+        artifacts.setdefault(location["uri"], {"location": location, "mimeType": "application/yaml"})
+        artifact = {**location, "index": list(artifacts).index(location["uri"])}
+        if isinstance(mission, UnusableMission):
+            notifications += [_notification(fault, artifact) for fault in mission.faults]
+            continue
+        results += [_result(row, mission, artifact) for row in mission.rows if STATUS[row.status].sarif]
+        results += [_warning(warning, mission, artifact) for warning in mission.warnings]
+    run = {
+        "tool": {"driver": _driver(report.version)},
+        "columnKind": "unicodeCodePoints",
+        "invocations": [
+            {"executionSuccessful": not notifications, "toolExecutionNotifications": notifications},
+        ],
+        "artifacts": list(artifacts.values()),
+        "results": results,
+    }
+    return json.dumps({"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}, allow_nan=False) + "\n"
+
+
+def _driver(version: str) -> dict[str, Any]:
+    return {
+        "name": "bisar-budget",
+        "version": version,
+        "rules": [_rule(rule, short, help_text) for rule, (short, help_text) in RULES.items()],
+        "notifications": [
+            {
+                "id": "unusable_mission",
+                "name": "UnusableMission",
+                "shortDescription": {"text": "A mission file that cannot be used; nothing in it was judged"},
+            }
+        ],
+    }
+
+
+def _rule(rule: str, short: str, help_text: str) -> dict[str, Any]:
+    is_remark = rule in ("mission_file", "autofocus_pull_in")
+    return {
+        "id": rule,
+        "name": rule.title().replace("_", ""),
+        "shortDescription": {"text": short},
+        "fullDescription": {"text": help_text},
+        "help": {"text": help_text},
+        "defaultConfiguration": {"level": "warning" if is_remark else "error"},
+        "properties": {
+            "precision": "very-high",
+            "problem.severity": "warning" if is_remark else "error",
+            "tags": ["bistatic-sar"],
+        },
+    }
+
+
+def _artifact_location(file: str, style: Style) -> dict[str, Any]:
+    path = "standard input" if file == "-" else source_path(file, style.root)
+    address = uri(path)
+    return {"uri": address} if address.startswith("file:") else {"uri": address, "uriBaseId": SRCROOT}
+
+
+def _result(row: Row, mission: MissionFindings, artifact: dict[str, Any]) -> dict[str, Any]:
+    rule = "autofocus_pull_in" if row.subject.kind == "autofocus_pull_in" else row.metric
+    rule = rule if rule in RULES else "other"
+    result = _located(rule, STATUS[row.status].sarif, finding(row), row.line, artifact, row.id)
+    result["properties"] = {
+        key: value if not isinstance(value, str) else printable(value)
+        for key, value in (
+            ("mission", mission.name),
+            ("status", row.status),
+            ("metric", row.metric),
+            ("unit", row.unit),
+            ("declared", row.declared),
+            ("allowable", row.allowable),
+            ("binding_requirement", row.binding_requirement),
+            ("utilization", row.utilization),
+            ("margin", row.margin),
+            ("equation", row.equation),
+            ("requirement_id", row.requirement_id),
+            ("evidence", row.evidence),
+        )
+        if value is not None
+    }
+    if row.status == "waived":
+        result["suppressions"] = [_suppression(row, artifact)]
+    return result
+
+
+def _warning(warning: FileWarning, mission: MissionFindings, artifact: dict[str, Any]) -> dict[str, Any]:
+    return _located("mission_file", "warning", warning.message, warning.line, artifact, warning.message)
+
+
+def _located(
+    rule: str, level: str, message: str, line: int | None, artifact: dict[str, Any], subject: str
+) -> dict[str, Any]:
+    """Return a result; `subject` is what stays the same when lines move, and tells it from others in the file."""
+    name = printable(subject)
+    return {
+        "ruleId": rule,
+        "ruleIndex": _RULE_INDEX[rule],
+        "level": level,
+        "message": {"text": printable(message)},
+        "locations": [
+            {
+                "physicalLocation": {"artifactLocation": artifact, "region": _region(line)},
+                "logicalLocations": [{"fullyQualifiedName": name, "kind": "member"}],
+            }
+        ],
+        # Code scanning tells an old alert from a new one by this key alone.
+        "partialFingerprints": {"primaryLocationLineHash": _fingerprint(rule, artifact["uri"], name)},
+    }
+
+
+@cache
+def _fingerprint(*parts: str) -> str:
+    return sha256("\0".join(parts).encode()).hexdigest()[:16] + ":1"
+
+
+def _region(line: int | None) -> dict[str, int]:
+    if not isinstance(line, Place):
+        return {"startLine": 1 if line is None else line}
+    start, column, end, end_column = line.region
+    region = {"startLine": start, "startColumn": column}
+    if end is not None and end_column is not None:
+        region |= {"endLine": end, "endColumn": end_column}
+    return region
+
+
+def _suppression(row: Row, artifact: dict[str, Any]) -> dict[str, Any]:
+    """Return the waiver: it stands in the file that is checked, which the standard calls `inSource`."""
+    waiver = next(one for one in row.waivers if not one.is_expired)
+    region = {"startLine": int(waiver.line or 1)}
+    return {
+        "kind": "inSource",
+        "status": "accepted",
+        "justification": printable(waiver.reason),
+        "location": {"physicalLocation": {"artifactLocation": artifact, "region": region}},
+        "properties": {"until": waiver.until.isoformat()},
+    }
+
+
+def _notification(fault: Fault, artifact: dict[str, Any]) -> dict[str, Any]:
+    region: dict[str, int] = {"startLine": fault.line or 1}
+    if fault.column is not None:
+        region["startColumn"] = fault.column
+    return {
+        "descriptor": {"id": "unusable_mission", "index": 0},
+        "level": "error",
+        "message": {"text": printable(str(fault))},
+        "locations": [{"physicalLocation": {"artifactLocation": artifact, "region": region}}],
+    }

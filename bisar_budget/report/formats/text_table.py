@@ -1,0 +1,336 @@
+"""The report for a terminal: verdict, geometry, the rows that matter with the worst first, what decides them."""
+
+import math
+import re
+from collections.abc import Iterator, Sequence
+from functools import cache
+
+from bisar_budget.errors import printable
+from bisar_budget.findings.mission import MissionFindings, UnusableMission
+from bisar_budget.findings.row import Row, worst_first
+from bisar_budget.findings.status import STATUS, worst
+from bisar_budget.geometry import BistaticGeometry, PlatformState
+from bisar_budget.mission.model import Document
+from bisar_budget.report import Piece, Style
+from bisar_budget.report.words.layout import WIDTH, wrapped, wrapped_counts
+from bisar_budget.units import format_quantity
+
+# A requirement that can set an allowable, in words; the terminal has room for the first.
+BINDING_WORDS = {
+    "quadratic_phase_error": "quadratic phase error",
+    "cubic_phase_error": "cubic phase error",
+    "location_error": "location error",
+}
+_MODELS = {
+    "published": "published (Rigling & Moses, Tables I and II)",
+    "full": "full (exact ranges, displacement included)",
+    "strictest": "strictest (the stricter of published and full for each row)",
+}
+RULES = {"each": "each error alone", "sum": "worst-case sum", "rss": "root-sum-square"}
+_NARROW_DEG = 30.0  # between range and Doppler gradients; below it the verdict says what that does
+
+
+def piece(mission: MissionFindings | UnusableMission, style: Style) -> str:
+    """Write the part of one mission, at most 80 columns where the file's own names allow it."""
+    return "\n".join(_unusable(mission, style) if isinstance(mission, UnusableMission) else _mission(mission, style))
+
+
+def joined(pieces: Sequence[Piece], version: str, style: Style) -> str:
+    """Write the report for reading."""
+    text = ("\n" if style.verbosity < 0 else "\n\n").join(piece.text for piece in pieces)
+    if len(pieces) > 1:
+        text += "\n\n" + _overall([piece.status for piece in pieces], style)
+    return text + "\n"
+
+
+def _unusable(mission: UnusableMission, style: Style) -> list[str]:
+    count = len(mission.faults)
+    summary = (
+        f"{STATUS['error'].text} {printable(mission.file)}: cannot be used, {count} fault{'s' if count != 1 else ''}"
+    )
+    if style.verbosity < 0:
+        return [_lead(summary, "error", style)]
+    places = [f"  {fault.line or '-'}:{fault.column or '-'}  {fault}" for fault in mission.faults]
+    first, *rest = wrapped_counts(summary)
+    return [_lead(first, "error", style), *rest, *(line for place in places for line in wrapped(place, "       "))]
+
+
+def _mission(mission: MissionFindings, style: Style) -> list[str]:
+    if style.verbosity < 0:
+        count = len(mission.warnings)
+        warned = f"; {count} warning{'s' if count != 1 else ''} about the file" if count else ""
+        return [_lead(_summary(mission) + warned, mission.status, style)]
+    alone = "; each error alone" if mission.combine == "each" else ""
+    first, *rest = wrapped_counts(_summary(mission) + alone)
+    document = ", ".join(filter(None, (document_words(mission.document), mission.document.author)))
+    name = f"{mission.name} ({document})" if document else mission.name
+    lines = [_lead(first, mission.status, style), *rest, *wrapped(name, "  ")]
+    if sentence := narrow_gradients(mission.geometry):
+        lines += wrapped(sentence, "  ")
+    lines += ["", *(line for key, text in head(mission) for line in wrapped(f"{key:<12} {text}", " " * 13))]
+    lines += ["", *_table(mission, style)]
+    details = list(_details(mission, style))
+    lines += ["", *details] if details else []
+    lines += [line for text in _asides(mission, style) for line in wrapped(text, "  ")]
+    if mission.monte_carlo is not None:
+        from bisar_budget.report.words.probabilities import probabilities
+
+        lines += ["", *probabilities(mission.monte_carlo)]
+    if mission.verdicts is not None:
+        from bisar_budget.report.formats.verification import evidence
+
+        lines += ["", "Images with each error at its limit", "", *evidence(mission.verdicts, style)]
+    return lines
+
+
+def document_words(document: Document) -> str:
+    """Number and issue of a document; empty where the file gives neither."""
+    return ", ".join(filter(None, (document.number, document.issue and f"issue {document.issue}")))
+
+
+def narrow_gradients(geometry: BistaticGeometry) -> str:
+    """Say what range and Doppler gradients close to parallel do to displacements; nothing from 30 degrees on."""
+    angle = geometry.gradient_angle
+    if math.degrees(angle) >= _NARROW_DEG:
+        return ""
+    return (
+        f"Range and Doppler gradients are only {_degrees(angle)} apart: displacements are {1 / math.sin(angle):.2g} "
+        "times those at right angles."
+    )
+
+
+def head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
+    """Say in a few lines what was checked: geometry, resolution, budget, model."""
+    geometry, allocation = mission.geometry, mission.allocation
+    is_first = True  # the first squint says what one is
+    for name, state in (("Transmitter", geometry.transmitter), ("Receiver", geometry.receiver)):
+        yield name, _platform(state, is_first)
+        is_first = is_first and state.squint is None
+    yield (
+        "Geometry",
+        f"bistatic angle {_degrees(geometry.bistatic_angle)}, look azimuth {_degrees(geometry.look_azimuth)}, "
+        f"range and Doppler gradients {_degrees(geometry.gradient_angle)} apart, "
+        f"wavelength {format_quantity(mission.wavelength, 'm', 4)}",
+    )
+    yield (
+        "Resolution",
+        f"{format_quantity(mission.resolution.range, 'm')} range, "
+        f"{format_quantity(mission.resolution.cross_range, 'm')} cross range (peak to null, on ground)",
+    )
+    split = allocation.qpe
+    shares = f"transmitter {split.transmitter:.3g}, receiver {split.receiver:.3g}"
+    shares += f", clock {split.clock:.3g}" if split.clock is not None else ""
+    shares += f", reserve {split.reserve:.3g}" if split.reserve else ""
+    gain = ""
+    if allocation.n_pull is not None:
+        gain = (
+            f"; autofocus pulls in (corrects) up to {multiple_of_pi(allocation.n_pull)} rad: limits times "
+            f"{allocation.autofocus_gain:.3g}"
+        )
+    yield "Budget", f"quadratic phase error (QPE) {format_quantity(allocation.qpe_total, 'rad')}: {shares}{gain}"
+    yield "Model", f"{_MODELS[mission.model]}, {RULES[mission.combine]}"
+    if mission.scene is not None and not mission.scene.degeneracy:
+        radius = format_quantity(mission.scene.radius, "m")
+        yield (
+            "Scene",
+            f"radius {radius}; one autofocus correction of the declared errors serves {mission.scene.served}",
+        )
+    if mission.coverage_factor != 1:
+        yield "Coverage", f"navigation and clock: declared is {mission.coverage_factor:g} times the file's value"
+
+
+def multiple_of_pi(factor: float) -> str:
+    """Write 2 as 2π, 1 as π."""
+    return "π" if factor == 1 else f"{factor:g}π"
+
+
+def _platform(state: PlatformState, explains_squint: bool) -> str:
+    squint = "still"
+    if state.squint is not None:
+        squint = f"squint {_degrees(state.squint)}" + (" off broadside" if explains_squint else "")
+    return (
+        f"{format_quantity(state.slant_range, 'm', 4)} away, azimuth {_degrees(state.azimuth)}, "
+        f"elevation {_degrees(state.elevation)}, {squint}"
+    )
+
+
+def _degrees(angle: float) -> str:
+    return f"{math.degrees(angle):.1f}°".replace("-0.0°", "0.0°")
+
+
+_HEADER = ("status", "row", "declared", "allowable", "use", "by")
+
+
+def _table(mission: MissionFindings, style: Style) -> Iterator[str]:
+    """Rows that are declared or limit something, the worst first, and how many others there are."""
+    rows, hidden = worst_first(mission.rows), list[Row]()
+    # Where nothing is declared the allowables are the answer.
+    if not style.all_rows and style.verbosity <= 0 and any(row.status != "not_declared" for row in rows):
+        hidden = [row for row in rows if not matters(row)]
+        rows = [row for row in rows if matters(row)]
+    cells = [_row(row) for row in rows]
+    widths = [max(len(line[column]) for line in (_HEADER, *cells)) for column in range(len(_HEADER))]
+    widths[0] = 8  # the same in every table: the eye and scripts look there
+    names = [len(line[1]) for line in (_HEADER, *cells)]
+    room = WIDTH - sum(widths) + widths[1] - len(_HEADER) + 1
+    widths[1] = max(name for name in names if name <= max(room, len("row")))
+    yield _line(_HEADER, widths)
+    for row, line in zip(rows, cells, strict=True):
+        if len(line[1]) > widths[1]:  # an id that would take its line beyond 80 columns stands above its numbers
+            yield f"{_word(row.status, style, widths[0])} {line[1]}"
+            yield _line(("", "", *line[2:]), widths)
+        else:
+            yield _word(row.status, style, widths[0]) + _line(line, widths)[widths[0] :]
+        if row.requirement_id and (not STATUS[row.status].is_explained and style.verbosity < 1):
+            yield f"{'':<{widths[0]}} [{row.requirement_id}]"  # the others have it with their reason
+    yield from wrapped(_table_key(rows, hidden), "  ")
+
+
+def matters(row: Row) -> bool:
+    """Whether a row is declared or limits something; along other axes than the file's, only if it does not pass."""
+    if row.status in ("info", "pass"):
+        return row.is_independent and (row.status == "pass" or bool(row.declared))
+    return row.status != "not_declared"
+
+
+def _table_key(rows: Sequence[Row], hidden: Sequence[Row]) -> str:
+    """Say what the columns are, and what is not in the table."""
+    key = "use: declared / allowable"
+    if any(row.binding_requirement not in (None, "quadratic_phase_error") for row in rows):
+        key += "; by: what sets the allowable; a table, an equation or a model stands for QPE"
+    counts = [
+        (sum(row.status == "not_declared" for row in hidden), "not declared"),
+        (sum(row.status != "not_declared" for row in hidden), "that limit nothing"),
+    ]
+    others = ", ".join(f"{count} {what}" for count, what in counts if count)
+    return f"{key}. Not shown (--all): {others}." if others else f"{key}."
+
+
+def _line(cells: Sequence[str], widths: Sequence[int]) -> str:
+    """One line of the table: names to the left, numbers to the right, the last column to the left."""
+    status, name, *numbers, last = cells
+    right = " ".join(cell.rjust(width) for cell, width in zip(numbers, widths[2:-1], strict=True))
+    return f"{status:<{widths[0]}} {name:<{widths[1]}} {right} {last}".rstrip()
+
+
+def _row(row: Row) -> tuple[str, ...]:
+    status, limit, unit, declared = row.status, row.allowable, row.unit, row.declared
+    size = "-" if declared is None else format_quantity(declared, unit)
+    use = "-"
+    if limit is None:
+        is_open = status == "not_evaluated" or status == "info" or row.metric == "pslr" or row.metric == "islr"
+        allowable = "-" if is_open else "no limit"
+    else:
+        # Rounded down, so that an allowable copied from the page into a file passes.
+        allowable = format_quantity(limit, unit, 3, "down")
+        if row.utilization is not None and status != "not_evaluated":
+            use = percent(row.utilization)
+    return STATUS[status].text, row.id, size, allowable, use, _limited_by(row)
+
+
+def binding_words(row: Row) -> str:
+    """Say which other requirement than the one the row is about sets its allowable; nothing if it is that one."""
+    return "" if row.binding_requirement == row.metric else BINDING_WORDS.get(row.binding_requirement or "", "")
+
+
+def _limited_by(row: Row) -> str:
+    """What sets the allowable: another requirement than the row's own, else the place of its equation."""
+    binding = binding_words(row)
+    return binding.split()[0] if binding else _short_reference(row.equation)
+
+
+@cache
+def _short_reference(equation: str) -> str:
+    """Shorten `Table II row 4` to `II.4`, `Section V, …` to `V`, the full model's to `full`; others to nothing."""
+    if equation in ("full model", "first principles"):
+        return "full"
+    match = re.match(r"Table (I+)(?: rows? ([\d-]+))?|Section (V?I*)|(\(\d+\))", equation)
+    if match is None:
+        return ""
+    table, row, section, number = match.groups()
+    return f"{table}.{row}" if row and row.isdigit() else table or section or number
+
+
+def percent(ratio: float) -> str:
+    """Write a ratio in percent; near 100 % with the digits that tell which side it is on."""
+    value = 100 * ratio
+    if value == 0:
+        return "0 %"
+    if value >= 99999.5:
+        return ">1e5 %"
+    if value < 0.01:
+        return "<0.01 %"
+    if value < 0.1:
+        return f"{value:.2g} %"  # as wide as the column
+    if value < 99:
+        return f"{value:.3g} %"
+    side = 0 if abs(value - 100) < 1e-7 else math.copysign(1, value - 100)
+    for digits in range(max(3, len(f"{value:.0f}")), 13):
+        text = f"{value:.{digits}g}"
+        shown = float(text) - 100
+        if (shown > 0) == (side > 0) and (shown < 0) == (side < 0):
+            return f"{text} %"
+    return f"{value} %"
+
+
+def _details(mission: MissionFindings, style: Style) -> Iterator[str]:
+    """What decides the rows that do not simply pass, once for all that share it; with -v all about every row."""
+    groups: dict[tuple[str, tuple[str, ...]], list[Row]] = {}
+    for row in worst_first(mission.rows):
+        if style.verbosity > 0:
+            yield from _detail([row], [*filter(None, [row.reason]), *row.notes, *_more(row)], mission, style)
+        elif STATUS[row.status].is_explained:
+            groups.setdefault((row.status, row.decisive), []).append(row)
+    for (_, texts), rows in groups.items():
+        yield from _detail(rows, texts, mission, style)
+
+
+def _detail(rows: Sequence[Row], texts: Sequence[str], mission: MissionFindings, style: Style) -> Iterator[str]:
+    file = printable(mission.file)
+    names = []
+    for row in rows:
+        own_id = f" [{row.requirement_id}]" if row.requirement_id else ""
+        place = f"{file}:{row.line}" if row.line is not None else file
+        names.append(f"{row.id}{own_id} ({place})")
+    first, *rest = wrapped(f"{STATUS[rows[0].status].text} {', '.join(names)}", "  ")
+    yield _lead(first, rows[0].status, style)
+    yield from rest
+    for text in texts:
+        yield from wrapped(f"  {text}", "  ")
+
+
+def _more(row: Row) -> Iterator[str]:
+    yield f"from {row.equation}"
+    if row.displacement_m is not None:
+        x, y = row.displacement_m
+        yield f"moves the image by {format_quantity(x, 'm')} east, {format_quantity(y, 'm')} north"
+    if row.evidence:
+        yield f"evidence: {row.evidence}"
+
+
+def _asides(mission: MissionFindings, style: Style) -> Iterator[str]:
+    for warning in mission.warnings:
+        place = f"{printable(mission.file)}:{warning.line}: " if warning.line is not None else ""
+        yield f"warning: {place}{printable(warning.message)}"
+    if style.verbosity > 0:
+        yield from (f"note: {note}" for note in mission.notes)
+
+
+def _summary(mission: MissionFindings) -> str:
+    counts = ", ".join(f"{count} {STATUS[status].text}" for status, count in mission.summary.items())
+    return f"{STATUS[mission.status].text} {printable(mission.file)}: {counts}"
+
+
+def _overall(statuses: Sequence[str], style: Style) -> str:
+    counts = ", ".join(f"{statuses.count(status)} {STATUS[status].text}" for status in STATUS if status in statuses)
+    return f"{_word(worst(statuses), style)} {len(statuses)} missions: {counts}"
+
+
+def _lead(line: str, status: str, style: Style) -> str:
+    """Colour the status that a line begins with."""
+    return _word(status, style) + line.removeprefix(STATUS[status].text)
+
+
+def _word(status: str, style: Style, width: int = 0) -> str:
+    word = f"{STATUS[status].text:<{width}}"
+    return f"\x1b[{STATUS[status].sgr}m{word}\x1b[0m" if style.color else word

@@ -1,0 +1,272 @@
+"""What a chip says about each part of the aperture: the phase that an error leaves there, read from the image.
+
+Every pulse contributes to every pixel what exact ranges by the measured paths say. Correlated with a pulse's
+contribution, an image gives that pulse's phase: the projection of the spectrum to slow time, with range walk and bent
+lines as they are. The error-free response, formed and read by the same paths, takes out what is common to both. A
+polynomial through these phases then is fitted to the pixels themselves, so that the ends of the patch, where a finite
+image cuts sidelobes off, count as what they are.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.geometry import GroundVector
+from bisar_budget.simulate.collection import (
+    CELLS,
+    CONTRIBUTIONS,
+    OVERSAMPLING,
+    Chip,
+    Errors,
+    PointCollection,
+    pulses_for,
+)
+from bisar_budget.simulate.exact import ExactEffect
+from bisar_budget.simulate.image_formation import taylor_window
+from bisar_budget.simulate.phase_history import Complexes, Floats, cell_centres
+
+READ_CELLS = 1  # of range that a chip needs around the middle line, beside what a response walks
+_STRIDE = 2  # lines from one that is read to the next
+_INNER = 0.95  # of the aperture, in the correlation; its edges ring in a patch of finite extent
+# Order of the polynomial: a turn of ±0.5 rad shows sixth powers; continued to what a patch does not hold, high ones
+# are worth nothing.
+_ORDERS = ((0.9, 6), (0.6, 3), (-1.0, 2))
+_PRESENT = 0.25  # of the median strength over the aperture; less is smeared out of the patch
+_WALKS = 2  # fits, the range walk being that of the fit before
+_REFINEMENTS, _HALVINGS, _SETTLED_RAD = 20, 6, 1e-5
+_REPRODUCED, _EXACT = (
+    0.05,
+    2e-3,
+)  # of an image's norm: less left over, and the polynomial is the image's; is it for sure
+_BLOCK = 1 << 18  # contributions formed at once
+_KERNEL = np.linspace(0, 64, 4097)  # range cells, of a tapered range response
+
+
+class ApertureReading(NamedTuple):
+    """Phases at the aperture edge, signed like the range error [rad].
+
+    `across_pixels` is how far the response lies from the middle along y′, by the linear part of the phase.
+    `walked_pixels` is what the other parts put the centre of gravity nearer along x′: at a frequency of y′ it lies
+    where the range error less its slope times slow time puts it. `coverage` is what the patch holds of the aperture,
+    1 unless a smear leaves it.
+    """
+
+    quadratic: float
+    cubic: float
+    across_pixels: float
+    walked_pixels: float
+    coverage: float
+
+
+def read_aperture(
+    collection: PointCollection,
+    errors: Errors,
+    centre: GroundVector,
+    chip: Chip,
+    reference: Chip,
+    walk_cells: float = 0.0,
+    expected: ExactEffect | None = None,
+) -> ApertureReading:
+    """Read quadratic and cubic phase of a response.
+
+    Parameters
+    ----------
+    collection : PointCollection
+        That formed the chips.
+    errors : Errors
+        Of the measured paths.
+    centre : (2,) float
+        Middle of the chips and place of the reference. [m]
+    chip, reference : Chip
+        With and without error, on the same pixels.
+    walk_cells : float
+        Range cells that the response walks, both ways: so many lines are read.
+    expected : ExactEffect, optional
+        Where the fit may start too, if what the pulses say does not lead to a polynomial that reproduces the pixels:
+        close to a platform a long smear overlaps itself.
+
+    Raises
+    ------
+    ValueError
+        The response is not in the image.
+    """
+    lines, columns = chip.image.shape
+    middle = lines // 2
+    half = min(middle, lines - 1 - middle, round(walk_cells * OVERSAMPLING / 2)) // _STRIDE * _STRIDE
+    rows = slice(middle - half, middle + half + 1, _STRIDE)
+    slow_time = cell_centres(collection.aperture_time, pulses_for(round(columns / OVERSAMPLING)))
+    place = slow_time / (collection.aperture_time / 2)
+    pixels = chip.grid[rows].reshape(-1, 3)
+    images = [one.image[rows] for one in (chip, reference)]
+    tapered = np.stack([(one * _taper(columns)).reshape(-1) for one in images])
+    correlated = np.empty((2, slow_time.size), dtype=complex)
+    block = max(1, _BLOCK // pixels.shape[0])
+    for start in range(0, slow_time.size, block):
+        part = slice(start, start + block)
+        contribution = _contributions(collection, errors, centre, slow_time[part], pixels)
+        correlated[:, part] = tapered @ contribution.conj().T
+    seen, clean = correlated
+    product, strength = seen * clean.conj(), np.abs(seen) / np.maximum(np.abs(clean), 1e-30)
+    inner = np.abs(place) < _INNER
+    present = strength > _PRESENT * np.median(strength[inner])
+    centre_pulse, count = place.size // 2, place.size
+    if not np.isfinite(strength).all() or (expected is None and not present[centre_pulse]):
+        raise ValueError("the response is not in the image")
+    fit: Floats = np.zeros(4)
+    covered = 0.0
+    if present[centre_pulse]:
+        gaps = np.nonzero(~(present & inner))[0]
+        first = int(gaps[gaps < centre_pulse].max(initial=-1)) + 1
+        last = int(gaps[gaps > centre_pulse].min(initial=count))
+        kept = slice(first, last)
+        covered = float(place[last - 1] - place[first]) / (2 * _INNER)
+        order = next(order for part, order in _ORDERS if covered > part)
+        phase = np.unwrap(np.angle(product[kept]))
+        fit = np.zeros(max(4, order + 1))
+        fit[: order + 1] = np.polynomial.legendre.legfit(place[kept], phase, order, w=np.abs(clean[kept]))
+    # Of a large patch some pixels are enough for a polynomial.
+    some = slice(None, None, -(-pixels.shape[0] * slow_time.size // CONTRIBUTIONS))
+    seen_there, clean_there = (one.reshape(-1)[some] for one in images)
+    at_rest = _contributions(collection, errors, centre, slow_time, pixels[some]).sum(axis=0)
+    gain = complex(np.vdot(at_rest, clean_there) / np.vdot(at_rest, at_rest))
+    starts = [np.pad(fit, (0, _ORDERS[0][1] + 1 - fit.size))]
+    if expected is not None:
+        starts.append(np.array([0.0, 0.0, -expected.quadratic / 1.5, -expected.cubic / 2.5, 0.0, 0.0, 0.0]))
+    best = _Refined(fit, math.inf)
+    for first_fit in starts:
+        found = _Refined(first_fit, math.inf)
+        for _ in range(_WALKS if walk_cells else 1):
+            # What is left of the range error takes a pulse to other range cells too.
+            phase = np.polynomial.legendre.legval(place, [0.0, *found.fit[1:]])
+            left = -collection.wavelength / (2 * math.pi) * phase
+            single = _contributions(collection, errors, centre, slow_time, pixels[some], left)
+            found = _refined(found.fit, place, single.astype(np.complex128), seen_there, gain)
+        best = min(best, found, key=lambda one: one.misfit)
+        if best.misfit < _EXACT:
+            break
+    if best.misfit < _REPRODUCED:
+        fit, covered = best.fit, 1.0
+    elif not covered:
+        raise ValueError("the response is not in the image")
+    # A pixel along y′ changes the range sum over the aperture by λ / OVERSAMPLING, twice its P₁ part.
+    turn = 1 if collection.flown(errors).turns_left(centre) else -1
+    across = -turn * OVERSAMPLING / math.pi * float(fit[1])
+    slope = np.polynomial.legendre.legder([0.0, 0.0, *fit[2:]])
+    mean = float(np.mean(place * np.polynomial.legendre.legval(place, slope)))
+    walked = mean / (2 * math.pi) * collection.relative_bandwidth * OVERSAMPLING
+    # The image's phase is −2π/λ times the range error; P₂ = (3t² - 1)/2, P₃ = (5t³ - 3t)/2.
+    return ApertureReading(float(-1.5 * fit[2]), float(-2.5 * fit[3]), across, -walked, min(1.0, covered * 1.02))
+
+
+class _Refined(NamedTuple):
+    """Polynomial of the phase, and what of the image it leaves over, of its norm."""
+
+    fit: Floats
+    misfit: float
+
+
+def _refined(fit: Floats, place: Floats, contribution: Complexes, seen: Complexes, gain: complex) -> _Refined:
+    """Fit the phase's polynomial to the pixels, by Gauss and Newton; a step that makes it worse is shortened."""
+    legendre = np.polynomial.legendre.legvander(place, fit.size - 1)
+    norm = float(np.linalg.norm(seen))
+
+    def left_by(coefficients: Floats) -> tuple[Complexes, float, Complexes]:
+        pulses = gain * np.exp(1j * (legendre @ coefficients))
+        model = pulses @ contribution
+        # The constant phase is free: what it takes is known at once.
+        turn = np.angle(np.vdot(model, seen))
+        pulses, model = pulses * np.exp(1j * turn), model * np.exp(1j * turn)
+        amplitude = float(abs(np.vdot(model, seen)) / np.real(np.vdot(model, model)))
+        return seen - amplitude * model, amplitude, pulses
+
+    found = fit.copy()
+    left, amplitude, pulses = left_by(found)
+    for _ in range(_REFINEMENTS):
+        columns = contribution.T @ (1j * amplitude * pulses[:, None] * legendre)
+        both = np.concatenate((columns.real, columns.imag))
+        step = np.linalg.lstsq(both, np.concatenate((left.real, left.imag)), rcond=1e-6)[0]
+        for _ in range(_HALVINGS):
+            ahead = left_by(found + step)
+            if np.linalg.norm(ahead[0]) <= np.linalg.norm(left):
+                break
+            step = step / 2
+        else:
+            break
+        found = found + step
+        left, amplitude, pulses = ahead
+        if np.abs(step[1:]).max() < _SETTLED_RAD:
+            break
+    return _Refined(found, float(np.linalg.norm(left)) / norm)
+
+
+def _taper(columns: int) -> Floats:
+    """Weights along a line: its ends, half the cells of a response without smear, fade."""
+    ramp = round(CELLS * OVERSAMPLING / 2)
+    place = np.arange(columns)
+    inside = np.minimum(place + 0.5, columns - place - 0.5) / ramp
+    taper: Floats = np.sin(math.pi / 2 * np.clip(inside, 0, 1)) ** 2
+    return taper
+
+
+def _contributions(
+    collection: PointCollection,
+    errors: Errors,
+    centre: GroundVector,
+    slow_time: Floats,
+    pixels: Floats,
+    left: Floats | None = None,
+) -> NDArray[np.complex64]:
+    """What each pulse adds to the image of a point at a place, (pulses, pixels), at baseband.
+
+    `left` (pulses,) is a range error that displaces its range response, and has no part in the phase. [m]
+    """
+    flown = collection.flown(errors)
+    at_middle = flown.range_sum(pixels) - flown.range_sum(np.asarray(centre, dtype=float))
+    point = np.array([[*centre, 0.0]])
+    paths = collection.paths(errors.smooth(), slow_time)
+    if collection.is_tapered:
+        weights = taylor_window(257)
+        frequency = cell_centres(1.0, 257)
+        kernel = np.cos(2 * math.pi * np.outer(_KERNEL, frequency)) @ weights / 257
+        by_time = _weights(collection, slow_time)[:, None]
+    contribution = np.empty((slow_time.size, pixels.shape[0]), dtype=np.complex64)
+    pulses = max(1, _BLOCK // pixels.shape[0])
+    for start in range(0, slow_time.size, pulses):
+        part = slice(start, start + pulses)
+        farther = np.zeros(contribution[part].shape)
+        for one in paths:
+            farther += _distance(one.measured[part], pixels)
+            farther -= _distance(one.measured[part], point)
+        # Whole cycles are taken off in double precision; of what is left single precision holds 1e-6 rad, in a
+        # quarter of the time.
+        cycles = (farther - at_middle) / collection.wavelength
+        cycles -= np.rint(cycles)
+        turned = (2 * math.pi * cycles).astype(np.float32)
+        if left is not None:
+            farther -= left[part, None]
+        cells = (farther * (collection.radar.bandwidth / SPEED_OF_LIGHT)).astype(np.float32)
+        if collection.is_tapered:
+            strength = np.interp(np.abs(cells), _KERNEL, kernel, right=0.0) * by_time[part]
+        else:
+            strength = np.sinc(cells)
+        np.multiply(np.cos(turned), strength, out=contribution[part].real)
+        np.multiply(np.sin(turned), strength, out=contribution[part].imag)
+    return contribution
+
+
+def _weights(collection: PointCollection, slow_time: Floats) -> Floats:
+    """Of a Taylor window over the aperture."""
+    fine = taylor_window(1024)
+    weights: Floats = np.interp(slow_time, cell_centres(collection.aperture_time, fine.size), fine)
+    return weights
+
+
+def _distance(positions: Floats, points: Floats) -> Floats:
+    """From positions (m, 3) to points (n, 3), (m, n): to 1e-8 m from a geostationary orbit. [m]"""
+    square: Floats = positions @ (-2 * points.T)
+    square += np.einsum("ij,ij->i", positions, positions)[:, None]
+    square += np.einsum("ij,ij->i", points, points)
+    return np.sqrt(square, out=square)

@@ -1,0 +1,143 @@
+"""Form images with each error set exactly at its limit, and measure whether the limit is true."""
+
+from collections.abc import Callable, Iterator
+from fnmatch import fnmatchcase
+from functools import partial
+
+from bisar_budget.budget.aggregates import aggregate_rows
+from bisar_budget.effects.echoes import SLOWEST
+from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.models import QUADRATIC
+from bisar_budget.effects.subject import Subject, subject
+from bisar_budget.effects.vibration_lines import lines_of
+from bisar_budget.findings.images import Verdict, VerifiedMission
+from bisar_budget.findings.row import Row
+from bisar_budget.mission.model import Mission, Simulation
+from bisar_budget.verify import duration, phase_cases
+from bisar_budget.verify import vibration_cases as vibration
+from bisar_budget.verify.location_case import location
+from bisar_budget.verify.study import Study
+from bisar_budget.workers import worker_pool
+
+__all__ = ["Study", "rows_to_verify", "seconds_to_verify", "verify_mission"]
+
+Case = Callable[[], Verdict]
+
+
+def verify_mission(
+    mission: Mission, only: str = "*", jobs: int = 1, progress: Callable[[str], None] = lambda row_id: None
+) -> VerifiedMission:
+    """Verify every limit of a mission whose row id matches a glob.
+
+    Parameters
+    ----------
+    mission : Mission
+        As loaded.
+    only : str
+        Glob of row ids.
+    jobs : int
+        Processes; the verdicts do not depend on it.
+    progress : callable
+        Told the id of each row that is done.
+
+    Returns
+    -------
+    VerifiedMission
+        Rows with a limit, in the order of `check`, and both platforms' vibration together.
+    """
+    mission = mission._replace(places={})  # the parser's marks cannot go to another process, and nobody asks here
+    known = cases(Study(mission))
+    wanted = [row_id for row_id in known if fnmatchcase(row_id, only)]
+    rows: list[Verdict] = []
+    if min(jobs, len(wanted)) <= 1:
+        for row_id in wanted:
+            rows.append(known[row_id]())
+            progress(row_id)
+    else:
+        with worker_pool(min(jobs, len(wanted)), "spawn") as pool:
+            for row in pool.map(partial(_verify_row, mission), wanted):
+                rows.append(row)
+                progress(row.id)
+    return VerifiedMission(
+        file=mission.file, name=mission.name, rows=tuple(rows), conditions=", ".join(_conditions(mission))
+    )
+
+
+def rows_to_verify(mission: Mission, only: str = "*") -> list[str]:
+    """Ids of the rows that `verify_mission` would verify."""
+    return [row_id for row_id in cases(Study(mission)) if fnmatchcase(row_id, only)]
+
+
+def seconds_to_verify(mission: Mission, only: str = "*", jobs: int = 1) -> float:
+    """About how long `verify_mission` will take; 0 where it is far below a minute. [s]"""
+    mission = mission._replace(places={})
+    wanted = rows_to_verify(mission, only)
+    return duration.seconds_to_verify(mission, cases, wanted) / max(1, min(jobs, len(wanted)))
+
+
+def cases(study: Study) -> dict[str, Case]:
+    """Row ids in the order of `check`, with the call that verifies each."""
+    return dict(_cases(study))
+
+
+def _aggregates(study: Study) -> Iterator[Row]:
+    for model in study.models:
+        yield from aggregate_rows(study.analysis, *study.analysis.models(model.name), study.allocation)
+
+
+def _verify_row(mission: Mission, row_id: str) -> Verdict:
+    return cases(Study(mission))[row_id]()
+
+
+def _conditions(mission: Mission) -> Iterator[str]:
+    """Say of what images the verdicts are, and which keys of the file have no part in them."""
+    settings = mission.simulation or Simulation()
+    yield f"one point, exact ranges, {settings.window} window"
+    yield "no noise" if settings.noise is None else "no noise (simulation.noise is for `simulate`)"
+    given = mission.collection.pulses
+    yield "pulses as needed" + (f" (the {given} of collection.pulses must not alias)" if given else "")
+
+
+def _order(one: Subject) -> tuple[int, int]:
+    """Of a platform's vibrations as `check` has it: lines, lines together, noise."""
+    return (("sinusoidal", "sinusoidal.sum", "wideband").index(one.axis), one.entry or 0)
+
+
+def _cases(study: Study) -> Iterator[tuple[str, Case]]:
+    mission, allocation = study.mission, study.allocation
+    for source in study.sources:
+        if not source.is_motion:
+            yield source.id, partial(phase_cases.other, study, source)
+        elif study.allowed(source).smallest is not None:
+            yield source.id, partial(phase_cases.quadratic, study, source)
+    slow: dict[Subject, Case] = {}
+    for name in PLATFORMS:
+        for index, line in enumerate(lines_of(mission, name)):
+            if line.frequency * study.collection.aperture_time < SLOWEST:
+                one = subject(name, "vibration", "sinusoidal", entry=index)
+                slow[one] = partial(phase_cases.slow_vibration, study, one.id, name, line)
+    swaying = slow | dict(vibration.cases(mission, allocation, study.collection))
+    for owner in (*PLATFORMS, "mission"):
+        for one in sorted((one for one in swaying if one.owner == owner), key=_order):
+            yield one.id, swaying[one]
+    requirements = mission.requirements
+    if mission.allocation.combine == "each":
+        # The row exists only where it warns.
+        if any(row.subject == subject("mission", QUADRATIC) for row in _aggregates(study)):
+            row_id = subject("mission", QUADRATIC).id
+            yield row_id, partial(phase_cases.total, study, row_id, "mission")
+    else:
+        owners = ["transmitter", "receiver", "mission"]
+        if allocation.qpe.clock is not None:
+            owners.insert(2, "clock")
+        for owner in owners:
+            row_id = subject(owner, QUADRATIC).id
+            yield row_id, partial(phase_cases.total, study, row_id, owner)
+    if requirements.cubic_phase_error is not None:
+        yield "mission.cubic_phase_error", partial(phase_cases.cubic, study, requirements.cubic_phase_error)
+    if requirements.location_error is not None:
+        yield "mission.location_error", partial(location, study, requirements.location_error)
+    if allocation.n_pull is not None:
+        yield "mission.autofocus_pull_in", partial(phase_cases.pull_in, study, allocation.n_pull)
+    if mission.scene.radius is not None and study.model != "published":
+        yield "mission.spatial_variance", partial(phase_cases.edge, study)

@@ -1,0 +1,245 @@
+"""One mission as `verify` looks at it: its errors put into images, at a limit or at any size."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from bisar_budget.analysis.analysis import Analysis, Model
+from bisar_budget.budget.error_rows import Allowed, allowed_by
+from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.effects.effect import ErrorSource
+from bisar_budget.effects.models import QUADRATIC
+from bisar_budget.effects.subject import Subject
+from bisar_budget.mission.model import Mission
+from bisar_budget.simulate.autofocus import ALGORITHMS
+from bisar_budget.simulate.collection import (
+    CELLS,
+    MAX_CELLS,
+    OVERSAMPLING,
+    RANGE_CELLS,
+    Chip,
+    Errors,
+    PointCollection,
+    superposed,
+)
+from bisar_budget.simulate.exact import ExactEffect
+from bisar_budget.simulate.phase_history import Floats, PathError
+from bisar_budget.verify.aperture_reading import READ_CELLS, ApertureReading, read_aperture
+from bisar_budget.verify.refocus import refocused
+
+Sizes = Sequence[tuple[ErrorSource, float]]  # errors and how large each is, signed
+_CLOCK_TERMS = ("constant", "linear", "quadratic", "cubic")
+_SHARED_RAD = 0.5  # of phase by which lines on which one phase is estimated may differ
+_SCALED, _SCALINGS = 1e-4, 40  # of a budget; steps at most
+_SLOWEST = 0.02  # of the fastest turn of Doppler: slower, a part of the aperture is not followed
+
+
+class Spread(NamedTuple):
+    """Resolution cells over which a response is smeared along its line, and over which it walks in range."""
+
+    smear: int
+    walk: int
+
+
+class Study:
+    """One mission with what its rows share."""
+
+    def __init__(self, mission: Mission, analysis: Analysis | None = None) -> None:
+        self.mission, self.analysis = mission, analysis or Analysis(mission)
+        self.geometry, self.sources = self.analysis.geometry, self.analysis.sources
+        self.model = mission.allocation.model
+        self.allocation = self.analysis.allocation
+        self.plane = self.analysis.published.plane  # (25)
+        self.collection = PointCollection(mission, self.geometry)
+
+    @property
+    def is_full(self) -> bool:
+        """Whether exact ranges say where the image goes and what its cubic phase is; else Table I and (25)."""
+        return self.model != "published"
+
+    @property
+    def models(self) -> tuple[Model, ...]:
+        """Those that gate: under `strictest` both."""
+        full, published = self.analysis.models("full")
+        return {"full": (full,), "published": (published,)}.get(self.model, (published, full))
+
+    @property
+    def declared(self) -> list[ErrorSource]:
+        """Declared errors that an image can show; `other` errors are phases without a motion."""
+        return [s for s in self.analysis.stated if s.declared and s.is_motion]
+
+    def members(self, owner: str) -> list[ErrorSource]:
+        """Declared errors that count against an owner's budget."""
+        return [s for s in self.declared if owner == "mission" or self.allocation.qpe.includes(s.owner, owner)]
+
+    def boundary(self, source: ErrorSource, limit: float) -> float | None:
+        """Smallest size at which a gating model has an error reach a quadratic phase [rad]; None without one."""
+        sizes = (model.allowable(source, QUADRATIC, limit) for model in self.models)
+        return min((size for size in sizes if size is not None), default=None)
+
+    def allowed(self, source: ErrorSource) -> Allowed:
+        """Allowable of an error's row by all requirements, autofocus included, and which one binds."""
+        limit = self.allocation.qpe_limit(source.owner) * self.allocation.autofocus_gain
+        found = [allowed_by(self.analysis, model, source, limit) for model in self.models]
+        return min(found, key=lambda one: math.inf if one.smallest is None else one.smallest)
+
+    def errors(self, source: ErrorSource, size: float) -> Errors:
+        """Return one error of a given size and nothing else."""
+        _, owner, kind, axis, *_ = source.subject
+        if owner == "clock":
+            order = _CLOCK_TERMS.index(axis)
+            return Errors(clock=tuple(size if index == order else 0.0 for index in range(4)))
+        if kind == "terrain":  # a scene that is higher: both platforms measured too high
+            up = PathError(position=(0.0, 0.0, size))
+            return Errors(transmitter=up, receiver=up)
+        x, y, z = (size * component for component in source.direction)
+        error = {
+            "position": PathError(position=(x, y, z)),
+            "velocity": PathError(velocity=(x, y, z)),
+            "acceleration": PathError(acceleration=(x, y, z)),
+        }[kind]
+        return Errors(transmitter=error, receiver=error) if source.is_common else Errors().of(owner, error)
+
+    def together(self, sizes: Sizes, scale: float = 1.0) -> Errors:
+        """Several errors at once, each `scale` times its size."""
+        return superposed(self.errors(source, scale * size) for source, size in sizes)
+
+    def effect(self, sizes: Sizes, scale: float = 1.0) -> ExactEffect:
+        """What several errors do by exact ranges."""
+        return self.collection.effect(self.together(sizes, scale))
+
+    def worse_sign(self, sizes: Sizes, scale: float) -> float:
+        """The scale with the sign that leaves more quadratic phase: a limit has two signs.
+
+        Raises
+        ------
+        ValueError
+            With neither sign any ground point has the range history.
+        """
+        phases = {}
+        for signed in (scale, -scale):
+            try:
+                phases[signed] = abs(self.effect(sizes, signed).quadratic)
+            except ValueError as error:
+                none = error
+        if not phases:
+            raise none
+        return max(phases, key=lambda signed: phases[signed])
+
+    def summed(self, members: Sequence[ErrorSource], budget: float) -> list[tuple[ErrorSource, float]]:
+        """Declared errors scaled until their phases by the gating model, of the worse sign each, sum to a budget.
+
+        Signs are those that make the phases add; empty where there is no phase.
+        """
+        model = self.models[-1]
+
+        def phases(scale: float) -> list[float]:
+            return [self._worst(model, s, scale * (s.declared or 0.0)) for s in members]
+
+        total = math.fsum(map(abs, phases(1.0)))
+        if not total:
+            return []
+        scale = 1.0
+        for _ in range(_SCALINGS):
+            if not math.isfinite(total):
+                scale /= 2
+            elif abs(total / budget - 1) < _SCALED:
+                break
+            else:
+                scale *= min(4.0, max(0.25, budget / total))
+            total = math.fsum(map(abs, phases(scale)))
+        return [
+            (s, math.copysign(scale * (s.declared or 0.0), qpe * (s.declared or 0.0)))
+            for s, qpe in zip(members, phases(scale), strict=True)
+            if qpe
+        ]
+
+    def _worst(self, model: Model, source: ErrorSource, size: float) -> float:
+        """Quadratic phase of the worse sign of an error, with the sign of a small one. [rad]"""
+        found = model.declared(source._replace(declared=size)).qpe
+        return found if math.isfinite(found) else math.inf
+
+    def at_limit(self, of: Subject, limit: float) -> Errors:
+        """Return the errors that a verdict of quadratic phase was read with."""
+        source = next((s for s in self.sources if s.subject == of), None)
+        sizes = [(source, limit)] if source is not None else self.summed(self.members(of.owner), limit)
+        return self.together(sizes, self.worse_sign(sizes, 1.0))
+
+    def images(self, of: Subject, limit: float, room: float = 1.0) -> tuple[Chip, Chip, Errors, ExactEffect]:
+        """Image at a limit of a row of quadratic phase, as its verdict reads it, and of no error at that place."""
+        errors = self.at_limit(of, limit)
+        effect = self.collection.effect(errors)
+        return *self.chips(errors, effect, room=room), errors, effect
+
+    def focused(self, errors: Errors, effect: ExactEffect, chip: Chip) -> Chip:
+        """Refocus a chip by the mission's algorithm, its phase estimated on lines that share it.
+
+        Where range cells are long, lines beside the response show it with a quadratic phase of their own.
+        """
+        algorithm = ALGORITHMS[self.mission.autofocus.algorithm]
+        lines = chip.image.shape[0]
+        half = min(lines // 2, lines - 1 - lines // 2, self.shared_lines(errors, effect))
+        return refocused(self.collection, errors, effect.displacement, chip, algorithm, half)
+
+    def shared_lines(self, errors: Errors, effect: ExactEffect) -> int:
+        """Lines on either side of the middle one that share its quadratic phase, or that the response walks over."""
+        per_line = abs(self.analysis.exact.phases_per_term[0][0]) * self.collection.range_cell / OVERSAMPLING
+        shared = int(min(_SHARED_RAD / per_line if per_line else 1e6, 1e6))
+        return max(shared, round(self.spread(errors, effect).walk * OVERSAMPLING / 2))
+
+    def spread(self, errors: Errors, effect: ExactEffect) -> Spread:
+        """Where an error puts the parts of a response, by the range error that it leaves over the aperture.
+
+        A part lies along the line of equal range where the Doppler that is left is that of the place. Where Doppler
+        turns slowly, in part of a long aperture or with nearly parallel gradients, a small slope is a long way.
+        """
+        half = self.collection.aperture_time / 2
+        time = np.linspace(-half, half, 257)
+        point = np.array([*effect.displacement, 0.0])
+        left: Floats = SPEED_OF_LIGHT * self.collection.clock(errors, time)
+        slopes: Floats = np.zeros((time.size, 2))
+        for one in self.collection.paths(errors.smooth(), time):
+            sight = one.measured - point
+            distance = np.linalg.norm(sight, axis=1)
+            left = left + np.linalg.norm(one.actual, axis=1) - distance
+            slopes = slopes - sight[:, :2] / distance[:, None]
+        flown = self.collection.flown(errors)
+        cells = flown.cells(effect.displacement, self.mission.radar.bandwidth, self.collection.wavelength)
+        by_range = slopes[time.size // 2]
+        doppler = slopes @ (np.array([by_range[1], -by_range[0]]) / np.hypot(*by_range))
+        rate = np.gradient(doppler, time)
+        least = _SLOWEST * np.abs(rate).max()
+        places = np.gradient(left, time) / np.where(np.abs(rate) < least, np.copysign(least, rate), rate)
+        walk = left - places * (doppler - doppler[time.size // 2])
+        return Spread(
+            2 * math.ceil(min(float(np.abs(places).max()) / cells[1], 1e6)),
+            2 * math.ceil(min(float(np.abs(walk).max()) / self.collection.range_cell - 0.25, 64)),
+        )
+
+    def chips(
+        self, errors: Errors, effect: ExactEffect, range_cells: int = RANGE_CELLS, room: float = 1.0
+    ) -> tuple[Chip, Chip]:
+        """Image of the errors and of no error at the place they move the point to, large enough for the smear.
+
+        `room` is how often the smear must fit: autofocus gives out in less than it needs.
+        """
+        smear, walk = self.spread(errors, effect)
+        cells = min(MAX_CELLS, max(CELLS + smear, math.ceil(room * smear)))
+        return self.collection.pair(errors, effect.displacement, cells, range_cells + walk)
+
+    def read(
+        self, errors: Errors, effect: ExactEffect, chip: Chip, reference: Chip, *, is_focused: bool = False
+    ) -> ApertureReading:
+        """Quadratic and cubic phase of a response, measured."""
+        walk = self.spread(errors, effect).walk
+        return read_aperture(
+            self.collection,
+            errors,
+            effect.displacement,
+            chip,
+            reference,
+            walk and walk + READ_CELLS,
+            None if is_focused else effect,
+        )

@@ -1,0 +1,210 @@
+"""Verdicts on the vibration limits: one platform alone, and both together.
+
+What comes out for the published limits at equal shares: a sinusoid of one platform makes echoes 9 dB inside the
+requirement, both in phase 3 dB inside; noise-like vibration of both, independent, fills the requirement. By the full
+model's limits both in phase fill it.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+
+import numpy as np
+
+from bisar_budget.analysis.allocation import Allocation
+from bisar_budget.analysis.vibration_limits import vibration_limits
+from bisar_budget.effects.echoes import SLOWEST, near_lines, sinc, worst_phases
+from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.subject import Subject, subject
+from bisar_budget.effects.vibration_lines import Line, lines_of
+from bisar_budget.findings.images import Verdict
+from bisar_budget.mission.model import Mission
+from bisar_budget.simulate.collection import CELLS, Errors, PointCollection
+from bisar_budget.simulate.impulse_response import upsampled
+from bisar_budget.simulate.phase_history import PathError, PathSinusoid, cell_centres
+
+TOLERANCE_DB = 0.5
+
+_FINE = 8  # interpolation of a cut before its peak is read
+_WIDEBAND_RUNS = 32
+_UNDECLARED_CYCLES = 10  # of a vibration per aperture, where the file gives no frequency
+
+Case = Callable[[], Verdict]
+
+
+def cases(mission: Mission, allocation: Allocation, collection: PointCollection) -> Iterator[tuple[Subject, Case]]:
+    """Give the subject of each vibration limit and the call that verifies it.
+
+    Parameters
+    ----------
+    mission : Mission
+        Gives the requirements, and the frequencies that are looked at.
+    allocation : Allocation
+        Shares of power.
+    collection : PointCollection
+        Forms the images.
+    """
+    pslr, islr = mission.requirements.pslr, mission.requirements.islr
+    model, T = mission.allocation.model, collection.aperture_time
+    amplitude, rms = (
+        {name: limit.by(model) for name, limit in vibration_limits(mission, allocation, metric).items()}
+        for metric in ("pslr", "islr")
+    )
+    seed = mission.simulation.seed if mission.simulation else 1
+    lines = {name: lines_of(mission, name) for name in PLATFORMS}
+    for name in PLATFORMS:
+        if pslr is not None:
+            echo = partial(_sinusoidal, collection, model, pslr, {name: amplitude[name]})
+            for index, frequency in enumerate([line.frequency for line in lines[name]] or [None]):
+                if frequency is not None and frequency * T < SLOWEST:
+                    continue  # a phase, which `phase_cases` looks at
+                one = subject(name, "vibration", "sinusoidal", entry=index)
+                yield one, partial(echo, one.id, frequency)
+            for index, members in enumerate(near_lines([line.frequency * T for line in lines[name]])):
+                one = subject(name, "vibration", "sinusoidal.sum", entry=index)
+                near = [lines[name][member] for member in members]
+                yield one, partial(_near, collection, model, pslr, {name: amplitude[name]}, one.id, near)
+        if islr is not None:
+            one = subject(name, "vibration", "wideband")
+            yield one, partial(_wideband, collection, model, islr, {name: rms[name]}, one.id, seed)
+    if pslr is not None:
+        frequency = next((line.frequency for name in PLATFORMS for line in lines[name]), None)
+        both = subject("mission", "vibration", "sinusoidal")
+        yield both, partial(_sinusoidal, collection, model, pslr, amplitude, both.id, frequency)
+    if islr is not None:
+        both = subject("mission", "vibration", "wideband")
+        yield both, partial(_wideband, collection, model, islr, rms, both.id, seed)
+
+
+def _blank(row_id: str, model: str, limits: dict[str, float], requirement_db: float) -> Verdict:
+    # Both together: the larger of two limits stands for the row.
+    return Verdict(
+        id=row_id, model=model, boundary_error=max(limits.values()), unit="m", requirement_db=requirement_db
+    )
+
+
+def _sinusoidal(
+    collection: PointCollection,
+    model: str,
+    requirement_db: float,
+    limits: dict[str, float],
+    row_id: str,
+    declared: float | None,
+) -> Verdict:
+    """Measure the paired echo on the difference from the error-free image, which its sidelobes would bury."""
+    frequency = _UNDECLARED_CYCLES / collection.aperture_time if declared is None else declared
+    sinusoids = {name: (PathSinusoid(amplitude=size, frequency=frequency),) for name, size in limits.items()}
+    who = "one platform alone" if len(limits) == 1 else "both platforms in phase"
+    assumed = ", a frequency assumed: the file declares no vibration" if declared is None else ""
+    return _echo(collection, _blank(row_id, model, limits, requirement_db), sinusoids, who, assumed)
+
+
+def _near(
+    collection: PointCollection,
+    model: str,
+    requirement_db: float,
+    limits: dict[str, float],
+    row_id: str,
+    lines: Sequence[Line],
+) -> Verdict:
+    """Lines near each other, in their declared ratio and their worst phases, scaled to their limit together."""
+    blank = _blank(row_id, model, limits, requirement_db)
+    (name,) = limits
+    cycles = [line.frequency * collection.aperture_time for line in lines]
+    worst = worst_phases([line.amplitude for line in lines], cycles)
+    if not worst.amplitude:
+        return blank._replace(reason="the lines have no amplitude")
+    scale = limits[name] / worst.amplitude
+    sinusoids = tuple(
+        PathSinusoid(scale * line.amplitude, line.frequency, 0.0 if sinc(worst.cycles - n) >= 0 else math.pi)
+        for line, n in zip(lines, cycles, strict=True)
+    )
+    return _echo(collection, blank, {name: sinusoids}, "one platform's lines in their worst phases")
+
+
+def _echo(
+    collection: PointCollection,
+    blank: Verdict,
+    sinusoids: Mapping[str, tuple[PathSinusoid, ...]],
+    who: str,
+    assumed: str = "",
+) -> Verdict:
+    every = [sinusoid.frequency * collection.aperture_time for those in sinusoids.values() for sinusoid in those]
+    slowest, cycles = min(every), max(every)
+    if slowest < 3:
+        return blank._replace(reason=f"{slowest:.3g} cycles per aperture: below three the echoes lie on the mainlobe")
+    cells = 2 * math.ceil(min(cycles, 1e6)) + CELLS
+    errors = Errors()
+    for name, those in sinusoids.items():
+        errors = errors.of(name, PathError(sinusoids=those))
+    try:
+        clean = collection.chip((0.0, 0.0), Errors(), cells=cells).cut
+        echo = collection.chip((0.0, 0.0), errors, cells=cells).cut - clean
+    except ValueError as error:
+        return blank._replace(reason=f"{cycles:.3g} cycles per aperture: {error}")
+    # An echo keeps its range while a scatterer at its place would walk by one wavelength per cycle.
+    walk = cycles * collection.radar.bandwidth / collection.radar.center_frequency
+    smeared = f", smeared over {walk:.2g} range cells" if walk > 0.3 else ""
+    peaks = [float(np.abs(upsampled(cut, _FINE)).max()) for cut in (echo, clean)]
+    level = 20 * math.log10(peaks[0] / peaks[1])
+    return blank._replace(
+        measured_db=level,
+        verdict=_compare(level - (blank.requirement_db or 0.0)),
+        reason=f"echoes of {who}, at {cycles:.3g} cells from the peak{smeared}{assumed}",
+    )
+
+
+def _wideband(
+    collection: PointCollection,
+    model: str,
+    requirement_db: float,
+    limits: dict[str, float],
+    row_id: str,
+    seed: int,
+) -> Verdict:
+    """Measure the power that white vibration spreads, over all of the repeat interval, on a seeded ensemble.
+
+    By Parseval the power beside the coherent response is the variance of the aperture's phasor, so that the
+    sum over the image, range walk included, is taken in the aperture.
+    """
+    rng = np.random.default_rng(seed)
+    slow_time = cell_centres(collection.aperture_time, 256)
+    clean = collection.paths(Errors(), slow_time)
+    errors = Errors()
+    for name, rms in limits.items():
+        errors = errors.of(name, PathError(wideband_rms=rms))
+
+    def added(*, is_common: bool) -> tuple[float, float]:
+        """Mean of the added ISLR over the ensemble, and its standard error."""
+        ratios = []
+        for _ in range(_WIDEBAND_RUNS):
+            flown = collection.paths(errors, slow_time, rng)
+            shifts = [
+                np.linalg.norm(now.measured, axis=1) - np.linalg.norm(before.measured, axis=1)
+                for now, before in zip(flown, clean, strict=True)
+            ]
+            if is_common:  # the second platform makes the first one's motion, at its own limit
+                first, second = limits.values()
+                shifts[1] = shifts[0] * second / first
+            coherent = abs(np.exp(2j * math.pi / collection.wavelength * (shifts[0] + shifts[1])).mean()) ** 2
+            ratios.append((1 - coherent) / coherent)
+        return float(np.mean(ratios)), float(np.std(ratios, ddof=1) / math.sqrt(_WIDEBAND_RUNS))
+
+    mean, spread = added(is_common=False)
+    reason = "power added by one platform alone"
+    if len(limits) == 2:
+        common = 10 * math.log10(added(is_common=True)[0])
+        reason = f"power added by both platforms, independent; the same motion of both adds {common:.1f} dB"
+    level = 10 * math.log10(mean)
+    return _blank(row_id, model, limits, requirement_db)._replace(
+        measured_db=level,
+        measured_db_error=10 / math.log(10) * spread / mean,
+        verdict=_compare(level - requirement_db),
+        reason=reason,
+    )
+
+
+def _compare(excess_db: float) -> str:
+    if abs(excess_db) <= TOLERANCE_DB:
+        return "confirmed"
+    return "optimistic" if excess_db > 0 else "conservative"

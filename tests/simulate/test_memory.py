@@ -1,0 +1,184 @@
+"""Memory and time of images are known before they are formed, and held, by compiled kernels as by NumPy."""
+
+import re
+import time
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from bisar_budget.mission.load import load_mission, parse_mission
+from bisar_budget.simulate import far_field, image_formation, range_profile
+from bisar_budget.simulate.far_field import far_field_filter
+from bisar_budget.simulate.image_formation import backprojection, is_compiled, kernel_within, matched_filter
+from bisar_budget.simulate.point import SimulationError, simulate_point
+from bisar_budget.verify.limits import rows_to_verify, seconds_to_verify, verify_mission
+from tests.conftest import ROOT, mission_text
+from tests.simulate.conftest import collection
+
+SECTION_V = ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml"
+needs_numba = pytest.mark.skipif(not is_compiled(), reason="needs Numba")
+
+
+def traced(task) -> float:
+    tracemalloc.start()
+    try:
+        task()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def far_apart(cells: float) -> np.ndarray:
+    """Pixels so many range cells of 1 m apart, as short apertures have them."""
+    rng = np.random.default_rng(3)
+    return np.c_[rng.uniform(-cells / 2, cells / 2, (200, 2)), np.zeros(200)]
+
+
+class TestFarApart:
+    """Pixels 10⁶ cells apart took a gigabyte for one pulse, and twenty times as long as NumPy."""
+
+    @pytest.fixture
+    def history(self):
+        return collection(pulses=16).record([1, 2, 0])
+
+    @needs_numba
+    @pytest.mark.parametrize("kernel", ["cubic", "linear"])
+    def test_memory_does_not_grow_with_the_distance(self, history, kernel) -> None:
+        points = far_apart(1e6)
+        backprojection(history, points[:2], kernel)
+        assert traced(lambda: backprojection(history, points, kernel)) < 30e6
+
+    @needs_numba
+    def test_it_is_what_numpy_gives(self, history) -> None:
+        points = far_apart(1e6)
+        assert np.array_equal(backprojection(history, points, "cubic"), backprojection(history, points, "numpy"))
+
+    @needs_numba
+    def test_a_lattice_whose_disc_is_too_large_is_read_at_each_pixel(self) -> None:
+        """A line of equal range is thousands of metres long and a cell deep: only a disc around it is large."""
+        c = collection(pulses=8)
+        history = c.record([1, 2, 0])
+        along = np.array([-np.sin(c.geometry.look_azimuth), np.cos(c.geometry.look_azimuth), 0.0])
+        points = np.linspace(-400, 400, 200)[:, None] * along
+        exact = matched_filter(history, points)
+        assert np.abs(backprojection(history, points, "cubic") - exact).max() < 1e-5 * np.abs(exact).max()
+
+    @needs_numba
+    def test_long_profiles_are_formed_a_few_at_a_time(self) -> None:
+        """65 536 samples of a pulse, of which a small patch needs a hundred: all pulses at once took gigabytes."""
+        c = collection(pulses=64, frequencies=16384)
+        history, points = c.record([1, 2, 0]), np.zeros((4, 3))
+        backprojection(history, points)
+        peak = traced(lambda: backprojection(history, points))
+        assert peak < 40e6
+        all_at_once = 64 * range_profile.profile_length(history, 2) * range_profile.PROFILE_BYTES
+        assert all_at_once > 90e6  # what it would have been
+
+
+class TestFarField:
+    """A patch whose cells are kilometres wide ended in a failed allocation of finufft, exit 3."""
+
+    @pytest.fixture
+    def history(self):
+        return collection(pulses=24, frequencies=32, aperture_time=6e-5).record([1, 2, 0])
+
+    def test_a_long_patch_is_the_sum_as_printed(self, history) -> None:
+        pytest.importorskip("finufft")
+        look = collection().geometry.look_azimuth
+        grid = image_formation.ground_grid((0.0, 0.0), look, (40.0, 2e6), (24, 24))
+        peak = traced(lambda: far_field_filter(history, grid, "nufft"))
+        direct = far_field_filter(history, grid, "direct")
+        assert np.abs(far_field_filter(history, grid) - direct).max() < 1e-6 * np.abs(direct).max()
+        assert peak < 30e6
+
+    def test_points_too_far_apart_are_summed_as_printed(self, history, monkeypatch) -> None:
+        pytest.importorskip("finufft")
+        points = far_apart(1e6)
+        monkeypatch.setattr(far_field, "_LARGEST_GRID", 1)
+        assert np.array_equal(far_field_filter(history, points), far_field_filter(history, points, "direct"))
+
+
+class TestLimit:
+    @pytest.mark.parametrize("former", ["backprojection", "polar_format", "matched_filter", "far_field"])
+    @pytest.mark.parametrize("aperture", [3e-6, 1e-5])
+    def test_short_apertures_hold_it_or_are_refused(self, former, aperture) -> None:
+        """They took 12.7 GB under 500 MB, and 7.3 GB under 20 MB."""
+        text = mission_text(collection__aperture_time=aperture, simulation={"memory_limit": "20 MB"})
+
+        def form() -> None:
+            with pytest.raises(SimulationError, match=r"simulation\.memory_limit is 20 MB: raise it"):
+                simulate_point(parse_mission(text), image_former=former)
+
+        form()  # imports
+        assert traced(form) < 5e6
+
+    def test_the_command_refuses_with_2(self, run, tmp_path) -> None:
+        path = tmp_path / "m.yaml"
+        path.write_text(mission_text(collection__aperture_time=1e-5, simulation={"memory_limit": "20 MB"}))
+        result = run("simulate", path)
+        assert result.exit_code == 2
+        assert "simulation.memory_limit is 20 MB: raise it" in result.stderr
+
+    @needs_numba
+    def test_compiled_code_counts(self) -> None:
+        """It takes 60 MB to load."""
+        assert kernel_within(100e6) == "numpy"
+        assert kernel_within(500e6) == "cubic"
+
+    def test_data_of_a_chip_count(self) -> None:
+        """Its range profiles were taken to be short, however far its pixels are from each other."""
+        mission = load_mission(str(SECTION_V))
+        limited = mission._replace(
+            simulation=(parse_mission(mission_text(simulation={"memory_limit": "20 MB"}))).simulation
+        )
+        (row,) = verify_mission(limited, "transmitter.acceleration.x").rows
+        assert row.verdict == "not_evaluated"
+        assert re.search(r"pulses of 64 frequencies needs about [\d.]+ MB, .*memory_limit is 20 MB", row.reason)
+
+
+class TestTime:
+    """Nobody was told that a simulation takes hours."""
+
+    def test_it_is_foreseen(self) -> None:
+        """Within a factor of ten on a machine that does other things too; here to within two when it rests."""
+        foreseen = []
+        mission = load_mission(str(SECTION_V))
+        simulate_point(mission)  # compiled, imported
+        begun = []
+        simulate_point(
+            mission, foreseen=lambda seconds: (foreseen.append(seconds), begun.append(time.perf_counter()))
+        )
+        took = time.perf_counter() - begun[0]
+        assert took / 10 < foreseen[0] < 10 * took
+
+    def test_a_short_verification_is_not_measured(self) -> None:
+        assert seconds_to_verify(load_mission(str(SECTION_V))) == 0.0
+
+    def test_a_long_one_grows_with_its_rows(self, monkeypatch) -> None:
+        """Measured is one image; the rest is counted."""
+        monkeypatch.setattr("bisar_budget.verify.duration._SLOWEST", 1e3)
+        monkeypatch.setattr("bisar_budget.verify.duration._smallest_pair", lambda collection: 10.0)
+        mission = load_mission(str(SECTION_V))
+        rows = rows_to_verify(mission)
+        whole = seconds_to_verify(mission)
+        assert whole >= 10.0 * len(rows)
+        assert seconds_to_verify(mission, jobs=2) == pytest.approx(whole / 2)
+        assert 10.0 <= seconds_to_verify(mission, rows[0]) < whole / 2
+
+    def test_the_smallest_pair_is_measured(self, monkeypatch) -> None:
+        monkeypatch.setattr("bisar_budget.verify.duration._SLOWEST", 1e3)
+        assert 0 < seconds_to_verify(load_mission(str(SECTION_V)), "timing.quadratic") < 60
+
+    @pytest.mark.parametrize("command", ["verify", "simulate"])
+    def test_the_command_says_so_and_what_to_change(self, run, monkeypatch, command) -> None:
+        monkeypatch.setattr("bisar_budget.cli.verify.LONG", 1e-9)
+        monkeypatch.setattr("bisar_budget.verify.duration._SLOWEST", 1e3)
+        result = run(command, SECTION_V, *(["--only", "timing.quadratic"] if command == "verify" else []))
+        (line,) = [line for line in result.stderr.splitlines() if line.startswith("Forming the images of ")]
+        assert re.search(r"will take about [\d.]+ (s|minutes); ", line)
+        assert ("--only" if command == "verify" else "collection.pulses") in line
+        assert "Forming" not in result.stdout
+
+    def test_a_short_one_is_silent(self, run) -> None:
+        assert run("verify", SECTION_V, "--only", "timing.quadratic").stderr == ""
