@@ -636,6 +636,18 @@ class TestSystem:
             assert (done.returncode, done.stderr) == (0, b"")
 
 
+@pytest.mark.parametrize("format_name", ["html", "markdown"])
+def test_an_error_that_no_image_has_is_no_part_of_a_sum(format_name: str) -> None:
+    """Its phase was `inf rad`, and its part of the sum `nan %`."""
+    errors = {"position": ["40 km", 0, 0], "velocity": "5 mm/s"}
+    found = findings(platforms__receiver__motion_error=errors, allocation__model="full")
+    (row,) = [row for row in found.rows if row.id == "receiver.position.x"]
+    assert "no ground point has this range history" in row.reason
+    text = render(format_name, Report(version="", missions=(found,)), Style(detail="full"))
+    assert not re.search(r"\b(nan|inf)\b", re.sub("<style>.*?</style>", "", text, flags=re.DOTALL))
+    assert "no image" in text
+
+
 @pytest.mark.parametrize("seed", range(0, 400, 4))
 def test_a_fuzzed_file_is_a_mission_or_faults(seed: int) -> None:
     """The first cases of the long round, `docs/prove_hostile.py`."""
