@@ -69,6 +69,8 @@ class _Commands(click.Group):
             if not _has_folder():
                 fail("the current folder is gone; a name that does not start with / leads nowhere")
             _own_fault(error)
+        except MemoryError:
+            fail("the system refuses: memory ran out")
         except WorkerLostError as error:
             fail(f"{error}; fewer processes (--jobs 1) or a smaller simulation.memory_limit need less")
         except Exception as error:

@@ -618,22 +618,42 @@ class TestSystem:
         optimized = run(*arguments, env={**os.environ, "PYTHONOPTIMIZE": "2"})
         assert (optimized.returncode, optimized.stdout) == (plain.returncode, plain.stdout)
 
-    def test_what_a_library_warns_of_is_not_said(self, mission) -> None:
+    def while_checking(self, mission, statement: str, **variables: str) -> subprocess.CompletedProcess:
+        """Check a mission, with something else going on meanwhile."""
         script = (
-            "import warnings, bisar_budget.budget.check as check\n"
+            "import warnings, bisar_budget.budget.fleet as fleet\n"
             "from bisar_budget.cli import main\n"
-            "real = check.check_mission\n"
-            "check.check_mission = lambda *a, **k: (warnings.warn('from a library'), real(*a, **k))[1]\n"
-            "import bisar_budget.budget.fleet as fleet\n"
-            "fleet.check_mission = check.check_mission\n"
+            "real = fleet.check_mission\n"
+            "def check_mission(*given, **named):\n"
+            f"    {statement}\n"
+            "    return real(*given, **named)\n"
+            "fleet.check_mission = check_mission\n"
             "main()\n"
         )
-        for setting in ("default", "error"):
-            environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONWARNINGS": setting}
-            done = subprocess.run(
-                [sys.executable, "-c", script, "check", str(mission)], capture_output=True, cwd=ROOT, env=environment
-            )
-            assert (done.returncode, done.stderr) == (0, b"")
+        environment = {**os.environ, "PYTHONPATH": str(ROOT), **variables}
+        command = [sys.executable, "-c", script, "check", str(mission)]
+        return subprocess.run(command, capture_output=True, cwd=ROOT, env=environment)
+
+    @pytest.mark.parametrize("setting", ["default", "error"])
+    def test_what_a_library_warns_of_is_not_said(self, mission, setting: str) -> None:
+        done = self.while_checking(mission, "warnings.warn('from a library')", PYTHONWARNINGS=setting)
+        assert (done.returncode, done.stderr) == (0, b"")
+
+    def test_memory_that_runs_out_is_2(self, mission) -> None:
+        done = self.while_checking(mission, "raise MemoryError")
+        assert (done.returncode, done.stderr) == (2, b"Error: the system refuses: memory ran out\n")
+
+
+@pytest.mark.parametrize("format_name", ["html", "markdown"])
+def test_an_error_that_no_image_has_is_no_part_of_a_sum(format_name: str) -> None:
+    """Its phase was `inf rad`, and its part of the sum `nan %`."""
+    errors = {"position": ["40 km", 0, 0], "velocity": "5 mm/s"}
+    found = findings(platforms__receiver__motion_error=errors, allocation__model="full")
+    (row,) = [row for row in found.rows if row.id == "receiver.position.x"]
+    assert "no ground point has this range history" in row.reason
+    text = render(format_name, Report(version="", missions=(found,)), Style(detail="full"))
+    assert not re.search(r"\b(nan|inf)\b", re.sub("<style>.*?</style>", "", text, flags=re.DOTALL))
+    assert "no image" in text
 
 
 @pytest.mark.parametrize("seed", range(0, 400, 4))

@@ -457,7 +457,10 @@ def _power_shares(mission: Mission, allocation: Allocation) -> Iterator[PowerSha
 
 
 def _contributions(analysis: Analysis, model: str) -> tuple[Contribution, ...]:
-    """Errors as the file states them, the largest quadratic phase error first."""
+    """Errors as the file states them, the largest quadratic phase error first.
+
+    An error that no image has comes before all others, and the others are no part of a sum with it.
+    """
     by = {name: analysis.declared(one) for name, one in (("published", analysis.published), ("full", analysis.full))}
     sizes = {source.id: max(abs(found[source.id].qpe) for name, found in by.items() if model in (name, "strictest"))
              for source in analysis.stated}  # fmt: skip
@@ -470,7 +473,8 @@ def _contributions(analysis: Analysis, model: str) -> tuple[Contribution, ...]:
         owner, kind, axis = _kind(source)
         published, full = (_phase(abs(by[name][source.id].qpe)) for name in ("published", "full"))
         qpe = sizes[source.id]
-        part, of_sum = qpe / largest, percent(qpe / total)
+        part = 1.0 if qpe == largest else qpe / largest
+        of_sum = percent(qpe / total) if math.isfinite(total) else "–"
         result.append(Contribution(source.id, owner, kind, axis, _phase(qpe), published, full, part, of_sum))
     return tuple(result)
 
@@ -496,7 +500,7 @@ def _kind(source: ErrorSource) -> tuple[str, str, str]:
 
 
 def _phase(value: float) -> str:
-    return format_quantity(value, "rad")
+    return format_quantity(value, "rad") if math.isfinite(value) else "no image"
 
 
 def _validity(mission: Mission, found: MissionFindings) -> Iterator[tuple[str, str]]:
