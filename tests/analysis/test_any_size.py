@@ -195,7 +195,7 @@ def test_gradients_that_span_a_fiftieth_count_as_parallel() -> None:
 
 
 def test_a_crest_between_two_sizes_is_not_stepped_over() -> None:
-    """The phase rises 2.6 % above its limit between 2.90 and 3.40 km and falls again; at 4.22 km it rises for good."""
+    """The phase is up to 2.6 % above its limit from 2.90 to 3.40 km, and again from 4.22 km on."""
     mission = parse_mission(mission_text("satellite_aircraft", 535))
     error = next(e for e in reference.errors_of(mission) if e.id == "transmitter.position.z")
     size = next(r for r in check_mission(mission, DAY).rows if r.id == error.id).allowable_full
