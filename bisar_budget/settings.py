@@ -6,7 +6,7 @@ import stat
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from bisar_budget.errors import shown
+from bisar_budget.faults import shown
 
 TABLE = "tool.bisar-budget"
 KEYS = {

@@ -8,7 +8,7 @@ import re
 from functools import cache
 
 from bisar_budget.constants import STANDARD_GRAVITY
-from bisar_budget.errors import InvalidValueError
+from bisar_budget.faults import InvalidValueError
 
 _NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 # What nearly every quantity looks like; all else is looked at closely.

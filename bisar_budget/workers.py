@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from multiprocessing import active_children, get_context, parent_process
 from multiprocessing.connection import wait
 
-from bisar_budget.errors import WorkerLostError
+from bisar_budget.faults import WorkerLostError
 
 
 @contextmanager

@@ -33,7 +33,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.cli.streams import harmless
-from bisar_budget.errors import MissionError
+from bisar_budget.faults import MissionError
 from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
 from bisar_budget.findings.status import exit_code
 from bisar_budget.mission.load import MAX_BYTES, load_mission

@@ -20,7 +20,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from bisar_budget.errors import MissionError
+from bisar_budget.faults import MissionError
 from bisar_budget.mission.load import parse_mission
 from tests.conftest import mission_text
 from tests.recorded import record

@@ -19,7 +19,7 @@ from collections.abc import Iterator
 from random import Random
 from typing import NamedTuple
 
-from bisar_budget.errors import MissionError
+from bisar_budget.faults import MissionError
 from bisar_budget.geometry import PlatformState, Vector, cross, dot, norm, unit
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission

@@ -52,7 +52,7 @@ _POINTS_OF_29 = f"{_IMAGES}test_points_of_29_are_where_each_third_of_the_apertur
 _SMEAR_DIRECTION = "tests/theory/test_smear_direction.py::test_a_range_rate_moves_the_image_along_31"
 _SMEAR_OF_A_VERDICT = f"{_BORDERS}test_the_smear_of_a_verdict_lies_along_31"
 _FIVE_PERCENT = f"{_BORDERS}test_a_velocity_limit_is_confirmed_within_5_percent_of_the_budget"
-_LINE_OF_SIGHT = "tests/unit/test_geometry.py::test_a_line_of_sight_turns_as_the_platform_flies"
+_LINE_OF_SIGHT = "tests/house/test_geometry.py::test_a_line_of_sight_turns_as_the_platform_flies"
 
 MUTANTS = (
     Mutant(
@@ -95,7 +95,7 @@ MUTANTS = (
         "bisar_budget/analysis/allocation.py",
         "return self.receiver if self.clock is None else self.clock",
         "return self.transmitter if self.clock is None else self.clock",
-        ("tests/unit/test_check.py::TestAllocation::test_without_a_share_the_clock_is_held_to_the_receivers",),
+        ("tests/budget/test_check.py::TestAllocation::test_without_a_share_the_clock_is_held_to_the_receivers",),
     ),
     Mutant(
         "turn of a line of sight: sign of the climb in its radial part",
@@ -116,7 +116,7 @@ MUTANTS = (
         _GEOMETRY,
         "across = math.hypot(*self.doppler_gradient) * math.sin(self.gradient_angle)",
         "across = math.hypot(*self.doppler_gradient)",
-        ("tests/unit/test_defects.py::test_cross_range_resolution_of_gradients_that_are_not_at_right_angles",),
+        ("tests/budget/test_defects.py::test_cross_range_resolution_of_gradients_that_are_not_at_right_angles",),
     ),
     Mutant(
         "(29): sign",

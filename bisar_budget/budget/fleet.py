@@ -11,7 +11,7 @@ from functools import partial
 from typing import TypeVar
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.errors import MissionError
+from bisar_budget.faults import MissionError
 from bisar_budget.findings.mission import MissionFindings, UnusableMission
 from bisar_budget.mission.load import load_mission
 from bisar_budget.resources import cores

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.effects.subject import Subject
-from bisar_budget.errors import KeyPath
+from bisar_budget.faults import KeyPath
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.model import Mission

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from bisar_budget.constants import EARTH_GRAVITATIONAL_PARAMETER, EARTH_RADIUS
 from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.errors import KeyPath
+from bisar_budget.faults import KeyPath
 from bisar_budget.findings.mission import FileWarning
 from bisar_budget.geometry import Vector, norm
 from bisar_budget.mission.model import Mission, Platform

@@ -16,7 +16,7 @@ from bisar_budget.effects.models import CUBIC, QUADRATIC
 from bisar_budget.effects.slow_vibration import cubic_part, quadratic_part
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.vibration_lines import Line, along_line_of_sight, lines_of, projected
-from bisar_budget.errors import KeyPath
+from bisar_budget.faults import KeyPath
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.model import Mission, MotionError
 from bisar_budget.units import format_limit, format_quantity

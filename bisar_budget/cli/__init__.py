@@ -13,7 +13,7 @@ import click
 
 from bisar_budget import __version__
 from bisar_budget.cli.streams import EXIT_INTERRUPTED, EXIT_OUR_FAULT, complain, drop_output, fail
-from bisar_budget.errors import WorkerLostError, printable
+from bisar_budget.faults import WorkerLostError, printable
 from bisar_budget.resources import docstring
 
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)

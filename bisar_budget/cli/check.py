@@ -27,7 +27,7 @@ from bisar_budget.cli.streams import (
     write_file,
 )
 from bisar_budget.constants import MAX_DRAWS
-from bisar_budget.errors import printable
+from bisar_budget.faults import printable
 from bisar_budget.report import FORMATS
 
 if TYPE_CHECKING:
@@ -408,7 +408,7 @@ def _append_step_summary(path: str, report: "Report", style: "Style") -> None:
 
 
 def _say_faults(missions: "Iterable[MissionFindings | UnusableMission | None]") -> None:
-    from bisar_budget.errors import MissionError
+    from bisar_budget.faults import MissionError
     from bisar_budget.findings.mission import UnusableMission
 
     for mission in missions:

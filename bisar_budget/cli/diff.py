@@ -20,7 +20,7 @@ from bisar_budget.cli.streams import (
     fail,
     spare,
 )
-from bisar_budget.errors import printable
+from bisar_budget.faults import printable
 
 
 class _Part(ParamType[float]):
@@ -29,7 +29,7 @@ class _Part(ParamType[float]):
     name = "percent"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        from bisar_budget.errors import InvalidValueError
+        from bisar_budget.faults import InvalidValueError
         from bisar_budget.units import RATIO, parse_quantity
 
         try:
@@ -87,7 +87,7 @@ def diff(
     u2/u1 - 1. Exit code: 0; 1 with --fail-on-erosion; 2 for wrong usage, an unusable file or an unknown revision.
     """
     from bisar_budget.budget.check import check_mission
-    from bisar_budget.errors import MissionError
+    from bisar_budget.faults import MissionError
     from bisar_budget.mission.load import load_mission, parse_mission
     from bisar_budget.mission.revision import RevisionError, file_at
     from bisar_budget.report.change import difference

@@ -20,7 +20,7 @@ def init(file: str, name: str, force: bool) -> None:
 
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-    from bisar_budget.errors import InvalidValueError
+    from bisar_budget.faults import InvalidValueError
     from bisar_budget.mission.readers import Text
     from bisar_budget.resources import resource
 

@@ -6,7 +6,7 @@ import click
 
 from bisar_budget.cli.streams import FILE, deliver, fail, load_all, spare, write_file
 from bisar_budget.cli.verify import announce, faster, progress_bar
-from bisar_budget.errors import printable
+from bisar_budget.faults import printable
 
 
 @click.command()

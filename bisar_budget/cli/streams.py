@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
-from bisar_budget.errors import printable
+from bisar_budget.faults import printable
 
 if TYPE_CHECKING:
     from click import ParamType as ParamType
@@ -66,7 +66,7 @@ def expand(patterns: Iterable[str]) -> list[str]:
 
 def load_all(files: Sequence[str], model: str | None = None) -> "list[Mission]":
     """Load every mission, or say every fault of every file and exit."""
-    from bisar_budget.errors import MissionError
+    from bisar_budget.faults import MissionError
     from bisar_budget.mission.load import load_mission
 
     loaded, is_usable = [], True

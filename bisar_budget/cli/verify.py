@@ -19,7 +19,7 @@ from bisar_budget.cli.streams import (
     spare,
     wants_color,
 )
-from bisar_budget.errors import printable
+from bisar_budget.faults import printable
 from bisar_budget.resources import cores
 
 LONG = 60.0  # s; what takes longer is announced

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from bisar_budget.effects.combine import combine_displacements, combine_phases
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource
 from bisar_budget.effects.subject import subject
-from bisar_budget.errors import Place
+from bisar_budget.faults import Place
 from bisar_budget.geometry import FRAME_AXES, GroundVector
 from bisar_budget.mission.model import Mission, MotionError
 from bisar_budget.mission.symmetric import quadratic_form

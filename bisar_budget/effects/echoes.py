@@ -4,8 +4,9 @@ A vibration of n cycles per aperture and peak phase φ makes echoes at n cells f
 amplitude and of its shape: of a uniform aperture sinc(x) = sin(πx)/(πx), whose sidelobes reach the next echo. The
 phases of vibrations are not known. At a place x the echoes of several are at their worst in phase, with
 Σ φ_k/2·|sinc(x − n_k)|, and what counts is the place where that is largest. Derived here; held within 0.5 dB to
-transforms of the phasor in the worst of its phases, from three cycles per aperture on (`tests/unit/test_echoes.py`).
-The echoes at −n_k are left out: they add up to 0.3 dB at three cycles, and less beyond.
+transforms of the phasor in the worst of its phases, from three cycles per aperture on
+(`tests/effects/test_echoes.py`). The echoes at −n_k are left out: they add up to 0.3 dB at three cycles, and less
+beyond.
 """
 
 import math

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from bisar_budget import evaluators
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG
 from bisar_budget.effects.subject import MOTION, Subject
-from bisar_budget.errors import KeyPath
+from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import BistaticGeometry, GroundVector, Vector, angle_between_lines
 
 PLATFORMS = ("transmitter", "receiver")

@@ -21,7 +21,7 @@ from bisar_budget.effects.effect import (
 )
 from bisar_budget.effects.exact_ranges import ExactRanges
 from bisar_budget.effects.subject import Subject, subject
-from bisar_budget.errors import KeyPath
+from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, PlatformState, Vector
 from bisar_budget.mission.model import Mission, MotionError
 

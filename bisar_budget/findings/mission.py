@@ -4,7 +4,7 @@ from datetime import date
 from typing import TYPE_CHECKING, NamedTuple
 
 from bisar_budget.analysis.allocation import Allocation
-from bisar_budget.errors import Fault
+from bisar_budget.faults import Fault
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUSES, worst
 from bisar_budget.geometry import BistaticGeometry

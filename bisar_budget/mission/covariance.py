@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from typing import Annotated, Any, NamedTuple
 
 from bisar_budget import units
-from bisar_budget.errors import KeyPath, Problem
+from bisar_budget.faults import KeyPath, Problem
 from bisar_budget.geometry import FRAME_AXES, Vector
 from bisar_budget.mission.readers import INVALID, Key, OneOf, Quantity, Reader, Report, Section, Triple
 from bisar_budget.mission.symmetric import eigensystem, exceed, quadratic_form

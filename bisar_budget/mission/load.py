@@ -14,7 +14,7 @@ from typing import Any, BinaryIO, cast
 import yaml
 from yaml import AliasEvent, MappingEndEvent, ScalarEvent
 
-from bisar_budget.errors import Fault, KeyPath, MissionError, Problem, printable, shown
+from bisar_budget.faults import Fault, KeyPath, MissionError, Problem, printable, shown
 from bisar_budget.mission.model import MISSION, Mission
 from bisar_budget.mission.readers import INVALID
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from bisar_budget import units
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.errors import KeyPath, Place, Problem
+from bisar_budget.faults import KeyPath, Place, Problem
 from bisar_budget.geometry import (
     STRAIGHT,
     BistaticGeometry,

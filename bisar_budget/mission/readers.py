@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from bisar_budget.errors import InvalidValueError, KeyPath, Problem
+from bisar_budget.faults import InvalidValueError, KeyPath, Problem
 from bisar_budget.resources import docstring
 from bisar_budget.units import Dimension, format_quantity, parse_quantity
 

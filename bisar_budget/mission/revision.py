@@ -3,7 +3,7 @@
 import os
 from subprocess import DEVNULL, PIPE, run
 
-from bisar_budget.errors import printable
+from bisar_budget.faults import printable
 
 
 class RevisionError(Exception):

@@ -31,11 +31,12 @@ _CLOCK = {unit: power for power, unit in enumerate(CLOCK_UNITS.values())}
 class Variable(NamedTuple):
     """One standard variable, mean 0 and variance 1, and what it does.
 
-    `parts` are the errors it makes, and how much of each [unit]. Effects: quadratic and cubic phase at the aperture
-    edge [rad], displacement east and north [m].
+    `of` is the error, or the covariance, that it belongs to. `parts` are the errors it makes, and how much of each
+    [unit]. Effects: quadratic and cubic phase at the aperture edge [rad], displacement east and north [m].
     """
 
     id: str
+    of: str
     owner: str
     distribution: str
     parts: tuple[tuple[ErrorSource, float], ...]

@@ -98,18 +98,18 @@ def _variables(analysis: Analysis) -> Iterator[Variable]:
             # To six decimals a correlation matrix may have an eigenvalue just below zero.
             scale = math.sqrt(max(0.0, value)) / factor
             parts = [(s, (s.declared or 0.0) * vectors[i][index] * scale) for i, s in enumerate(members)]
-            yield _variable(f"{group.id}.{index}", group.platform, "normal", parts, plane)
+            yield _variable(f"{group.id}.{index}", group.id, group.platform, "normal", parts, plane)
     for source in left.values():
         distribution = _distribution(mission, source)
         is_covered = source.owner != "mission" or source.is_common
         size = abs(source.declared or 0.0) / (factor if is_covered else 1.0)
         if distribution == "uniform":
             size /= math.sqrt(3)  # the standard uncertainty of ±a, GUM 4.3.7
-        yield _variable(source.id, source.owner, distribution, [(source, size)], plane)
+        yield _variable(source.id, source.id, source.owner, distribution, [(source, size)], plane)
 
 
 def _variable(
-    id: str, owner: str, distribution: str, parts: Sequence[tuple[ErrorSource, float]], plane: ImagePlane
+    id: str, of: str, owner: str, distribution: str, parts: Sequence[tuple[ErrorSource, float]], plane: ImagePlane
 ) -> Variable:
     moves = [plane.displacement(source.full, size) or (0.0, 0.0) for source, size in parts]
     effects = (
@@ -118,7 +118,7 @@ def _variable(
         math.fsum(move[0] for move in moves),
         math.fsum(move[1] for move in moves),
     )
-    return Variable(id, owner, distribution, tuple(parts), effects)
+    return Variable(id, of, owner, distribution, tuple(parts), effects)
 
 
 def _requirements(mission: Mission, allocation: Allocation, declared: Sequence[ErrorSource]) -> Iterator[Judged]:
@@ -167,9 +167,8 @@ class _Predictions:
         found: dict[str, float] = {}
         for variable in self.variables:
             if variable.owner in judged.owners:
-                name = variable.id.rsplit(".", 1)[0] if len(variable.parts) > 1 else variable.id
                 square = math.fsum(variable.effects[column] ** 2 for column in judged.columns)
-                found[name] = found.get(name, 0.0) + square
+                found[variable.of] = found.get(variable.of, 0.0) + square
         return found
 
     def is_normal(self, name: str) -> bool:

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from bisar_budget import units
-from bisar_budget.errors import InvalidValueError
+from bisar_budget.faults import InvalidValueError
 from bisar_budget.units import parse_quantity
 
 _MOST_POINTS = 100

@@ -83,18 +83,19 @@ def _joined(names: Iterable[str], words: Mapping[str, str], what: str) -> list[t
 
 def statuses(directive: Generated) -> str:
     """Every status, worst first, with the words of the body."""
-    rows = _joined(STATUS, directive.words(), "statuses")
-    heads = ("status", "in the text", "decides the result", "means")
-    return table(
-        heads,
-        [(f"`{name}`", f"`{STATUS[name].text}`", "yes" if STATUS[name].gates else "", text) for name, text in rows],
-    )
+    rows = []
+    for name, text in _joined(STATUS, directive.words(), "statuses"):
+        status = STATUS[name]
+        code = "1" if status.fails else "1 with `--strict`" if status.fails_strict else "0"
+        code = "2" if name == "error" else code
+        rows.append((f"`{name}`", f"`{status.text}`", code if status.gates else "", text))
+    return table(("status", "in the text", "exit code", "means"), rows)
 
 
 def formats(directive: Generated) -> str:
     """Every format of a report, with the names of files that choose it."""
     rows = _joined(FORMATS, directive.words(), "formats")
-    ends = {name: ", ".join(f"`{end}`" for end in one.suffixes) for name, one in FORMATS.items()}
+    ends = {name: ", ".join(f"`{suffix}`" for suffix in one.suffixes) for name, one in FORMATS.items()}
     return table(("`--format`", "`--report` with", "is"), [(f"`{name}`", ends[name], text) for name, text in rows])
 
 
@@ -403,7 +404,7 @@ def symbols(directive: Generated) -> str:
 
 def rooms(_: Generated) -> str:
     """The rooms of the package from the lowest floor up, with the first line of what each says of itself."""
-    structure = ast.parse((ROOT / "tests" / "unit" / "test_structure.py").read_text(encoding="utf-8"))
+    structure = ast.parse((ROOT / "tests" / "house" / "test_structure.py").read_text(encoding="utf-8"))
     (floors,) = [
         ast.literal_eval(node.value)
         for node in structure.body

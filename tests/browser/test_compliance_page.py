@@ -15,7 +15,7 @@ import pytest
 from bisar_budget.findings.mission import Report, UnusableMission
 from bisar_budget.report import Style, render
 from tests.conftest import ROOT, findings
-from tests.unit.test_report_compliance import EVERY_KEY, FAULT, SECTION_V, found_in, illustrated
+from tests.report.test_report_compliance import EVERY_KEY, FAULT, SECTION_V, found_in, illustrated
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 if CHROMIUM is None:

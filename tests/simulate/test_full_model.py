@@ -9,7 +9,7 @@ import pytest
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.check import check_mission
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.errors import MissionError
+from bisar_budget.faults import MissionError
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.simulate.exact import exact_effect
 from bisar_budget.simulate.phase_history import cell_centres, path

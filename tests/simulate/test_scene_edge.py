@@ -9,7 +9,7 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.scene import ScenePhases, _where, at
 from bisar_budget.budget.check import check_mission
 from bisar_budget.effects.models import QUADRATIC
-from bisar_budget.errors import MissionError
+from bisar_budget.faults import MissionError
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.simulate.collection import RANGE_CELLS

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from bisar_budget.constants import UTILIZATION_TOLERANCE
-from bisar_budget.errors import KeyPath
+from bisar_budget.faults import KeyPath
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS

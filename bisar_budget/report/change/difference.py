@@ -4,13 +4,13 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-from bisar_budget.errors import printable
+from bisar_budget.faults import printable
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report.change.comparison import Change, MissionChange, Moved
-from bisar_budget.report.formats.text_table import percent
 from bisar_budget.report.words.escapes import markdown_text
 from bisar_budget.report.words.layout import table, wrapped
+from bisar_budget.report.words.sentences import percent
 from bisar_budget.units import format_quantity
 
 FORMAT = "bisar-budget/diff/1"

@@ -13,7 +13,7 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.catalogue import EQUATIONS
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.effect import MOTION_UNITS, ErrorSource
-from bisar_budget.errors import KeyPath
+from bisar_budget.faults import KeyPath
 from bisar_budget.findings.images import PointImage
 from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
 from bisar_budget.findings.row import Row, worst_first
@@ -51,15 +51,9 @@ from bisar_budget.report.drawing.evidence_drawings import (
 )
 from bisar_budget.report.explain.explanation import chain, collection_chain
 from bisar_budget.report.formats import verification
-from bisar_budget.report.formats.text_table import (
-    head,
-    matters,
-    multiple_of_pi,
-    narrow_gradients,
-    percent,
-)
 from bisar_budget.report.words.escapes import source_path
-from bisar_budget.report.words.sentences import measure
+from bisar_budget.report.words.missions import head, multiple_of_pi, narrow_gradients
+from bisar_budget.report.words.sentences import matters, measure, percent
 from bisar_budget.units import format_quantity
 
 if TYPE_CHECKING:

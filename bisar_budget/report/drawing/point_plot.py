@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.errors import printable
+from bisar_budget.faults import printable
 from bisar_budget.mission.model import Mission
 from bisar_budget.report.drawing.point_figures import FLOOR_DB, ImagePanel, Limits, Sheet, rotated_back, sheet
 from bisar_budget.report.words.layout import wrapped

@@ -15,7 +15,7 @@ from bisar_budget.effects.effect import ErrorSource, image_plane
 from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.slow_vibration import cubic_part, quadratic_part
 from bisar_budget.effects.vibration_lines import lines_of
-from bisar_budget.errors import KeyPath, printable
+from bisar_budget.faults import KeyPath, printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
@@ -25,8 +25,8 @@ from bisar_budget.report.explain import formulas
 from bisar_budget.report.explain.explained_error import as_written, declaration, effect, missing, place
 from bisar_budget.report.explain.explained_full import at_the_allowable
 from bisar_budget.report.explain.formulas import Step, Sum, WorkedEquation, equation, number, step, with_unit
-from bisar_budget.report.formats.text_table import percent
 from bisar_budget.report.words.layout import wrapped
+from bisar_budget.report.words.sentences import percent
 from bisar_budget.units import format_quantity
 
 _DEEPER = 3  # a broken equation goes on; no symbol has the width that would put its equals sign there

@@ -6,14 +6,13 @@ The runner shows ten errors and ten warnings of a step, so the worst come first.
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from bisar_budget.errors import Fault, Place, Region
+from bisar_budget.faults import Fault, Place, Region
 from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
 from bisar_budget.findings.row import worst_first
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
-from bisar_budget.report.formats.text_table import percent
 from bisar_budget.report.words.escapes import command_property, command_text, markdown_text, source_path
-from bisar_budget.report.words.sentences import finding
+from bisar_budget.report.words.sentences import finding, percent
 
 _ORDER = ("error", "warning", "notice")
 _SHOWN_IN_SUMMARY = 20

@@ -7,14 +7,14 @@ from functools import cache
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from markupsafe import Markup, escape
 
-from bisar_budget.errors import printable
+from bisar_budget.faults import printable
 from bisar_budget.findings.mission import Report
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report.compliance.page import compliance
 from bisar_budget.report.explain import typeset
 from bisar_budget.report.explain.formulas import Sum, WorkedEquation
-from bisar_budget.report.formats.text_table import document_words
+from bisar_budget.report.words.missions import document_words
 from bisar_budget.resources import resource
 
 _AFTER = re.compile(r"([._/])(?=\w)")  # where a long name may break

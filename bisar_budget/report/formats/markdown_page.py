@@ -8,7 +8,7 @@ from html import unescape
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from markupsafe import Markup
 
-from bisar_budget.errors import printable
+from bisar_budget.faults import printable
 from bisar_budget.findings.mission import MissionFindings, Report
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
@@ -16,8 +16,8 @@ from bisar_budget.report.compliance.page import compliance, drawings, illustrati
 from bisar_budget.report.compliance.view import Compliance, ShownImage
 from bisar_budget.report.explain import typeset
 from bisar_budget.report.explain.formulas import Sum, WorkedEquation
-from bisar_budget.report.formats.text_table import document_words
 from bisar_budget.report.words.escapes import markdown_text, uri
+from bisar_budget.report.words.missions import document_words
 from bisar_budget.resources import resource
 
 _BAR = 20  # characters

@@ -9,7 +9,7 @@ from functools import cache
 from hashlib import sha256
 from typing import Any
 
-from bisar_budget.errors import Fault, Place, printable
+from bisar_budget.faults import Fault, Place, printable
 from bisar_budget.findings.mission import FileWarning, MissionFindings, Report, UnusableMission
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS

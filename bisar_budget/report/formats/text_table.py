@@ -1,33 +1,18 @@
 """The report for a terminal: verdict, geometry, the rows that matter with the worst first, what decides them."""
 
-import math
 import re
 from collections.abc import Iterator, Sequence
 from functools import cache
 
-from bisar_budget.errors import printable
+from bisar_budget.faults import printable
 from bisar_budget.findings.mission import MissionFindings, UnusableMission
 from bisar_budget.findings.row import Row, worst_first
 from bisar_budget.findings.status import STATUS, worst
-from bisar_budget.geometry import BistaticGeometry, PlatformState
-from bisar_budget.mission.model import Document
 from bisar_budget.report import Piece, Style
 from bisar_budget.report.words.layout import WIDTH, wrapped, wrapped_counts
+from bisar_budget.report.words.missions import document_words, head, narrow_gradients
+from bisar_budget.report.words.sentences import binding_words, matters, percent
 from bisar_budget.units import format_quantity
-
-# A requirement that can set an allowable, in words; the terminal has room for the first.
-BINDING_WORDS = {
-    "quadratic_phase_error": "quadratic phase error",
-    "cubic_phase_error": "cubic phase error",
-    "location_error": "location error",
-}
-_MODELS = {
-    "published": "published (Rigling & Moses, Tables I and II)",
-    "full": "full (exact ranges, displacement included)",
-    "strictest": "strictest (the stricter of published and full for each row)",
-}
-RULES = {"each": "each error alone", "sum": "worst-case sum", "rss": "root-sum-square"}
-_NARROW_DEG = 30.0  # between range and Doppler gradients; below it the verdict says what that does
 
 
 def piece(mission: MissionFindings | UnusableMission, style: Style) -> str:
@@ -83,81 +68,6 @@ def _mission(mission: MissionFindings, style: Style) -> list[str]:
     return lines
 
 
-def document_words(document: Document) -> str:
-    """Number and issue of a document; empty where the file gives neither."""
-    return ", ".join(filter(None, (document.number, document.issue and f"issue {document.issue}")))
-
-
-def narrow_gradients(geometry: BistaticGeometry) -> str:
-    """Say what range and Doppler gradients close to parallel do to displacements; nothing from 30 degrees on."""
-    angle = geometry.gradient_angle
-    if math.degrees(angle) >= _NARROW_DEG:
-        return ""
-    return (
-        f"Range and Doppler gradients are only {_degrees(angle)} apart: displacements are {1 / math.sin(angle):.2g} "
-        "times those at right angles."
-    )
-
-
-def head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
-    """Say in a few lines what was checked: geometry, resolution, budget, model."""
-    geometry, allocation = mission.geometry, mission.allocation
-    is_first = True  # the first squint says what one is
-    for name, state in (("Transmitter", geometry.transmitter), ("Receiver", geometry.receiver)):
-        yield name, _platform(state, is_first)
-        is_first = is_first and state.squint is None
-    yield (
-        "Geometry",
-        f"bistatic angle {_degrees(geometry.bistatic_angle)}, look azimuth {_degrees(geometry.look_azimuth)}, "
-        f"range and Doppler gradients {_degrees(geometry.gradient_angle)} apart, "
-        f"wavelength {format_quantity(mission.wavelength, 'm', 4)}",
-    )
-    yield (
-        "Resolution",
-        f"{format_quantity(mission.resolution.range, 'm')} range, "
-        f"{format_quantity(mission.resolution.cross_range, 'm')} cross range (peak to null, on ground)",
-    )
-    split = allocation.qpe
-    shares = f"transmitter {split.transmitter:.3g}, receiver {split.receiver:.3g}"
-    shares += f", clock {split.clock:.3g}" if split.clock is not None else ""
-    shares += f", reserve {split.reserve:.3g}" if split.reserve else ""
-    gain = ""
-    if allocation.n_pull is not None:
-        gain = (
-            f"; autofocus pulls in (corrects) up to {multiple_of_pi(allocation.n_pull)} rad: limits times "
-            f"{allocation.autofocus_gain:.3g}"
-        )
-    yield "Budget", f"quadratic phase error (QPE) {format_quantity(allocation.qpe_total, 'rad')}: {shares}{gain}"
-    yield "Model", f"{_MODELS[mission.model]}, {RULES[mission.combine]}"
-    if mission.scene is not None and not mission.scene.degeneracy:
-        radius = format_quantity(mission.scene.radius, "m")
-        yield (
-            "Scene",
-            f"radius {radius}; one autofocus correction of the declared errors serves {mission.scene.served}",
-        )
-    if mission.coverage_factor != 1:
-        yield "Coverage", f"navigation and clock: declared is {mission.coverage_factor:g} times the file's value"
-
-
-def multiple_of_pi(factor: float) -> str:
-    """Write 2 as 2π, 1 as π."""
-    return "π" if factor == 1 else f"{factor:g}π"
-
-
-def _platform(state: PlatformState, explains_squint: bool) -> str:
-    squint = "still"
-    if state.squint is not None:
-        squint = f"squint {_degrees(state.squint)}" + (" off broadside" if explains_squint else "")
-    return (
-        f"{format_quantity(state.slant_range, 'm', 4)} away, azimuth {_degrees(state.azimuth)}, "
-        f"elevation {_degrees(state.elevation)}, {squint}"
-    )
-
-
-def _degrees(angle: float) -> str:
-    return f"{math.degrees(angle):.1f}°".replace("-0.0°", "0.0°")
-
-
 _HEADER = ("status", "row", "declared", "allowable", "use", "by")
 
 
@@ -184,13 +94,6 @@ def _table(mission: MissionFindings, style: Style) -> Iterator[str]:
         if row.requirement_id and (not STATUS[row.status].is_explained and style.verbosity < 1):
             yield f"{'':<{widths[0]}} [{row.requirement_id}]"  # the others have it with their reason
     yield from wrapped(_table_key(rows, hidden), "  ")
-
-
-def matters(row: Row) -> bool:
-    """Whether a row is declared or limits something; along other axes than the file's, only if it does not pass."""
-    if row.status in ("info", "pass"):
-        return row.is_independent and (row.status == "pass" or bool(row.declared))
-    return row.status != "not_declared"
 
 
 def _table_key(rows: Sequence[Row], hidden: Sequence[Row]) -> str:
@@ -228,11 +131,6 @@ def _row(row: Row) -> tuple[str, ...]:
     return STATUS[status].text, row.id, size, allowable, use, _limited_by(row)
 
 
-def binding_words(row: Row) -> str:
-    """Say which other requirement than the one the row is about sets its allowable; nothing if it is that one."""
-    return "" if row.binding_requirement == row.metric else BINDING_WORDS.get(row.binding_requirement or "", "")
-
-
 def _limited_by(row: Row) -> str:
     """What sets the allowable: another requirement than the row's own, else the place of its equation."""
     binding = binding_words(row)
@@ -249,28 +147,6 @@ def _short_reference(equation: str) -> str:
         return ""
     table, row, section, number = match.groups()
     return f"{table}.{row}" if row and row.isdigit() else table or section or number
-
-
-def percent(ratio: float) -> str:
-    """Write a ratio in percent; near 100 % with the digits that tell which side it is on."""
-    value = 100 * ratio
-    if value == 0:
-        return "0 %"
-    if value >= 99999.5:
-        return ">1e5 %"
-    if value < 0.01:
-        return "<0.01 %"
-    if value < 0.1:
-        return f"{value:.2g} %"  # as wide as the column
-    if value < 99:
-        return f"{value:.3g} %"
-    side = 0 if abs(value - 100) < 1e-7 else math.copysign(1, value - 100)
-    for digits in range(max(3, len(f"{value:.0f}")), 13):
-        text = f"{value:.{digits}g}"
-        shown = float(text) - 100
-        if (shown > 0) == (side > 0) and (shown < 0) == (side < 0):
-            return f"{text} %"
-    return f"{value} %"
 
 
 def _details(mission: MissionFindings, style: Style) -> Iterator[str]:

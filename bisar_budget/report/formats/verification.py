@@ -4,7 +4,7 @@ import json
 import math
 from collections.abc import Iterator, Sequence
 
-from bisar_budget.errors import printable
+from bisar_budget.faults import printable
 from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.report import Style
 from bisar_budget.report.words.layout import table, wrapped, wrapped_counts

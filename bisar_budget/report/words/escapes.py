@@ -8,7 +8,7 @@ import os
 import re
 from urllib.parse import quote
 
-from bisar_budget.errors import printable
+from bisar_budget.faults import printable
 
 _XML = {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "'": "&apos;"}
 _XML_SPECIAL = re.compile("[&<>\"']")

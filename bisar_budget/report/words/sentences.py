@@ -1,8 +1,50 @@
-"""What a row says, in a sentence: for formats that have room for one line of text."""
+"""What every format says of a row: how much of its limit it uses, what sets the limit, why it stands as it does."""
+
+import math
 
 from bisar_budget.findings.row import Row
-from bisar_budget.report.formats.text_table import binding_words, percent
 from bisar_budget.units import format_quantity
+
+# A requirement that can set an allowable, in words; the terminal has room for the first.
+BINDING_WORDS = {
+    "quadratic_phase_error": "quadratic phase error",
+    "cubic_phase_error": "cubic phase error",
+    "location_error": "location error",
+}
+
+
+def matters(row: Row) -> bool:
+    """Whether a row is declared or limits something; along other axes than the file's, only if it does not pass."""
+    if row.status in ("info", "pass"):
+        return row.is_independent and (row.status == "pass" or bool(row.declared))
+    return row.status != "not_declared"
+
+
+def binding_words(row: Row) -> str:
+    """Say which other requirement than the one the row is about sets its allowable; nothing if it is that one."""
+    return "" if row.binding_requirement == row.metric else BINDING_WORDS.get(row.binding_requirement or "", "")
+
+
+def percent(ratio: float) -> str:
+    """Write a ratio in percent; near 100 % with the digits that tell which side it is on."""
+    value = 100 * ratio
+    if value == 0:
+        return "0 %"
+    if value >= 99999.5:
+        return ">1e5 %"
+    if value < 0.01:
+        return "<0.01 %"
+    if value < 0.1:
+        return f"{value:.2g} %"  # as wide as the column
+    if value < 99:
+        return f"{value:.3g} %"
+    side = 0 if abs(value - 100) < 1e-7 else math.copysign(1, value - 100)
+    for digits in range(max(3, len(f"{value:.0f}")), 13):
+        text = f"{value:.{digits}g}"
+        shown = float(text) - 100
+        if (shown > 0) == (side > 0) and (shown < 0) == (side < 0):
+            return f"{text} %"
+    return f"{value} %"
 
 
 def measure(row: Row) -> str:

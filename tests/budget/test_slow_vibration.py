@@ -12,7 +12,7 @@ from bisar_budget.mission.load import parse_mission
 from bisar_budget.report import FORMATS, Style, render
 from bisar_budget.report.explain.explanation import explain
 from tests.conftest import TODAY, findings, mission_text, row
-from tests.unit.test_report_explanation import evaluated, sums
+from tests.report.test_report_explanation import evaluated, sums
 
 LAMBDA = 299_792_458 / 10e9
 T = 6.0

@@ -13,7 +13,7 @@ import threading
 
 import pytest
 
-from bisar_budget.errors import MissionError
+from bisar_budget.faults import MissionError
 from bisar_budget.findings.mission import Report
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.mission.load import parse_mission

@@ -560,7 +560,7 @@ signed = st.floats(-1e3, 1e3)
 )
 @settings(max_examples=80, deadline=None)  # absurd errors take exact ranges all their iterations
 def test_every_number_is_finite_and_every_row_consistent(velocity, error, rule, frame, n_pull) -> None:
-    from bisar_budget.errors import MissionError
+    from bisar_budget.faults import MissionError
 
     text = mission_text(
         platforms__transmitter__velocity=list(velocity),

@@ -14,7 +14,7 @@ import pytest
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.cli.streams import harmless
-from bisar_budget.errors import MissionError
+from bisar_budget.faults import MissionError
 from bisar_budget.findings.mission import Report
 from bisar_budget.mission.load import MAX_FAULTS, parse_mission
 from bisar_budget.report import FORMATS, Style, render

@@ -13,7 +13,7 @@ from bisar_budget.report.explain import typeset
 from bisar_budget.report.explain.explanation import chain, collection_chain
 from bisar_budget.report.explain.formulas import WorkedEquation, filled
 from tests.conftest import TODAY
-from tests.unit.test_report_explanation import MISSIONS
+from tests.report.test_report_explanation import MISSIONS
 
 
 def derived_equations(model: str = "published") -> list[tuple[str, WorkedEquation]]:

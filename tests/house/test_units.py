@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from bisar_budget import units
 from bisar_budget.budget.check import check_mission
-from bisar_budget.errors import InvalidValueError
+from bisar_budget.faults import InvalidValueError
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.units import format_limit, format_quantity, parse_quantity
 from tests.conftest import ROOT, TODAY

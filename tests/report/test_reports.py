@@ -8,11 +8,11 @@ import re
 
 import pytest
 
-from bisar_budget.errors import Fault
+from bisar_budget.faults import Fault
 from bisar_budget.findings.mission import Report, UnusableMission
 from bisar_budget.findings.row import worst_first
 from bisar_budget.report import FORMATS, Style, render
-from bisar_budget.report.formats.text_table import percent
+from bisar_budget.report.words.sentences import percent
 from tests.conftest import ROOT, findings
 
 ROW_KEYS = [

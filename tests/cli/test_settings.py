@@ -5,7 +5,7 @@ import json
 import pytest
 
 from tests.conftest import ROOT, mission_text
-from tests.unit.test_structure import loaded_after
+from tests.house.test_structure import loaded_after
 
 WARNING = mission_text(timing_error__quadratic=6e-13)  # passes, unless strict
 

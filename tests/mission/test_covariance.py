@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from bisar_budget.errors import MissionError
+from bisar_budget.faults import MissionError
 from bisar_budget.geometry import FRAME_AXES
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.symmetric import eigensystem, exceed

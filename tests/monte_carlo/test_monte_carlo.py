@@ -17,8 +17,8 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.monte_carlo import draws as drawing
 from bisar_budget.monte_carlo.probability import _wilson, _within, monte_carlo
 from tests import reference
+from tests.cli.test_settings import project, table  # noqa: F401
 from tests.conftest import findings, mission_text, row
-from tests.unit.test_settings import project, table  # noqa: F401
 
 N = 100_000
 T, F0 = 6.0, 10e9

@@ -15,7 +15,7 @@ from markdown_it import MarkdownIt
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.cli.check import check
-from bisar_budget.errors import Fault
+from bisar_budget.faults import Fault
 from bisar_budget.findings.mission import Report, UnusableMission
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.report import FORMATS, Style, format_of, render

@@ -16,7 +16,7 @@ from markdown_it import MarkdownIt
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.check import check_mission
-from bisar_budget.errors import Fault, printable
+from bisar_budget.faults import Fault, printable
 from bisar_budget.findings.images import ImageEvidence, PointImage, Verdict
 from bisar_budget.findings.mission import MissionFindings, Option, Report, UnusableMission
 from bisar_budget.mission.load import load_mission

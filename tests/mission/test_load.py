@@ -7,7 +7,7 @@ import yaml
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from bisar_budget.errors import MissionError
+from bisar_budget.faults import MissionError
 from bisar_budget.mission import load
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import MISSION, Mission

@@ -1,0 +1,92 @@
+"""What every format says of a mission: its geometry, resolution, budget and model."""
+
+import math
+from collections.abc import Iterator
+
+from bisar_budget.findings.mission import MissionFindings
+from bisar_budget.geometry import BistaticGeometry, PlatformState
+from bisar_budget.mission.model import Document
+from bisar_budget.units import format_quantity
+
+_MODELS = {
+    "published": "published (Rigling & Moses, Tables I and II)",
+    "full": "full (exact ranges, displacement included)",
+    "strictest": "strictest (the stricter of published and full for each row)",
+}
+RULES = {"each": "each error alone", "sum": "worst-case sum", "rss": "root-sum-square"}
+_NARROW_DEG = 30.0  # between range and Doppler gradients; below it the verdict says what that does
+
+
+def document_words(document: Document) -> str:
+    """Number and issue of a document; empty where the file gives neither."""
+    return ", ".join(filter(None, (document.number, document.issue and f"issue {document.issue}")))
+
+
+def narrow_gradients(geometry: BistaticGeometry) -> str:
+    """Say what range and Doppler gradients close to parallel do to displacements; nothing from 30 degrees on."""
+    angle = geometry.gradient_angle
+    if math.degrees(angle) >= _NARROW_DEG:
+        return ""
+    return (
+        f"Range and Doppler gradients are only {_degrees(angle)} apart: displacements are {1 / math.sin(angle):.2g} "
+        "times those at right angles."
+    )
+
+
+def head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
+    """Say in a few lines what was checked: geometry, resolution, budget, model."""
+    geometry, allocation = mission.geometry, mission.allocation
+    is_first = True  # the first squint says what one is
+    for name, state in (("Transmitter", geometry.transmitter), ("Receiver", geometry.receiver)):
+        yield name, _platform(state, is_first)
+        is_first = is_first and state.squint is None
+    yield (
+        "Geometry",
+        f"bistatic angle {_degrees(geometry.bistatic_angle)}, look azimuth {_degrees(geometry.look_azimuth)}, "
+        f"range and Doppler gradients {_degrees(geometry.gradient_angle)} apart, "
+        f"wavelength {format_quantity(mission.wavelength, 'm', 4)}",
+    )
+    yield (
+        "Resolution",
+        f"{format_quantity(mission.resolution.range, 'm')} range, "
+        f"{format_quantity(mission.resolution.cross_range, 'm')} cross range (peak to null, on ground)",
+    )
+    split = allocation.qpe
+    shares = f"transmitter {split.transmitter:.3g}, receiver {split.receiver:.3g}"
+    shares += f", clock {split.clock:.3g}" if split.clock is not None else ""
+    shares += f", reserve {split.reserve:.3g}" if split.reserve else ""
+    gain = ""
+    if allocation.n_pull is not None:
+        gain = (
+            f"; autofocus pulls in (corrects) up to {multiple_of_pi(allocation.n_pull)} rad: limits times "
+            f"{allocation.autofocus_gain:.3g}"
+        )
+    yield "Budget", f"quadratic phase error (QPE) {format_quantity(allocation.qpe_total, 'rad')}: {shares}{gain}"
+    yield "Model", f"{_MODELS[mission.model]}, {RULES[mission.combine]}"
+    if mission.scene is not None and not mission.scene.degeneracy:
+        radius = format_quantity(mission.scene.radius, "m")
+        yield (
+            "Scene",
+            f"radius {radius}; one autofocus correction of the declared errors serves {mission.scene.served}",
+        )
+    if mission.coverage_factor != 1:
+        yield "Coverage", f"navigation and clock: declared is {mission.coverage_factor:g} times the file's value"
+
+
+def multiple_of_pi(factor: float) -> str:
+    """Write 2 as 2π, 1 as π."""
+    return "π" if factor == 1 else f"{factor:g}π"
+
+
+def _platform(state: PlatformState, explains_squint: bool) -> str:
+    squint = "still"
+    if state.squint is not None:
+        squint = f"squint {_degrees(state.squint)}" + (" off broadside" if explains_squint else "")
+    return (
+        f"{format_quantity(state.slant_range, 'm', 4)} away, azimuth {_degrees(state.azimuth)}, "
+        f"elevation {_degrees(state.elevation)}, {squint}"
+    )
+
+
+def _degrees(angle: float) -> str:
+    return f"{math.degrees(angle):.1f}°".replace("-0.0°", "0.0°")
