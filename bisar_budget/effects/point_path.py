@@ -27,9 +27,9 @@ _FOLDS = 0.1  # of what the gradients span at the centre; a way that ends at mor
 _CLOSE = 1e-5  # of a limit, where a search ends
 _ALMOST = 0.002  # of a limit, from where a parabola leads to it
 _NOT_FOLDED = 0.5  # of what the gradients span at the centre
-_CREST = 0.01  # of a limit, below which the crest of a curve through few points may be above it
+_CREST = 0.01  # of a limit: so little below it, the crest of a curve through few points may be above
 _DEPARTS = 0.5  # of the limit: a value so far from a straight line may have been anywhere in between
-_COARSE = 0.02  # of the size: no interval is looked into that is shorter
+_COARSE = 0.02  # of the size: within a shorter interval a curve is trusted
 _STEPS = 40
 
 Value = Callable[[ExactPhases], float]  # what is held to a limit, signed
@@ -210,14 +210,16 @@ class PointPath:
         a, b, width = value(low.phases), value(high.phases), high.size - low.size
         slope = per_unit if index == 1 else self._slope(index - 1, value)
         last = self._slope(index, value) if index + 1 < len(self.known) else 2 * (b - a) / width - slope
+        is_wide = width > _COARSE * high.size
+        near = limit * (1 - _CREST) if is_wide else limit
         for part in _crests(slope * width, b - a, last * width):
             square, cube = part * part, part * part * part
             on_curve = a + slope * width * (part - 2 * square + cube) + last * width * (cube - square)
             on_curve += (b - a) * (3 * square - 2 * cube)
-            if 0.02 < part < 0.98 and abs(on_curve) >= limit * (1 - _CREST):
+            if 0.02 < part < 0.98 and abs(on_curve) >= near:
                 return low.size + part * width
         departs = abs(b - a - slope * width)
-        return low.size + width / 2 if departs > _DEPARTS * limit and width > _COARSE * high.size else None
+        return low.size + width / 2 if is_wide and departs > _DEPARTS * limit else None
 
     def _slope(self, index: int, value: Value) -> float:
         """Slope at a known point of the parabola through it and its neighbours. [of the value per unit]"""
