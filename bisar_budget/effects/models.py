@@ -216,9 +216,8 @@ class FullModel:
         """Search for the size from a first guess, by both signs."""
         smallest = None
         for sign in (1.0, -1.0):
-            found = self._path(source, sign).first_reaching(
-                _VALUES[requirement], limit, sign * per_unit, first, farthest
-            )
+            slope = per_unit if requirement == LOCATION else sign * per_unit  # a length has no sign
+            found = self._path(source, sign).first_reaching(_VALUES[requirement], limit, slope, first, farthest)
             if found is not None:
                 smallest, farthest, first = found, found, min(first, found)
         return smallest

@@ -27,6 +27,9 @@ _FOLDS = 0.1  # of what the gradients span at the centre; a way that ends at mor
 _CLOSE = 1e-5  # of a limit, where a search ends
 _ALMOST = 0.002  # of a limit, from where a parabola leads to it
 _NOT_FOLDED = 0.5  # of what the gradients span at the centre
+_CREST = 0.01  # of a limit, below which the crest of a curve through few points may be above it
+_DEPARTS = 0.5  # of the limit: a value so far from a straight line may have been anywhere in between
+_COARSE = 0.02  # of the size: no interval is looked into that is shorter
 _STEPS = 40
 
 Value = Callable[[ExactPhases], float]  # what is held to a limit, signed
@@ -191,28 +194,37 @@ class PointPath:
         while index < len(self.known) and self.known[index].size <= upto:
             if abs(value(self.known[index].phases)) >= limit * (1 - _CLOSE):
                 return self._between(value, limit, index, per_unit)
-            top = self._top(index, value, limit, per_unit)
-            if top is not None and self.to(top) is None:
+            doubtful = self._doubtful(index, value, limit, per_unit)
+            if doubtful is not None and self.to(doubtful) is None:
                 return None
-            index += top is None
+            index += doubtful is None
         return None
 
-    def _top(self, index: int, value: Value, limit: float, per_unit: float) -> float | None:
-        """Size within an interval at which a parabola stands above the limit, where both ends are below."""
+    def _doubtful(self, index: int, value: Value, limit: float, per_unit: float) -> float | None:
+        """Size to look at within an interval whose ends are below the limit; None where what lies between is too.
+
+        That at which the value, led on by its slopes at both ends, stands above the limit; or the middle, where the
+        end departs so far from the slope at the beginning that no curve through so few points is to be trusted.
+        """
         low, high = self.known[index - 1], self.known[index]
         a, b, width = value(low.phases), value(high.phases), high.size - low.size
-        chord = (b - a) / width
-        if index == 1:
-            slope = per_unit
-        else:
-            before = self.known[index - 2]
-            earlier = (a - value(before.phases)) / (low.size - before.size)
-            slope = (chord * (low.size - before.size) + earlier * width) / (high.size - before.size)
-        bend = (chord - slope) / width
-        way = -slope / (2 * bend) if bend else 0.0
-        if not 0.02 * width < way < 0.98 * width or abs(a + slope * way / 2) < limit:
-            return None
-        return low.size + way
+        slope = per_unit if index == 1 else self._slope(index - 1, value)
+        last = self._slope(index, value) if index + 1 < len(self.known) else 2 * (b - a) / width - slope
+        for part in _crests(slope * width, b - a, last * width):
+            square, cube = part * part, part * part * part
+            on_curve = a + slope * width * (part - 2 * square + cube) + last * width * (cube - square)
+            on_curve += (b - a) * (3 * square - 2 * cube)
+            if 0.02 < part < 0.98 and abs(on_curve) >= limit * (1 - _CREST):
+                return low.size + part * width
+        departs = abs(b - a - slope * width)
+        return low.size + width / 2 if departs > _DEPARTS * limit and width > _COARSE * high.size else None
+
+    def _slope(self, index: int, value: Value) -> float:
+        """Slope at a known point of the parabola through it and its neighbours. [of the value per unit]"""
+        before, at, after = self.known[index - 1 : index + 2]
+        a, b, c = value(before.phases), value(at.phases), value(after.phases)
+        first, second = at.size - before.size, after.size - at.size
+        return ((b - a) / first * second + (c - b) / second * first) / (first + second)
 
     def _between(self, value: Value, limit: float, index: int, per_unit: float) -> float:
         """Size at which the magnitude reaches the limit, in the interval that ends at a known point."""
@@ -252,6 +264,18 @@ def _on_parabola(slope: float, size: float, value: float, limit: float) -> float
     bend = (value / size - slope) / size
     root = slope * slope + 4 * bend * limit
     return 2 * limit / (slope + math.sqrt(root)) if root >= 0 and slope + root > 0 else None
+
+
+def _crests(slope: float, rise: float, last: float) -> tuple[float, ...]:
+    """Parts of an interval at which a cubic has no slope, by its slopes at both ends and its rise in between."""
+    # The derivative is slope + 2·b·t + 3·c·t² with t from 0 to 1.
+    b, c = 3 * rise - 2 * slope - last, slope + last - 2 * rise
+    root = b * b - 3 * c * slope
+    if root < 0:
+        return ()
+    # Without the difference of nearly equal numbers; a parabola has c = 0, and one crest.
+    far = -(b + math.copysign(math.sqrt(root), b))
+    return tuple(part for part in (far / (3 * c) if c else None, slope / far if far else None) if part is not None)
 
 
 def _parallel_between(before: _Known, beyond: _Known) -> float:

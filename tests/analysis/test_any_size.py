@@ -192,3 +192,16 @@ def test_gradients_that_span_a_fiftieth_count_as_parallel() -> None:
     place = reference.Lanes(mission, [error]).follow(sizes).place[0]
     assert np.isfinite(place[:3]).all()
     assert np.isnan(place[3]).all()
+
+
+def test_a_crest_between_two_sizes_is_not_stepped_over() -> None:
+    """The phase is up to 2.6 % above its limit from 2.90 to 3.40 km, and again from 4.22 km on."""
+    mission = parse_mission(mission_text("satellite_aircraft", 535))
+    error = next(e for e in reference.errors_of(mission) if e.id == "transmitter.position.z")
+    size = next(r for r in check_mission(mission, DAY).rows if r.id == error.id).allowable_full
+    limit = 0.5 * math.pi * 1.28  # the platform's half of what autofocus corrects
+    sizes = np.array([0.5, 0.99, 1.0, 1.01, 1.1, 1.4]) * size
+    qpe = np.abs(reference.Lanes(mission, [error]).follow(sizes[None]).qpe[0])
+    assert qpe[2] == pytest.approx(limit, rel=0.003)
+    assert (qpe[[0, 1, 5]] < limit).all()
+    assert (qpe[[3, 4]] > limit).all()
