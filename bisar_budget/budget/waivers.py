@@ -1,7 +1,7 @@
 """Waivers: rows that may fail until a date. What is waived, expired or useless is always said."""
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from datetime import date
 from fnmatch import translate
 
@@ -30,21 +30,21 @@ def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> tuple[l
     warnings : list of FileWarning
         Waivers that name no row, or none that fails.
     """
-    result = list(rows)
+    ids = [row.id for row in rows]
+    broken = {position for position, row in enumerate(rows) if row.status == "fail"}
     warnings = []
-    expired: dict[int, AppliedWaiver] = {}  # of each row the one that held longest: a thousand would fill a report
+    # A thousand waivers of one row would fill a report: it has the first that holds and the one that held longest.
+    holding: dict[int, AppliedWaiver] = {}
+    over: list[tuple[AppliedWaiver, set[int]]] = []
     for index, waiver in enumerate(mission.waivers):
         line = mission.line(("waivers", index, "id"))
-        is_named = _matcher(waiver.id)
-        named = [position for position, row in enumerate(rows) if is_named(row.id)]
-        failing = [position for position in named if rows[position].status == "fail"]
+        named = _named(waiver.id, ids)
+        failing = broken.intersection(named)
         applied = AppliedWaiver(line, waiver.until, waiver.reason, is_expired=today > waiver.until)
-        for position in failing:
-            row = result[position]
-            if applied.is_expired:
-                expired[position] = max(applied, expired.get(position, applied), key=lambda one: one.until)
-            elif row.status == "fail":
-                result[position] = row._replace(status="waived", waivers=(*row.waivers, applied))
+        if applied.is_expired:
+            over.append((applied, failing))
+        else:
+            holding = dict.fromkeys(failing, applied) | holding
         if not named:
             warnings.append(FileWarning(line=line, message=f"waiver {waiver.id}: matches no row"))
         elif len(named) == len(rows):
@@ -55,15 +55,21 @@ def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> tuple[l
             warnings.append(
                 FileWarning(line=line, message=f"waiver {waiver.id}: not used: no row that it names fails")
             )
-    for position, last in expired.items():
-        row = result[position]
-        result[position] = row._replace(waivers=(*row.waivers, last))
-    return result, warnings
+    last: dict[int, AppliedWaiver] = {}
+    for applied, failing in sorted(over, key=lambda one: one[0].until):
+        last |= dict.fromkeys(failing, applied)
+    return [_waived(row, holding.get(position), last.get(position)) for position, row in enumerate(rows)], warnings
 
 
-def _matcher(pattern: str) -> Callable[[str], object]:
-    """Tell which ids a waiver names; an id may hold a bracket of its own."""
+def _waived(row: Row, holding: AppliedWaiver | None, last: AppliedWaiver | None) -> Row:
+    applied = [one for one in (holding, last) if one is not None]
+    status = row.status if holding is None else "waived"
+    return row._replace(status=status, waivers=(*row.waivers, *applied)) if applied else row
+
+
+def _named(pattern: str, ids: Sequence[str]) -> list[int]:
+    """Places of the ids that a waiver names; an id may hold a bracket of its own."""
     if not any(char in pattern for char in "*?["):
-        return pattern.__eq__
-    glob = re.compile(translate(pattern)).match
-    return lambda row_id: row_id == pattern or glob(row_id)
+        return [place for place, row_id in enumerate(ids) if row_id == pattern]
+    matches = map(re.compile(translate(pattern)).match, ids)
+    return [place for place, match in enumerate(matches) if match or ids[place] == pattern]
