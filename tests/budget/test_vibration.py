@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bisar_budget.analysis import vibration_limits as vibration
 from bisar_budget.analysis.allocation import Split
-from bisar_budget.budget import vibration_rows as vibration
 from bisar_budget.budget.check import check_mission
 from bisar_budget.effects.slow_vibration import cubic_part, quadratic_part
 from bisar_budget.effects.vibration_lines import along_line_of_sight
