@@ -2,6 +2,7 @@
 
 import copy
 import math
+import signal
 from collections.abc import Callable
 from datetime import date
 from functools import cache
@@ -122,3 +123,9 @@ def run() -> Callable[..., Result]:
         return CliRunner(**_APART).invoke(cli, [str(arg) for arg in args], **options)
 
     return invoke
+
+
+def heed_signals() -> None:
+    """In a child before it starts: undo what a runner in the background ignores, SIGINT and SIGHUP."""
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)

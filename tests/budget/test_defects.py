@@ -18,7 +18,7 @@ from bisar_budget.findings.mission import Report
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.report import Style, render
-from tests.conftest import ROOT, findings, mission_text, row
+from tests.conftest import ROOT, findings, heed_signals, mission_text, row
 
 COMMAND = [sys.executable, "-m", "bisar_budget"]
 ERROR = "platforms__transmitter__motion_error"
@@ -98,7 +98,11 @@ class TestStreams:
 
     def test_an_interrupt_is_not_a_broken_requirement(self) -> None:
         process = subprocess.Popen(
-            [*COMMAND, "check", "-"], stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+            [*COMMAND, "check", "-"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            preexec_fn=heed_signals,
         )
         with pytest.raises(subprocess.TimeoutExpired):
             process.wait(1.5)  # it has started and waits for the mission

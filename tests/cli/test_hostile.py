@@ -18,7 +18,7 @@ from bisar_budget.faults import MissionError
 from bisar_budget.findings.mission import Report
 from bisar_budget.mission.load import MAX_FAULTS, parse_mission
 from bisar_budget.report import FORMATS, Style, render
-from tests.conftest import ROOT, TODAY, findings, mission_text
+from tests.conftest import ROOT, TODAY, findings, heed_signals, mission_text
 from tests.fuzz import RAW, RUN, case
 
 COMMAND = [sys.executable, "-m", "bisar_budget"]
@@ -72,7 +72,9 @@ class TestWorkers:
     """Signals left workers and a resource tracker behind, which held standard output."""
 
     def start(self, **options) -> tuple[subprocess.Popen, set[int]]:
-        process = subprocess.Popen([*COMMAND, "verify", str(SECTION_V), "--jobs", "2"], cwd=ROOT, **options)
+        process = subprocess.Popen(
+            [*COMMAND, "verify", str(SECTION_V), "--jobs", "2"], cwd=ROOT, preexec_fn=heed_signals, **options
+        )
         # Two workers, with a thread that watches their parent each, and the tracker of their resources.
         assert until(lambda: sum(threads(child) > 1 for child in children(process.pid)) == 2, 120)
         assert len(children(process.pid)) == 3
