@@ -156,13 +156,14 @@ class FullModel:
     def allowable(self, source: ErrorSource, requirement: str, limit: float, upto: float = math.inf) -> float | None:
         """Smallest size, of either sign, at which an error reaches a limit [rad], or [m] for the location.
 
-        None where none does that takes its platform no farther than a tenth of the slant range, or `upto`.
+        None where none does that takes its platform no farther than a tenth of the slant range, or than the declared
+        one does, or `upto`.
         """
         per_unit = _per_unit(source.full, self.plane, requirement)
         linear = _size(limit, per_unit)
         if not source.is_motion:
             return linear
-        farthest = min(upto, self.farthest(source))
+        farthest = min(upto, max(self.farthest(source), abs(source.declared or 0.0)))
         first = farthest if linear is None else min(linear, farthest)
         if self._adds(source, first, requirement) <= _SHARE * limit:
             return None if linear is None or linear > farthest else linear

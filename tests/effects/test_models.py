@@ -277,3 +277,13 @@ def test_terrain_clock_and_common_errors_have_their_own_farthest_size() -> None:
     assert analysis.full.farthest(sources["common.velocity.x"]) == pytest.approx(0.1 * nearest / 3)
     constant = analysis.full.farthest(sources["timing.constant"])
     assert constant == pytest.approx(0.1 * nearest / C)
+
+
+@pytest.mark.parametrize("constant", [4e-6, 2e-5, 1e-4])
+def test_an_error_beyond_a_tenth_of_the_range_is_held_to_its_limit_all_the_same(constant: float) -> None:
+    """No limit was searched beyond a tenth of the range: 247 rad passed where 31.4 rad were allowed."""
+    error = {"timing_error__constant": constant, "autofocus__n_pull": 20, "allocation__model": "full"}
+    found = row(findings(**error), "timing.constant")
+    assert found.status == "fail"
+    at_limit = row(findings(**{**error, "timing_error__constant": found.allowable}), "timing.constant")
+    assert abs(at_limit.qpe_full_rad) == pytest.approx(20 * math.pi / 2, rel=1e-6)  # the receiver's half
