@@ -5,7 +5,7 @@ import json
 import math
 import re
 from datetime import date
-from functools import cache, partial
+from functools import cache
 
 import numpy as np
 import pytest
@@ -617,7 +617,11 @@ def test_compiled_and_numpy_images_give_the_same_verdicts(monkeypatch) -> None:
     pytest.importorskip("numba", reason="the extra `fast` is not installed")
     mission = load_mission(str(SECTION_V.with_name("rigling_moses_section_v_autofocus.yaml")))
     fast = verify_mission(mission, "receiver.*").rows
-    monkeypatch.setattr(collection_module, "backprojection", partial(backprojection, kernel="numpy"))
+
+    def by_numpy(history, points, *_: object, **__: object):
+        return backprojection(history, points, "numpy")
+
+    monkeypatch.setattr(collection_module, "backprojection", by_numpy)
     plain = verify_mission(mission, "receiver.*").rows
     assert [(row.verdict, row.verdict_autofocus) for row in fast] == [
         (row.verdict, row.verdict_autofocus) for row in plain
