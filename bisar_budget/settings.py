@@ -18,6 +18,7 @@ KEYS = {
     "monte-carlo": int,
     "seed": int,
     "color": str,
+    "sensors": list,
 }
 _KINDS = {str: "text", bool: "true or false", int: "a whole number", list: "a list of file names"}
 # Only a file that mentions the tool is parsed: tomllib costs a fifth of a check's start. Escapes may hide the name.
@@ -40,7 +41,7 @@ class Settings(NamedTuple):
 def project_settings(folder: str) -> Settings | None:
     """Read the table for a folder; None if no `pyproject.toml` in it or above has one.
 
-    Names of reports are relative to the file that says them.
+    Names of reports and folders of sensors are relative to the file that says them.
 
     Raises
     ------
@@ -85,8 +86,9 @@ def _read(file: str) -> Settings | None:
     for key, value in table.items():
         _hold_to_type(file, key, value)
     values = dict(table)
-    if "report" in values:
-        values["report"] = [os.path.join(os.path.dirname(file), name) for name in values["report"]]
+    for key in ("report", "sensors"):
+        if key in values:
+            values[key] = [os.path.join(os.path.dirname(file), name) for name in values[key]]
     return Settings(file, values)
 
 

@@ -62,6 +62,7 @@ def _scaled(base: str, prefixes: str, power: int = 1) -> dict[str, float]:
 
 _LENGTHS = _scaled("m", "kcmun") | {"ft": 0.3048, "nmi": 1852.0}
 _G = STANDARD_GRAVITY
+_DEGREE = math.pi / 180
 
 FREQUENCY = Dimension("a frequency", "Hz", _scaled("Hz", "kMGT"))
 TIME = Dimension("a time", "s", _scaled("s", "munp") | {"min": 60.0})
@@ -88,6 +89,42 @@ POWER_RATIO = Dimension("a power ratio in decibel", "dB", {"dB": 1.0})
 POSITION_VARIANCE = Dimension("a position variance", "m^2", _scaled("m^2", "kcmu", 2))
 POSITION_VELOCITY = Dimension("a covariance of position and velocity", "m^2/s", _scaled("m^2/s", "kcmu", 2))
 VELOCITY_VARIANCE = Dimension("a velocity variance", "m^2/s^2", _scaled("m^2/s^2", "kcmu", 2))
+ANGULAR_RATE = Dimension(
+    "an angular rate",
+    "rad/s",
+    {f"{unit}/s": factor for unit, factor in _scaled("rad", "mun").items()}
+    | {"deg/s": _DEGREE, "deg/min": _DEGREE / 60, "deg/h": _DEGREE / 3600},
+    usual=("deg/h", "deg/s"),
+)
+_ROOT_HOUR = 1 / 60  # of an hour's root, in roots of a second
+VELOCITY_RANDOM_WALK = Dimension(
+    "a velocity random walk",
+    "m/s/sqrt(s)",
+    {
+        "m/s/sqrt(s)": 1.0,
+        "m/s/sqrt(h)": _ROOT_HOUR,
+        "mm/s/sqrt(s)": 1e-3,
+        "ft/s/sqrt(h)": 0.3048 * _ROOT_HOUR,
+        "m/s^2/sqrt(Hz)": 1.0,
+        "ug/sqrt(Hz)": 1e-6 * _G,
+        "mg/sqrt(Hz)": 1e-3 * _G,
+    },
+    usual=("m/s/sqrt(h)", "ug/sqrt(Hz)"),
+)
+ANGLE_RANDOM_WALK = Dimension(
+    "an angle random walk",
+    "rad/sqrt(s)",
+    {
+        "rad/sqrt(s)": 1.0,
+        "deg/sqrt(h)": _DEGREE * _ROOT_HOUR,
+        "deg/sqrt(s)": _DEGREE,
+        "rad/s/sqrt(Hz)": 1.0,
+        "deg/s/sqrt(Hz)": _DEGREE,
+        "deg/h/sqrt(Hz)": _DEGREE / 3600,
+    },
+    usual=("deg/sqrt(h)", "rad/sqrt(s)"),
+)
+PHASE_NOISE = Dimension("a phase noise L(f)", "dBc/Hz", {"dBc/Hz": 1.0}, usual=("dBc/Hz",))
 MEMORY = Dimension("an amount of memory", "B", _scaled("B", "kMGT") | {"KB": 1e3, "MiB": 2.0**20, "GiB": 2.0**30})
 
 DIMENSIONS = (
@@ -104,6 +141,10 @@ DIMENSIONS = (
     POSITION_VARIANCE,
     POSITION_VELOCITY,
     VELOCITY_VARIANCE,
+    ANGULAR_RATE,
+    VELOCITY_RANDOM_WALK,
+    ANGLE_RANDOM_WALK,
+    PHASE_NOISE,
     MEMORY,
 )
 
@@ -239,6 +280,7 @@ def _finite(number: float, dimension: Dimension) -> float:
 def _normal(unit: str) -> str:
     unit = unit.strip().replace("µ", "u").replace("μ", "u").replace("²", "^2").replace("³", "^3")
     unit = re.sub(r"\s*([/^])\s*", r"\1", unit.replace("**", "^"))
+    unit = re.sub(r"√\(?(s|h|Hz)\)?", r"sqrt(\1)", unit)
     return unit.replace("s2", "s^2").replace("s3", "s^3")
 
 

@@ -36,8 +36,9 @@ from bisar_budget.cli.streams import harmless
 from bisar_budget.faults import MissionError
 from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
 from bisar_budget.findings.status import exit_code
-from bisar_budget.mission.load import MAX_BYTES, load_mission
+from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.model import Mission
+from bisar_budget.mission.tree import MAX_BYTES
 from bisar_budget.report import FORMATS, Style, pictures, render
 from bisar_budget.report.change import difference
 from bisar_budget.report.change.comparison import compare

@@ -64,6 +64,8 @@ class _Gate(click.Command):
             settings = None
         defaults = {}
         for key, value in settings.values.items() if settings else ():
+            if key == "sensors":  # `parts` reads it
+                continue
             option = options[key]
             try:
                 for item in value if isinstance(value, list) else [value]:

@@ -31,6 +31,7 @@ from bisar_budget.mission.readers import (
     Reader,
     Section,
     Text,
+    TextList,
     TextMap,
     Triple,
     Version,
@@ -40,6 +41,7 @@ from bisar_budget.mission.readers import (
 
 if TYPE_CHECKING:
     from bisar_budget.mission.covariance import Covariance
+    from bisar_budget.mission.instruments import GaussMarkov, Imu, Oscillator, Synchronization
 
 STILL = 1e-6  # m/s; slower than this no platform flies an aperture
 
@@ -146,8 +148,23 @@ def _covariance_reader() -> Reader:
     return COVARIANCE
 
 
+def _instruments(name: str) -> Reader:
+    """A reader of `instruments`, which few files need."""
+    from bisar_budget.mission import instruments
+
+    reader: Reader = getattr(instruments, name)
+    return reader
+
+
+PART = Text()
+PARTS = OneOf(lambda value: TextList() if isinstance(value, list) else PART, (PART, TextList()))
+
+
 class MotionError(NamedTuple):
-    """How wrong the measured motion of one platform may be. A scalar means each axis."""
+    """How wrong the measured motion of one platform may be. A scalar means each axis.
+
+    `of_parts` names the figures that come from parts of the catalogue, and the source of each.
+    """
 
     frame: Annotated[
         str,
@@ -168,11 +185,26 @@ class MotionError(NamedTuple):
     ] = None
     distribution: Annotated[str, Key(DISTRIBUTION, DISTRIBUTIONS)] = "normal"
     vibration: Annotated[Vibration, Key(Section(Vibration))] = Vibration()
+    sensor: Annotated[
+        str | tuple[str, ...] | None,
+        Key(PARTS, "Parts of the catalogue (`bisar-budget sensors`), or files; keys of this file override theirs."),
+    ] = None
+    imu: Annotated["Imu | None", Key(Late(lambda: _instruments("IMU")), "Figures of the inertial sensor.")] = None
+    random: Annotated[
+        "tuple[GaussMarkov, ...]",
+        Key(Late(lambda: _instruments("RANDOM")), "Position errors that change within the aperture."),
+    ] = ()
     source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
+    of_parts: tuple[tuple[str, str], ...] = ()
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
-        """Hold a covariance to standing alone, to its frame and to a normal distribution."""
+        """Hold a covariance to standing alone, to its frame and to a normal distribution; names to one each."""
+        seen: set[str] = set()
+        for index, one in enumerate(values.get("random", ())):
+            if one.name in seen:
+                yield Problem("is the name of an earlier error", at=("random", index, "name"))
+            seen.add(one.name)
         covariance: Covariance | None = values.get("covariance")
         if covariance is None:
             return
@@ -192,6 +224,10 @@ class MotionError(NamedTuple):
             return self.covariance.of(kind)
         stated: Vector | None = getattr(self, kind)
         return stated
+
+    def evidence(self, figure: str) -> str | None:
+        """Where a figure comes from: a part of the catalogue, else what the file says of all."""
+        return dict(self.of_parts).get(figure, self.source)
 
 
 class CommonMotionError(NamedTuple):
@@ -240,6 +276,9 @@ class Platform(NamedTuple):
     ] = None
     climb: Annotated[float | None, Key(VELOCITY, "Vertical speed, up positive.")] = None
     motion_error: Annotated[MotionError, Key(Section(MotionError))] = MotionError()
+    oscillator: Annotated[
+        "Oscillator | None", Key(Late(lambda: _instruments("OSCILLATOR")), "The oscillator and its noise.")
+    ] = None
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
@@ -483,6 +522,10 @@ class Mission(NamedTuple):
         CommonMotionError | None, Key(Section(CommonMotionError), "The same for both platforms, in the scene's axes.")
     ] = None
     timing_error: Annotated[TimingError, Key(Section(TimingError))] = TimingError()
+    synchronization: Annotated[
+        "Synchronization | None",
+        Key(Late(lambda: _instruments("SYNCHRONIZATION")), "How the receiver follows the transmitter's oscillator."),
+    ] = None
     other_errors: Annotated[tuple[OtherError, ...], Key(ListOf(OtherError))] = ()
     requirements: Annotated[Requirements, Key(Section(Requirements))] = Requirements()
     requirement_ids: Annotated[Mapping[str, str], Key(TextMap(), "Row id to the project's own requirement id.")] = {}
@@ -558,6 +601,14 @@ def _turning_points(state: PlatformState, half: float) -> Iterator[float]:
     yield from (-half, half)
     if state.acceleration[2] > 0:
         yield max(-half, min(half, -state.velocity[2] / state.acceleration[2]))
+
+
+def names_parts(mission: Mission) -> bool:
+    """Whether a mission takes figures from parts of the catalogue."""
+    return any(
+        platform.motion_error.sensor or (platform.oscillator is not None and platform.oscillator.sensor)
+        for platform in mission.platforms
+    )
 
 
 MISSION = Section(Mission)

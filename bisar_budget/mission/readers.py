@@ -21,6 +21,7 @@ Report = Callable[[KeyPath, Problem], None]
 _POINT = "A decimal is written with a point, a comma separates"
 _MAX_TEXT = 500  # characters
 _MAX_ENTRIES = 1000  # of a list
+_FEW = 8  # parts that one platform is made of
 _MAX_IDS = 4000  # more rows than all lists together make
 _MAX_WILDCARDS = 20  # an id has four parts; patterns of hundreds take a second for each fifty
 # Controls, line separators, lone surrogates, byte order mark, and the marks that turn the reading direction.
@@ -221,6 +222,26 @@ class Words(Reader):
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Array of the words."""
         return {"type": "array", "items": self.word.schema(definitions), "uniqueItems": True}
+
+
+class TextList(Reader):
+    """A list of a few texts, each once."""
+
+    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
+        """Read each text at its own place."""
+        if not isinstance(value, list) or not 1 <= len(value) <= _FEW:
+            report(path, Problem(f"must be a list of 1 to {_FEW} names"))
+            return INVALID
+        texts = tuple([_read(Text(), text, (*path, index), report) for index, text in enumerate(value)])
+        for index, text in enumerate(texts):
+            if text is not INVALID and text in texts[:index]:
+                report((*path, index), Problem("is in the list twice"))
+                return INVALID
+        return INVALID if INVALID in texts else texts
+
+    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+        """Array of text."""
+        return {"type": "array", "items": Text().schema(definitions), "minItems": 1, "maxItems": _FEW}
 
 
 class Whole(Reader):
@@ -427,10 +448,6 @@ class Late(Reader):
 
 def _read(reader: Reader, value: Any, path: KeyPath, report: Report) -> Any:
     return INVALID if value is INVALID else reader.read(value, path, report)
-
-
-def _not_yet(feature: str, how: str = "") -> str:
-    return f"is not supported {how}by this version of bisar-budget: {feature}"
 
 
 def did_you_mean(given: object, known: tuple[str, ...]) -> str:

@@ -8,7 +8,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from bisar_budget.faults import MissionError
-from bisar_budget.mission import load
+from bisar_budget.mission import tree
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import MISSION, Mission
 from tests.conftest import BASE, mission_text
@@ -146,7 +146,7 @@ def test_unreadable_file(tmp_path, monkeypatch) -> None:
 def test_pure_python_parser_reads_the_same(monkeypatch) -> None:
     text = mission_text(waivers=[{"id": "*", "until": "2027-01-01", "reason": "x"}])
     fast = parse_mission(text)
-    monkeypatch.setattr(load, "_PARSER", yaml.SafeLoader)
+    monkeypatch.setattr(tree, "_PARSER", yaml.SafeLoader)
     slow = parse_mission(text)
     assert slow._replace(places={}) == fast._replace(places={})
     assert {path: slow.line(path) for path in slow.places} == {path: fast.line(path) for path in fast.places}
@@ -234,7 +234,7 @@ def test_any_value_anywhere(key: str, value, place) -> None:
 
 
 def test_recursion_limit_is_far_away() -> None:
-    assert sys.getrecursionlimit() > load.MAX_DEPTH * 10
+    assert sys.getrecursionlimit() > tree.MAX_DEPTH * 10
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,240 @@
+"""Figures of data sheets: inertial sensors, position noise, oscillators, synchronisation. Values are SI, 1 sigma."""
+
+import math
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
+from typing import Annotated, Any, NamedTuple
+
+from bisar_budget import units
+from bisar_budget.faults import InvalidValueError, KeyPath, Problem
+from bisar_budget.geometry import Vector
+from bisar_budget.mission.readers import (
+    INVALID,
+    Choice,
+    Key,
+    ListOf,
+    Quantity,
+    Reader,
+    Report,
+    Section,
+    Text,
+    Triple,
+)
+
+IMU_KINDS = (
+    "accelerometer_bias",
+    "attitude",
+    "gyro_bias",
+    "velocity_random_walk",
+    "angle_random_walk",
+)
+_BIAS = Triple(Quantity(units.ACCELERATION, ge=0, le=1e3), or_scalar=True)
+_TILT = Triple(Quantity(units.ANGLE, ge=0, le=math.pi / 4), or_scalar=True)
+_DRIFT = Triple(Quantity(units.ANGULAR_RATE, ge=0, le=1e3), or_scalar=True)
+_VELOCITY_WALK = Triple(Quantity(units.VELOCITY_RANDOM_WALK, ge=0, le=1e3), or_scalar=True)
+_ANGLE_WALK = Triple(Quantity(units.ANGLE_RANDOM_WALK, ge=0, le=1e2), or_scalar=True)
+
+
+class Imu(NamedTuple):
+    """Figures of an inertial sensor, 1 sigma. A scalar means each axis; three values follow the error's frame."""
+
+    accelerometer_bias: Annotated[Vector | None, Key(_BIAS, "What is left of it in flight.")] = None
+    attitude: Annotated[Vector | None, Key(_TILT, "Roll and pitch at mid-aperture, about each axis.")] = None
+    gyro_bias: Annotated[Vector | None, Key(_DRIFT, "What is left of it in flight.")] = None
+    velocity_random_walk: Annotated[Vector | None, Key(_VELOCITY_WALK, "Noise of the accelerometers.")] = None
+    angle_random_walk: Annotated[Vector | None, Key(_ANGLE_WALK, "Noise of the gyros.")] = None
+    source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
+
+
+class GaussMarkov(NamedTuple):
+    """A first-order Gauss-Markov position error: what is left of GNSS noise, say."""
+
+    name: Annotated[str, Key(Text(), "Becomes the row id PLATFORM.random.NAME.")]
+    sigma: Annotated[Vector, Key(Triple(Quantity(units.LENGTH, ge=0, le=1e6), or_scalar=True), "1 sigma, each axis.")]
+    correlation_time: Annotated[float, Key(Quantity(units.TIME, gt=0, ge=1e-6, le=1e9))]
+    source: Annotated[str | None, Key(Text())] = None
+
+
+class _Curve(Reader):
+    """A mapping of abscissas to ordinates, in any order of the file, read into pairs in rising order."""
+
+    def __init__(self, abscissa: Quantity, ordinate: Quantity, what: str, fewest: int, most: int = 100) -> None:
+        self.abscissa, self.ordinate, self.what, self.fewest, self.most = abscissa, ordinate, what, fewest, most
+
+    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
+        """Read each point at its own place."""
+        if not isinstance(value, dict) or not self.fewest <= len(value) <= self.most:
+            given = f", {len(value)} given" if isinstance(value, dict) else ""
+            report(path, Problem(f"must be {self.fewest} to {self.most} points{given}", f"accepted: {self.what}"))
+            return INVALID
+        points = {}
+        is_valid = True
+        for key, item in value.items():
+            here = (*path, key)
+            try:
+                at = self.abscissa.leaf(key)
+            except InvalidValueError as error:
+                report(here, error.problem)
+                is_valid = False
+                continue
+            if at in points:
+                report(here, Problem("is in the list twice"))
+                is_valid = False
+            points[at] = item if item is INVALID else self.ordinate.read(item, here, report)
+        if INVALID in points.values() or not is_valid:
+            return INVALID
+        return tuple(sorted(points.items()))
+
+    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+        """Object of points."""
+        return {
+            "type": "object",
+            "additionalProperties": self.ordinate.schema(definitions),
+            "minProperties": self.fewest,
+            "maxProperties": self.most,
+        }
+
+
+class PowerLaw(NamedTuple):
+    """One-sided spectrum of the fractional frequency, S_y = h₋₂/f² + h₋₁/f + h₀ + h₁·f + h₂·f². SI."""
+
+    random_walk: float = 0.0
+    flicker: float = 0.0
+    white: float = 0.0
+    flicker_phase: float = 0.0
+    white_phase: float = 0.0
+
+
+_POWERS = ("h-2", "h-1", "h0", "h1", "h2")
+_COEFFICIENT = Quantity(units.RATIO, ge=0, le=1)
+
+
+class _PowerLawReader(Reader):
+    """A mapping of h-2 … h2 to coefficients."""
+
+    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
+        """Read each coefficient at its own place."""
+        if not isinstance(value, dict) or not value:
+            report(path, Problem("must be a mapping of coefficients", f"accepted: {', '.join(_POWERS)}"))
+            return INVALID
+        read = dict.fromkeys(_POWERS, 0.0)
+        is_valid = True
+        for key, item in value.items():
+            if key not in read:
+                report((*path, key), Problem("is not a known key", f"accepted: {', '.join(_POWERS)}"))
+                is_valid = False
+                continue
+            read[key] = item if item is INVALID else _COEFFICIENT.read(item, (*path, key), report)
+        return PowerLaw(*read.values()) if is_valid and INVALID not in read.values() else INVALID
+
+    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+        """Object of coefficients."""
+        one = _COEFFICIENT.schema(definitions)
+        return {"type": "object", "properties": dict.fromkeys(_POWERS, one), "additionalProperties": False}
+
+
+Points = tuple[tuple[float, float], ...]
+FORMS = ("phase_noise", "allan_deviation", "power_law")
+_STEEPEST = 60.0  # dB a decade; noise of an oscillator falls by 40 at most
+_RISE = 20.0  # dB a decade; a mask that rises by more is a tone, or a slip
+
+
+class Oscillator(NamedTuple):
+    """An oscillator and its noise, in one of three forms or as a part of the catalogue."""
+
+    frequency: Annotated[
+        float | None, Key(Quantity(units.FREQUENCY, gt=0, ge=1, le=1e15), "At which a mask is stated.")
+    ] = None
+    phase_noise: Annotated[
+        Points | None,
+        Key(
+            _Curve(
+                Quantity(units.FREQUENCY, gt=0, ge=1e-6, le=1e12),
+                Quantity(units.PHASE_NOISE, ge=-250, le=60),
+                "{1 Hz: -95 dBc/Hz, 10 Hz: -125 dBc/Hz} and the like",
+                2,
+            ),
+            "L(f), single sideband; interpolated over logarithms.",
+        ),
+    ] = None
+    allan_deviation: Annotated[
+        Points | None,
+        Key(
+            _Curve(
+                Quantity(units.TIME, gt=0, ge=1e-6, le=1e9),
+                Quantity(units.RATIO, gt=0, ge=1e-20, le=1e-3),
+                "{1 s: 6e-12, 10 s: 2e-11} and the like",
+                1,
+            ),
+            "σ_y(τ); a power law is fitted.",
+        ),
+    ] = None
+    power_law: Annotated[
+        PowerLaw | None, Key(_PowerLawReader(), "h-2 … h2 of the one-sided spectrum of fractional frequency.")
+    ] = None
+    bandwidth: Annotated[
+        float,
+        Key(
+            Quantity(units.FREQUENCY, gt=0, ge=1e-3, le=1e12),
+            "Phase noise counts up to here, of a mask up to its last point if that is lower.",
+        ),
+    ] = 1e3
+    sensor: Annotated[str | None, Key(Text(), "A part of the catalogue, or a file; keys beside it override.")] = None
+    source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
+
+    @staticmethod
+    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+        """Hold it to one form, and a mask to slopes that an oscillator can have."""
+        forms = [form for form in FORMS if values.get(form) is not None]
+        ways = f"accepted: one of {', '.join(FORMS)}"
+        if len(forms) > 1:
+            yield Problem(f"there is also a {forms[0]}", ways, at=(forms[1],))
+        if values.get("sensor") is None and values.keys() >= set(FORMS):
+            if not forms:
+                yield Problem("says nothing of its noise", f"{ways}, or sensor: a part of the catalogue")
+            if values["phase_noise"] is not None and values.get("frequency", 0.0) is None:
+                yield Problem("is missing", "accepted: the frequency at which the mask is stated", at=("frequency",))
+        for (f, level), (g, next_level) in pairwise(values.get("phase_noise") or ()):
+            slope = (next_level - level) / math.log10(g / f)
+            if slope < -_STEEPEST or slope > _RISE:
+                does = "rises" if slope > 0 else "falls"
+                yield Problem(
+                    f"{does} by {abs(slope):.3g} dB a decade between {f:g} Hz and {g:g} Hz",
+                    f"accepted: a rise of at most {_RISE:g} and a fall of at most {_STEEPEST:g} dB a decade",
+                    at=("phase_noise",),
+                )
+
+
+METHODS = ("linear", "direct_path")
+
+
+class Synchronization(NamedTuple):
+    """How the receiver follows the transmitter's oscillator."""
+
+    error: Annotated[
+        float, Key(Quantity(units.ANGLE, ge=0, le=math.pi), "Phase error of the link, 1 sigma, each time.")
+    ]
+    interval: Annotated[
+        float | None, Key(Quantity(units.TIME, gt=0, ge=1e-9, le=1e6), "Between exchanged pulses.")
+    ] = None
+    method: Annotated[
+        str,
+        Key(
+            Choice(*METHODS),
+            "linear: pulses are exchanged, between them the phase is interpolated; "
+            "direct_path: the receiver hears the transmitter and takes it as its clock.",
+        ),
+    ] = "linear"
+    source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
+
+    @staticmethod
+    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+        """Hold exchanged pulses to an interval."""
+        if values.keys() >= {"method", "interval"} and values["method"] == "linear" and values["interval"] is None:
+            yield Problem("is missing", "accepted: the time between exchanged pulses", at=("interval",))
+
+
+IMU = Section(Imu)
+RANDOM = ListOf(GaussMarkov)
+OSCILLATOR = Section(Oscillator)
+SYNCHRONIZATION = Section(Synchronization)

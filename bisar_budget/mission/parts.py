@@ -1,0 +1,289 @@
+"""Parts of the catalogue: inertial sensors, GNSS receivers and oscillators, with their figures and where these stand.
+
+One YAML file for each part, in `specs/sensors/`, in the folders that a project names, or anywhere by its path. A
+mission names parts, and what the mission says itself overrides single figures.
+"""
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from typing import Annotated, Any, NamedTuple
+
+from bisar_budget.faults import KeyPath, MissionError, Problem, shown
+from bisar_budget.geometry import Vector
+from bisar_budget.mission.instruments import (
+    FORMS,
+    IMU_KINDS,
+    GaussMarkov,
+    Imu,
+    Oscillator,
+)
+from bisar_budget.mission.model import COORDINATE, VELOCITY, Mission, MotionError
+from bisar_budget.mission.readers import (
+    INVALID,
+    Choice,
+    Key,
+    ListOf,
+    OneOf,
+    Report,
+    Section,
+    Text,
+    TextMap,
+    Triple,
+    did_you_mean,
+)
+from bisar_budget.mission.tree import MAX_BYTES, UnusableError, read_tree
+from bisar_budget.resources import resource
+from bisar_budget.settings import SettingsError, project_settings
+
+_NAME = Text()
+_SOURCE = OneOf(lambda value: TextMap() if isinstance(value, dict) else _NAME, (_NAME, TextMap()))
+_SAYS = Key(_NAME, "What its figures are in their source.")
+_SOURCES = Key(_SOURCE, "Document, revision and table of every figure, or of each by its key.")
+_MOST = 1000  # parts of a folder
+
+
+class ImuPart(NamedTuple):
+    """An inertial sensor."""
+
+    kind: Annotated[str, Key(Choice("imu"))]
+    name: Annotated[str, Key(_NAME)]
+    source: Annotated[str | Mapping[str, str], _SOURCES]
+    accelerometer_bias: Annotated[Vector | None, Imu.__annotations__["accelerometer_bias"].__metadata__[0]] = None
+    attitude: Annotated[Vector | None, Imu.__annotations__["attitude"].__metadata__[0]] = None
+    gyro_bias: Annotated[Vector | None, Imu.__annotations__["gyro_bias"].__metadata__[0]] = None
+    velocity_random_walk: Annotated[Vector | None, Imu.__annotations__["velocity_random_walk"].__metadata__[0]] = None
+    angle_random_walk: Annotated[Vector | None, Imu.__annotations__["angle_random_walk"].__metadata__[0]] = None
+    says: Annotated[str | None, _SAYS] = None
+
+
+class GnssPart(NamedTuple):
+    """A GNSS receiver in one of its modes: what its position and velocity are wrong by, 1 sigma, east, north, up."""
+
+    kind: Annotated[str, Key(Choice("gnss"))]
+    name: Annotated[str, Key(_NAME)]
+    source: Annotated[str | Mapping[str, str], _SOURCES]
+    position: Annotated[Vector | None, Key(Triple(COORDINATE, or_scalar=True))] = None
+    velocity: Annotated[Vector | None, Key(Triple(VELOCITY, or_scalar=True))] = None
+    random: Annotated[tuple[GaussMarkov, ...], Key(ListOf(GaussMarkov))] = ()
+    says: Annotated[str | None, _SAYS] = None
+
+
+class OscillatorPart(NamedTuple):
+    """An oscillator."""
+
+    kind: Annotated[str, Key(Choice("oscillator"))]
+    name: Annotated[str, Key(_NAME)]
+    source: Annotated[str | Mapping[str, str], _SOURCES]
+    frequency: Annotated[float | None, Oscillator.__annotations__["frequency"].__metadata__[0]] = None
+    phase_noise: Annotated[Any, Oscillator.__annotations__["phase_noise"].__metadata__[0]] = None
+    allan_deviation: Annotated[Any, Oscillator.__annotations__["allan_deviation"].__metadata__[0]] = None
+    power_law: Annotated[Any, Oscillator.__annotations__["power_law"].__metadata__[0]] = None
+    says: Annotated[str | None, _SAYS] = None
+
+    @staticmethod
+    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+        """Hold it to what an oscillator of a mission is held to."""
+        yield from Oscillator.problems({**values, "sensor": None})
+
+
+Part = ImuPart | GnssPart | OscillatorPart
+_SECTIONS: dict[str, Section] = {
+    "imu": Section(ImuPart),
+    "gnss": Section(GnssPart),
+    "oscillator": Section(OscillatorPart),
+}
+FIGURES = {"imu": IMU_KINDS, "gnss": ("position", "velocity", "random"), "oscillator": ("frequency", *FORMS)}
+
+
+class PartError(Exception):
+    """A part that cannot be used; the message says why."""
+
+
+def evidence(part: Part, figure: str) -> str:
+    """Where a figure of a part stands."""
+    source = part.source if isinstance(part.source, str) else part.source.get(figure, "")
+    return f"{part.name}: {source}"
+
+
+def read_part(file: str) -> Part:
+    """Read the file of a part.
+
+    Raises
+    ------
+    PartError
+        It cannot be read, or is no part.
+    """
+    try:
+        with open(file, "rb") as stream:
+            data = stream.read(MAX_BYTES + 1)
+        tree = read_tree(data, file)
+    except OSError as error:
+        raise PartError(f"{file} cannot be read: {error.strerror}") from None
+    except ValueError:  # a NUL in the name
+        raise PartError("is no name of a file") from None
+    except MissionError as error:
+        raise PartError(f"{file}: {error.faults[0]}") from None
+    kind = tree.root.get("kind")
+    section = _SECTIONS.get(kind) if isinstance(kind, str) else None
+    part: Any = INVALID
+    if section is None:
+        raise PartError(f"{file}: kind: must be one of {', '.join(_SECTIONS)}")
+    with suppress(UnusableError):
+        part = section.read(tree.root, (), tree.report)
+    if tree.faults:
+        fault = tree.faults[0]
+        raise PartError(f"{file}:{fault.line}:{fault.column}: {fault}")
+    unsourced = [
+        figure for figure in FIGURES[kind] if getattr(part, figure) and evidence(part, figure).endswith(": ")
+    ]
+    if unsourced:
+        raise PartError(f"{file}: source: says nothing of {', '.join(unsourced)}")
+    found: Part = part
+    return found
+
+
+def folders(beside: str) -> list[str]:
+    """Where parts are looked for: the project's own folders, then the catalogue of this package.
+
+    Raises
+    ------
+    PartError
+        The project's settings cannot be read.
+    """
+    try:
+        settings = project_settings(beside or os.getcwd())
+    except SettingsError as error:
+        raise PartError(str(error)) from None
+    except OSError:  # somebody removed the current folder
+        settings = None
+    own = list(settings.values.get("sensors", ())) if settings else []
+    return [*own, str(resource("specs", "sensors"))]
+
+
+def catalogue(places: Sequence[str]) -> dict[str, str]:
+    """File of each part by its name; a project's own stand before the catalogue's."""
+    found: dict[str, str] = {}
+    for folder in places:
+        try:
+            names = sorted(os.listdir(folder))
+        except OSError:
+            raise PartError(f"{folder}: cannot be listed") from None
+        for name in names[:_MOST]:
+            stem, suffix = os.path.splitext(name)
+            if suffix in (".yaml", ".yml"):
+                found.setdefault(stem, os.path.join(folder, name))
+    return found
+
+
+def _find(name: str, beside: str) -> Part:
+    if name.endswith((".yaml", ".yml")):
+        return read_part(os.path.join(beside, name))
+    places = folders(beside)
+    for folder in places:
+        for suffix in (".yaml", ".yml"):
+            file = os.path.join(folder, name + suffix)
+            if os.sep not in name and os.path.exists(file):
+                return read_part(file)
+    near = did_you_mean(name, tuple(catalogue(places)))
+    raise PartError(f"is no part of the catalogue; `bisar-budget sensors` lists them. {near}".rstrip())
+
+
+def with_parts(mission: Mission, beside: str, report: Report) -> Any:
+    """Put in the figures of the parts that a mission names; `INVALID` after a report.
+
+    Parameters
+    ----------
+    mission : Mission
+        As read.
+    beside : str
+        Folder of the mission file.
+    report : callable
+        Takes what is wrong, and where.
+    """
+    is_valid = True
+    platforms = mission.platforms
+    for name in platforms._fields:
+        platform = getattr(platforms, name)
+        error, path = platform.motion_error, ("platforms", name, "motion_error", "sensor")
+        parts = _parts_of(error.sensor, path, ("imu", "gnss"), beside, report)
+        error = INVALID if parts is INVALID else _motion_of(error, parts, path, report)
+        oscillator = platform.oscillator
+        if oscillator is not None and oscillator.sensor is not None:
+            path = ("platforms", name, "oscillator", "sensor")
+            parts = _parts_of(oscillator.sensor, path, ("oscillator",), beside, report)
+            oscillator = INVALID if parts is INVALID else _oscillator_of(oscillator, parts[0])
+        if INVALID in (error, oscillator):
+            is_valid = False
+            continue
+        platforms = platforms._replace(**{name: platform._replace(motion_error=error, oscillator=oscillator)})
+    return mission._replace(platforms=platforms) if is_valid else INVALID
+
+
+def _parts_of(
+    names: str | tuple[str, ...] | None, path: KeyPath, kinds: Sequence[str], beside: str, report: Report
+) -> Any:
+    is_list = isinstance(names, tuple)
+    found: list[Part] = []
+    is_valid = True
+    for index, name in enumerate(names if isinstance(names, tuple) else [names] if names else []):
+        here = (*path, index) if is_list else path
+        try:
+            part = _find(name, beside)
+            if part.kind not in kinds:
+                raise PartError(f"is an {part.kind}" if part.kind != "gnss" else "is a GNSS receiver")
+        except PartError as error:
+            report(here, Problem(str(error), f"accepted: parts of the kind {' or '.join(kinds)}"))
+            is_valid = False
+            continue
+        if any(part.kind == other.kind for other in found):
+            report(here, Problem(f"is a second {part.kind}", "accepted: one part of each kind"))
+            is_valid = False
+        found.append(part)
+    return found if is_valid else INVALID
+
+
+def _motion_of(error: MotionError, parts: Sequence[Part], path: KeyPath, report: Report) -> Any:
+    """Put figures of parts where the file has none."""
+    of_parts: dict[str, str] = {}
+    for part in parts:
+        if isinstance(part, ImuPart):
+            own = error.imu or Imu()
+            taken = {
+                figure: getattr(part, figure)
+                for figure in IMU_KINDS
+                if getattr(own, figure) is None and getattr(part, figure) is not None
+            }
+            error = error._replace(imu=own._replace(**taken))
+        elif isinstance(part, GnssPart):
+            taken = (
+                {}
+                if error.covariance is not None
+                else {
+                    figure: getattr(part, figure)
+                    for figure in ("position", "velocity")
+                    if getattr(error, figure) is None and getattr(part, figure) is not None
+                }
+            )
+            if taken and error.frame != "scene":
+                report(path, Problem(f"{shown(part.name)} is stated east, north, up", "accepted: frame: scene"))
+                return INVALID
+            if part.random and not error.random:
+                taken["random"] = part.random
+            error = error._replace(**taken)
+        else:
+            continue
+        of_parts |= {figure: evidence(part, figure) for figure in taken}
+    return error._replace(of_parts=tuple(of_parts.items()))
+
+
+def _oscillator_of(oscillator: Oscillator, part: Part) -> Oscillator:
+    """An oscillator with the figures of a part; a noise of the file's own replaces that of the part."""
+    has_own = any(getattr(oscillator, form) is not None for form in FORMS)
+    taken = {} if has_own else {form: getattr(part, form) for form in FORMS}
+    if oscillator.frequency is None:
+        taken["frequency"] = getattr(part, "frequency", None)
+    if not has_own:
+        (form,) = [form for form in FORMS if getattr(part, form) is not None]
+        taken["source"] = evidence(part, form)
+    return oscillator._replace(**taken)

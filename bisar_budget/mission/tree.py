@@ -1,0 +1,219 @@
+"""YAML as a plain tree with positions: what stands in a file, before anybody asks what it means.
+
+The tree is built from the parser's events, so that depth is bounded before anything recurses further, and
+every scalar stays the text that stands in the file: YAML 1.1 would read `9.6e9` as text,
+`on` as true and `010` as eight.
+"""
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
+
+import yaml
+from yaml import AliasEvent, MappingEndEvent, ScalarEvent
+
+from bisar_budget.faults import Fault, KeyPath, MissionError, Problem, printable, shown
+from bisar_budget.mission.readers import INVALID
+
+MAX_BYTES = 1 << 20  # a mission file has a few kilobytes
+MAX_DEPTH = 20  # containers inside each other; the schema needs 9
+MAX_VALUES = 100_000  # the longest lists that the schema takes come to a third
+MAX_FAULTS = 200  # nobody mends more at once, and each costs a line of every report
+
+_PARSER = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
+_NULLS = ("", "~", "null", "Null", "NULL")
+
+
+def file_fault(problem: str, hint: str = "") -> Fault:
+    """A fault of the file as a whole."""
+    return Fault(line=None, column=None, key="", problem=problem, hint=hint)
+
+
+def _decoded(data: bytes | str, file: str) -> str:
+    if len(data) > MAX_BYTES:
+        raise MissionError(file, (file_fault(f"is larger than {MAX_BYTES // 1024} KiB, so no mission file"),))
+    if isinstance(data, str):
+        return data
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        fault = Fault(
+            line=line, column=None, key="", problem="is not UTF-8 text", given=f"byte {data[error.start]:#x}"
+        )
+        raise MissionError(file, (fault,)) from None
+
+
+class UnusableError(Exception):
+    """Nothing after this point is worth reading; the fault is in the tree."""
+
+
+class Tree:
+    """What the file says: nested dict, list and str, with the parser's event of every key and value.
+
+    What cannot be read is reported and stands in the tree as `INVALID`.
+    """
+
+    def __init__(self) -> None:
+        self.root: Any = INVALID
+        self.keys: dict[KeyPath, Any] = {}
+        self.values: dict[KeyPath, Any] = {}  # events, which hold the marks of start and end
+        self.faults: list[Fault] = []
+
+    def fault(self, mark: Any, path: KeyPath, problem: str, **more: str) -> None:
+        """Note a fault at a place of the file; without a mark, at its start. Of too many only the first are said."""
+        line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
+        self.faults.append(Fault(line=line, column=column, key=_dotted(path), problem=problem, **more))
+        if len(self.faults) >= MAX_FAULTS:
+            self.faults.append(file_fault(f"has {MAX_FAULTS} faults or more; what follows them was not read"))
+            raise UnusableError
+
+    def report(self, path: KeyPath, problem: Problem) -> None:
+        """Note what a reader found wrong, at the value's place, else at the nearest key's above it."""
+        path = (*path, *problem.at)
+        value: Any = self.root
+        for part in path:
+            try:
+                value = value[part]
+            except (KeyError, IndexError, TypeError):
+                value = None
+                break
+        is_key = value is None or problem.problem == "is not a known key"
+        place = (self.keys if is_key else self.values).get(path)
+        for length in range(len(path) - 1, 0, -1):
+            if place is not None:
+                break
+            place = self.keys.get(path[:length]) or self.values.get(path[:length])
+        mark = None if place is None else place.start_mark
+        given = shown(value) if isinstance(value, str) and not is_key else ""
+        self.fault(mark, path, problem.problem, given=given, accepted=problem.accepted, hint=problem.hint)
+
+    def read_document(self, next_event: Callable[[], Any]) -> None:
+        """Read the one document of a file."""
+        while type(event := next_event()) is not yaml.DocumentStartEvent:
+            if type(event) is yaml.StreamEndEvent:
+                return
+        self.root = self._node(next_event, next_event(), ())
+        while type(event := next_event()) is not yaml.StreamEndEvent:
+            if type(event) is yaml.DocumentStartEvent:
+                self.fault(event.start_mark, (), "has a second YAML document", accepted="one mission to a file")
+                raise UnusableError
+
+    def _node(self, next_event: Callable[[], Any], event: Any, path: KeyPath) -> Any:
+        """Read one value; the depth of the recursion is bounded by `MAX_DEPTH`."""
+        self.values[path] = event
+        if len(self.values) > MAX_VALUES:
+            self.faults.append(file_fault(f"has more than {MAX_VALUES} values, so no mission file"))
+            raise UnusableError
+        mark = event.start_mark
+        kind = type(event)
+        if kind is ScalarEvent:
+            value: Any = event.value
+            if not event.style and value in _NULLS:  # plain: "" from libyaml, None from pure Python
+                self.fault(mark, path, "has no value", hint="Give it one, or remove the key")
+                value = INVALID
+        elif kind is AliasEvent:
+            self.fault(mark, path, "is an alias (*)", accepted="write the value out")
+            return INVALID
+        elif len(path) >= MAX_DEPTH:
+            self.fault(mark, (), f"is nested more than {MAX_DEPTH} deep")
+            raise UnusableError
+        elif kind is yaml.MappingStartEvent:
+            value = self._mapping(next_event, path)
+        else:
+            value = []
+            items: list[Any] = []
+            while type(item := next_event()) is not yaml.SequenceEndEvent:
+                items.append(item)
+                value.append(self._node(next_event, item, (*path, len(value))))
+            if event.flow_style:
+                self._decimal_commas(items, path)
+        if event.tag is not None and event.tag != "!":
+            self.fault(mark, path, "carries a YAML tag", given=shown(event.tag), accepted="plain values")
+            return INVALID
+        return value
+
+    def _decimal_commas(self, items: list[Any], path: KeyPath) -> None:
+        """Refuse `[0,5 m, 1 m, 2 m]` and `[0,5 m, 1 m]`, which YAML reads as four values and as three.
+
+        Told by the blank that other commas of the list have behind them.
+        """
+        commas = []
+        for index, (before, item) in enumerate(pairwise(items), start=1):
+            if all(type(one) is ScalarEvent for one in (before, item)):
+                is_tight = item.start_mark.column - before.end_mark.column == 1
+                commas.append((index, is_tight, before, item))
+        if all(is_tight for _, is_tight, _, _ in commas):
+            return
+        for index, is_tight, before, item in commas:
+            has_unit = any(char.isalpha() and char not in "eE" for char in item.value)
+            if is_tight and has_unit and before.value.lstrip("+-").isdigit() and item.value[:1].isdigit():
+                given = shown(f"{before.value},{item.value}")
+                problem, accepted = (
+                    "may be half of a number with a decimal comma",
+                    "a point, or a blank behind commas",
+                )
+                self.fault(item.start_mark, (*path, index), problem, given=given, accepted=accepted)
+
+    def _mapping(self, next_event: Callable[[], Any], path: KeyPath) -> dict[str, Any]:
+        mapping: dict[str, Any] = {}
+        while type(event := next_event()) is not MappingEndEvent:
+            mark = event.start_mark
+            if type(event) is not ScalarEvent:
+                self.fault(mark, path, "has a key that is not plain text")
+                raise UnusableError
+            key = event.value
+            here = (*path, key)
+            if key in mapping:
+                first = self.keys[here].start_mark.line + 1
+                problem = f"is a duplicate key; the first is in line {first}"
+                self.fault(mark, here, problem, accepted="each key once")
+                self._node(next_event, next_event(), (*path, f"{key} (again)"))
+                continue
+            self.keys[here] = event
+            event = next_event()
+            if type(event) is ScalarEvent and event.tag is None and event.value not in _NULLS:
+                self.values[here] = event  # as `_node` would: most values are such
+                mapping[key] = event.value
+            else:
+                mapping[key] = self._node(next_event, event, here)
+        return mapping
+
+
+def read_tree(data: bytes | str, file: str) -> Tree:
+    """Read the one document of a file; bytes are UTF-8.
+
+    Raises
+    ------
+    MissionError
+        It is no mapping in YAML, or too large; carries every fault.
+    """
+    text = _decoded(data, file)
+    tree = Tree()
+    try:
+        parser = _PARSER(text)
+        tree.read_document(parser.get_event)
+        if not isinstance(tree.root, dict) and not tree.faults:
+            problem = "is empty" if tree.root is INVALID else "is not a mapping of keys to values"
+            tree.faults.append(file_fault(problem, "`bisar-budget init` writes a mission file to start from"))
+    except yaml.MarkedYAMLError as error:
+        place = error.problem_mark or error.context_mark
+        problem = f"is not valid YAML: {' '.join(filter(None, (error.context, error.problem)))}"
+        tree.fault(place, (), problem)
+        raise MissionError(file, tuple(tree.faults)) from None
+    except yaml.reader.ReaderError as error:
+        line = text.count("\n", 0, max(0, error.position)) + 1
+        fault = Fault(line=line, column=None, key="", problem=f"is not a text file: {error.reason}")
+        raise MissionError(file, (fault,)) from None
+    except UnusableError:
+        raise MissionError(file, tuple(tree.faults)) from None
+    if not isinstance(tree.root, dict):
+        raise MissionError(file, tuple(tree.faults))
+    return tree
+
+
+def _dotted(path: KeyPath) -> str:
+    text = ""
+    for part in path:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
+    return printable(text) if len(text) <= 200 else shown(text)
