@@ -198,6 +198,178 @@ def amplitude_share(
     return shared_0/(other_share**0.5 + shared_0)
 
 
+def inertial_phases(
+    along: float,
+    level: float,
+    gravity: float,
+    wavelength: float,
+    aperture_time: float,
+) -> tuple[tuple[float, ...], ...]:
+    """Phases of one unit of each figure of an inertial sensor, one sigma. [rad/unit]
+
+    Columns: quadratic and cubic phase at the aperture edge, what is left after the cubic. Units are
+    m/s², rad, rad/s, m/s/√s, rad/√s. along is the length of the line of sight, 1, and level that of its
+    horizontal part; gravity in m/s². Walks start at mid-aperture. Derived here.
+    """
+    shared_0 = 3.1415926535897932/wavelength
+    shared_1 = along*shared_0
+    shared_2 = 0.25*aperture_time**2
+    shared_3 = gravity*level*shared_0
+    shared_4 = aperture_time**1.5*shared_1
+    shared_5 = 27.7488738510232*shared_4
+    shared_6 = aperture_time**2.5*shared_3
+    return (
+        (shared_1*shared_2, 0.0, 0.0),  # accelerometer bias
+        (shared_2*shared_3, 0.0, 0.0),  # attitude
+        (0.0, (1/24)*aperture_time**3*shared_3, 0.0),  # gyro bias
+        (0.298807152333598*shared_4, (1/132)*shared_5, (1/1155)*shared_5),  # velocity random walk
+        (0.0547864557708448*shared_6, 0.0532241987522154*shared_6, 0.00272029546189516*shared_6),  # angle random walk
+    )
+
+
+def gauss_markov_parts(
+    ratio: float,
+    decay: float,
+) -> tuple[tuple[float, ...], ...]:
+    """Mean squares of a Gauss-Markov process of variance 1 over an aperture. [-]
+
+    Columns: of the quadratic and the cubic phase at the aperture edge, of what is left after the cubic.
+    ratio is the aperture time over twice the correlation time, decay exp(−2·ratio). Terms cancel for a
+    ratio below 0.5. Derived here.
+    """
+    shared_0 = ratio**(-6)
+    shared_1 = 253.125*shared_0
+    shared_2 = ratio**(-4)
+    shared_3 = ratio**(-2)
+    shared_4 = 28.125*shared_3
+    shared_5 = 1/ratio
+    shared_6 = decay/ratio**5
+    shared_7 = decay*shared_2
+    shared_8 = decay/ratio**3
+    shared_9 = ratio**(-8)
+    shared_10 = 153.125*shared_3
+    shared_11 = decay/ratio**7
+    shared_12 = decay*shared_0
+    shared_13 = 787.5*shared_9
+    return (
+        (decay*shared_1 + decay*shared_4 - shared_1 + 84.375*shared_2 - shared_4 + 11.25*shared_5 + 506.25*shared_6 + 421.875*shared_7 + 168.75*shared_8, -decay*shared_10 - 34453.125*decay*shared_9 - 6890.625*shared_0 - shared_10 - 68906.25*shared_11 - 62015.625*shared_12 + 918.75*shared_2 + 43.75*shared_5 - 32156.25*shared_6 - 10106.25*shared_7 - 1837.5*shared_8 + 34453.125*shared_9, decay*shared_13 + 2*decay*shared_3 + 180*shared_0 + 1575*shared_11 + 1395*shared_12 - shared_13 - 30*shared_2 + 8*shared_3 - 4*shared_5 + 690*shared_6 + 195*shared_7 + 30*shared_8 + 1),  # mean squares
+    )
+
+
+def gauss_markov_parts_slow(
+    ratio: float,
+) -> tuple[tuple[float, ...], ...]:
+    """The same for a long correlation time. [-]
+
+    A series, for less than 0.5. Derived here.
+    """
+    shared_0 = ratio**3
+    shared_1 = ratio**5
+    shared_2 = ratio**6
+    shared_3 = ratio**7
+    shared_4 = ratio**8
+    shared_5 = ratio**9
+    return (
+        (0.25*ratio**4 + (15/14)*ratio - 5/14*shared_0 - 25/231*shared_1 + (1/28)*shared_2 - 25/2574*shared_3 + (1/441)*shared_4 - 1/2145*shared_5, (35/18)*ratio - 35/198*shared_0 + (175/3861)*shared_1 - 1/36*shared_2 + (245/23166)*shared_3 - 1/324*shared_4 + (49/65637)*shared_5, (8/63)*ratio - 8/3465*shared_0 + (16/135135)*shared_1 - 8/405405*shared_3 + (1/99225)*shared_4 - 16/4922775*shared_5),  # mean squares
+    )
+
+
+def tone_parts(
+    angle: float,
+    sine: float,
+    cosine: float,
+) -> tuple[tuple[float, ...], ...]:
+    """Amplitudes of the phases of a tone of amplitude 1, and the share of its power that is left. [-]
+
+    Columns: of the quadratic and the cubic phase at the aperture edge, of what is left after the cubic.
+    angle is πfT, sine and cosine are its own. Terms cancel for an angle below 0.5. Derived here.
+    """
+    shared_0 = angle**(-3)
+    shared_1 = angle**(-2)
+    shared_2 = cosine*shared_1
+    shared_3 = 1/angle
+    shared_4 = shared_3*sine
+    shared_5 = sine/angle**4
+    shared_6 = cosine*shared_0
+    shared_7 = shared_1*sine
+    shared_8 = cosine*shared_3
+    return (
+        (22.5*shared_0*sine - 22.5*shared_2 - 7.5*shared_4, 262.5*shared_5 - 262.5*shared_6 - 105*shared_7 + 17.5*shared_8, -shared_1*sine**2 - 3*(shared_1*sine - shared_8)**2 - 5*(3*shared_0*sine - 3*shared_2 - shared_4)**2 - 7*(15*shared_5 - 15*shared_6 - 6*shared_7 + shared_8)**2 + 1),  # amplitude, amplitude, share of power
+    )
+
+
+def tone_parts_slow(
+    angle: float,
+) -> tuple[tuple[float, ...], ...]:
+    """The same of a slow tone. [-]
+
+    A series, for less than 0.5. Derived here.
+    """
+    shared_0 = angle**8
+    shared_1 = angle**10
+    return (
+        ((1/1008)*angle**6 - 1/28*angle**4 + 0.5*angle**2 - 1/66528*shared_0 + (1/6918912)*shared_1, (1/44478720)*angle**11 - 1/370656*angle**9 + (1/4752)*angle**7 - 1/108*angle**5 + (1/6)*angle**3, (2/153516738375)*angle**16 - 16/21070924875*angle**14 + (4/127702575)*angle**12 + (1/99225)*shared_0 - 8/9823275*shared_1),  # amplitude, amplitude, share of power
+    )
+
+
+def tone_parts_fast(
+    angle: float,
+) -> tuple[tuple[float, ...], ...]:
+    """Mean squares of the phases of a fast tone, and the share of its power that is left. [-]
+
+    Columns: of the quadratic and the cubic phase at the aperture edge, of what is left after the cubic.
+    angle is πfT; what turns with it is averaged. Derived here.
+    """
+    shared_0 = angle**(-6)
+    shared_1 = angle**(-4)
+    shared_2 = angle**(-2)
+    shared_3 = angle**(-8)
+    return (
+        (253.125*shared_0 + 84.375*shared_1 + 28.125*shared_2, 6890.625*shared_0 + 918.75*shared_1 + 153.125*shared_2 + 34453.125*shared_3, -180*shared_0 - 30*shared_1 - 8*shared_2 - 787.5*shared_3 + 1),  # mean squares, share of power
+    )
+
+
+def power_law_parts(
+    aperture_time: float,
+) -> tuple[tuple[float, ...], ...]:
+    """Mean squares of the phases of spectra f⁰, f⁻¹ … f⁻⁴ of density 1, from zero frequency on.
+
+    Rows: quadratic and cubic phase at the aperture edge. Columns: the slope n of f⁻ⁿ, [s^(n−1)].
+    Spectra are one-sided. Derived here.
+    """
+    shared_0 = 1/aperture_time
+    shared_1 = 3.1415926535897932**2
+    shared_2 = aperture_time*shared_1
+    shared_3 = aperture_time**2*shared_1
+    shared_4 = 3.1415926535897932**4*aperture_time**3
+    return (
+        (5.625*shared_0, 4.68750000000000, (15/28)*shared_2, 0.78125*shared_3, (5/28)*shared_4),  # quadratic
+        (21.875*shared_0, 1225/96, (35/36)*shared_2, (245/288)*shared_3, (35/396)*shared_4),  # cubic
+    )
+
+
+def interpolation_left(
+    angle: float,
+    cosine: float,
+) -> float:
+    """Share of a tone's power that linear interpolation between samples leaves. [-]
+
+    angle is 2πf times the interval, cosine its own. Terms cancel for an angle below 0.5. Derived here.
+    """
+    shared_0 = 4/angle**2
+    return cosine*shared_0 + (1/3)*cosine - shared_0 + 5/3
+
+
+def interpolation_left_slow(
+    angle: float,
+) -> float:
+    """The same of a slow tone. [-]
+
+    A series, for less than 0.5. Derived here.
+    """
+    return (17/26153487360)*angle**12 - 1/11975040*angle**10 + (13/1814400)*angle**8 - 11/30240*angle**6 + (1/120)*angle**4
+
+
 # Nodes over -1 … 1, in half apertures, and the weights that fit a history sampled there: value P₀,
 # slope P₁, quadratic at the edge (3/2 of P₂), cubic at the edge (5/2 of P₃); by the number of nodes.
 LEGENDRE_FITS: dict[int, tuple[tuple[float, ...], ...]] = {

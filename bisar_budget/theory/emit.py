@@ -15,7 +15,7 @@ from sympy.printing.precedence import precedence
 from sympy.printing.pycode import PythonCodePrinter
 
 from bisar_budget.theory import differential_range as dr
-from bisar_budget.theory import full, published
+from bisar_budget.theory import full, published, random_errors
 from bisar_budget.theory.symbols import (
     RECEIVER,
     TRANSMITTER,
@@ -228,6 +228,107 @@ def evaluators() -> tuple[Evaluator, ...]:
             details="In the ratio of the roots of power, the parts of both sum to 1. Derived here.",
             arguments=((share, "share"), (other, "other_share")),
             rows=((full.amplitude_share(share, other),),),
+            row_names=("",),
+        ),
+        *_of_random_errors(),
+    )
+
+
+def _of_random_errors() -> tuple[Evaluator, ...]:
+    """What noise over an aperture does; mean squares where it is a process."""
+    figures = random_errors.inertial()
+    columns = "Columns: quadratic and cubic phase at the aperture edge, what is left after the cubic. "
+    parts = "Columns: of the quadratic and the cubic phase at the aperture edge, of what is left after the cubic. "
+    slow = "A series, for less than 0.5. Derived here."
+    ratio = ((random_errors.ratio, "ratio"),)
+    angle, step = ((random_errors.angle, "angle"),), ((random_errors.step, "angle"),)
+    waves = ((random_errors.sine, "sine"), (random_errors.cosine, "cosine"))
+    return (
+        Evaluator(
+            name="inertial_phases",
+            summary="Phases of one unit of each figure of an inertial sensor, one sigma. [rad/unit]",
+            details=(
+                f"{columns}Units are m/s², rad, rad/s, m/s/√s, rad/√s. along is the length of the line of sight, 1, and "
+                "level that of its horizontal part; gravity in m/s². Walks start at mid-aperture. Derived here."
+            ),
+            arguments=(
+                (random_errors.along, "along"),
+                (random_errors.level, "level"),
+                (random_errors.gravity, "gravity"),
+                (wavelength, "wavelength"),
+                (T, "aperture_time"),
+            ),
+            rows=tuple(tuple(sympy.sqrt(square) for square in figure.phase) for figure in figures),
+            row_names=tuple(figure.name for figure in figures),
+        ),
+        Evaluator(
+            name="gauss_markov_parts",
+            summary="Mean squares of a Gauss-Markov process of variance 1 over an aperture. [-]",
+            details=(
+                f"{parts}ratio is the aperture time over twice the correlation time, decay exp(−2·ratio). Terms cancel "
+                "for a ratio below 0.5. Derived here."
+            ),
+            arguments=(*ratio, (random_errors.decay, "decay")),
+            rows=(tuple(random_errors.gauss_markov()),),
+            row_names=("mean squares",),
+        ),
+        Evaluator(
+            name="gauss_markov_parts_slow",
+            summary="The same for a long correlation time. [-]",
+            details=slow,
+            arguments=ratio,
+            rows=(tuple(random_errors.gauss_markov_slow()),),
+            row_names=("mean squares",),
+        ),
+        Evaluator(
+            name="tone_parts",
+            summary="Amplitudes of the phases of a tone of amplitude 1, and the share of its power that is left. [-]",
+            details=f"{parts}angle is πfT, sine and cosine are its own. Terms cancel for an angle below 0.5. Derived here.",
+            arguments=(*angle, *waves),
+            rows=(tuple(random_errors.tone_in_terms()),),
+            row_names=("amplitude, amplitude, share of power",),
+        ),
+        Evaluator(
+            name="tone_parts_slow",
+            summary="The same of a slow tone. [-]",
+            details=slow,
+            arguments=angle,
+            rows=(tuple(random_errors.tone_slow()),),
+            row_names=("amplitude, amplitude, share of power",),
+        ),
+        Evaluator(
+            name="tone_parts_fast",
+            summary="Mean squares of the phases of a fast tone, and the share of its power that is left. [-]",
+            details=f"{parts}angle is πfT; what turns with it is averaged. Derived here.",
+            arguments=angle,
+            rows=(tuple(random_errors.tone_fast()),),
+            row_names=("mean squares, share of power",),
+        ),
+        Evaluator(
+            name="power_law_parts",
+            summary="Mean squares of the phases of spectra f⁰, f⁻¹ … f⁻⁴ of density 1, from zero frequency on.",
+            details=(
+                "Rows: quadratic and cubic phase at the aperture edge. Columns: the slope n of f⁻ⁿ, [s^(n−1)]. "
+                "Spectra are one-sided. Derived here."
+            ),
+            arguments=((T, "aperture_time"),),
+            rows=(random_errors.power_law(2), random_errors.power_law(3)),
+            row_names=("quadratic", "cubic"),
+        ),
+        Evaluator(
+            name="interpolation_left",
+            summary="Share of a tone's power that linear interpolation between samples leaves. [-]",
+            details="angle is 2πf times the interval, cosine its own. Terms cancel for an angle below 0.5. Derived here.",
+            arguments=(*step, (random_errors.cosine, "cosine")),
+            rows=((random_errors.interpolated_in_terms(),),),
+            row_names=("",),
+        ),
+        Evaluator(
+            name="interpolation_left_slow",
+            summary="The same of a slow tone. [-]",
+            details=slow,
+            arguments=step,
+            rows=((random_errors.interpolated_slow(),),),
             row_names=("",),
         ),
     )

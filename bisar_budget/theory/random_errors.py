@@ -1,0 +1,304 @@
+"""Random errors over one aperture: what noise of sensors and clocks does to quadratic phase, cubic phase and ISLR.
+
+An error x over the aperture is a sum of Legendre polynomials Pₙ(2τ/T). Orders 0 and 1 displace, 3/2 of order 2 is the
+quadratic phase at the aperture edge, 5/2 of order 3 the cubic one, and what is left of its mean square spreads over
+the image. A tone of frequency f has the part (2n + 1)·jₙ(πfT) in order n, so that a spectrum is integrated with its
+square. A range error has the phase k·x, k = 2π/λ, one way. Derived here; nothing of it is in the paper.
+
+Spectra are one-sided. One sigma each; axes and platforms are independent.
+"""
+
+from collections.abc import Callable
+from functools import cache
+from typing import NamedTuple
+
+from sympy import (
+    Expr,
+    I,
+    Integer,
+    Integral,
+    Poly,
+    Rational,
+    Symbol,
+    cos,
+    exp,
+    expand,
+    expand_complex,
+    factorial,
+    gamma,
+    integrate,
+    legendre,
+    oo,
+    pi,
+    series,
+    simplify,
+    sin,
+    sqrt,
+)
+
+from bisar_budget.theory.published import Equation, Table, TableRow, one_way_phase
+from bisar_budget.theory.symbols import T, positive, real
+
+ORDERS = 4  # 0 to 3; what is left of a history after them spreads
+LEADING = (1, 1, Rational(3, 2), Rational(5, 2))  # coefficient of xⁿ in Pₙ: the order's value at the aperture edge
+TERMS = 9  # powers of a series about zero; below 0.5 what is left out is less than 1e-8 of it
+
+gravity = positive("g")
+along = positive("u")  # length of the line of sight; with a size for each axis, the root of Σ(u·σ)²
+level = positive("u_h")  # of its horizontal part
+ratio = positive("a")  # T/(2τ_c): half the aperture over the correlation time
+decay = positive("d")  # exp(−2a)
+angle = positive("x")  # πfT
+cosine, sine = real("cosine"), real("sine")
+step = positive("y")  # 2πf·T_s
+
+_x, _m, _M, _w = real("xi"), positive("m"), positive("M"), positive("w")
+
+
+class Moments(NamedTuple):
+    """Mean squares over an aperture: quadratic and cubic part at its edge, and what is left after the cubic."""
+
+    quadratic: Expr
+    cubic: Expr
+    left: Expr
+
+    def times(self, factor: Expr) -> "Moments":
+        """Scale them."""
+        return Moments(*(expand(factor * part) for part in self))
+
+
+def moments(coefficients: tuple[Expr, ...], mean_square: Expr) -> Moments:
+    """Sort the mean squares of the coefficients of P₀ … P₃ and that of the whole history."""
+    orders = [square / (2 * n + 1) for n, square in enumerate(coefficients)]
+    return Moments(
+        LEADING[2] ** 2 * coefficients[2],
+        LEADING[3] ** 2 * coefficients[3],
+        expand(mean_square - sum(orders)),
+    )
+
+
+# ---------------------------------------------------------------------- inertial sensors
+def _from_middle(response: Callable[[Expr], Expr]) -> Callable[[Expr, Expr], Expr]:
+    """Covariance at m ≤ M on one side of mid-aperture of white noise that acts from there on, by its response.
+
+    Both sides are independent: an error that is zero at mid-aperture has grown by other noise before than after.
+    """
+
+    def covariance(m: Expr, M: Expr) -> Expr:
+        return expand(integrate(expand(response(m - _w) * response(M - _w)), (_w, 0, m)))
+
+    return covariance
+
+
+@cache
+def walk(order: int) -> Moments:
+    """Mean squares of white noise integrated `order` times from mid-aperture on, for a unit density and T = 1."""
+    covariance = _from_middle(lambda t: t ** (order - 1) / factorial(order - 1))
+    squares = []
+    for n in range(ORDERS):
+        earlier = integrate(expand(legendre(n, _m) * covariance(_m, _M)), (_m, 0, _M))
+        one_side = 2 * integrate(expand(legendre(n, _M) * earlier), (_M, 0, 1))
+        squares.append(Rational(2 * n + 1, 2) ** 2 * 2 * one_side)
+    whole = integrate(covariance(_M, _M), (_M, 0, 1))
+    return moments(tuple(squares), whole).times(Rational(1, 2) ** (2 * order - 1))  # from half an aperture to T
+
+
+def constant(order: int) -> Moments:
+    """Squares of τⁿ/n! for T = 1: a constant acceleration (2) or its rate (3)."""
+    history = (_x / 2) ** order / factorial(order)
+    squares = tuple(
+        (Rational(2 * n + 1, 2) * Poly(history * legendre(n, _x), _x).integrate()(1)
+         - Rational(2 * n + 1, 2) * Poly(history * legendre(n, _x), _x).integrate()(-1)) ** 2
+        for n in range(ORDERS)
+    )  # fmt: skip
+    return moments(squares, integrate(history**2, (_x, -1, 1)) / 2)
+
+
+class Figure(NamedTuple):
+    """A figure of an inertial sensor: its symbol, what it is, mean squares of the phase that a unit of it makes."""
+
+    symbol: Symbol
+    name: str
+    says: str
+    phase: Moments
+
+
+def inertial() -> tuple[Figure, ...]:
+    """Figures of an inertial sensor over one aperture, in the order of the mission file. [rad²/unit²]"""
+    k = one_way_phase(Integer(1))
+
+    def figure(symbol: str, name: str, says: str, of_range: Moments, size: Expr, power: Expr) -> Figure:
+        return Figure(positive(symbol), name, says, of_range.times((k * size) ** 2 * T ** (2 * power)))
+
+    return (
+        figure("b", "accelerometer bias", "an acceleration error", constant(2), along, Integer(2)),
+        figure("psi", "attitude", "gravity leaks, g·ψ across it", constant(2), gravity * level, Integer(2)),
+        figure("epsilon", "gyro bias", "attitude drifts: a jerk g·ε", constant(3), gravity * level, Integer(3)),
+        figure("N", "velocity random walk", "white acceleration", walk(2), along, Rational(3, 2)),
+        figure(
+            "N_g", "angle random walk", "attitude walks from mid-aperture", walk(3), gravity * level, Rational(5, 2)
+        ),
+    )
+
+
+# ---------------------------------------------------------------------- Gauss-Markov
+@cache
+def gauss_markov() -> Moments:
+    """Mean squares of a stationary process of variance 1 and correlation exp(−|t|/τ_c), in `ratio` and `decay`."""
+    squares = []
+    for n in range(ORDERS):
+        earlier = integrate(expand(legendre(n, _m) * exp(ratio * _m)), _m)
+        earlier = expand((earlier - earlier.subs(_m, -1)).subs(_m, _x) * exp(-ratio * _x))
+        both = integrate(expand(legendre(n, _x) * earlier), _x)
+        square = Rational(2 * n + 1, 2) ** 2 * 2 * expand(both.subs(_x, 1) - both.subs(_x, -1))
+        squares.append(expand(square).subs(exp(-2 * ratio), decay))
+    return moments(tuple(squares), Integer(1))
+
+
+@cache
+def gauss_markov_slow() -> Moments:
+    """The same where the correlation time is long, as a series in `ratio`."""
+    return Moments(*(_series(part.subs(decay, exp(-2 * ratio)), ratio) for part in gauss_markov()))
+
+
+def _series(expression: Expr, variable: Symbol) -> Expr:
+    """Series about zero of an expression whose terms cancel there."""
+    exact = Poly(series(expression, variable, 0, 2 * ORDERS + TERMS).removeO(), variable)
+    first = min(power for (power,) in exact.monoms())
+    return sum(
+        coefficient * variable**power for (power,), coefficient in exact.terms() if power < first + TERMS
+    )
+
+
+# ---------------------------------------------------------------------- spectra
+def spherical_bessel(n: int) -> Expr:
+    """jₙ(x), the part of a tone in order n: half of ∫ Pₙ(t)·cos(xt − nπ/2) dt over −1 … 1."""
+    tone = sin(angle * _x) if n % 2 else cos(angle * _x)
+    sign = (1, 1, -1, -1)[n % 4]
+    return expand(sign * integrate(expand(legendre(n, _x) * tone), (_x, -1, 1)) / 2)
+
+
+@cache
+def tone() -> Moments:
+    """Amplitudes of the quadratic and the cubic phase of a tone of amplitude 1, and the share of its power left."""
+    parts = [spherical_bessel(n) for n in range(ORDERS)]
+    left = 1 - sum((2 * n + 1) * part**2 for n, part in enumerate(parts))
+    return Moments(LEADING[2] * 5 * parts[2], LEADING[3] * 7 * parts[3], left)
+
+
+def tone_in_terms() -> Moments:
+    """`tone` in `sine` and `cosine` of `angle`."""
+    return Moments(*(part.subs({sin(angle): sine, cos(angle): cosine}) for part in tone()))
+
+
+def tone_slow() -> Moments:
+    """`tone` of a slow tone, as a series in `angle`."""
+    return Moments(*(_series(part, angle) for part in tone()))
+
+
+def tone_fast() -> Moments:
+    """Mean squares of `tone` over a fast tone's angle, whose sine and cosine are averaged."""
+    quadratic, cubic, left = tone_in_terms()
+    mean = {sine**2: Rational(1, 2), cosine**2: Rational(1, 2), sine * cosine: Integer(0)}
+    return Moments(*(expand(expand(part).subs(mean)) for part in (quadratic**2, cubic**2, left)))
+
+
+def power_law_integral(n: int, slope: int) -> Expr:
+    """∫ jₙ(πfT)²·f^(−slope) df from 0 to infinity, over T^(slope − 1); Weber and Schafheitlin, DLMF 10.22.57."""
+    mu, power = n + Rational(1, 2), slope + 1
+    bessel = (
+        gamma(power)
+        * gamma(mu + Rational(1 - power, 2))
+        / (2**power * gamma(Rational(1 + power, 2)) ** 2 * gamma(mu + Rational(1 + power, 2)))
+    )
+    return simplify(pi / 2 * bessel * pi ** (slope - 1))
+
+
+def power_law(order: int) -> tuple[Expr, ...]:
+    """Mean squares of the quadratic (2) or cubic (3) phase of a spectrum f⁰ … f⁻⁴ of density 1. [s^(n−1)]"""
+    return tuple(
+        (LEADING[order] * (2 * order + 1)) ** 2 * power_law_integral(order, slope) * T ** (slope - 1)
+        for slope in range(5)
+    )
+
+
+def interpolated() -> Expr:
+    """Share of a tone's power that linear interpolation between samples leaves, in y = 2πf·T_s."""
+    part = positive("nu")
+    missed = exp(I * step * part) - (1 - part) - part * exp(I * step)
+    there = (1 - part) + part * exp(-I * step)
+    square = expand_complex(expand(missed * (exp(-I * step * part) - there)))
+    return simplify(integrate(expand(square), (part, 0, 1)).rewrite(cos))
+
+
+def interpolated_in_terms() -> Expr:
+    """`interpolated` in `cosine` of `step`."""
+    return interpolated().subs(cos(step), cosine)
+
+
+def interpolated_slow() -> Expr:
+    """`interpolated` of a slow tone, as a series in `step`."""
+    return _series(interpolated(), step)
+
+
+def interpolated_noise() -> Expr:
+    """Mean square of samples of variance 1 with linear interpolation between them."""
+    part = positive("nu")
+    return integrate((1 - part) ** 2 + part**2, (part, 0, 1))
+
+
+# ---------------------------------------------------------------------- for a reader
+def table() -> Table:
+    """What a figure of an inertial sensor does at the aperture edge."""
+    rows = tuple(
+        TableRow(
+            number=None,
+            error=figure.symbol,
+            label=figure.symbol,
+            cells=tuple(simplify(sqrt(square)) * figure.symbol for square in figure.phase),
+            note=f"{figure.name}: {figure.says}",
+        )
+        for figure in inertial()
+    )
+    return Table(
+        number="Inertial sensors",
+        title="Phase by one figure of a platform's inertial sensor, one sigma",
+        columns=("Quadratic phase [rad]", "Cubic phase [rad]", "Left after the cubic, rms [rad]"),
+        rows=rows,
+        notes=(
+            "Derived here. u is the length of the line of sight, 1, and u_h that of its horizontal part.",
+            "Attitude and gyros act through gravity, which leaks horizontally. Walks start at mid-aperture.",
+        ),
+    )
+
+
+def equations() -> tuple[Equation, ...]:
+    """Parts of a tone, integrals of power laws, and what synchronisation leaves."""
+    frequency, spectrum = positive("f"), positive("S")
+    transfer = positive("tone")
+    quadratic, cubic, left = tone()
+    names = (("quadratic", "phi_2", quadratic), ("cubic", "phi_3", cubic))
+    integrals = (
+        Equation(
+            "",
+            f"Mean square of the {what} phase of a spectrum S",
+            positive(symbol) ** 2,
+            Integral(spectrum * transfer**2, (frequency, 0, oo)),
+        )
+        for what, symbol, _ in names[:1]
+    )
+    laws = (
+        Equation("", f"Mean square of the quadratic phase, spectrum f^-{slope}", positive(f"c_{slope}"), value)
+        for slope, value in enumerate(power_law(2))
+    )
+    return (
+        *(Equation("", f"Amplitude of the {what} phase of a tone, x = πfT", real(name), simplify(value))
+          for what, name, value in names),
+        Equation("", "Share of a tone's power left after the cubic", real("L"), left),
+        *integrals,
+        *laws,
+        Equation("", "Share of a tone left by linear interpolation, y = 2πfT_s", real("L_s"), interpolated()),
+        Equation("", "Mean square of noise of the link", positive("sigma") ** 2 * Symbol("l"),
+                 interpolated_noise() * positive("sigma") ** 2),
+    )  # fmt: skip
+
