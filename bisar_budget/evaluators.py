@@ -208,7 +208,7 @@ def inertial_phases(
     """Phases of one unit of each figure of an inertial sensor, one sigma. [rad/unit]
 
     Columns: quadratic and cubic phase at the aperture edge, what is left after the cubic. Units are
-    m/s², rad, rad/s, m/s/√s, rad/√s. along is the length of the line of sight, 1, and level that of its
+    m/s², rad, rad/s, m/s/√s, rad/√s. along is the length of the line of sight, 1, level that of its
     horizontal part; gravity in m/s². Walks start at mid-aperture. Derived here.
     """
     shared_0 = 3.1415926535897932/wavelength
@@ -282,7 +282,7 @@ def tone_parts(
     """Amplitudes of the phases of a tone of amplitude 1, and the share of its power that is left. [-]
 
     Columns: of the quadratic and the cubic phase at the aperture edge, of what is left after the cubic.
-    angle is πfT, sine and cosine are its own. Terms cancel for an angle below 0.5. Derived here.
+    angle is πfT, sine and cosine its own. Terms cancel below 0.5. Derived here.
     """
     shared_0 = angle**(-3)
     shared_1 = angle**(-2)
@@ -313,19 +313,20 @@ def tone_parts_slow(
 
 
 def tone_parts_fast(
-    angle: float,
+    inverse_0: float,
+    inverse_2: float,
+    inverse_4: float,
+    inverse_6: float,
+    inverse_8: float,
 ) -> tuple[tuple[float, ...], ...]:
     """Mean squares of the phases of a fast tone, and the share of its power that is left. [-]
 
     Columns: of the quadratic and the cubic phase at the aperture edge, of what is left after the cubic.
-    angle is πfT; what turns with it is averaged. Derived here.
+    What turns with the angle πfT is averaged. Arguments are the angle's powers 0, −2 … −8; of a
+    spectrum, its integrals with them. Derived here.
     """
-    shared_0 = angle**(-6)
-    shared_1 = angle**(-4)
-    shared_2 = angle**(-2)
-    shared_3 = angle**(-8)
     return (
-        (253.125*shared_0 + 84.375*shared_1 + 28.125*shared_2, 6890.625*shared_0 + 918.75*shared_1 + 153.125*shared_2 + 34453.125*shared_3, -180*shared_0 - 30*shared_1 - 8*shared_2 - 787.5*shared_3 + 1),  # mean squares, share of power
+        (28.125*inverse_2 + 84.375*inverse_4 + 253.125*inverse_6, 153.125*inverse_2 + 918.75*inverse_4 + 6890.625*inverse_6 + 34453.125*inverse_8, inverse_0 - 8*inverse_2 - 30*inverse_4 - 180*inverse_6 - 787.5*inverse_8),  # mean squares, share of power
     )
 
 
@@ -354,7 +355,7 @@ def interpolation_left(
 ) -> float:
     """Share of a tone's power that linear interpolation between samples leaves. [-]
 
-    angle is 2πf times the interval, cosine its own. Terms cancel for an angle below 0.5. Derived here.
+    angle is 2πf times the interval, cosine its own. Terms cancel below 0.5. Derived here.
     """
     shared_0 = 4/angle**2
     return cosine*shared_0 + (1/3)*cosine - shared_0 + 5/3

@@ -220,6 +220,8 @@ def format_quantity(value: float, unit: str, digits: int = 3, rounding: str = "n
             value /= scale
             break
     text = "%.*g" % (digits, value)  # noqa: UP031 -- a table has thirty of these, and format() takes twice as long
+    if unit == "dB" and rounding == "down" and value < 0:  # a lower level is the stricter one
+        return _stricter(value, digits) + suffix
     if "e" in text or (rounding == "down" and abs(float(text)) > abs(value)):
         text = _rounded(value, digits, rounding)
     return text + suffix
@@ -240,16 +242,31 @@ _STEPS = {
     "m/s": _SMALL,
     "m/s^2": _SMALL,
 }
+# Written in the units of data sheets: factor to SI, and what stands behind the number.
+_SHEETS = {
+    "rad/s": (_DEGREE / 3600, " deg/h"),
+    "m/s/sqrt(s)": (_ROOT_HOUR, " m/s/√h"),
+    "rad/sqrt(s)": (_DEGREE * _ROOT_HOUR, " deg/√h"),
+}
 
 
 @cache
 def _steps(unit: str) -> tuple[tuple[float, float, float, str], ...]:
     """Scale, range of sizes written in it and what stands behind the number, for each prefix; last, the bare unit."""
+    if unit in _SHEETS:
+        scale, suffix = _SHEETS[unit]
+        return ((scale, 0.0, math.inf, suffix),)
     pretty = unit.replace("^2", "²").replace("^3", "³")
     if pretty.startswith("1/"):
         return ((1.0, 0.0, math.inf, pretty[1:]),)
     steps = ((scale, scale * 0.9995, scale * 1e6, f" {prefix}{pretty}") for scale, prefix in _STEPS.get(unit, ()))
     return (*steps, (1.0, 0.0, math.inf, f" {pretty}".rstrip()))
+
+
+def _stricter(level: float, digits: int) -> str:
+    """Write a negative level so that it is not above what it is."""
+    step = 10.0 ** (math.floor(math.log10(-level)) - digits + 1)
+    return f"{math.floor(level / step * (1 + 1e-12)) * step:.{digits}g}"
 
 
 def _rounded(value: float, digits: int, rounding: str) -> str:

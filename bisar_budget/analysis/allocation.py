@@ -10,7 +10,7 @@ from bisar_budget.effects.effect import ErrorSource
 from bisar_budget.mission.model import MetricSplits, Mission, Shares
 
 if TYPE_CHECKING:
-    from bisar_budget.effects.slow_vibration import SlowPhase
+    from bisar_budget.effects.slow_vibration import OwnPhase
 
 BALANCED_RANGE = (0.05, 0.95)  # neither platform is left without a budget
 
@@ -64,7 +64,7 @@ class Allocation(NamedTuple):
 
 
 def allocate(
-    mission: Mission, stated: Sequence[ErrorSource], phases: Mapping[str, float], slow: Sequence["SlowPhase"] = ()
+    mission: Mission, stated: Sequence[ErrorSource], phases: Mapping[str, float], own: Sequence["OwnPhase"] = ()
 ) -> Allocation:
     """Divide the budgets of a mission as its `allocation.split` says.
 
@@ -76,14 +76,14 @@ def allocate(
         Declared errors, along the axes that the file states them in.
     phases : mapping of str to float
         Quadratic phase of each by the gating model, by row id: `balanced` weighs them. [rad]
-    slow : sequence of SlowPhase
-        Vibrations below one cycle per aperture, which it weighs too.
+    own : sequence of OwnPhase
+        Phases of slow vibrations, sensors and clocks, which it weighs too.
     """
     split = mission.allocation.split
     metrics = split if isinstance(split, MetricSplits) else None
     return Allocation(
         qpe_total=mission.requirements.quadratic_phase_error,
-        qpe=_divide(metrics.quadratic_phase_error if metrics else split, mission, stated, phases, slow),
+        qpe=_divide(metrics.quadratic_phase_error if metrics else split, mission, stated, phases, own),
         pslr=_divide_power(metrics.pslr if metrics else split),
         islr=_divide_power(metrics.islr if metrics else split),
         n_pull=mission.autofocus.n_pull,
@@ -99,7 +99,7 @@ def _divide(
     mission: Mission,
     stated: Sequence[ErrorSource],
     phases: Mapping[str, float],
-    slow: Sequence["SlowPhase"],
+    own: Sequence["OwnPhase"],
 ) -> Split:
     if isinstance(split, Shares):
         return _split(split)
@@ -109,7 +109,7 @@ def _divide(
     for platform in ("transmitter", "receiver"):
         rule = mission.allocation.combine
         members = [(s.id, phases[s.id]) for s in stated if EQUAL.includes(s.owner, platform)]
-        members += [(one.row_id, one.qpe_rad) for one in slow if one.owner == platform]
+        members += [(one.row_id, one.qpe_rad) for one in own if EQUAL.includes(one.owner, platform)]
         weight[platform] = combined_phase(members, rule, correlated_errors(mission))
     # An error that leaves no image has no finite phase: it takes all that it may.
     weight = {name: min(size, 1e300) for name, size in weight.items()}

@@ -3,16 +3,20 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 from bisar_budget.analysis.allocation import Allocation, allocate
 from bisar_budget.effects.correlation import Correlated, correlated_errors
 from bisar_budget.effects.effect import ErrorSource
 from bisar_budget.effects.exact_ranges import ExactRanges
 from bisar_budget.effects.models import Declared, FullModel, PublishedModel
-from bisar_budget.effects.slow_vibration import slow_phases
+from bisar_budget.effects.slow_vibration import OwnPhase, slow_phases
 from bisar_budget.effects.sources import error_sources
 from bisar_budget.geometry import BistaticGeometry
-from bisar_budget.mission.model import Mission
+from bisar_budget.mission.model import Mission, has_instruments
+
+if TYPE_CHECKING:
+    from bisar_budget.effects.random_errors import RandomError
 
 Model = PublishedModel | FullModel
 
@@ -42,6 +46,31 @@ class Analysis:
     def sources(self) -> list[ErrorSource]:
         """Every error the mission can have, declared or not, in the order of the contract."""
         return error_sources(self.mission, self.geometry, self.exact)
+
+    @cached_property
+    def random(self) -> "list[RandomError]":
+        """Errors of sensors and clocks that the mission names."""
+        if not has_instruments(self.mission):
+            return []
+        from bisar_budget.effects.random_errors import random_errors
+
+        return random_errors(self.mission, self.geometry)
+
+    @cached_property
+    def slow(self) -> list[OwnPhase]:
+        """Phases of the declared vibrations below one cycle per aperture."""
+        return slow_phases(self.mission)
+
+    def own_phases(self, model: str) -> list[OwnPhase]:
+        """Phases of what displaces nothing: slow vibrations, and the declared errors of sensors and clocks."""
+        found = list(self.slow)
+        for error in self.random:
+            if error.declared is not None:
+                effect = error.effect(model)
+                found.append(
+                    OwnPhase(error.id, error.owner, effect.quadratic * error.declared, effect.cubic * error.declared)
+                )
+        return found
 
     @cached_property
     def stated(self) -> list[ErrorSource]:
@@ -91,4 +120,6 @@ class Analysis:
         phases = {
             source.id: max((self.does(model, source).qpe for model in models), key=abs) for source in self.stated
         }
-        return allocate(self.mission, self.stated, phases, slow_phases(self.mission))
+        by_model = [self.own_phases(model.name) for model in models]
+        own = [max(of_one, key=lambda one: one.qpe_rad) for of_one in zip(*by_model, strict=True)]
+        return allocate(self.mission, self.stated, phases, own)

@@ -6,7 +6,6 @@ from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis, Model
 from bisar_budget.effects.effect import ErrorSource
 from bisar_budget.effects.models import Declared
-from bisar_budget.effects.slow_vibration import slow_phases
 from bisar_budget.geometry import GroundVector
 
 Phases = list[tuple[str, float]]
@@ -21,7 +20,7 @@ class Together:
         self.found: Mapping[str, Declared] = analysis.declared(model)
         self.stated = analysis.stated
         self.motion = [source for source in self.stated if source.is_motion]
-        self.slow = slow_phases(analysis.mission)
+        self.own = analysis.own_phases(model.name)
 
     def members(self, allocation: Allocation, owner: str) -> list[ErrorSource]:
         """Those that count against the share of an owner; against the mission's all."""
@@ -32,13 +31,13 @@ class Together:
         return [(source.id, self.found[source.id].qpe) for source in members]
 
     def owed(self, allocation: Allocation, owner: str) -> Phases:
-        """Quadratic phases that count against the share of an owner, those of slow vibrations too. [rad]"""
-        slow = [s for s in self.slow if owner == "mission" or allocation.qpe.includes(s.owner, owner)]
-        return [*self.phases(self.members(allocation, owner)), *((s.row_id, s.qpe_rad) for s in slow)]
+        """Quadratic phases that count against the share of an owner, those that displace nothing too. [rad]"""
+        own = [one for one in self.own if owner == "mission" or allocation.qpe.includes(one.owner, owner)]
+        return [*self.phases(self.members(allocation, owner)), *((one.row_id, one.qpe_rad) for one in own)]
 
     def all_cubics(self) -> Phases:
-        """Cubic phases of motion, the clock and slow vibrations. [rad]"""
-        return [*self.cubics(), *((s.row_id, s.cubic_rad) for s in self.slow)]
+        """Cubic phases of motion, the clock, slow vibrations and sensors. [rad]"""
+        return [*self.cubics(), *((one.row_id, one.cubic_rad) for one in self.own)]
 
     def cubics(self) -> Phases:
         """Cubic phase of each error that moves something, signed. [rad]"""

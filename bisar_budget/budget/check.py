@@ -78,6 +78,7 @@ def check_mission(mission: Mission, today: date, *, is_brief: bool = False) -> M
             *warnings,
             *_unused_correlations(mission),
             *straight_orbits(mission),
+            *_of_instruments(analysis),
             *pull_in_caps(mission, resolution),
             *_nothing_declared(rows),
         ),
@@ -101,6 +102,7 @@ def _checked(analysis: Analysis, gating: str) -> _Checked:
     rows = [
         *error_rows(analysis, model, other, allocation),
         *vibration_rows(mission, allocation, gating),
+        *_instrument_rows(analysis, gating, allocation),
         *aggregate_rows(analysis, model, other, allocation),
     ]
     scene = None
@@ -108,6 +110,15 @@ def _checked(analysis: Analysis, gating: str) -> _Checked:
         scene, row = _scene_row(analysis, gating, allocation)
         rows.append(row)
     return _Checked([row._replace(model=gating) for row in rows], scene)
+
+
+def _instrument_rows(analysis: Analysis, gating: str, allocation: Allocation) -> list[Row]:
+    """Rows of sensors and clocks, which few missions name."""
+    if not analysis.random:
+        return []
+    from bisar_budget.budget.random_rows import islr_rows, random_rows
+
+    return [*random_rows(analysis, gating, allocation), *islr_rows(analysis, gating, allocation)]
 
 
 def stricter(published: _Checked, full: _Checked) -> _Checked:
@@ -156,6 +167,21 @@ def _scene_row(analysis: Analysis, model: str, allocation: Allocation) -> tuple[
         notes=notes,
     )
     return edge, row
+
+
+def _of_instruments(analysis: Analysis) -> Iterator[FileWarning]:
+    """Warn of what sensors and clocks are stated by, and of what is stated twice."""
+    mission = analysis.mission
+    for error in analysis.random:
+        if error.warning:
+            yield FileWarning(line=mission.line(error.path), message=error.warning)
+        declared = error.subject.axis == "accelerometer_bias" and error.declared is not None
+        if declared and getattr(mission.platforms, error.owner).motion_error.acceleration is not None:
+            key = f"platforms.{error.owner}.motion_error"
+            yield FileWarning(
+                line=mission.line(error.path),
+                message=f"{key}: acceleration and the accelerometer bias are both stated; they add",
+            )
 
 
 def _unknown_requirement_ids(mission: Mission, rows: Sequence[Row]) -> Iterator[FileWarning]:

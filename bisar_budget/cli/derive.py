@@ -10,7 +10,7 @@ from bisar_budget.cli.streams import EXIT_BROKEN, complain, deliver, write_file
 @click.command()
 @click.option(
     "--table",
-    type=click.Choice(["all", "equations", "I", "II", "vibration", "full"]),
+    type=click.Choice(["all", "equations", "I", "II", "vibration", "full", "random"]),
     default="all",
     show_default=True,
     help="What to derive.",

@@ -176,11 +176,11 @@ class ExactRanges:
         """Range error at the nodes of a small unit of any error, before it displaces anything. [m/unit]"""
         if not source.is_position:
             return self.shape(source)
-        moved = [self._along(name, source.direction) for name in PLATFORMS if source.moves(name)]
+        moved = [self.along(name, source.direction) for name in PLATFORMS if source.moves(name)]
         along = moved[0] if len(moved) == 1 else list(map(add, *moved))
         return along if source.unit == "m" else list(map(mul, along, self.powers[source.unit]))
 
-    def _along(self, name: str, direction: Vector) -> list[float]:
+    def along(self, name: str, direction: Vector) -> list[float]:
         """What a metre along a direction does to the range of a platform at the nodes, −u·d."""
         key = (name, direction)
         if key not in self._known_along:
@@ -211,11 +211,19 @@ class ExactRanges:
 
     @cached_property
     def _quadratic_weights(self) -> list[float]:
-        """What a metre at each node adds to the quadratic phase, that of the displacement included. [rad/m]"""
-        value, slope, quadratic, _ = self.fit
-        (by_value, by_slope), _ = self.phases_per_term
-        by_slope /= self.half
-        return [self.k * q + by_value * v + by_slope * s for q, v, s in zip(quadratic, value, slope, strict=True)]
+        return self.phase_weights[0]
+
+    @cached_property
+    def phase_weights(self) -> tuple[list[float], list[float]]:
+        """What a metre at each node adds to quadratic and cubic phase, that of the displacement included. [rad/m]"""
+        value, slope, *phases = self.fit
+        found = []
+        for own, (by_value, by_slope) in zip(phases, self.phases_per_term, strict=True):
+            by_slope /= self.half
+            found.append(
+                [self.k * q + by_value * v + by_slope * s for q, v, s in zip(own, value, slope, strict=True)]
+            )
+        return found[0], found[1]
 
     @cached_property
     def _quadratics_of_axes(self) -> dict[tuple[str, str], tuple[Vector, float]]:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 from bisar_budget.effects.echoes import SLOWEST
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.subject import subject
+from bisar_budget.effects.tones import tone
 from bisar_budget.effects.vibration_lines import lines_of
 from bisar_budget.mission.model import Mission
 
@@ -20,22 +21,16 @@ def quadratic_part(cycles: float) -> float:
 
     The least-squares quadratic of cos(πnx) over the aperture; half of it is a Taylor term where n is small.
     """
-    k = math.pi * cycles
-    if k < 0.5:
-        return 7.5 * k**2 / 15 * (1 - k**2 / 14 + k**4 / 504)
-    return 7.5 * abs((3 / k**2 - 1) * math.sin(k) - 3 * math.cos(k) / k) / k
+    return abs(tone(math.pi * cycles)[0])
 
 
 def cubic_part(cycles: float) -> float:
     """Worst cubic phase likewise: 17.5·j₃(π·cycles), of the least-squares cubic of sin(πnx)."""
-    k = math.pi * cycles
-    if k < 0.5:
-        return 17.5 * k**3 / 105 * (1 - k**2 / 18 + k**4 / 792)
-    return 17.5 * abs((15 / k**3 - 6 / k) * math.sin(k) - (15 / k**2 - 1) * math.cos(k)) / k
+    return abs(tone(math.pi * cycles)[1])
 
 
-class SlowPhase(NamedTuple):
-    """A vibration below one cycle per aperture: row id, platform, worst-phase QPE and cubic phase. [rad]"""
+class OwnPhase(NamedTuple):
+    """What has no displacement, but phases that count in sums: row id, owner, QPE and cubic phase. [rad]"""
 
     row_id: str
     owner: str
@@ -43,7 +38,7 @@ class SlowPhase(NamedTuple):
     cubic_rad: float
 
 
-def slow_phases(mission: Mission) -> list[SlowPhase]:
+def slow_phases(mission: Mission) -> list[OwnPhase]:
     """Phases of the declared vibrations below one cycle per aperture, which count with those of other errors."""
     T = mission.collection.aperture_time
     found = []
@@ -53,5 +48,5 @@ def slow_phases(mission: Mission) -> list[SlowPhase]:
             if cycles < SLOWEST:
                 phase = 2 * math.pi * line.amplitude / mission.radar.wavelength
                 row_id = subject(name, "vibration", "sinusoidal", entry=index).id
-                found.append(SlowPhase(row_id, name, phase * quadratic_part(cycles), phase * cubic_part(cycles)))
+                found.append(OwnPhase(row_id, name, phase * quadratic_part(cycles), phase * cubic_part(cycles)))
     return found

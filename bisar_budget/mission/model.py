@@ -603,6 +603,14 @@ def _turning_points(state: PlatformState, half: float) -> Iterator[float]:
         yield max(-half, min(half, -state.velocity[2] / state.acceleration[2]))
 
 
+def has_instruments(mission: Mission) -> bool:
+    """Whether a mission says anything of inertial sensors, position noise, oscillators or synchronisation."""
+    return mission.synchronization is not None or any(
+        platform.oscillator is not None or platform.motion_error.imu is not None or platform.motion_error.random
+        for platform in mission.platforms
+    )
+
+
 def names_parts(mission: Mission) -> bool:
     """Whether a mission takes figures from parts of the catalogue."""
     return any(

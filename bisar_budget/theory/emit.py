@@ -248,8 +248,8 @@ def _of_random_errors() -> tuple[Evaluator, ...]:
             name="inertial_phases",
             summary="Phases of one unit of each figure of an inertial sensor, one sigma. [rad/unit]",
             details=(
-                f"{columns}Units are m/s², rad, rad/s, m/s/√s, rad/√s. along is the length of the line of sight, 1, and "
-                "level that of its horizontal part; gravity in m/s². Walks start at mid-aperture. Derived here."
+                f"{columns}Units are m/s², rad, rad/s, m/s/√s, rad/√s. along is the length of the line of sight, "
+                "1, level that of its horizontal part; gravity in m/s². Walks start at mid-aperture. Derived here."
             ),
             arguments=(
                 (random_errors.along, "along"),
@@ -265,8 +265,8 @@ def _of_random_errors() -> tuple[Evaluator, ...]:
             name="gauss_markov_parts",
             summary="Mean squares of a Gauss-Markov process of variance 1 over an aperture. [-]",
             details=(
-                f"{parts}ratio is the aperture time over twice the correlation time, decay exp(−2·ratio). Terms cancel "
-                "for a ratio below 0.5. Derived here."
+                f"{parts}ratio is the aperture time over twice the correlation time, decay exp(−2·ratio). "
+                "Terms cancel for a ratio below 0.5. Derived here."
             ),
             arguments=(*ratio, (random_errors.decay, "decay")),
             rows=(tuple(random_errors.gauss_markov()),),
@@ -283,7 +283,7 @@ def _of_random_errors() -> tuple[Evaluator, ...]:
         Evaluator(
             name="tone_parts",
             summary="Amplitudes of the phases of a tone of amplitude 1, and the share of its power that is left. [-]",
-            details=f"{parts}angle is πfT, sine and cosine are its own. Terms cancel for an angle below 0.5. Derived here.",
+            details=f"{parts}angle is πfT, sine and cosine its own. Terms cancel below 0.5. Derived here.",
             arguments=(*angle, *waves),
             rows=(tuple(random_errors.tone_in_terms()),),
             row_names=("amplitude, amplitude, share of power",),
@@ -299,8 +299,11 @@ def _of_random_errors() -> tuple[Evaluator, ...]:
         Evaluator(
             name="tone_parts_fast",
             summary="Mean squares of the phases of a fast tone, and the share of its power that is left. [-]",
-            details=f"{parts}angle is πfT; what turns with it is averaged. Derived here.",
-            arguments=angle,
+            details=(
+                f"{parts}What turns with the angle πfT is averaged. Arguments are the angle's powers 0, −2 … −8; "
+                "of a spectrum, its integrals with them. Derived here."
+            ),
+            arguments=tuple((symbol, f"inverse_{2 * n}") for n, symbol in enumerate(random_errors.inverse)),
             rows=(tuple(random_errors.tone_fast()),),
             row_names=("mean squares, share of power",),
         ),
@@ -318,7 +321,7 @@ def _of_random_errors() -> tuple[Evaluator, ...]:
         Evaluator(
             name="interpolation_left",
             summary="Share of a tone's power that linear interpolation between samples leaves. [-]",
-            details="angle is 2πf times the interval, cosine its own. Terms cancel for an angle below 0.5. Derived here.",
+            details="angle is 2πf times the interval, cosine its own. Terms cancel below 0.5. Derived here.",
             arguments=(*step, (random_errors.cosine, "cosine")),
             rows=((random_errors.interpolated_in_terms(),),),
             row_names=("",),

@@ -10,7 +10,7 @@ from sympy import Expr, MatrixBase
 
 from bisar_budget.theory import differential_range as dr
 from bisar_budget.theory import equations as paper
-from bisar_budget.theory import full, published
+from bisar_budget.theory import full, published, random_errors
 from bisar_budget.theory.published import Equation, Table
 from bisar_budget.theory.render import as_latex, as_mathml_content, as_text
 
@@ -43,7 +43,13 @@ def _is_shown(equation: Equation) -> bool:
 
 def formulas() -> Iterator[Expr]:
     """Every expression of the catalogue: cells of the tables, both sides of the equations, parts of some."""
-    tables: tuple[Table, ...] = (published.table_1(), published.table_2(), published.vibration(), full.table())
+    tables: tuple[Table, ...] = (
+        published.table_1(),
+        published.table_2(),
+        published.vibration(),
+        full.table(),
+        random_errors.table(),
+    )
     for table in tables:
         yield from (cell for row in table.rows for cell in row.cells if cell != 0)
     yield published.pull_in_factor()

@@ -16,7 +16,6 @@ from sympy import (
     Expr,
     I,
     Integer,
-    Integral,
     Poly,
     Rational,
     Symbol,
@@ -28,7 +27,6 @@ from sympy import (
     gamma,
     integrate,
     legendre,
-    oo,
     pi,
     series,
     simplify,
@@ -50,6 +48,7 @@ ratio = positive("a")  # T/(2τ_c): half the aperture over the correlation time
 decay = positive("d")  # exp(−2a)
 angle = positive("x")  # πfT
 cosine, sine = real("cosine"), real("sine")
+inverse = tuple(positive(f"inverse_{n}") for n in range(0, 2 * ORDERS + 1, 2))  # x⁻⁰, x⁻² … x⁻⁸
 step = positive("y")  # 2πf·T_s
 
 _x, _m, _M, _w = real("xi"), positive("m"), positive("M"), positive("w")
@@ -165,9 +164,7 @@ def _series(expression: Expr, variable: Symbol) -> Expr:
     """Series about zero of an expression whose terms cancel there."""
     exact = Poly(series(expression, variable, 0, 2 * ORDERS + TERMS).removeO(), variable)
     first = min(power for (power,) in exact.monoms())
-    return sum(
-        coefficient * variable**power for (power,), coefficient in exact.terms() if power < first + TERMS
-    )
+    return sum(coefficient * variable**power for (power,), coefficient in exact.terms() if power < first + TERMS)
 
 
 # ---------------------------------------------------------------------- spectra
@@ -197,10 +194,11 @@ def tone_slow() -> Moments:
 
 
 def tone_fast() -> Moments:
-    """Mean squares of `tone` over a fast tone's angle, whose sine and cosine are averaged."""
+    """Mean squares of `tone` over a fast tone's angle, sine and cosine averaged, in `inverse` powers of the angle."""
     quadratic, cubic, left = tone_in_terms()
     mean = {sine**2: Rational(1, 2), cosine**2: Rational(1, 2), sine * cosine: Integer(0)}
-    return Moments(*(expand(expand(part).subs(mean)) for part in (quadratic**2, cubic**2, left)))
+    averaged = (Poly(expand(expand(part).subs(mean)), 1 / angle) for part in (quadratic**2, cubic**2, left))
+    return Moments(*(sum(c * inverse[n // 2] for (n,), c in part.terms()) for part in averaged))
 
 
 def power_law_integral(n: int, slope: int) -> Expr:
@@ -268,25 +266,15 @@ def table() -> Table:
         notes=(
             "Derived here. u is the length of the line of sight, 1, and u_h that of its horizontal part.",
             "Attitude and gyros act through gravity, which leaks horizontally. Walks start at mid-aperture.",
+            "A spectrum of phase S is integrated with the squares of φ₂ and φ₃ of a tone, and with the share left.",
         ),
     )
 
 
 def equations() -> tuple[Equation, ...]:
     """Parts of a tone, integrals of power laws, and what synchronisation leaves."""
-    frequency, spectrum = positive("f"), positive("S")
-    transfer = positive("tone")
     quadratic, cubic, left = tone()
     names = (("quadratic", "phi_2", quadratic), ("cubic", "phi_3", cubic))
-    integrals = (
-        Equation(
-            "",
-            f"Mean square of the {what} phase of a spectrum S",
-            positive(symbol) ** 2,
-            Integral(spectrum * transfer**2, (frequency, 0, oo)),
-        )
-        for what, symbol, _ in names[:1]
-    )
     laws = (
         Equation("", f"Mean square of the quadratic phase, spectrum f^-{slope}", positive(f"c_{slope}"), value)
         for slope, value in enumerate(power_law(2))
@@ -295,10 +283,8 @@ def equations() -> tuple[Equation, ...]:
         *(Equation("", f"Amplitude of the {what} phase of a tone, x = πfT", real(name), simplify(value))
           for what, name, value in names),
         Equation("", "Share of a tone's power left after the cubic", real("L"), left),
-        *integrals,
         *laws,
         Equation("", "Share of a tone left by linear interpolation, y = 2πfT_s", real("L_s"), interpolated()),
-        Equation("", "Mean square of noise of the link", positive("sigma") ** 2 * Symbol("l"),
-                 interpolated_noise() * positive("sigma") ** 2),
+        Equation("", "Mean square of noise of the link with straight lines between, of σ² each time",
+                 positive("sigma_L") ** 2, interpolated_noise() * positive("sigma") ** 2),
     )  # fmt: skip
-

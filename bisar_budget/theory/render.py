@@ -14,13 +14,23 @@ from sympy.printing.mathml import MathMLPresentationPrinter
 from sympy.printing.str import StrPrinter
 
 from bisar_budget.theory import equations as paper
-from bisar_budget.theory import full, published
+from bisar_budget.theory import full, published, random_errors
 from bisar_budget.theory.published import Equation, Table
 
 _NAME = re.compile(
     r"(?P<letter>[A-Za-z]+?)(?P<index>_\d)?(?P<accent>tilde|bar|hat|prime|dot|ddot|dddot|ddddot)?(?:_(?P<subscript>\w+))?"
 )
-_GREEK = {"lambda": "λ", "tau": "τ", "phi": "φ", "Phi": "Φ", "theta": "θ", "beta": "β", "sigma": "σ"}
+_GREEK = {
+    "lambda": "λ",
+    "tau": "τ",
+    "phi": "φ",
+    "Phi": "Φ",
+    "theta": "θ",
+    "beta": "β",
+    "sigma": "σ",
+    "psi": "ψ",
+    "epsilon": "ε",
+}
 _ACCENTS = {
     "prime": "′",
     "tilde": "\u0303",
@@ -249,18 +259,22 @@ def as_mathml_content(expression: Basic) -> str:
 
 
 def derivation(selection: str, format_name: str) -> str:
-    """Write what `bisar-budget derive` prints: `all`, `equations`, `I`, `II`, `vibration` or `full`."""
+    """Write what `bisar-budget derive` prints: `all`, `equations`, `I`, `II`, `vibration`, `full` or `random`."""
     tables: dict[str, Callable[[], Table]] = {
         "I": published.table_1,
         "II": published.table_2,
         "vibration": published.vibration,
         "full": full.table,
+        "random": random_errors.table,
     }
     blocks = []
     if selection in ("all", "equations"):
         blocks.append(_EQUATIONS[format_name](_TITLE, paper.equations()))
     for name, table in tables.items():
         if selection in ("all", name):
+            if name == "random":
+                title = "Equations of random errors, spectra one-sided"
+                blocks.append(_EQUATIONS[format_name](title, random_errors.equations()))
             if name == "full":
                 blocks.append(_EQUATIONS[format_name]("Equations of the full model", full.equations()))
             blocks.append(_TABLES[format_name](table()))

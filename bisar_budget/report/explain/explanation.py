@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.scene import ScenePhases, at
+from bisar_budget.analysis.spread import spread_powers
 from bisar_budget.analysis.together import Together
 from bisar_budget.analysis.vibration_limits import amplitude_share, echo_phase, slow_limits
 from bisar_budget.constants import ROUNDING
@@ -22,6 +23,7 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.geometry import dot, without_rounding
 from bisar_budget.mission.model import Mission
 from bisar_budget.report.explain import formulas
+from bisar_budget.report.explain.explained_budget import limit_steps
 from bisar_budget.report.explain.explained_error import as_written, declaration, effect, missing, place
 from bisar_budget.report.explain.explained_full import at_the_allowable
 from bisar_budget.report.explain.formulas import Step, Sum, WorkedEquation, equation, number, step, with_unit
@@ -75,6 +77,14 @@ def chain(mission: Mission, found: MissionFindings, row: Row) -> Iterator[Step]:
         yield from declaration(mission, source)
         yield from effect(analysis, found, source, row.model)
         yield from _budget(analysis, source, row)
+    elif (random := next((one for one in analysis.random if one.id == row.id), None)) is not None:
+        from bisar_budget.report.explain.explained_random import explained_random
+
+        yield from explained_random(analysis, found.allocation, random, row)
+    elif row.subject.kind == "islr":
+        from bisar_budget.report.explain.explained_random import explained_islr
+
+        yield from explained_islr(spread_powers(analysis, row.model or ""), mission, found.allocation, row)
     elif row.subject.kind == "vibration":
         yield from _vibration(mission, found.allocation, row)
     elif row.subject.kind in (QUADRATIC, "autofocus_pull_in"):
@@ -85,7 +95,7 @@ def chain(mission: Mission, found: MissionFindings, row: Row) -> Iterator[Step]:
         yield from _spatial_variance(analysis, found, row)
     elif row.subject.kind == LOCATION:
         yield from _location_aggregate(mission, together, found, row)
-    if row.declared is not None and row.allowable is not None and row.utilization is not None:
+    if row.declared is not None and row.allowable is not None and row.utilization is not None and row.unit != "dB":
         values = {"declared": row.declared, "allowable": row.allowable}
         yield from step("Utilization", *equation("utilization", "declared/allowable", values, row.utilization, ""))
 
@@ -113,7 +123,7 @@ def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]
     """From the requirements to the smallest size that one of them allows."""
     allocation, requirements = analysis.allocation, analysis.mission.requirements
     limit = allocation.qpe_limit(source.owner) * allocation.autofocus_gain
-    yield from _limit(allocation, source.owner, limit)
+    yield from limit_steps(allocation, source.owner, limit)
     model = analysis.full if row.model == "full" else analysis.published
     by_quadratic = row.allowable_full if row.model == "full" else row.allowable_published
     sizes: dict[str, float] = {}
@@ -153,29 +163,6 @@ def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]
         f"Allowable: the smallest, by {', '.join(sizes)}",
         Sum(f"allowable = {text} = {with_unit(row.allowable, row.unit)}"),
     )
-
-
-def _limit(allocation: Allocation, owner: str, limit: float) -> Iterator[Step]:
-    """Budget times share times gain."""
-    total, share, gain = allocation.qpe_total, allocation.qpe.of(owner), allocation.autofocus_gain
-    whose = {
-        "clock": "the receiver’s share" if allocation.qpe.clock is None else "the clock’s share",
-        "mission": "all of it: it belongs to no platform",
-    }
-    yield from _autofocus_gain(allocation)
-    values = {"total": total, "share": share, "gain": gain}
-    title = f"Budget requirements.quadratic_phase_error, {whose.get(owner, f'the {owner}’s share')}"
-    yield from step(title, *equation("limit", "total*share*gain", values, limit, "rad"))
-
-
-def _autofocus_gain(allocation: Allocation) -> Iterator[Step]:
-    if allocation.n_pull is None:
-        yield from step("No autofocus (autofocus.n_pull): gain = 1")
-        return
-    values = {"N_pull": allocation.n_pull, "q": allocation.qpe_total}
-    raw = math.pi * allocation.n_pull / allocation.qpe_total
-    lines = equation("gain", formulas.AUTOFOCUS_GAIN, values, raw, "")
-    yield from step("Autofocus, Section VI" + (", never below 1" if raw < 1 else ""), *lines)
 
 
 def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
@@ -262,7 +249,7 @@ def _slow_vibration(mission: Mission, allocation: Allocation, row: Row, cycles: 
     lines = equation("cubic", "2*π*A*c/λ", values, row.cubic_rad or 0.0, "rad")
     yield from step("Cubic phase in the worst phase, c = 17.5·j₃(π·f·T)", *lines)
     limit = allocation.qpe_limit(platform) * allocation.autofocus_gain
-    yield from _limit(allocation, platform, limit)
+    yield from limit_steps(allocation, platform, limit)
     limits, required = slow_limits(mission, allocation, platform, cycles), mission.requirements.cubic_phase_error
     values = {"limit": limit, "λ": wavelength, "q": quadratic_part(cycles)}
     lines = equation("by_QPE", "limit*λ/(2*π*q)", values, limits.quadratic, "m")
@@ -322,7 +309,7 @@ def _phase_aggregate(together: Together, found: MissionFindings, row: Row) -> It
         lines = equation("allowable", "π*N_pull", values, row.allowable or 0.0, "rad")
         yield from step("What autofocus corrects, Section VI", *lines)
     else:
-        yield from _limit(found.allocation, owner, row.allowable or 0.0)
+        yield from limit_steps(found.allocation, owner, row.allowable or 0.0)
 
 
 def _cubic_aggregate(together: Together, found: MissionFindings, row: Row) -> Iterator[Step]:

@@ -28,6 +28,22 @@ VIBRATION = {"pslr": "sqrt(PSLR)*λ*sqrt(s)/(2*π)", "islr": "sqrt(ISLR)*λ*sqrt
 # From first principles; of a sinusoid φ is the phase of the echoes that both platforms may make.
 FULL_VIBRATION = {"pslr": "a*λ*φ/(2*π)", "islr": "λ*sqrt(s)*sqrt(log(ISLR + 1))/(2*π)"}
 AMPLITUDE_SHARE = "sqrt(s_k)/(sqrt(s_t) + sqrt(s_r))"
+# Inertial sensors: quadratic phase, cubic phase and what is left, of one unit.
+INERTIAL = {
+    "accelerometer_bias": ("π*T^2*b*u/(4*λ)", "", ""),
+    "attitude": ("π*T^2*g*ψ*u_h/(4*λ)", "", ""),
+    "gyro_bias": ("", "π*T^3*ε*g*u_h/(24*λ)", ""),
+    "velocity_random_walk": (
+        "sqrt(70)*π*N*T^(3/2)*u/(28*λ)",
+        "sqrt(770)*π*N*T^(3/2)*u/(132*λ)",
+        "sqrt(770)*π*N*T^(3/2)*u/(1155*λ)",
+    ),
+    "angle_random_walk": (
+        "sqrt(164010)*π*N_g*T^(5/2)*g*u_h/(7392*λ)",
+        "5*sqrt(3003)*π*N_g*T^(5/2)*g*u_h/(5148*λ)",
+        "sqrt(15015)*π*N_g*T^(5/2)*g*u_h/(45045*λ)",
+    ),
+}
 AUTOFOCUS_GAIN = "π*N_pull/q"
 SMEAR = ("sin(φ̄_r)*cos(θ̄_r) + sin(φ̄_t)*cos(θ̄_t)", "-cos(φ̄_r)*cos(θ̄_r) - cos(φ̄_t)*cos(θ̄_t)")
 LOOK_AZIMUTH = "atan2(sin(φ̄_r)*cos(θ̄_r) + sin(φ̄_t)*cos(θ̄_t), cos(φ̄_r)*cos(θ̄_r) + cos(φ̄_t)*cos(θ̄_t))"

@@ -10,6 +10,7 @@ BINDING_WORDS = {
     "quadratic_phase_error": "quadratic phase error",
     "cubic_phase_error": "cubic phase error",
     "location_error": "location error",
+    "islr": "ISLR",
 }
 
 

@@ -1,0 +1,36 @@
+"""What spreads over the image: wideband vibration, noise of sensors, phase noise. Independent, so powers add."""
+
+import math
+
+from bisar_budget.analysis.allocation import Allocation
+from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.vibration_limits import spread_phase
+from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.subject import subject
+from bisar_budget.effects.vibration_lines import along_line_of_sight
+from bisar_budget.mission.model import Mission
+
+
+def spread_limit(mission: Mission, allocation: Allocation, owner: str, model: str) -> float | None:
+    """Rms phase that an owner may spread: the paper's rule, its square is the power, or first principles. [rad]"""
+    if mission.requirements.islr is None:
+        return None
+    power = 10 ** (mission.requirements.islr / 10)
+    whole = math.sqrt(power) if model == "published" else spread_phase(power)
+    return whole * math.sqrt(allocation.islr.of(owner))
+
+
+def spread_powers(analysis: Analysis, gating: str) -> list[tuple[str, str, float]]:
+    """Row id, owner and phase variance of everything that spreads. [rad²]"""
+    mission, found = analysis.mission, []
+    for name in PLATFORMS:
+        error = getattr(mission.platforms, name).motion_error
+        wideband = error.vibration.wideband
+        if wideband is not None:
+            rms = along_line_of_sight(wideband.rms, error, getattr(mission.platforms, name).state, "islr")
+            variance = (2 * math.pi * rms / mission.radar.wavelength) ** 2
+            found.append((subject(name, "vibration", "wideband").id, name, variance))
+    for one in analysis.random:
+        if one.declared is not None and one.effect(gating).spread:
+            found.append((one.id, one.owner, (one.effect(gating).spread * one.declared) ** 2))
+    return found

@@ -1,0 +1,214 @@
+"""Rows of sensors and clocks: how bad may a figure be, by its quadratic phase, cubic phase and what it spreads.
+
+Independent processes add their powers, whatever `allocation.combine` says of phases: what wideband vibration, noise
+of sensors and phase noise spread is held together to each platform's share of ISLR.
+"""
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from bisar_budget.analysis.allocation import Allocation
+from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.spread import spread_limit, spread_powers
+from bisar_budget.budget.judgement import judged
+from bisar_budget.budget.pull_in import caps, needed_sentence
+from bisar_budget.budget.vibration_rows import islr_db
+from bisar_budget.constants import UTILIZATION_TOLERANCE
+from bisar_budget.effects.models import CUBIC, QUADRATIC
+from bisar_budget.effects.random_errors import RandomEffect, RandomError
+from bisar_budget.effects.subject import subject
+from bisar_budget.findings.row import Row
+from bisar_budget.mission.model import Mission
+from bisar_budget.units import format_limit, format_quantity
+
+ISLR = "islr"
+
+
+class _Limits(NamedTuple):
+    """What an error is held to. [rad]"""
+
+    quadratic: float  # with autofocus
+    cubic: float | None
+    spread: float | None  # rms
+
+
+def random_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterator[Row]:
+    """Rows of every error of a sensor or a clock, declared or not."""
+    other = "full" if gating == "published" else "published"
+    for error in analysis.random:
+        yield _row(analysis, error, gating, other, allocation)
+
+
+def _row(analysis: Analysis, error: RandomError, gating: str, other: str, allocation: Allocation) -> Row:
+    mission, gain, size = analysis.mission, allocation.autofocus_gain, error.declared
+    mine, theirs = error.effect(gating), error.effect(other)
+    limits, others = (_limits(mission, allocation, error.owner, model) for model in (gating, other))
+    sizes = _sizes(mine, limits)
+    allowable = min(sizes.values(), default=None)
+    binding = min(sizes, key=lambda name: sizes[name]) if sizes else None
+    qpe = cubic = None
+    over = doubt = info = ""
+    if size is not None:
+        qpe, cubic = mine.quadratic * size, mine.cubic * size
+        if mission.allocation.combine != "each":
+            info = f"combine is {mission.allocation.combine}: the aggregate decides"
+        elif allowable is not None and size > allowable:
+            over = _over(mission, error, mine, limits, binding or "", allocation)
+        doubt = _doubt(other, theirs, others, size)
+    by_model = (mine, theirs) if gating == "published" else (theirs, mine)
+    row = judged(
+        mission,
+        subject=error.subject,
+        metric=QUADRATIC,
+        unit=error.unit,
+        declared=size,
+        allowable=allowable,
+        path=error.path,
+        equation=error.equation,
+        gain=_gain(binding, qpe, limits, gain, size, allowable),
+        over=over,
+        doubt=doubt,
+        no_limit=error.no_limit if allowable is None else "",
+        info=info,
+        limits=tuple(limits.quadratic / effect.quadratic if effect.quadratic else None for effect in by_model),  # type: ignore[arg-type]
+        qpe=None if size is None else by_model[0].quadratic * size,
+        qpe_full=None if size is None else by_model[1].quadratic * size,
+        evidence=error.evidence,
+        notes=error.notes,
+    )
+    row = row._replace(
+        binding_requirement=binding,
+        cubic_rad=cubic,
+        islr_db=None if size is None else islr_db((mine.spread * size) ** 2),
+        model=gating,
+    )
+    return in_decibel(row) if error.unit == "dB" else row
+
+
+def _gain(
+    binding: str | None, qpe: float | None, limits: _Limits, gain: float, size: float | None, allowable: float | None
+) -> float:
+    """Autofocus gain within an allowable: of one that the quadratic phase does not set, how far that is used."""
+    if gain == 1 or not qpe or not size or allowable is None:
+        return 1.0
+    return gain if binding == QUADRATIC else qpe / (limits.quadratic / gain) / (size / allowable)
+
+
+def in_decibel(row: Row) -> Row:
+    """Write a row whose numbers are factors of amplitude in decibel; its utilization stays that of amplitudes."""
+
+    def level(factor: float | None) -> float | None:
+        return 20 * math.log10(factor) + 0.0 if factor else None
+
+    return row._replace(
+        declared=level(row.declared),
+        allowable=level(row.allowable),
+        allowable_published=level(row.allowable_published),
+        allowable_full=level(row.allowable_full),
+    )
+
+
+def _limits(mission: Mission, allocation: Allocation, owner: str, model: str) -> _Limits:
+    spread = spread_limit(mission, allocation, owner, model)
+    quadratic = allocation.qpe_limit(owner) * allocation.autofocus_gain
+    return _Limits(quadratic, mission.requirements.cubic_phase_error, spread)
+
+
+def _sizes(effect: RandomEffect, limits: _Limits) -> dict[str, float]:
+    """Size at which an error reaches each requirement that it touches. [unit]"""
+    held = ((QUADRATIC, effect.quadratic, limits.quadratic), (CUBIC, effect.cubic, limits.cubic),
+            (ISLR, effect.spread, limits.spread))  # fmt: skip
+    return {name: limit / per_unit for name, per_unit, limit in held if per_unit and limit is not None}
+
+
+def _over(
+    mission: Mission, error: RandomError, effect: RandomEffect, limits: _Limits, binding: str, allocation: Allocation
+) -> str:
+    size = error.declared or 0.0
+    if binding == CUBIC:
+        allowed = format_limit(limits.cubic or 0.0, "rad")
+        return f"cubic phase {effect.cubic * size:.3g} rad, {allowed} allowed; autofocus gain does not apply"
+    if binding == ISLR:
+        return f"spreads {_level((effect.spread * size) ** 2)}, {_level((limits.spread or 0.0) ** 2, 'down')} allowed"
+    qpe = effect.quadratic * size
+    needed = needed_sentence(allocation.n_pull_needed(qpe, error.owner), caps(mission))
+    return f"QPE {qpe:.3g} rad, {format_limit(limits.quadratic, 'rad')} allowed; {needed}"
+
+
+def _level(variance: float, rounding: str = "nearest") -> str:
+    return format_quantity(islr_db(variance) or 0.0, "dB", 3, rounding)
+
+
+def _doubt(other: str, effect: RandomEffect, limits: _Limits, size: float) -> str:
+    """Say that the model that does not gate fails a declared error; else nothing."""
+    sizes = _sizes(effect, limits)
+    if not sizes or size <= min(sizes.values()) * (1 + UTILIZATION_TOLERANCE):
+        return ""
+    name = min(sizes, key=lambda one: sizes[one])
+    if name == ISLR:
+        return f"the {other} model says fail: it spreads {_level((effect.spread * size) ** 2)}"
+    is_quadratic = name == QUADRATIC
+    phase = (effect.quadratic if is_quadratic else effect.cubic) * size
+    allowed = format_limit((limits.quadratic if is_quadratic else limits.cubic) or 0.0, "rad")
+    what = "QPE" if is_quadratic else "cubic phase"
+    return f"the {other} model says fail: {what} {phase:.3g} rad, {allowed} allowed"
+
+
+# ---------------------------------------------------------------------- powers together
+def islr_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterator[Row]:
+    """What all independent noise spreads, for each platform and the mission; none where only vibration does."""
+    mission = analysis.mission
+    if mission.requirements.islr is None or not any(error.declared is not None for error in analysis.random):
+        return
+    owners = ["transmitter", "receiver", "mission"]
+    if allocation.islr.clock is not None:
+        owners.insert(2, "clock")
+    powers = spread_powers(analysis, gating)
+    other = "full" if gating == "published" else "published"
+    for owner in owners:
+        members = [(row_id, power) for row_id, whose, power in powers
+                   if owner == "mission" or allocation.islr.includes(whose, owner)]  # fmt: skip
+        variance = math.fsum(power for _, power in members)
+        limit, by_other = (spread_limit(mission, allocation, owner, model) or 0.0 for model in (gating, other))
+        rms = math.sqrt(variance)
+        over = doubt = ""
+        if rms > limit and members:
+            row_id, largest = max(members, key=lambda member: member[1])
+            over = (
+                f"noise spreads {_level(variance)}, {_level(limit**2, 'down')} allowed; largest: {row_id}, "
+                f"{_level(largest)}"
+            )
+        if rms > by_other * (1 + UTILIZATION_TOLERANCE):
+            doubt = f"the {other} model says fail: {_level(by_other**2, 'down')} allowed"
+        row = judged(
+            mission,
+            subject=subject(owner, ISLR),
+            metric=ISLR,
+            unit="dB",
+            declared=rms if members else None,
+            allowable=limit,
+            path=("requirements", "islr"),
+            equation="powers of the rows",
+            over=over,
+            doubt=doubt,
+            limits=(limit, by_other) if gating == "published" else (by_other, limit),
+        )
+        yield _as_islr(row, variance, gating)
+
+
+def _as_islr(row: Row, variance: float, gating: str) -> Row:
+    """Write rms phases as the ISLR that they add."""
+
+    def level(rms: float | None) -> float | None:
+        return islr_db(rms**2) if rms else None
+
+    return row._replace(
+        declared=level(row.declared),
+        allowable=level(row.allowable),
+        allowable_published=level(row.allowable_published),
+        allowable_full=level(row.allowable_full),
+        islr_db=None if row.declared is None else islr_db(variance),
+        binding_requirement=ISLR,
+        model=gating,
+    )

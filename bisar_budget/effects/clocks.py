@@ -1,0 +1,89 @@
+"""Phase noise of both oscillators, and of the link that synchronises them, over one aperture."""
+
+import math
+from collections.abc import Callable, Iterator
+
+from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.oscillators import noise_of
+from bisar_budget.effects.random_errors import RandomEffect, RandomError
+from bisar_budget.effects.spectra import Piece, parts
+from bisar_budget.effects.subject import subject
+from bisar_budget.effects.tones import Parts, held, interpolated
+from bisar_budget.mission.instruments import Oscillator, Synchronization
+from bisar_budget.mission.model import Mission
+from bisar_budget.units import format_quantity
+
+DIRECT = "the direct path is the receiver's clock: oscillators drop out"
+_MISFIT = 0.2  # of an Allan deviation, from where a power law does not describe it
+
+
+def clock_noise(mission: Mission) -> Iterator[RandomError]:
+    """Errors of the oscillators that a mission names, and of its synchronisation."""
+    sync = mission.synchronization
+    for name in PLATFORMS:
+        oscillator: Oscillator | None = getattr(mission.platforms, name).oscillator
+        if oscillator is not None:
+            yield _of_oscillator(mission, name, oscillator, sync)
+    if sync is not None:
+        yield _of_link(mission, sync)
+
+
+def _of_oscillator(mission: Mission, name: str, oscillator: Oscillator, sync: Synchronization | None) -> RandomError:
+    T, factor = mission.collection.aperture_time, mission.allocation.coverage_factor
+    noise = noise_of(oscillator, mission.radar.center_frequency, T)
+    notes, no_limit, warning = list(noise.notes), "no phase noise", ""
+    weight: Callable[[float], float] | None = None
+    interval = 0.0
+    if sync is not None and sync.method == "direct_path":
+        found, no_limit, notes = Parts(0.0, 0.0, 0.0), DIRECT, []
+    else:
+        if sync is not None and sync.interval is not None:
+            weight, interval = interpolated, sync.interval
+            notes.append(f"what synchronisation each {format_quantity(interval, 's')} leaves of it")
+        found = parts(noise.pieces, T, interval, weight)
+    key = ("platforms", name, "oscillator")
+    if noise.misfit > _MISFIT:
+        warning = (
+            f"{'.'.join(key)}: no power law fits the Allan deviation; the fit is off by {100 * noise.misfit:.3g} %"
+        )
+    elif noise.misfit > 0.005:
+        notes.append(f"the power law fits the Allan deviation to {100 * noise.misfit:.2g} %")
+    quadratic, cubic, spread = map(math.sqrt, found)
+    effect = RandomEffect(quadratic * factor, cubic * factor, spread)
+    return RandomError(
+        subject=subject(name, "oscillator"),
+        unit="dB",
+        declared=1.0,
+        path=key if oscillator.sensor is None else (*key, "sensor"),
+        published=effect,
+        full=effect,
+        equation="phase noise",
+        evidence=oscillator.source,
+        no_limit=no_limit,
+        notes=tuple(notes),
+        warning=warning,
+    )
+
+
+def _of_link(mission: Mission, sync: Synchronization) -> RandomError:
+    """Each exchange is wrong by an error of its own, and straight lines join them."""
+    T, factor = mission.collection.aperture_time, mission.allocation.coverage_factor
+    if sync.interval is None:  # from pulse to pulse: all of it spreads
+        found, note = Parts(0.0, 0.0, 1.0), "the error is another one for each pulse: all of it spreads"
+    else:
+        rate = 1 / sync.interval
+        white = Piece(0.0, 12 * rate, 2 * sync.interval, 0.0)
+        found, note = parts((white,), T, sync.interval, held), ""
+    quadratic, cubic, spread = map(math.sqrt, found)
+    effect = RandomEffect(quadratic, cubic, spread / factor)
+    return RandomError(
+        subject=subject("clock", "synchronization"),
+        unit="rad",
+        declared=sync.error * factor,
+        path=("synchronization", "error"),
+        published=effect,
+        full=effect,
+        equation="synchronisation",
+        evidence=sync.source,
+        notes=(note,) if note else (),
+    )

@@ -1,0 +1,122 @@
+"""Phase noise of an oscillator, from its mask, its Allan deviation or its power law. Spectra are one-sided."""
+
+import math
+from collections.abc import Sequence
+from itertools import combinations, pairwise
+from typing import NamedTuple
+
+from bisar_budget.effects.spectra import Piece
+from bisar_budget.mission.instruments import Oscillator, PowerLaw
+
+_STEEPEST, _LEAST_STEEP = 4.0, 3.0  # slopes of a mask below its first point
+
+
+class Noise(NamedTuple):
+    """Phase noise of an oscillator at the radar's centre frequency, and what was assumed to get it."""
+
+    pieces: tuple[Piece, ...]
+    notes: tuple[str, ...] = ()
+    misfit: float = 0.0  # of a power law to an Allan deviation, the worst point's
+
+
+def noise_of(oscillator: Oscillator, center_frequency: float, aperture_time: float) -> Noise:
+    """Spectrum of an oscillator's phase, one-sided. [rad²/Hz]"""
+    if oscillator.phase_noise is not None:
+        return _of_mask(oscillator, center_frequency, aperture_time)
+    if oscillator.power_law is not None:
+        return Noise(_of_power_law(oscillator.power_law, center_frequency, oscillator.bandwidth))
+    points = oscillator.allan_deviation or ()
+    law, misfit = fitted(points, oscillator.bandwidth)
+    notes = []
+    if points[-1][0] < aperture_time:
+        notes.append(
+            f"the Allan deviation ends at {points[-1][0]:g} s; up to the aperture time its power law continues"
+        )
+    if law.flicker_phase:
+        notes.append("an Allan deviation does not tell white from flicker phase noise: flicker is assumed")
+    return Noise(_of_power_law(law, center_frequency, oscillator.bandwidth), tuple(notes), misfit)
+
+
+def _of_mask(oscillator: Oscillator, center_frequency: float, aperture_time: float) -> Noise:
+    points = oscillator.phase_noise or ()
+    scale = 2 * (center_frequency / (oscillator.frequency or center_frequency)) ** 2
+    densities = [(f, scale * 10 ** (level / 10)) for f, level in points]
+    pieces = []
+    for (f, density), (g, next_density) in pairwise(densities):
+        slope = math.log(density / next_density) / math.log(g / f)
+        pieces.append(Piece(f, min(g, oscillator.bandwidth), density * f**slope, slope))
+    first, density = densities[0]
+    slope = min(_STEEPEST, max(_LEAST_STEEP, pieces[0].slope))
+    pieces.insert(0, Piece(0.0, min(first, oscillator.bandwidth), density * first**slope, slope))
+    notes: tuple[str, ...] = ()
+    # The quadratic phase is made of tones of about a cycle per aperture.
+    if first * aperture_time > 0.5:
+        notes = (f"the mask begins at {first:g} Hz; below, it continues as f^-{slope:.3g}",)
+    return Noise(tuple(piece for piece in pieces if piece.low < piece.high), notes)
+
+
+def _of_power_law(law: PowerLaw, center_frequency: float, bandwidth: float) -> tuple[Piece, ...]:
+    """S_φ = f₀²·S_y/f²."""
+    square = center_frequency**2
+    return tuple(
+        Piece(0.0, bandwidth, square * h, slope) for slope, h in zip((4.0, 3.0, 2.0, 1.0, 0.0), law, strict=True) if h
+    )
+
+
+def allan_variances(tau: float, bandwidth: float) -> tuple[float, ...]:
+    """Allan variance at an averaging time of h₋₂, h₋₁, h₀, h₁ and h₂ of 1; `bandwidth` is that of the measurement."""
+    return (
+        2 * math.pi**2 / 3 * tau,
+        2 * math.log(2),
+        1 / (2 * tau),
+        (1.038 + 3 * math.log(2 * math.pi * bandwidth * tau)) / (4 * math.pi**2 * tau**2),
+        3 * bandwidth / (4 * math.pi**2 * tau**2),
+    )
+
+
+def fitted(points: Sequence[tuple[float, float]], bandwidth: float) -> tuple[PowerLaw, float]:
+    """Fit h₋₂ … h₁, none negative, to an Allan deviation; and the largest misfit, of a deviation.
+
+    Least squares of relative variances. As few terms as points, of equal fits that with the fewest.
+    """
+    terms = 4  # white and flicker phase noise have nearly the same Allan variance
+    basis = [allan_variances(tau, bandwidth) for tau, _ in points]
+    scaled = [[one / deviation**2 for one in row[:terms]] for row, (_, deviation) in zip(basis, points, strict=True)]
+    best: tuple[float, list[float]] = (math.inf, [])
+    for count in range(1, min(terms, len(points)) + 1):
+        for chosen in combinations(range(terms), count):
+            found = _least_squares([[row[index] for index in chosen] for row in scaled])
+            if found is None or min(found) <= 0:
+                continue
+            h = [0.0] * 5
+            for index, value in zip(chosen, found, strict=True):
+                h[index] = value
+            worst = max(
+                abs(math.sqrt(math.fsum(a * b for a, b in zip(row, h[:terms], strict=True))) - 1) for row in scaled
+            )
+            if worst < 0.9 * best[0] and best[0] > 0.01:
+                best = (worst, h)
+    return PowerLaw(*best[1]), best[0]
+
+
+def _least_squares(rows: Sequence[Sequence[float]]) -> list[float] | None:
+    """Solve rows·x = 1 in the least squares; None where it has no one solution. A few unknowns, scaled first."""
+    count = len(rows[0])
+    sizes = [max(abs(row[index]) for row in rows) for index in range(count)]
+    if not all(sizes):
+        return None
+    scaled = [[value / size for value, size in zip(row, sizes, strict=True)] for row in rows]
+    matrix = [[math.fsum(row[i] * row[j] for row in scaled) for j in range(count)] for i in range(count)]
+    right = [math.fsum(row[i] for row in scaled) for i in range(count)]
+    for i in range(count):
+        pivot = max(range(i, count), key=lambda row: abs(matrix[row][i]))
+        if abs(matrix[pivot][i]) < 1e-13:
+            return None
+        matrix[i], matrix[pivot], right[i], right[pivot] = matrix[pivot], matrix[i], right[pivot], right[i]
+        for j in range(i + 1, count):
+            factor = matrix[j][i] / matrix[i][i]
+            matrix[j] = [a - factor * b for a, b in zip(matrix[j], matrix[i], strict=True)]
+            right[j] -= factor * right[i]
+    for i in reversed(range(count)):
+        right[i] = (right[i] - math.fsum(matrix[i][j] * right[j] for j in range(i + 1, count))) / matrix[i][i]
+    return [value / size for value, size in zip(right, sizes, strict=True)]

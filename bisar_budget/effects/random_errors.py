@@ -1,0 +1,211 @@
+"""Errors of sensors and clocks: what one unit of a figure does to quadratic phase, cubic phase and ISLR, 1 sigma.
+
+Biases of an inertial sensor are one error over the aperture, noise is another at every moment; both have a sigma and
+no sign. They contribute from the quadratic order on: the constant and linear part of a position is what aiding
+leaves, and the mission declares it. To the published model the line of sight is that of mid-aperture
+(`theory.random_errors`); the full model lets it turn, and counts what the displacement of the image adds.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from functools import cache
+from operator import mul
+from typing import NamedTuple
+
+from bisar_budget import evaluators
+from bisar_budget.constants import ROUNDING, STANDARD_GRAVITY
+from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.exact_ranges import ExactRanges
+from bisar_budget.effects.subject import Subject, subject
+from bisar_budget.faults import KeyPath
+from bisar_budget.geometry import BistaticGeometry, PlatformState, Vector
+from bisar_budget.mission.instruments import IMU_KINDS, GaussMarkov, Imu
+from bisar_budget.mission.model import Mission, MotionError
+
+IMU_UNITS = dict(zip(IMU_KINDS, ("m/s^2", "rad", "rad/s", "m/s/sqrt(s)", "rad/sqrt(s)"), strict=True))
+_BY_GRAVITY = ("attitude", "gyro_bias", "angle_random_walk")
+_NODES = 16  # a walk has a covariance with an edge, which fewer nodes miss by a percent
+NO_PHASE = "no quadratic phase, no cubic phase and nothing that spreads"
+
+
+class RandomEffect(NamedTuple):
+    """What a unit of an error does: quadratic and cubic phase at the aperture edge, rms of what spreads. [rad/unit]
+
+    `spread` is what is left of the phase after the cubic; it is a mean power, and no coverage factor is in it.
+    """
+
+    quadratic: float
+    cubic: float
+    spread: float
+
+
+class RandomError(NamedTuple):
+    """One error of a sensor or a clock: what it is, how large it is declared, what one unit of it does.
+
+    `declared` is the largest of the axes, coverage factor included, and all axes grow with it; None where the file is
+    silent. The unit of an oscillator is `dB`: its noise as a factor of amplitude, declared 1.
+    """
+
+    subject: Subject
+    unit: str
+    declared: float | None
+    path: KeyPath
+    published: RandomEffect
+    full: RandomEffect
+    equation: str
+    evidence: str | None
+    no_limit: str = NO_PHASE
+    notes: tuple[str, ...] = ()
+    warning: str = ""
+
+    @property
+    def id(self) -> str:
+        """That of its row."""
+        return self.subject.id
+
+    @property
+    def owner(self) -> str:
+        """Whose share it counts against: transmitter, receiver or clock."""
+        return self.subject.owner
+
+    def effect(self, model: str) -> RandomEffect:
+        """What a unit does by a model."""
+        return self.full if model == "full" else self.published
+
+
+def random_errors(mission: Mission, geometry: BistaticGeometry) -> list[RandomError]:
+    """List the errors of sensors and clocks that a mission names, in a fixed order; nothing for most.
+
+    Of a platform with an inertial sensor every figure is listed, declared or not.
+    """
+    found: list[RandomError] = []
+    states = (geometry.transmitter, geometry.receiver)
+    if any(getattr(mission.platforms, name).motion_error.imu for name in PLATFORMS):
+        exact = ExactRanges(geometry, mission.radar.wavelength, mission.collection.aperture_time, count=_NODES)
+        for name, state in zip(PLATFORMS, states, strict=True):
+            found += _of_imu(mission, name, state, exact)
+    for name, state in zip(PLATFORMS, states, strict=True):
+        found += _of_position(mission, name, state)
+    if mission.synchronization or any(getattr(mission.platforms, name).oscillator for name in PLATFORMS):
+        from bisar_budget.effects.clocks import clock_noise
+
+        found += clock_noise(mission)
+    return found
+
+
+def _of_imu(mission: Mission, name: str, state: PlatformState, exact: ExactRanges) -> Iterator[RandomError]:
+    error: MotionError = getattr(mission.platforms, name).motion_error
+    imu: Imu | None = error.imu
+    if imu is None:
+        return
+    axes = state.frame(error.frame)
+    factor = mission.allocation.coverage_factor
+    for index, (kind, unit) in enumerate(IMU_UNITS.items()):
+        values: Vector | None = getattr(imu, kind)
+        largest = None if values is None else max(values)
+        parts = tuple(value / largest for value in values) if values and largest else (1.0, 1.0, 1.0)
+        directions = [
+            _scaled(_leak(axis) if kind in _BY_GRAVITY else axis, p) for axis, p in zip(axes, parts, strict=True)
+        ]
+        along = math.hypot(*(_dot(state.look, direction) for direction in directions))
+        row = evaluators.inertial_phases(
+            along, along, STANDARD_GRAVITY, mission.radar.wavelength, mission.collection.aperture_time
+        )[index]
+        published = RandomEffect(row[0], row[1], row[2] / factor)
+        quadratic, cubic = _over_aperture(exact, name, kind, directions)
+        is_of_part = kind in dict(error.of_parts)
+        yield RandomError(
+            subject=subject(name, "imu", kind),
+            unit=unit,
+            declared=None if largest is None else largest * factor,
+            path=("platforms", name, "motion_error", *(("sensor",) if is_of_part else ("imu", kind))),
+            published=published,
+            full=RandomEffect(quadratic, cubic, published.spread),
+            equation="inertial sensor",
+            evidence=error.evidence(kind) if is_of_part else imu.source or error.source,
+            no_limit="the line of sight has no part in it: no phase",
+        )
+
+
+def _leak(axis: Vector) -> Vector:
+    """Where gravity leaks by a tilt about an axis: axis × up."""
+    return (axis[1], -axis[0], 0.0)
+
+
+def _scaled(vector: Vector, factor: float) -> Vector:
+    return (vector[0] * factor, vector[1] * factor, vector[2] * factor)
+
+
+def _dot(a: Vector, b: Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _over_aperture(exact: ExactRanges, name: str, kind: str, directions: Sequence[Vector]) -> tuple[float, float]:
+    """Sigma of quadratic and cubic phase of a unit over the exact paths, displacement of the image included. [rad]"""
+    covariance = _covariance(kind, exact.half)
+    scale = STANDARD_GRAVITY if kind in _BY_GRAVITY else 1.0
+    squares = []
+    for weights in exact.phase_weights:
+        square = size = 0.0
+        for direction in directions:
+            along = list(map(mul, weights, exact.along(name, direction)))
+            for row, weight in zip(covariance, along, strict=True):
+                square += weight * math.fsum(map(mul, row, along))
+            size += sum(map(abs, along)) ** 2 * covariance[0][0]
+        squares.append(square if square > (ROUNDING * 1e3) * size else 0.0)
+    return scale * math.sqrt(squares[0]), scale * math.sqrt(squares[1])
+
+
+@cache
+def _covariance(kind: str, half: float) -> tuple[tuple[float, ...], ...]:
+    """Covariance of the position error of a unit at the nodes, without gravity: zero at mid-aperture. [m²/unit²]"""
+    times = [node * half for node in evaluators.LEGENDRE_FITS[_NODES][0]]
+    if kind in ("accelerometer_bias", "attitude", "gyro_bias"):
+        order = 3 if kind == "gyro_bias" else 2
+        history = [tau**order / math.factorial(order) for tau in times]
+        return tuple(tuple(a * b for b in history) for a in history)
+    walk = _velocity_walk if kind == "velocity_random_walk" else _angle_walk
+    return tuple(tuple(walk(*sorted((abs(s), abs(t)))) if s * t > 0 else 0.0 for t in times) for s in times)
+
+
+def _velocity_walk(early: float, late: float) -> float:
+    """White acceleration of density 1, twice integrated from zero: ∫(early − w)(late − w) dw."""
+    return early**2 * (3 * late - early) / 6
+
+
+def _angle_walk(early: float, late: float) -> float:
+    """White rate of a tilt of density 1, three times integrated: ∫(early − w)²(late − w)²/4 dw."""
+    lag = late - early
+    return (early**5 / 5 + lag * early**4 / 2 + lag**2 * early**3 / 3) / 4
+
+
+def _of_position(mission: Mission, name: str, state: PlatformState) -> Iterator[RandomError]:
+    error: MotionError = getattr(mission.platforms, name).motion_error
+    if not error.random:
+        return
+    from bisar_budget.effects.tones import gauss_markov
+
+    k, factor = 2 * math.pi / mission.radar.wavelength, mission.allocation.coverage_factor
+    axes = state.frame(error.frame)
+    is_of_part = "random" in dict(error.of_parts)
+    process: GaussMarkov
+    for index, process in enumerate(error.random):
+        largest = max(process.sigma)
+        sizes = [sigma / largest if largest else 1.0 for sigma in process.sigma]
+        along = k * math.hypot(*(_dot(state.look, axis) * size for axis, size in zip(axes, sizes, strict=True)))
+        parts = gauss_markov(mission.collection.aperture_time, process.correlation_time)
+        effect = RandomEffect(
+            along * math.sqrt(parts.quadratic), along * math.sqrt(parts.cubic), along * math.sqrt(parts.left) / factor
+        )
+        own: KeyPath = ("sensor",) if is_of_part else ("random", index, "sigma")
+        yield RandomError(
+            subject=subject(name, "random", process.name),
+            unit="m",
+            declared=largest * factor,
+            path=("platforms", name, "motion_error", *own),
+            published=effect,
+            full=effect,
+            equation="Gauss-Markov",
+            evidence=error.evidence("random") if is_of_part else process.source or error.source,
+            no_limit="the line of sight has no part in it: no phase",
+        )

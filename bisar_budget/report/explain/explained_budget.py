@@ -1,0 +1,32 @@
+"""From the total of the quadratic phase error to what one owner may use of it."""
+
+import math
+from collections.abc import Iterator
+
+from bisar_budget.analysis.allocation import Allocation
+from bisar_budget.report.explain import formulas
+from bisar_budget.report.explain.formulas import Step, equation, step
+
+
+def limit_steps(allocation: Allocation, owner: str, limit: float) -> Iterator[Step]:
+    """Budget times share times gain."""
+    total, share, gain = allocation.qpe_total, allocation.qpe.of(owner), allocation.autofocus_gain
+    whose = {
+        "clock": "the receiver’s share" if allocation.qpe.clock is None else "the clock’s share",
+        "mission": "all of it: it belongs to no platform",
+    }
+    yield from autofocus_gain(allocation)
+    values = {"total": total, "share": share, "gain": gain}
+    title = f"Budget requirements.quadratic_phase_error, {whose.get(owner, f'the {owner}’s share')}"
+    yield from step(title, *equation("limit", "total*share*gain", values, limit, "rad"))
+
+
+def autofocus_gain(allocation: Allocation) -> Iterator[Step]:
+    """What autofocus multiplies limits with."""
+    if allocation.n_pull is None:
+        yield from step("No autofocus (autofocus.n_pull): gain = 1")
+        return
+    values = {"N_pull": allocation.n_pull, "q": allocation.qpe_total}
+    raw = math.pi * allocation.n_pull / allocation.qpe_total
+    lines = equation("gain", formulas.AUTOFOCUS_GAIN, values, raw, "")
+    yield from step("Autofocus, Section VI" + (", never below 1" if raw < 1 else ""), *lines)

@@ -1,0 +1,292 @@
+"""How a sensor or a clock comes to its phases: figures of a data sheet, line of sight, spectra and integrals."""
+
+import math
+from collections.abc import Iterator, Sequence
+
+from bisar_budget.analysis.allocation import Allocation
+from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.vibration_limits import spread_phase
+from bisar_budget.constants import STANDARD_GRAVITY
+from bisar_budget.effects.models import CUBIC, QUADRATIC
+from bisar_budget.effects.oscillators import noise_of
+from bisar_budget.effects.random_errors import RandomError
+from bisar_budget.effects.spectra import Piece, parts
+from bisar_budget.effects.tones import gauss_markov, interpolated
+from bisar_budget.faults import printable
+from bisar_budget.findings.row import Row
+from bisar_budget.mission.model import Mission
+from bisar_budget.report.explain.explained_budget import limit_steps
+from bisar_budget.report.explain.explained_error import as_written, missing, place
+from bisar_budget.report.explain.formulas import (
+    INERTIAL,
+    Step,
+    Sum,
+    WorkedEquation,
+    equation,
+    number,
+    step,
+    with_unit,
+)
+
+_SYMBOLS = {
+    "accelerometer_bias": "b",
+    "attitude": "ψ",
+    "gyro_bias": "ε",
+    "velocity_random_walk": "N",
+    "angle_random_walk": "N_g",
+}
+_PARTS = ("QPE", "cubic", "left")
+_WHAT = ("quadratic phase at the aperture edge", "cubic phase there", "what is left after the cubic, rms")
+
+
+def explained_random(analysis: Analysis, allocation: Allocation, error: RandomError, row: Row) -> Iterator[Step]:
+    """From the line of the file to the allowable."""
+    mission, kind = analysis.mission, error.subject.kind
+    model = row.model or "published"
+    yield from _declared(mission, error)
+    if kind == "imu":
+        yield from _imu(analysis, error, model)
+    elif kind == "random":
+        yield from _position(analysis, error)
+    elif kind == "oscillator":
+        yield from _oscillator(mission, error)
+    else:
+        yield from _link(mission, error)
+    yield from _phases(error, model)
+    yield from _allowable(mission, allocation, error, row, model)
+
+
+def _declared(mission: Mission, error: RandomError) -> Iterator[Step]:
+    if error.declared is None:
+        yield Step(missing(mission, error.path))
+        return
+    yield from step(f"Declared in {place(mission, error.path)}", as_written(mission, error.path))
+    if error.evidence:
+        yield from step("Evidence", printable(error.evidence))
+    k = mission.allocation.coverage_factor
+    if error.unit != "dB":
+        lines = equation("declared", "k*|value|", {"k": k, "value": error.declared / k}, error.declared, error.unit)
+        yield from step("Coverage factor allocation.coverage_factor; of three axes the largest value", *lines)
+
+
+def _imu(analysis: Analysis, error: RandomError, model: str) -> Iterator[Step]:
+    """The formulas of an inertial sensor with the line of sight at mid-aperture, then over exact ranges."""
+    mission, kind = analysis.mission, error.subject.axis
+    formulas = INERTIAL[kind]
+    symbol = _SYMBOLS[kind]
+    unit = error.published
+    wavelength, T = mission.radar.wavelength, mission.collection.aperture_time
+    gravity = STANDARD_GRAVITY
+    # The part of the line of sight is what the published effect has of it.
+    values = {symbol: 1.0, "T": T, "λ": wavelength, "g": gravity, "u": 1.0, "u_h": 1.0}
+    which = next(index for index, formula in enumerate(formulas) if formula)
+    along = (unit.quadratic, unit.cubic)[which] / (_of_one(kind, which, wavelength, T))
+    is_level = "u_h" in formulas[which]
+    values["u_h" if is_level else "u"] = along
+    name = "the horizontal part of the line of sight, u_h" if is_level else "the line of sight, u"
+    yield from step(f"Through {name}, at mid-aperture; of three values the root-sum-square of what each has")
+    for index, formula in enumerate(formulas):
+        if formula:
+            k = mission.allocation.coverage_factor if index == 2 else 1.0  # a mean power has no coverage factor
+            result = unit[index] * k
+            yield from step(
+                f"Derived: {_WHAT[index]}, of one unit", *equation(_PARTS[index], formula, values, result, "rad")
+            )
+    if model == "full":
+        full = error.full
+        lines = [
+            f"{part}/unit = {with_unit(value, f'rad per {error.unit}')}"
+            for part, value in zip(_PARTS, full[:2], strict=False)
+            if value
+        ]
+        yield from step(
+            "Full model: the same over exact ranges, the line of sight turning, displacement of the image included",
+            *lines,
+        )
+
+
+def _of_one(kind: str, which: int, wavelength: float, T: float) -> float:
+    """Effect of one unit along a whole line of sight."""
+    from bisar_budget import evaluators
+
+    row = evaluators.inertial_phases(1.0, 1.0, STANDARD_GRAVITY, wavelength, T)[list(_SYMBOLS).index(kind)]
+    return row[which]
+
+
+def _position(analysis: Analysis, error: RandomError) -> Iterator[Step]:
+    mission = analysis.mission
+    motion = getattr(mission.platforms, error.owner).motion_error
+    process = next(one for one in motion.random if one.name == error.subject.axis)
+    T, tau = mission.collection.aperture_time, process.correlation_time
+    yield from step(
+        "Half the aperture over the correlation time",
+        *equation("a", "T/(2*τ_c)", {"T": T, "τ_c": tau}, T / (2 * tau), ""),
+    )
+    found = gauss_markov(T, tau)
+    words = ("quadratic", "cubic", "left after the cubic")
+    yield from step(
+        "Mean squares of a process of variance 1 with the spectrum 4·τ_c/(1 + (2πf·τ_c)²)",
+        *(f"{word} = {number(value)}" for word, value in zip(words, found, strict=True)),
+    )
+    values = {"λ": mission.radar.wavelength, "u": error.published.quadratic * mission.radar.wavelength
+              / (2 * math.pi * math.sqrt(found.quadratic)), "q": found.quadratic}  # fmt: skip
+    lines = equation("QPE/unit", "2*π*u*sqrt(q)/λ", values, error.published.quadratic, "rad per m")
+    yield from step("Along the line of sight, u; of three values the root-sum-square of what each has", *lines)
+
+
+def _oscillator(mission: Mission, error: RandomError) -> Iterator[Step]:
+    oscillator = getattr(mission.platforms, error.owner).oscillator
+    sync = mission.synchronization
+    noise = noise_of(oscillator, mission.radar.center_frequency, mission.collection.aperture_time)
+    yield from step(
+        f"One-sided spectrum of phase at {mission.radar.center_frequency:.6g} Hz, S = 2·L(f)·(f_0/f_osc)^2 [rad²/Hz]",
+        *(
+            f"{piece.low:.6g} Hz to {piece.high:.6g} Hz: {piece.density:.6g} * f^-{piece.slope:.6g}"
+            for piece in noise.pieces
+        ),
+    )
+    if not error.published.quadratic:
+        yield Step(error.no_limit)
+        return
+    weight, interval, left = None, 0.0, ""
+    if sync is not None and sync.method == "linear" and sync.interval is not None:
+        weight, interval = interpolated, sync.interval
+        left = f", what synchronisation each {interval:.6g} s leaves of it"
+    yield from _integrals(noise.pieces, mission, interval, weight, left)
+    k = mission.allocation.coverage_factor
+    if k != 1:
+        yield from step(f"Phases times the coverage factor {number(k)}; what is left is a mean power and has none")
+
+
+def _integrals(
+    pieces: Sequence[Piece], mission: Mission, interval: float, weight: object, left: str
+) -> Iterator[Step]:
+    T = mission.collection.aperture_time
+    each = [parts((piece,), T, interval, weight) for piece in pieces]  # type: ignore[arg-type]
+    k = mission.allocation.coverage_factor
+    for index, (symbol, transfer) in enumerate(
+        (
+            ("QPE/unit", "[7.5·j₂(πfT)]²"),
+            ("cubic/unit", "[17.5·j₃(πfT)]²"),
+            ("left/unit", "[1 − Σ(2n+1)·jₙ(πfT)²], n to 3"),
+        )
+    ):
+        terms = [one[index] for one in each]
+        factor = k if index < 2 else 1.0
+        total = factor * math.sqrt(math.fsum(terms))
+        text = " + ".join(number(term) for term in terms)
+        text = f"sqrt({text})" if factor == 1 else f"{number(factor)}*sqrt({text})"
+        yield from step(
+            f"∫ S·{transfer} df of each piece{left}", Sum(f"{symbol} = {text} = {with_unit(total, 'rad')}")
+        )
+
+
+def _link(mission: Mission, error: RandomError) -> Iterator[Step]:
+    sync = mission.synchronization
+    if sync is None or sync.interval is None:
+        yield from step("Another error for each pulse: all of it spreads, none of it is a quadratic phase")
+        return
+    yield from step(
+        "Errors of each exchange, joined by straight lines: S = 2·σ²·T_s·sinc(f·T_s)⁴, two thirds of σ² in all",
+        f"T_s = {with_unit(sync.interval, 's')}",
+    )
+    effect = error.published
+    k = mission.allocation.coverage_factor
+    lines = [f"{part}/unit = {with_unit(value * (k if part == 'left' else 1.0), 'rad per rad')}"
+             for part, value in zip(_PARTS, effect, strict=True)]  # fmt: skip
+    yield from step("Integrated with the squares of 7.5·j₂(πfT), of 17.5·j₃(πfT), and 1 − Σ(2n+1)·jₙ²(πfT)", *lines)
+
+
+def _phases(error: RandomError, model: str) -> Iterator[Step]:
+    if error.declared is None:
+        return
+    effect = error.effect(model)
+    lines: list[WorkedEquation] = []
+    for symbol, per_unit in zip(_PARTS, effect, strict=True):
+        if per_unit:
+            values = {f"{symbol}/unit": per_unit, "declared": error.declared}
+            lines += equation(symbol, f"{symbol}/unit*declared", values, per_unit * error.declared, "rad")
+    if lines:
+        name = "full" if model == "full" else "published"
+        yield from step(f"Of what is declared, by the {name} model", *lines)
+
+
+def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row: Row, model: str) -> Iterator[Step]:
+    effect = error.effect(model)
+    limit = allocation.qpe_limit(error.owner) * allocation.autofocus_gain
+    yield from limit_steps(allocation, error.owner, limit)
+    sizes: dict[str, float] = {}
+    required = mission.requirements
+    if effect.quadratic:
+        sizes["by_QPE"] = limit / effect.quadratic
+        values = {"limit": limit, "QPE/unit": effect.quadratic}
+        lines = equation("by_QPE", "limit/(QPE/unit)", values, sizes["by_QPE"], _unit(error))
+        yield from step(f"Allowable by the {QUADRATIC.replace('_', ' ').removesuffix(' error')}", *lines)
+    if effect.cubic and required.cubic_phase_error is not None:
+        sizes["by_cubic"] = required.cubic_phase_error / effect.cubic
+        values = {"limit": required.cubic_phase_error, "cubic/unit": effect.cubic}
+        lines = equation("by_cubic", "limit/(cubic/unit)", values, sizes["by_cubic"], _unit(error))
+        yield from step(f"Allowable by requirements.{CUBIC}, without share and gain", *lines)
+    if effect.spread and required.islr is not None:
+        power, share = 10 ** (required.islr / 10), allocation.islr.of(error.owner)
+        rule = "sqrt(ISLR)" if model == "published" else "sqrt(log(ISLR + 1))"
+        whole = math.sqrt(power) if model == "published" else spread_phase(power)
+        rms = whole * math.sqrt(share)
+        lines = equation("rms", f"{rule}*sqrt(s)", {"ISLR": power, "s": share}, rms, "rad")
+        yield from step(
+            f"Phase that may be left, requirements.islr {required.islr:g} dB, share s of its power", *lines
+        )
+        sizes["by_ISLR"] = rms / effect.spread
+        values = {"rms": rms, "left/unit": effect.spread}
+        lines = equation("by_ISLR", "rms/(left/unit)", values, sizes["by_ISLR"], _unit(error))
+        yield from step("Allowable by requirements.islr", *lines)
+    if row.allowable is None or not sizes:
+        yield from step("Allowable: no limit", printable(row.reason or "no requirement limits this error"))
+        return
+    smallest = min(sizes.values())
+    text = f"min({', '.join(number(size) for size in sizes.values())})" if len(sizes) > 1 else number(smallest)
+    title = f"Allowable: the smallest, by {', '.join(sizes)}"
+    if error.unit != "dB":
+        yield from step(title, Sum(f"allowable = {text} = {with_unit(row.allowable, row.unit)}"))
+        return
+    yield from step(
+        f"{title}: a factor of the noise's amplitude", Sum(f"factor = {text} = {with_unit(smallest, '')}")
+    )
+    lines = equation("allowable", "20*log(factor)/log(10)", {"factor": smallest}, row.allowable, "dB")
+    yield from step("Its noise may rise by", *lines)
+    yield from step("Utilization", *equation("utilization", "1/factor", {"factor": smallest}, 1 / smallest, ""))
+
+
+def _unit(error: RandomError) -> str:
+    return "" if error.unit == "dB" else error.unit
+
+
+def explained_islr(
+    powers: Sequence[tuple[str, str, float]], mission: Mission, allocation: Allocation, row: Row
+) -> Iterator[Step]:
+    """Powers of everything that spreads, together."""
+    model, owner = row.model or "published", row.owner
+    members = [
+        (name, power) for name, whose, power in powers if owner == "mission" or allocation.islr.includes(whose, owner)
+    ]
+    if not members or row.declared is None or row.allowable is None:
+        yield from step("Nothing that spreads is declared")
+        return
+    total = math.fsum(power for _, power in members)
+    width = max(len(name) for name, _ in members)
+    listed = [f"{printable(name):<{width}}  {power:.6g} rad²" for name, power in members]
+    terms = " + ".join(number(power) for _, power in members)
+    yield from step("Squares of the rms phases that are left after the cubic: independent, so they add", *listed,
+                    Sum(f"v = {terms} = {with_unit(total, 'rad²')}"))  # fmt: skip
+    lines = equation("declared", "10*log(e^v - 1)/log(10)", {"v": total, "e": math.e}, row.declared, "dB")
+    yield from step("As ISLR: a phase of variance v leaves e^-v of the power in the response", *lines)
+    power, share = 10 ** ((mission.requirements.islr or 0.0) / 10), allocation.islr.of(owner)
+    rule, whole = ("ISLR", power) if model == "published" else ("log(ISLR + 1)", spread_phase(power) ** 2)
+    limit = whole * share
+    lines = equation("v_max", f"{rule}*s", {"ISLR": power, "s": share}, limit, "rad²")
+    yield from step("Variance that requirements.islr allows, share s of the power", *lines)
+    lines = equation("allowable", "10*log(e^v_max - 1)/log(10)", {"v_max": limit, "e": math.e}, row.allowable, "dB")
+    yield from step("As ISLR", *lines)
+    values = {"v": total, "v_max": limit}
+    lines = equation("utilization", "sqrt(v/v_max)", values, row.utilization or 0.0, "")
+    yield from step("Utilization, of amplitudes", *lines)
