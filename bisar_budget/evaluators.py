@@ -349,28 +349,6 @@ def power_law_parts(
     )
 
 
-def interpolation_left(
-    angle: float,
-    cosine: float,
-) -> float:
-    """Share of a tone's power that linear interpolation between samples leaves. [-]
-
-    angle is 2πf times the interval, cosine its own. Terms cancel below 0.5. Derived here.
-    """
-    shared_0 = 4/angle**2
-    return cosine*shared_0 + (1/3)*cosine - shared_0 + 5/3
-
-
-def interpolation_left_slow(
-    angle: float,
-) -> float:
-    """The same of a slow tone. [-]
-
-    A series, for less than 0.5. Derived here.
-    """
-    return (17/26153487360)*angle**12 - 1/11975040*angle**10 + (13/1814400)*angle**8 - 11/30240*angle**6 + (1/120)*angle**4
-
-
 # Nodes over -1 … 1, in half apertures, and the weights that fit a history sampled there: value P₀,
 # slope P₁, quadratic at the edge (3/2 of P₂), cubic at the edge (5/2 of P₃); by the number of nodes.
 LEGENDRE_FITS: dict[int, tuple[tuple[float, ...], ...]] = {

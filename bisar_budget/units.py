@@ -266,7 +266,7 @@ def _steps(unit: str) -> tuple[tuple[float, float, float, str], ...]:
 def _stricter(level: float, digits: int) -> str:
     """Write a negative level so that it is not above what it is."""
     step = 10.0 ** (math.floor(math.log10(-level)) - digits + 1)
-    return f"{math.floor(level / step * (1 + 1e-12)) * step:.{digits}g}"
+    return f"{math.floor(level / step * (1 - 1e-12)) * step:.{digits}g}"
 
 
 def _rounded(value: float, digits: int, rounding: str) -> str:

@@ -1,14 +1,14 @@
 """Phase noise of both oscillators, and of the link that synchronises them, over one aperture."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.effects.random_errors import RandomEffect, RandomError
-from bisar_budget.effects.spectra import Piece, parts
+from bisar_budget.effects.spectra import link_parts, parts, synchronized_parts
 from bisar_budget.effects.subject import subject
-from bisar_budget.effects.tones import Parts, held, interpolated
+from bisar_budget.effects.tones import Parts
 from bisar_budget.mission.instruments import Oscillator, Synchronization
 from bisar_budget.mission.model import Mission
 from bisar_budget.units import format_quantity
@@ -32,15 +32,14 @@ def _of_oscillator(mission: Mission, name: str, oscillator: Oscillator, sync: Sy
     T, factor = mission.collection.aperture_time, mission.allocation.coverage_factor
     noise = noise_of(oscillator, mission.radar.center_frequency, T)
     notes, no_limit, warning = list(noise.notes), "no phase noise", ""
-    weight: Callable[[float], float] | None = None
-    interval = 0.0
     if sync is not None and sync.method == "direct_path":
         found, no_limit, notes = Parts(0.0, 0.0, 0.0), DIRECT, []
     else:
         if sync is not None and sync.interval is not None:
-            weight, interval = interpolated, sync.interval
-            notes.append(f"what synchronisation each {format_quantity(interval, 's')} leaves of it")
-        found = parts(noise.pieces, T, interval, weight)
+            notes.append(f"what synchronisation each {format_quantity(sync.interval, 's')} leaves of it")
+            found = synchronized_parts(noise.pieces, T, sync.interval)
+        else:
+            found = parts(noise.pieces, T)
     key = ("platforms", name, "oscillator")
     if noise.misfit > _MISFIT:
         warning = (
@@ -71,9 +70,7 @@ def _of_link(mission: Mission, sync: Synchronization) -> RandomError:
     if sync.interval is None:  # from pulse to pulse: all of it spreads
         found, note = Parts(0.0, 0.0, 1.0), "the error is another one for each pulse: all of it spreads"
     else:
-        rate = 1 / sync.interval
-        white = Piece(0.0, 12 * rate, 2 * sync.interval, 0.0)
-        found, note = parts((white,), T, sync.interval, held), ""
+        found, note = link_parts(T, sync.interval), ""
     quadratic, cubic, spread = map(math.sqrt, found)
     effect = RandomEffect(quadratic, cubic, spread / factor)
     return RandomError(

@@ -25,6 +25,7 @@ from bisar_budget.mission.model import Mission, MotionError
 IMU_UNITS = dict(zip(IMU_KINDS, ("m/s^2", "rad", "rad/s", "m/s/sqrt(s)", "rad/sqrt(s)"), strict=True))
 _BY_GRAVITY = ("attitude", "gyro_bias", "angle_random_walk")
 _NODES = 16  # a walk has a covariance with an edge, which fewer nodes miss by a percent
+_CANCELS = ROUNDING * 1e-2  # of a square: below it, its root is rounding
 NO_PHASE = "no quadratic phase, no cubic phase and nothing that spreads"
 
 
@@ -32,11 +33,13 @@ class RandomEffect(NamedTuple):
     """What a unit of an error does: quadratic and cubic phase at the aperture edge, rms of what spreads. [rad/unit]
 
     `spread` is what is left of the phase after the cubic; it is a mean power, and no coverage factor is in it.
+    `covariance` is that of quadratic and cubic phase. [rad²/unit²]
     """
 
     quadratic: float
     cubic: float
     spread: float
+    covariance: float = 0.0
 
 
 class RandomError(NamedTuple):
@@ -112,7 +115,7 @@ def _of_imu(mission: Mission, name: str, state: PlatformState, exact: ExactRange
             along, along, STANDARD_GRAVITY, mission.radar.wavelength, mission.collection.aperture_time
         )[index]
         published = RandomEffect(row[0], row[1], row[2] / factor)
-        quadratic, cubic = _over_aperture(exact, name, kind, directions)
+        quadratic, cubic, covariance = _over_aperture(exact, name, kind, directions)
         is_of_part = kind in dict(error.of_parts)
         yield RandomError(
             subject=subject(name, "imu", kind),
@@ -120,7 +123,7 @@ def _of_imu(mission: Mission, name: str, state: PlatformState, exact: ExactRange
             declared=None if largest is None else largest * factor,
             path=("platforms", name, "motion_error", *(("sensor",) if is_of_part else ("imu", kind))),
             published=published,
-            full=RandomEffect(quadratic, cubic, published.spread),
+            full=RandomEffect(quadratic, cubic, published.spread, covariance),
             equation="inertial sensor",
             evidence=error.evidence(kind) if is_of_part else imu.source or error.source,
             no_limit="the line of sight has no part in it: no phase",
@@ -140,20 +143,27 @@ def _dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def _over_aperture(exact: ExactRanges, name: str, kind: str, directions: Sequence[Vector]) -> tuple[float, float]:
-    """Sigma of quadratic and cubic phase of a unit over the exact paths, displacement of the image included. [rad]"""
-    covariance = _covariance(kind, exact.half)
+def _over_aperture(
+    exact: ExactRanges, name: str, kind: str, directions: Sequence[Vector]
+) -> tuple[float, float, float]:
+    """Sigma of quadratic and of cubic phase of a unit over the exact paths [rad], and their covariance. [rad²]"""
+    by_node = _covariance(kind, exact.half)
+    sigmas = [math.sqrt(row[node]) for node, row in enumerate(by_node)]
     scale = STANDARD_GRAVITY if kind in _BY_GRAVITY else 1.0
-    squares = []
-    for weights in exact.phase_weights:
-        square = size = 0.0
-        for direction in directions:
-            along = list(map(mul, weights, exact.along(name, direction)))
-            for row, weight in zip(covariance, along, strict=True):
-                square += weight * math.fsum(map(mul, row, along))
-            size += sum(map(abs, along)) ** 2 * covariance[0][0]
-        squares.append(square if square > (ROUNDING * 1e3) * size else 0.0)
-    return scale * math.sqrt(squares[0]), scale * math.sqrt(squares[1])
+    squares, sizes = [0.0, 0.0, 0.0], [0.0, 0.0]  # of both phases, and their product
+    for direction in directions:
+        along = [list(map(mul, weights, exact.along(name, direction))) for weights in exact.phase_weights]
+        spread = [[math.fsum(map(mul, row, weights)) for row in by_node] for weights in along]
+        for index, (first, second) in enumerate(((0, 0), (1, 1), (0, 1))):
+            squares[index] += math.fsum(map(mul, along[first], spread[second]))
+        for index, weights in enumerate(along):
+            sizes[index] += math.fsum(map(abs, map(mul, weights, sigmas))) ** 2
+    # What is left of terms that cancel exactly is rounding, and would make a limit out of nothing.
+    quadratic, cubic = (
+        scale * math.sqrt(square) if square > _CANCELS * size else 0.0
+        for square, size in zip(squares[:2], sizes, strict=True)
+    )
+    return quadratic, cubic, scale**2 * squares[2] if quadratic and cubic else 0.0
 
 
 @cache

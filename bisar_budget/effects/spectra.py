@@ -5,16 +5,20 @@ Spectra are one-sided, of phase at the radar's centre frequency. [rad²/Hz] A da
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from functools import lru_cache
 from itertools import pairwise
 from typing import NamedTuple
 
 from bisar_budget import evaluators
-from bisar_budget.effects.tones import SLOW, Parts, tone
+from bisar_budget.effects.tones import Parts, held, tone
 
-_FAST = 12 * math.pi  # angle from which what turns with a tone is averaged
+_TURNS = 24  # half turns of a tone within the aperture that are followed one by one
+_FAST = _TURNS * math.pi  # angle from which what turns with a tone is averaged
 _FIRST = 0.1  # angle below which a tone's parts are their first powers, to 4e-4 of the 3 % that lie there
 _OCTAVE = 2.0
+_SAME = 1.000001  # of two edges, computed in two ways
+_NOTHING = 1e-6  # of the first edge: nothing of a tone's parts is below
+_FOLDED = 8  # intervals of sampling beyond which straight lines pass less than 1e-5 of a tone's power
+_ALIASES = 3  # tones folded from so many rates away are counted one by one, those beyond by an integral
 
 # Nodes and weights of Gauss and Legendre on 0 … 1.
 _NODES = tuple((0.5 + 0.5 * node, weight) for node, weight in zip(*evaluators.LEGENDRE_FITS[6][:2], strict=True))
@@ -40,12 +44,7 @@ class Piece(NamedTuple):
         return float(self.density * (high**exponent - (low**exponent if low else 0.0)) / exponent)
 
 
-def parts(
-    pieces: Sequence[Piece],
-    aperture_time: float,
-    interval: float = 0.0,
-    weight: Callable[[float], float] | None = None,
-) -> Parts:
+def parts(pieces: Sequence[Piece], aperture_time: float) -> Parts:
     """Integrate a spectrum with the parts of a tone, to 1e-4.
 
     Parameters
@@ -54,64 +53,101 @@ def parts(
         Of a one-sided spectrum. [rad²/Hz]
     aperture_time : float
         [s]
-    interval : float
-        Of synchronisation. [s]
-    weight : callable, optional
-        Of 2πf·interval: what synchronisation makes of a tone's power. It ends as a constant: its mean.
     """
-    total = Parts(0.0, 0.0, 0.0)
-    scale = math.pi * aperture_time
+    scale, total = math.pi * aperture_time, Parts(0.0, 0.0, 0.0)
     for piece in pieces:
-        for low, high in _panels(piece, scale, interval):
-            total = total.plus(_panel(piece, low, high, aperture_time, interval, weight))
+        for low, high in _panels(piece.low, piece.high, _edges(aperture_time)):
+            if high * scale <= _FIRST * _SAME:
+                found = _slow(piece, low, high, scale)
+            elif low * scale >= _FAST / _SAME:
+                found = _fast(piece, low, high, scale)
+            else:
+                found = _panel(piece.at, low, high, scale)
+            total = total.plus(found)
     return total
 
 
-def _panels(piece: Piece, scale: float, interval: float) -> Iterator[tuple[float, float]]:
-    """Intervals of frequency within which a tone's parts, and the weight, are smooth. [Hz]"""
+def synchronized_parts(pieces: Sequence[Piece], aperture_time: float, interval: float) -> Parts:
+    """The same of what synchronisation leaves: a phase less the straight lines between samples of it.
+
+    Straight lines pass sinc²(f·T_s) of a tone, and fold every tone that is m/T_s away on it: of a spectrum S they
+    leave S·(1 − sinc²)² + sinc⁴·Σ S(|f + m/T_s|), m ≠ 0. The lines begin anywhere in the interval.
+    """
+    end = max(piece.high for piece in pieces)
+    rate = 1 / interval
+    edges = _edges(aperture_time) + [rate * n / 4 for n in range(1, 4 * _FOLDED + 1)]
+    edges += [edge for piece in pieces for edge in (piece.low, piece.high)]
+    scale, total = math.pi * aperture_time, Parts(0.0, 0.0, 0.0)
+    beyond = [_beyond(piece, rate) for piece in pieces]
+
+    def left(f: float) -> float:
+        return _left(pieces, beyond, f, rate)
+
+    last = max(_FOLDED * rate, _FAST / scale)
+    for low, high in _panels(0.0, min(end, last), edges):
+        total = total.plus(_panel(left, low, high, scale))
+    # Where straight lines pass nothing any more.
+    for piece in pieces:
+        if piece.high > last:
+            total = total.plus(_fast(piece, max(piece.low, last), piece.high, scale))
+    return total
+
+
+def _left(pieces: Sequence[Piece], beyond: Sequence[float], f: float, rate: float) -> float:
+    """Spectrum that straight lines between samples leave. [rad²/Hz]"""
+    passed = held(2 * math.pi * f / rate)  # sinc⁴
+    nearest = round(f / rate)
+    start = f - nearest * rate
+    total = 0.0
+    for piece, far in zip(pieces, beyond, strict=True):
+        own, aliases = 0.0, far
+        for n in range(-_ALIASES, _ALIASES + 1):
+            at = abs(start + n * rate)
+            if piece.low <= at < piece.high:
+                if n == nearest:
+                    own = piece.at(at)
+                else:
+                    aliases += piece.at(at)
+        if abs(nearest) > _ALIASES and piece.low <= f < piece.high:
+            own = piece.at(f)
+        total += own * (1 - math.sqrt(passed)) ** 2 + passed * aliases
+    return total
+
+
+def _beyond(piece: Piece, rate: float) -> float:
+    """Sum of what is folded from farther away, as an integral; its first correction is that of the midpoint rule."""
+    low = max(piece.low, (_ALIASES + 0.5) * rate)
+    if low >= piece.high:
+        return 0.0
+    rise = -piece.slope * piece.at(low) / low  # of the spectrum, at the integral's beginning
+    return 2 * (piece.integral(low, piece.high) / rate + rise * rate / 24)
+
+
+def _edges(aperture_time: float) -> list[float]:
+    """Frequencies between which a tone's parts are smooth. [Hz]"""
+    scale = math.pi * aperture_time
     edges = [_FIRST / scale * _OCTAVE**n for n in range(4)]
-    edges += [math.pi * n / scale for n in range(1, 13)]
-    if interval:
-        rate = 1 / (2 * math.pi * interval)
-        edges += [SLOW * rate * _OCTAVE**-n for n in range(4)] + [
-            SLOW * rate,
-            *(math.pi * n * rate for n in range(1, 13)),
-        ]
-    inside = sorted(edge for edge in edges if piece.low < edge < piece.high)
-    yield from pairwise([piece.low, *inside, piece.high])
+    return edges + [math.pi * n / scale for n in range(1, _TURNS + 1)]
 
 
-def _panel(
-    piece: Piece,
-    low: float,
-    high: float,
-    aperture_time: float,
-    interval: float,
-    weight: Callable[[float], float] | None,
-) -> Parts:
-    scale, rate = math.pi * aperture_time, 2 * math.pi * interval
-    is_slow, is_fast = high * scale <= _FIRST * 1.000001, low * scale >= _FAST * 0.999999
-    if weight is None and is_slow:
-        return _slow(piece, low, high, scale)
-    if weight is None and is_fast:
-        return _fast(piece, low, high, scale)
-    if weight is not None and interval and is_fast and low * rate >= _FAST * 0.999999:
-        return _fast(piece, low, high, scale).times(_mean(weight))
-    # Over logarithms, where a panel is long.
+def _panels(low: float, high: float, edges: Sequence[float]) -> Iterator[tuple[float, float]]:
+    return pairwise([low, *sorted({edge for edge in edges if low < edge < high}), high])
+
+
+def _panel(density: Callable[[float], float], low: float, high: float, scale: float) -> Parts:
+    """Integrate between two edges, over logarithms: a panel may be long."""
     quadratic = cubic = left = 0.0
-    bottom = low or high * 1e-6
-    span = math.log(high / bottom)
+    low = low or high * _NOTHING
+    is_fast, span = low * scale >= _FAST / _SAME, math.log(high / low)
     for part, share in _NODES:
-        f = bottom * math.exp(span * part)
+        f = low * math.exp(span * part)
         angle = f * scale
         if is_fast:
             ((square, cube, rest),) = evaluators.tone_parts_fast(1.0, *(angle**-power for power in (2, 4, 6, 8)))
         else:
             square, cube, rest = tone(angle)
             square, cube = square * square, cube * cube
-        power = piece.at(f) * f * span * share
-        if weight is not None:
-            power *= weight(f * rate)
+        power = density(f) * f * span * share
         quadratic += power * square
         cubic += power * cube
         left += power * rest
@@ -134,8 +170,11 @@ def _fast(piece: Piece, low: float, high: float, scale: float) -> Parts:
     return Parts(*found)
 
 
-@lru_cache
-def _mean(weight: Callable[[float], float]) -> float:
-    """What a weight is on average at high frequencies."""
-    start, count = 1e6 * math.pi, 64
-    return math.fsum(weight(start + 2 * math.pi * n / count) for n in range(count)) / count
+def link_parts(aperture_time: float, interval: float) -> Parts:
+    """Parts of samples of variance 1 with straight lines between: one-sided 2·T_s·sinc⁴(f·T_s), ⅔ in all."""
+    rate, scale = 1 / interval, math.pi * aperture_time
+    edges = _edges(aperture_time) + [rate * n / 4 for n in range(1, 4 * _FOLDED + 1)]
+    total = Parts(0.0, 0.0, 0.0)
+    for low, high in _panels(0.0, _FOLDED * rate, edges):
+        total = total.plus(_panel(lambda f: 2 * interval * held(2 * math.pi * f * interval), low, high, scale))
+    return total

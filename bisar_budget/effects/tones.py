@@ -46,15 +46,6 @@ def tone(angle: float) -> tuple[float, float, float]:
     return found  # type: ignore[return-value]
 
 
-def interpolated(step: float) -> float:
-    """Share of a tone's power that linear interpolation between samples leaves; `step` is 2πf·T_s."""
-    return (
-        evaluators.interpolation_left_slow(step)
-        if step < SLOW
-        else evaluators.interpolation_left(step, math.cos(step))
-    )
-
-
 def held(step: float) -> float:
     """Spectrum of samples joined by straight lines, over that of white noise of their variance: sinc⁴."""
     half = step / 2

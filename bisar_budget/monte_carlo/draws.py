@@ -32,7 +32,8 @@ class Variable(NamedTuple):
     """One standard variable, mean 0 and variance 1, and what it does.
 
     `of` is the error, or the covariance, that it belongs to. `parts` are the errors it makes, and how much of each
-    [unit]. Effects: quadratic and cubic phase at the aperture edge [rad], displacement east and north [m].
+    [unit]; none where it is noise, which is phases alone. Effects: quadratic and cubic phase at the aperture edge
+    [rad], displacement east and north [m].
     """
 
     id: str
@@ -127,7 +128,7 @@ class _Sums:
     """Effects of one block of draws, added up: the quadratic phase by owner, all else for the mission.
 
     By owner, if kept: `motion` is position, velocity and acceleration error of both platforms, (2, 3, 3, draws),
-    `clock` its coefficients (4, draws), `phase_alone` what is stated as a phase (draws,).
+    `clock` its coefficients (4, draws), `phase_alone` what is stated as a phase, quadratic and cubic (2, draws).
     """
 
     def __init__(
@@ -153,6 +154,8 @@ class _Sums:
         if self.keeps_motion:
             for source, size in variable.parts:
                 self._add_motion(variable.owner, source, size, drawn)
+            if not variable.parts:
+                self._add_phases(variable.owner, variable.effects[:2], drawn)
 
     def _add_motion(self, owner: str, source: ErrorSource, size: float, drawn: Floats) -> None:
         if source.is_position:
@@ -165,7 +168,10 @@ class _Sums:
         elif source.owner == "clock":
             self.clock.setdefault(owner, np.zeros((4, self.size)))[_CLOCK[source.unit]] += size * drawn
         else:
-            self.phase_alone.setdefault(owner, np.zeros(self.size))[:] += size * drawn
+            self._add_phases(owner, (size, 0.0), drawn)
+
+    def _add_phases(self, owner: str, phases: tuple[float, ...], drawn: Floats) -> None:
+        self.phase_alone.setdefault(owner, np.zeros((2, self.size)))[:] += np.multiply.outer(phases, drawn)
 
     def phase(self, owners: Sequence[str] | None = None) -> Floats:
         """Quadratic phase of the errors of some owners, else of all, (draws,). [rad]"""
@@ -192,13 +198,11 @@ class _Sums:
         if owners not in self._exact:
             self._exact[owners] = self._by_exact_ranges(analysis, owners)
         found = self._exact[owners]
+        quadratic, cubic = _sum(self.phase_alone, owners, np.zeros((2, 1)))
         if judged.columns == (0,):
-            alone = sum(
-                (self.phase_alone[owner] for owner in owners if owner in self.phase_alone), np.zeros(self.size)
-            )
-            square: Floats = (found.quadratic + alone) ** 2
+            square: Floats = (found.quadratic + quadratic) ** 2
         elif judged.columns == (1,):
-            square = found.cubic**2
+            square = (found.cubic + cubic) ** 2
         else:
             square = np.sum(found.displacement**2, axis=-1)
         return square

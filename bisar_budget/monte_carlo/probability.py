@@ -11,6 +11,7 @@ Vibration is not drawn: its amplitude is declared and its limits are those of ec
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
@@ -19,9 +20,12 @@ from bisar_budget.constants import MAX_DRAWS
 from bisar_budget.effects.correlation import combined_displacement, combined_phase
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource, ImagePlane
 from bisar_budget.findings.monte_carlo import MonteCarlo, Requirement
-from bisar_budget.mission.model import Mission, Simulation
+from bisar_budget.mission.model import Mission, Simulation, has_instruments
 from bisar_budget.mission.symmetric import eigensystem
 from bisar_budget.monte_carlo.draws import Judged, Variable, count
+
+if TYPE_CHECKING:
+    from bisar_budget.effects.random_errors import RandomError
 
 CONFIDENCE = 0.95
 DOMINANT = 0.5  # of the variance: beyond, a sum has the shape of that one error, whatever the others are
@@ -56,7 +60,7 @@ def monte_carlo(analysis: Analysis, draws: int, seed: int | None = None) -> Mont
     if seed is None:
         seed = (mission.simulation or Simulation()).seed
     variables = list(_variables(analysis))
-    judged = list(_requirements(mission, analysis.allocation, analysis.stated))
+    judged = list(_requirements(mission, analysis.allocation, variables))
     counted = count(analysis, variables, judged, draws, seed)
     predictions = _Predictions(analysis, variables)
     requirements = tuple(
@@ -106,6 +110,24 @@ def _variables(analysis: Analysis) -> Iterator[Variable]:
         if distribution == "uniform":
             size /= math.sqrt(3)  # the standard uncertainty of ±a, GUM 4.3.7
         yield _variable(source.id, source.id, source.owner, distribution, [(source, size)], plane)
+    for error in analysis.random:
+        yield from _of_noise(error, factor)
+
+
+def _of_noise(error: "RandomError", factor: float) -> Iterator[Variable]:
+    """Two variables of a sensor or a clock: its quadratic phase with the cubic that goes with it, and the rest."""
+    if not error.declared:
+        return
+    size = error.declared / factor
+    effect = error.full
+    if error.unit == "dB":  # the coverage factor is in its phases
+        size, effect = 1.0, effect._replace(quadratic=effect.quadratic / factor, cubic=effect.cubic / factor)
+    quadratic, cubic = effect.quadratic * size, effect.cubic * size
+    shared = effect.covariance * size**2 / quadratic if quadratic else 0.0
+    alone = math.sqrt(max(0.0, cubic**2 - shared**2))
+    for part, effects in (("", (quadratic, shared, 0.0, 0.0)), (".cubic", (0.0, alone, 0.0, 0.0))):
+        if any(effects):
+            yield Variable(f"{error.id}{part}", error.id, error.owner, "normal", (), effects)
 
 
 def _variable(
@@ -121,9 +143,9 @@ def _variable(
     return Variable(id, of, owner, distribution, tuple(parts), effects)
 
 
-def _requirements(mission: Mission, allocation: Allocation, declared: Sequence[ErrorSource]) -> Iterator[Judged]:
+def _requirements(mission: Mission, allocation: Allocation, variables: Sequence[Variable]) -> Iterator[Judged]:
     """Those of `check` that declared errors count against."""
-    present = {source.owner for source in declared}
+    present = {variable.owner for variable in variables}
     every = ("transmitter", "receiver", "clock", "mission")
     wanted = {
         "transmitter": ("transmitter",),
@@ -135,12 +157,12 @@ def _requirements(mission: Mission, allocation: Allocation, declared: Sequence[E
         if present.intersection(owners):
             limit = allocation.qpe_limit("clock" if name == "timing" else name) * allocation.autofocus_gain
             yield Judged(f"{name}.quadratic_phase_error", "rad", limit, owners, (0,))
-    if any(source.is_motion for source in declared):
-        requirements = mission.requirements
-        if requirements.cubic_phase_error is not None:
-            yield Judged("mission.cubic_phase_error", "rad", requirements.cubic_phase_error, every, (1,))
-        if requirements.location_error is not None:
-            yield Judged("mission.location_error", "m", requirements.location_error, every, (2, 3))
+    cubic, location = mission.requirements.cubic_phase_error, mission.requirements.location_error
+    moves = any(source.is_motion for variable in variables for source, _ in variable.parts)
+    if cubic is not None and (moves or any(variable.effects[1] for variable in variables)):
+        yield Judged("mission.cubic_phase_error", "rad", cubic, every, (1,))
+    if location is not None and moves:
+        yield Judged("mission.location_error", "m", location, every, (2, 3))
 
 
 class _Predictions:
@@ -148,15 +170,19 @@ class _Predictions:
 
     def __init__(self, analysis: Analysis, variables: Sequence[Variable]) -> None:
         self.together, self.variables = Together(analysis, analysis.full), variables
+        drawn = {error.id for error in analysis.random}
+        self.noise = [own for own in self.together.own if own.row_id in drawn]
 
     def combined(self, judged: Judged, rule: str) -> float | None:
         """What a rule of `allocation.combine` holds to the limit, coverage factor included; None: no image."""
         together = self.together
         if judged.columns == (0,):
             members = [source for source in together.stated if source.owner in judged.owners]
-            phase = combined_phase(together.phases(members), rule, together.groups)
+            noise = [(own.row_id, own.qpe_rad) for own in self.noise if own.owner in judged.owners]
+            phase = combined_phase([*together.phases(members), *noise], rule, together.groups)
         elif judged.columns == (1,):
-            phase = combined_phase(together.cubics(), rule, together.groups)
+            noise = [(own.row_id, own.cubic_rad) for own in self.noise]
+            phase = combined_phase([*together.cubics(), *noise], rule, together.groups)
         else:
             moves = together.moves(rule)
             return None if moves is None else combined_displacement(moves, rule, together.groups)
@@ -278,5 +304,7 @@ def _notes(mission: Mission, declared: Sequence[ErrorSource], is_exact: bool) ->
     vibrations = [getattr(mission.platforms, name).motion_error.vibration for name in PLATFORMS]
     if any(one.sinusoidal or one.wideband for one in vibrations):
         yield "vibration is not drawn; the phase of a slow vibration is not included"
+    if mission.requirements.islr is not None and has_instruments(mission):
+        yield "what sensors and clocks spread is a mean power: ISLR is not drawn"
     if mission.allocation.coverage_factor != 1:
         yield "the coverage factor is in sum and rss, not in the draws"

@@ -241,7 +241,7 @@ def _of_random_errors() -> tuple[Evaluator, ...]:
     parts = "Columns: of the quadratic and the cubic phase at the aperture edge, of what is left after the cubic. "
     slow = "A series, for less than 0.5. Derived here."
     ratio = ((random_errors.ratio, "ratio"),)
-    angle, step = ((random_errors.angle, "angle"),), ((random_errors.step, "angle"),)
+    angle = ((random_errors.angle, "angle"),)
     waves = ((random_errors.sine, "sine"), (random_errors.cosine, "cosine"))
     return (
         Evaluator(
@@ -317,22 +317,6 @@ def _of_random_errors() -> tuple[Evaluator, ...]:
             arguments=((T, "aperture_time"),),
             rows=(random_errors.power_law(2), random_errors.power_law(3)),
             row_names=("quadratic", "cubic"),
-        ),
-        Evaluator(
-            name="interpolation_left",
-            summary="Share of a tone's power that linear interpolation between samples leaves. [-]",
-            details="angle is 2πf times the interval, cosine its own. Terms cancel below 0.5. Derived here.",
-            arguments=(*step, (random_errors.cosine, "cosine")),
-            rows=((random_errors.interpolated_in_terms(),),),
-            row_names=("",),
-        ),
-        Evaluator(
-            name="interpolation_left_slow",
-            summary="The same of a slow tone. [-]",
-            details=slow,
-            arguments=step,
-            rows=((random_errors.interpolated_slow(),),),
-            row_names=("",),
         ),
     )
 

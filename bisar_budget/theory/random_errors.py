@@ -220,23 +220,22 @@ def power_law(order: int) -> tuple[Expr, ...]:
     )
 
 
+def passed() -> Expr:
+    """Amplitude of a tone that straight lines between its samples pass, sinc²(f·T_s): the transform of a triangle."""
+    part = positive("nu")
+    return simplify(2 * integrate((1 - part) * cos(step * part), (part, 0, 1)))
+
+
 def interpolated() -> Expr:
-    """Share of a tone's power that linear interpolation between samples leaves, in y = 2πf·T_s."""
+    """Share of a tone's power that linear interpolation between samples leaves, in y = 2πf·T_s.
+
+    At its own frequency (1 − sinc²)² of it, at each of those that it is folded to sinc⁴ there.
+    """
     part = positive("nu")
     missed = exp(I * step * part) - (1 - part) - part * exp(I * step)
     there = (1 - part) + part * exp(-I * step)
     square = expand_complex(expand(missed * (exp(-I * step * part) - there)))
     return simplify(integrate(expand(square), (part, 0, 1)).rewrite(cos))
-
-
-def interpolated_in_terms() -> Expr:
-    """`interpolated` in `cosine` of `step`."""
-    return interpolated().subs(cos(step), cosine)
-
-
-def interpolated_slow() -> Expr:
-    """`interpolated` of a slow tone, as a series in `step`."""
-    return _series(interpolated(), step)
 
 
 def interpolated_noise() -> Expr:
@@ -284,7 +283,8 @@ def equations() -> tuple[Equation, ...]:
           for what, name, value in names),
         Equation("", "Share of a tone's power left after the cubic", real("L"), left),
         *laws,
-        Equation("", "Share of a tone left by linear interpolation, y = 2πfT_s", real("L_s"), interpolated()),
+        Equation("", "Amplitude that straight lines between samples pass, y = 2πfT_s", real("H"), passed()),
+        Equation("", "Share of a tone's power that they leave, at all frequencies", real("L_s"), interpolated()),
         Equation("", "Mean square of noise of the link with straight lines between, of σ² each time",
                  positive("sigma_L") ** 2, interpolated_noise() * positive("sigma") ** 2),
     )  # fmt: skip

@@ -13,6 +13,7 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.catalogue import EQUATIONS
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.effect import MOTION_UNITS, ErrorSource
+from bisar_budget.effects.subject import Subject
 from bisar_budget.faults import KeyPath
 from bisar_budget.findings.images import PointImage
 from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
@@ -220,7 +221,7 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
         gain_text=_gain(allocation),
         shares=tuple(_shares(allocation)),
         power_shares=tuple(_power_shares(mission, allocation)),
-        contributions=_contributions(analysis, found.model),
+        contributions=_contributions(analysis, found.rows, found.model),
         moves=_moves(found, analysis.stated),
         validity=tuple(_validity(mission, found)),
         inputs=tuple(_inputs(mission, found, file)),
@@ -392,10 +393,10 @@ def _requirement(mission: Mission, found: MissionFindings, row: Row, source: Err
     """Say what sets the allowable of the row."""
     allocation, requirements = found.allocation, mission.requirements
     binding = row.binding_requirement if row.metric == "quadratic_phase_error" else row.metric
-    if row.metric in ("pslr", "islr"):
-        value = requirements.pslr if row.metric == "pslr" else requirements.islr
-        what = "paired echoes" if row.metric == "pslr" else "power spread"
-        split = allocation.pslr if row.metric == "pslr" else allocation.islr
+    if binding in ("pslr", "islr"):
+        value = requirements.pslr if binding == "pslr" else requirements.islr
+        what = "paired echoes" if binding == "pslr" else "power spread"
+        split = allocation.pslr if binding == "pslr" else allocation.islr
         if value is None:
             return "none stated"
         return f"{what} ≤ {value:g} dB, {split.of(row.owner):.3g} of the power"
@@ -456,26 +457,27 @@ def _power_shares(mission: Mission, allocation: Allocation) -> Iterator[PowerSha
             yield PowerShare(name, f"{value:g} dB", f"{split.transmitter:.3g}", f"{split.receiver:.3g}")
 
 
-def _contributions(analysis: Analysis, model: str) -> tuple[Contribution, ...]:
+def _contributions(analysis: Analysis, rows: Sequence[Row], model: str) -> tuple[Contribution, ...]:
     """Errors as the file states them, the largest quadratic phase error first.
 
     An error that no image has comes before all others, and the others are no part of a sum with it.
     """
-    by = {name: analysis.declared(one) for name, one in (("published", analysis.published), ("full", analysis.full))}
-    sizes = {source.id: max(abs(found[source.id].qpe) for name, found in by.items() if model in (name, "strictest"))
-             for source in analysis.stated}  # fmt: skip
-    declared = sorted(
-        (source for source in analysis.stated if sizes[source.id]), key=lambda source: -sizes[source.id]
-    )
+    phases: dict[str, dict[str, float]] = {}
+    for by in (analysis.published, analysis.full):
+        phases[by.name] = {row_id: abs(found.qpe) for row_id, found in analysis.declared(by).items()}
+        phases[by.name] |= {own.row_id: own.qpe_rad for own in analysis.own_phases(by.name)}
+    subjects = {row.id: row.subject for row in rows}
+    gating = [name for name in phases if model in (name, "strictest")]
+    sizes = {row_id: max(phases[name][row_id] for name in gating) for row_id in phases["full"]}
     total, largest = math.fsum(sizes.values()), max(sizes.values(), default=0.0)
     result = []
-    for source in declared:
-        owner, kind, axis = _kind(source)
-        published, full = (_phase(abs(by[name][source.id].qpe)) for name in ("published", "full"))
-        qpe = sizes[source.id]
+    for row_id in sorted((row_id for row_id in sizes if sizes[row_id]), key=lambda row_id: -sizes[row_id]):
+        owner, kind, axis = _kind(subjects[row_id])
+        qpe = sizes[row_id]
         part = 1.0 if qpe == largest else qpe / largest
         of_sum = percent(qpe / total) if math.isfinite(total) else "–"
-        result.append(Contribution(source.id, owner, kind, axis, _phase(qpe), published, full, part, of_sum))
+        published, full = (_phase(by_model[row_id]) for by_model in phases.values())
+        result.append(Contribution(row_id, owner, kind, axis, _phase(qpe), published, full, part, of_sum))
     return tuple(result)
 
 
@@ -487,16 +489,18 @@ def _moves(found: MissionFindings, stated: Iterable[ErrorSource]) -> tuple[Move,
     moving.sort(key=lambda one: -one[1])
     largest = max((size for _, size in moving), default=1.0)
     return tuple(
-        Move(source.id, *_kind(source), format_quantity(size, "m"), size / largest) for source, size in moving
+        Move(source.id, *_kind(source.subject), format_quantity(size, "m"), size / largest) for source, size in moving
     )
 
 
-def _kind(source: ErrorSource) -> tuple[str, str, str]:
+def _kind(subject: Subject) -> tuple[str, str, str]:
     """Owner, kind and axis of an error."""
-    _, owner, kind, axis, *_ = source.subject
+    _, owner, kind, axis, *_ = subject
     if kind in MOTION_UNITS:
-        return "both platforms" if source.is_common else owner, kind, axis.replace("_", " ")
-    return owner, kind, axis or "height"
+        return "both platforms" if owner == "mission" else owner, kind, axis.replace("_", " ")
+    if kind == "terrain":
+        return owner, kind, "height"
+    return owner, kind, axis.replace("_", " ")
 
 
 def _phase(value: float) -> str:
@@ -527,6 +531,15 @@ def _validity(mission: Mission, found: MissionFindings) -> Iterator[tuple[str, s
         "Sidelobes",
         "PSLR and ISLR bound what vibration adds along the line of sight, not the sidelobes of the window",
     )
+    if any(platform.motion_error.imu or platform.motion_error.random for platform in mission.platforms):
+        yield (
+            "Sensors",
+            "one sigma, axes independent. They act from the quadratic phase on: what displaces is the declared "
+            "position and velocity. Attitude and gyros act through gravity, which leaks horizontally. Random walks "
+            "start at mid-aperture",
+        )
+    if any(platform.oscillator for platform in mission.platforms) or mission.synchronization:
+        yield "Clocks", "spectra of phase are one-sided, and count up to the oscillator’s bandwidth or the mask’s end"
 
 
 def _inputs(mission: Mission, found: MissionFindings, file: str) -> Iterator[Input]:
@@ -572,10 +585,11 @@ def _inputs(mission: Mission, found: MissionFindings, file: str) -> Iterator[Inp
     yield given("warning above", f"{100 * allocation.warn_above:g} % of a limit", ("allocation", "warn_above"))
 
 
+_SOURCED = (*MOTION_UNITS, "vibration", "other", "imu", "random", "oscillator", "synchronization")
+
+
 def _may_have_a_source(row: Row) -> bool:
-    return (
-        row.declared is not None and row.is_independent and row.subject.kind in (*MOTION_UNITS, "vibration", "other")
-    )
+    return row.declared is not None and row.is_independent and row.subject.kind in _SOURCED
 
 
 def _sources(rows: Sequence[Row]) -> tuple[Source, ...]:

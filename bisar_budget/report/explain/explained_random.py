@@ -10,8 +10,8 @@ from bisar_budget.constants import STANDARD_GRAVITY
 from bisar_budget.effects.models import CUBIC, QUADRATIC
 from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.effects.random_errors import RandomError
-from bisar_budget.effects.spectra import Piece, parts
-from bisar_budget.effects.tones import gauss_markov, interpolated
+from bisar_budget.effects.spectra import Piece, parts, synchronized_parts
+from bisar_budget.effects.tones import gauss_markov
 from bisar_budget.faults import printable
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.model import Mission
@@ -52,7 +52,7 @@ def explained_random(analysis: Analysis, allocation: Allocation, error: RandomEr
         yield from _oscillator(mission, error)
     else:
         yield from _link(mission, error)
-    yield from _phases(error, model)
+    yield from _phases(mission, error, model)
     yield from _allowable(mission, allocation, error, row, model)
 
 
@@ -148,21 +148,24 @@ def _oscillator(mission: Mission, error: RandomError) -> Iterator[Step]:
     if not error.published.quadratic:
         yield Step(error.no_limit)
         return
-    weight, interval, left = None, 0.0, ""
-    if sync is not None and sync.method == "linear" and sync.interval is not None:
-        weight, interval = interpolated, sync.interval
-        left = f", what synchronisation each {interval:.6g} s leaves of it"
-    yield from _integrals(noise.pieces, mission, interval, weight, left)
+    interval = sync.interval if sync is not None and sync.method == "linear" else None
+    yield from _integrals(noise.pieces, mission, interval)
     k = mission.allocation.coverage_factor
     if k != 1:
         yield from step(f"Phases times the coverage factor {number(k)}; what is left is a mean power and has none")
 
 
-def _integrals(
-    pieces: Sequence[Piece], mission: Mission, interval: float, weight: object, left: str
-) -> Iterator[Step]:
+def _integrals(pieces: Sequence[Piece], mission: Mission, interval: float | None) -> Iterator[Step]:
+    """What each piece of a spectrum adds to the mean squares."""
     T = mission.collection.aperture_time
-    each = [parts((piece,), T, interval, weight) for piece in pieces]  # type: ignore[arg-type]
+    if interval is None:
+        each, density = [parts((piece,), T) for piece in pieces], "S"
+    else:
+        each, density = [synchronized_parts((piece,), T, interval) for piece in pieces], "S_left"
+        yield from step(
+            f"Exchanges each T_s = {interval:.6g} s, straight lines between: "
+            "S_left = S·(1 − sinc²(f·T_s))² + sinc⁴(f·T_s)·Σ S(|f + m/T_s|), m ≠ 0"
+        )
     k = mission.allocation.coverage_factor
     for index, (symbol, transfer) in enumerate(
         (
@@ -177,7 +180,7 @@ def _integrals(
         text = " + ".join(number(term) for term in terms)
         text = f"sqrt({text})" if factor == 1 else f"{number(factor)}*sqrt({text})"
         yield from step(
-            f"∫ S·{transfer} df of each piece{left}", Sum(f"{symbol} = {text} = {with_unit(total, 'rad')}")
+            f"∫ {density}·{transfer} df of each piece", Sum(f"{symbol} = {text} = {with_unit(total, 'rad')}")
         )
 
 
@@ -197,18 +200,27 @@ def _link(mission: Mission, error: RandomError) -> Iterator[Step]:
     yield from step("Integrated with the squares of 7.5·j₂(πfT), of 17.5·j₃(πfT), and 1 − Σ(2n+1)·jₙ²(πfT)", *lines)
 
 
-def _phases(error: RandomError, model: str) -> Iterator[Step]:
+def _phases(mission: Mission, error: RandomError, model: str) -> Iterator[Step]:
     if error.declared is None:
         return
-    effect = error.effect(model)
+    effect, k = error.effect(model), _covered(mission, error)
     lines: list[WorkedEquation] = []
     for symbol, per_unit in zip(_PARTS, effect, strict=True):
-        if per_unit:
-            values = {f"{symbol}/unit": per_unit, "declared": error.declared}
+        if not per_unit:
+            continue
+        values = {f"{symbol}/unit": per_unit, "declared": error.declared}
+        if symbol == "left" and k != 1:  # a mean power has no coverage factor
+            values |= {"left/unit": per_unit * k, "k": k}
+            lines += equation(symbol, "left/unit*declared/k", values, per_unit * error.declared, "rad")
+        else:
             lines += equation(symbol, f"{symbol}/unit*declared", values, per_unit * error.declared, "rad")
     if lines:
-        name = "full" if model == "full" else "published"
-        yield from step(f"Of what is declared, by the {name} model", *lines)
+        yield from step(f"Of what is declared, by the {model} model", *lines)
+
+
+def _covered(mission: Mission, error: RandomError) -> float:
+    """Coverage factor within what is declared; that of an oscillator is in its phases."""
+    return 1.0 if error.unit == "dB" else mission.allocation.coverage_factor
 
 
 def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row: Row, model: str) -> Iterator[Step]:
@@ -237,8 +249,10 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
             f"Phase that may be left, requirements.islr {required.islr:g} dB, share s of its power", *lines
         )
         sizes["by_ISLR"] = rms / effect.spread
-        values = {"rms": rms, "left/unit": effect.spread}
-        lines = equation("by_ISLR", "rms/(left/unit)", values, sizes["by_ISLR"], _unit(error))
+        k = _covered(mission, error)
+        values = {"rms": rms, "left/unit": effect.spread * k, "k": k}
+        formula = "rms/(left/unit)" if k == 1 else "k*rms/(left/unit)"
+        lines = equation("by_ISLR", formula, values, sizes["by_ISLR"], _unit(error))
         yield from step("Allowable by requirements.islr", *lines)
     if row.allowable is None or not sizes:
         yield from step("Allowable: no limit", printable(row.reason or "no requirement limits this error"))
