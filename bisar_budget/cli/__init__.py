@@ -24,6 +24,7 @@ _MODULES = {
     "diff": "diff",
     "init": "mission_files",
     "schema": "mission_files",
+    "sensors": "sensors",
     "simulate": "simulate",
     "verify": "verify",
 }

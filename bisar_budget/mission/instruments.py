@@ -188,7 +188,7 @@ class Oscillator(NamedTuple):
         forms = [form for form in FORMS if values.get(form) is not None]
         ways = f"accepted: one of {', '.join(FORMS)}"
         if len(forms) > 1:
-            yield Problem(f"there is also a {forms[0]}", ways, at=(forms[1],))
+            yield Problem(f"stands beside {forms[0]}", ways, at=(forms[1],))
         if values.get("sensor") is None and values.keys() >= set(FORMS):
             if not forms:
                 yield Problem("says nothing of its noise", f"{ways}, or sensor: a part of the catalogue")

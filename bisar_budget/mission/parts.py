@@ -5,6 +5,7 @@ mission names parts, and what the mission says itself overrides single figures.
 """
 
 import os
+import stat
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from typing import Annotated, Any, NamedTuple
@@ -106,6 +107,37 @@ def evidence(part: Part, figure: str) -> str:
     return f"{part.name}: {source}"
 
 
+class Entry(NamedTuple):
+    """A part of the catalogue: the name that a mission asks for, its file, and its figures as written there."""
+
+    id: str
+    file: str
+    part: Part
+    figures: Mapping[str, str]
+
+
+def entries(places: Sequence[str]) -> Iterator[Entry]:
+    """Read every part of the catalogue, by kind and name.
+
+    Raises
+    ------
+    PartError
+        One of them is no part.
+    """
+    found = [(name, file, *_read(file)) for name, file in catalogue(places).items()]
+    for name, file, part, written in sorted(found, key=lambda one: (list(_SECTIONS).index(one[2].kind), one[0])):
+        figures = {key: _as_written(written[key]) for key in FIGURES[part.kind] if key in written}
+        yield Entry(name, file, part, figures)
+
+
+def _as_written(value: Any) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{key}: {_as_written(item)}" for key, item in value.items())
+    if isinstance(value, list):
+        return f"[{', '.join(map(_as_written, value))}]"
+    return str(value)
+
+
 def read_part(file: str) -> Part:
     """Read the file of a part.
 
@@ -114,7 +146,13 @@ def read_part(file: str) -> Part:
     PartError
         It cannot be read, or is no part.
     """
+    return _read(file)[0]
+
+
+def _read(file: str) -> tuple[Part, Mapping[str, Any]]:
     try:
+        if not stat.S_ISREG(os.stat(file).st_mode):  # a pipe would wait for ever
+            raise PartError(f"{file} is no regular file")
         with open(file, "rb") as stream:
             data = stream.read(MAX_BYTES + 1)
         tree = read_tree(data, file)
@@ -139,8 +177,7 @@ def read_part(file: str) -> Part:
     ]
     if unsourced:
         raise PartError(f"{file}: source: says nothing of {', '.join(unsourced)}")
-    found: Part = part
-    return found
+    return part, tree.root
 
 
 def folders(beside: str) -> list[str]:
