@@ -1,0 +1,324 @@
+"""Sensors and clocks in the budget: allowables on both sides of each limit, sums, shares, powers, waivers."""
+
+import json
+import math
+from typing import Any
+
+import pytest
+
+from bisar_budget.budget.check import check_mission
+from bisar_budget.effects.models import QUADRATIC
+from bisar_budget.findings.mission import MissionFindings
+from bisar_budget.findings.row import Row
+from bisar_budget.mission.load import parse_mission
+from tests.conftest import TODAY
+
+WAVELENGTH = 299_792_458.0 / 10e9
+K = 2 * math.pi / WAVELENGTH
+T = 4.0
+G = 9.80665
+
+# Receiver above the y axis at 30 degrees: the line of sight is (0, cos 30°, sin 30°).
+MISSION: dict[str, Any] = {
+    "schema_version": 1,
+    "name": "Sensors",
+    "radar": {"center_frequency": "10 GHz", "bandwidth": "150 MHz"},
+    "collection": {"aperture_time": f"{T} s"},
+    "platforms": {
+        "transmitter": {"position": ["300 km", 0, "500 km"], "velocity": [0, "1 km/s", 0]},
+        "receiver": {
+            "slant_range": "30 km",
+            "azimuth": "90 deg",
+            "elevation": "30 deg",
+            "speed": "60 m/s",
+            "motion_azimuth": "180 deg",
+            "motion_error": {},
+        },
+    },
+    "requirements": {"cubic_phase_error": "22.5 deg", "islr": "-20 dB"},
+    "allocation": {"model": "published", "combine": "each"},
+}
+IMU = {
+    "accelerometer_bias": "50 ug",
+    "attitude": "0.003 deg",
+    "gyro_bias": "0.5 deg/h",
+    "velocity_random_walk": "0.06 m/s/sqrt(h)",
+    "angle_random_walk": "0.01 deg/sqrt(h)",
+}
+MASK = {"frequency": "10 MHz", "phase_noise": {"1 Hz": "-105 dBc/Hz", "10 Hz": "-135 dBc/Hz", "1 kHz": "-155 dBc/Hz"}}
+
+
+def merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    out = dict(base)
+    for key, value in changes.items():
+        out[key] = (
+            merged(out.get(key, {}), value) if isinstance(value, dict) and isinstance(out.get(key), dict) else value
+        )
+    return out
+
+
+def check(**changes: Any) -> MissionFindings:
+    return check_mission(parse_mission(json.dumps(merged(MISSION, changes))), TODAY)
+
+
+def with_error(error: dict[str, Any], **changes: Any) -> MissionFindings:
+    return check(**merged({"platforms": {"receiver": {"motion_error": error}}}, changes))
+
+
+def row(found: MissionFindings, row_id: str) -> Row:
+    return next(one for one in found.rows if one.id == row_id)
+
+
+def test_allowables_are_those_of_the_formulas() -> None:
+    """By hand: share π/8, cubic 22.5 deg, half the power of -20 dB; along the line of sight 1, level cos 30°."""
+    found = with_error({"imu": IMU})
+    level = math.cos(math.radians(30))
+    half, cubic = math.pi / 8, math.radians(22.5)
+    rms = math.sqrt(0.01 / 2)
+    expected = {
+        "accelerometer_bias": (half / (K * T**2 / 8), "quadratic_phase_error"),
+        "attitude": (half / (K * G * level * T**2 / 8), "quadratic_phase_error"),
+        "gyro_bias": (cubic / (K * G * level * T**3 / 48), "cubic_phase_error"),
+        "velocity_random_walk": (half / (K * math.sqrt(5 / 224) * T**1.5), "quadratic_phase_error"),
+        "angle_random_walk": (half / (K * G * level * math.sqrt(355 / 473088) * T**2.5), "quadratic_phase_error"),
+    }
+    for kind, (allowable, binding) in expected.items():
+        one = row(found, f"receiver.imu.{kind}")
+        assert one.allowable == pytest.approx(allowable, rel=1e-12), kind
+        assert one.binding_requirement == binding, kind
+    walk = row(found, "receiver.imu.velocity_random_walk")
+    assert walk.islr_db == pytest.approx(20 * math.log10(1e-3 * K * T**1.5 / math.sqrt(6930)), abs=0.01)
+    assert rms / (K * T**1.5 / math.sqrt(6930)) > walk.allowable
+
+
+@pytest.mark.parametrize("model", ["published", "full"])
+@pytest.mark.parametrize(("kind", "unit"), [
+    ("accelerometer_bias", "m/s^2"), ("attitude", "rad"), ("gyro_bias", "rad/s"),
+    ("velocity_random_walk", "m/s/sqrt(s)"), ("angle_random_walk", "rad/sqrt(s)"),
+])  # fmt: skip
+def test_both_sides_of_a_limit(kind: str, unit: str, model: str) -> None:
+    allowable = row(with_error({"imu": IMU}, allocation={"model": model}), f"receiver.imu.{kind}").allowable
+    for factor, status in ((1 - 1e-6, "warn"), (1 + 1e-6, "fail")):
+        found = with_error({"imu": {kind: f"{allowable * factor!r} {unit}"}}, allocation={"model": model})
+        assert row(found, f"receiver.imu.{kind}").status == status
+
+
+def test_a_figure_that_nobody_states_still_has_its_allowable() -> None:
+    one = row(with_error({"imu": {"gyro_bias": "1 deg/h"}}), "receiver.imu.attitude")
+    assert (one.status, one.declared) == ("not_declared", None)
+    assert one.allowable is not None
+
+
+def test_three_values_follow_the_axes_of_the_frame() -> None:
+    """A bias along the line of sight counts, one across it does not; a tilt about the line of sight leaks across."""
+
+    def qpe(kind: str, values: list[str]) -> float | None:
+        found = with_error({"frame": "look", "imu": {kind: values}})
+        return row(found, f"receiver.imu.{kind}").qpe_published_rad
+
+    bias = 50e-6 * G * K * T**2 / 8
+    assert qpe("accelerometer_bias", ["50 ug", "0 ug", "0 ug"]) == pytest.approx(bias)
+    assert qpe("accelerometer_bias", ["0 ug", "50 ug", "50 ug"]) == pytest.approx(0, abs=1e-9 * bias)
+    assert qpe("accelerometer_bias", ["30 ug", "0 ug", "50 ug"]) == pytest.approx(0.6 * bias)
+    leak = math.radians(0.01) * G * K * T**2 / 8 * math.cos(math.radians(30))
+    assert qpe("attitude", ["0 deg", "0.01 deg", "0 deg"]) == pytest.approx(leak)  # about the level cross axis
+    assert qpe("attitude", ["0.01 deg", "0 deg", "0 deg"]) == pytest.approx(0, abs=1e-9 * leak)
+    assert qpe("attitude", ["0 deg", "0 deg", "0.01 deg"]) == pytest.approx(0, abs=1e-9 * leak)
+
+
+def test_the_coverage_factor_multiplies_phases_and_not_powers() -> None:
+    one = {"imu": IMU, "random": [{"name": "GNSS", "sigma": "0.2 mm", "correlation_time": "1 s"}]}
+    platforms = {"receiver": {"motion_error": one, "oscillator": MASK}}
+    once, thrice = (check(platforms=platforms, allocation={"coverage_factor": k}) for k in (1, 3))
+    for row_id in ("receiver.imu.velocity_random_walk", "receiver.random.GNSS", "receiver.oscillator"):
+        a, b = row(once, row_id), row(thrice, row_id)
+        assert b.qpe_published_rad == pytest.approx(3 * a.qpe_published_rad)
+        assert b.cubic_rad == pytest.approx(3 * a.cubic_rad)
+        assert b.islr_db == pytest.approx(a.islr_db, abs=1e-9)
+    assert row(thrice, "mission.islr").declared == pytest.approx(row(once, "mission.islr").declared, abs=1e-9)
+
+
+def test_an_oscillator_may_rise_by_so_many_decibels() -> None:
+    """Raised by its allowable, within six digits, it stands at the limit."""
+    found = check(platforms={"receiver": {"oscillator": MASK}})
+    one = row(found, "receiver.oscillator")
+    assert (one.unit, one.declared) == ("dB", 0.0)
+    assert one.utilization == pytest.approx(10 ** (-one.allowable / 20))
+    for step, status in ((-0.01, "warn"), (0.01, "fail")):
+        levels = {
+            f: f"{float(level.split()[0]) + one.allowable + step!r} dBc/Hz"
+            for f, level in MASK["phase_noise"].items()
+        }
+        raised = check(platforms={"receiver": {"oscillator": {**MASK, "phase_noise": levels}}})
+        assert row(raised, "receiver.oscillator").status == status
+
+
+def test_a_power_law_and_its_mask_are_the_same() -> None:
+    """h₋₁ of 1e-24: S_φ = f₀²·h₋₁/f³, and L(f) at 10 MHz is half of f_osc²·h₋₁/f³."""
+    law = {"power_law": {"h-1": 1e-24}}
+    level = 10 * math.log10(1e14 * 1e-24 / 2)
+    mask = {"frequency": "10 MHz", "phase_noise": {"1 Hz": f"{level!r} dBc/Hz", "1 kHz": f"{level - 90!r} dBc/Hz"}}
+    adev = {"allan_deviation": {f"{tau} s": math.sqrt(2 * math.log(2) * 1e-24) for tau in (1, 10, 100)}}
+    expected = math.sqrt(1e20 * 1e-24 * 25 * math.pi**2 / 32 * T**2)
+    for form in (law, mask, adev):
+        one = row(check(platforms={"receiver": {"oscillator": form}}), "receiver.oscillator")
+        assert one.qpe_published_rad == pytest.approx(expected, rel=1e-4)
+
+
+def test_a_fit_that_is_no_fit_warns() -> None:
+    points = {"1 s": 1e-12, "2 s": 6e-12, "4 s": 1e-12, "8 s": 6e-12}
+    found = check(platforms={"receiver": {"oscillator": {"allan_deviation": points}}})
+    assert any("no power law fits the Allan deviation" in warning.message for warning in found.warnings)
+    good = check(platforms={"receiver": {"oscillator": {"allan_deviation": {"1 s": 1e-12, "100 s": 1e-11}}}})
+    assert not any("fit" in warning.message for warning in good.warnings)
+
+
+def test_what_is_extrapolated_is_said_once() -> None:
+    """Below the first point of a mask, where that is within the aperture's own frequencies, and beyond the last τ."""
+    found = check(platforms={"receiver": {"oscillator": MASK}})
+    assert [n for n in row(found, "receiver.oscillator").notes if "mask begins" in n] == [
+        "the mask begins at 1 Hz; below, it continues as f^-3"
+    ]
+    early = {**MASK, "phase_noise": {"0.01 Hz": "-45 dBc/Hz", **MASK["phase_noise"]}}
+    assert not row(check(platforms={"receiver": {"oscillator": early}}), "receiver.oscillator").notes
+    short = check(platforms={"receiver": {"oscillator": {"allan_deviation": {"0.1 s": 1e-11, "1 s": 1e-11}}}})
+    assert any("ends at 1 s" in note for note in row(short, "receiver.oscillator").notes)
+
+
+class TestSums:
+    ERRORS = {
+        "imu": IMU,
+        "velocity": "1 mm/s",
+        "random": [{"name": "GNSS", "sigma": "0.1 mm", "correlation_time": "2 s"}],
+    }
+
+    @pytest.mark.parametrize("rule", ["sum", "rss"])
+    def test_phases_enter_the_aggregates(self, rule: str) -> None:
+        found = with_error(self.ERRORS, allocation={"combine": rule, "model": "full"}, autofocus={"n_pull": 1})
+        phases = [abs(one.qpe_full_rad) for one in found.rows if one.owner == "receiver" and one.metric != "islr"
+                  and one.is_independent and one.declared and one.subject.kind != QUADRATIC]  # fmt: skip
+        assert len(phases) == 9
+        total = math.fsum(phases) if rule == "sum" else math.hypot(*phases)
+        assert row(found, "receiver.quadratic_phase_error").declared == pytest.approx(total)
+        assert row(found, "mission.autofocus_pull_in").declared == pytest.approx(math.fsum(phases))
+        cubics = [one.cubic_rad for one in found.rows if one.cubic_rad and one.subject.kind != "cubic_phase_error"]
+        combined = math.fsum(cubics) if rule == "sum" else math.hypot(*cubics)
+        assert row(found, "mission.cubic_phase_error").declared == pytest.approx(combined)
+        assert row(found, "receiver.imu.attitude").status == "info"
+
+    def test_each_warns_of_what_all_together_exceed(self) -> None:
+        """Six of some 0.35 rad are held to π/8 each, and all together to π/4."""
+        size = 0.35 / (K * T**2 / 8)
+        imu = {"accelerometer_bias": f"{size!r} m/s^2", "attitude": f"{size / G / math.cos(math.radians(30))!r} rad"}
+        noise = [{"name": str(n), "sigma": "1.8 mm", "correlation_time": "2 s"} for n in range(4)]
+        found = with_error(
+            {"imu": imu, "random": noise}, requirements={"islr": "-1 dB", "cubic_phase_error": "90 deg"}
+        )
+        alone = [
+            one.qpe_published_rad for one in found.rows if one.subject.kind in ("imu", "random") and one.declared
+        ]
+        assert len(alone) == 6
+        assert max(alone) < math.pi / 8
+        assert math.hypot(*alone) > math.pi / 4
+        assert row(found, "mission.quadratic_phase_error").status == "warn"
+
+    def test_the_balanced_split_weighs_them(self) -> None:
+        found = check(
+            platforms={"receiver": {"motion_error": {"imu": IMU}}, "transmitter": {"oscillator": MASK}},
+            allocation={"split": "balanced", "combine": "rss"},
+        )
+        receiver = math.hypot(*(one.qpe_published_rad for one in found.rows if one.subject.kind == "imu"))
+        transmitter = row(found, "transmitter.oscillator").qpe_published_rad
+        share = transmitter / (transmitter + receiver)
+        assert found.allocation.qpe.transmitter == pytest.approx(max(0.05, share), rel=1e-9)
+
+    def test_strictest_takes_the_stricter_model(self) -> None:
+        """A platform that turns its line of sight: the full model counts it."""
+        near = {"slant_range": "1 km", "speed": "90 m/s", "motion_error": {"imu": IMU}}
+        found = {model: check(platforms={"receiver": near}, allocation={"model": model})
+                 for model in ("published", "full", "strictest")}  # fmt: skip
+        for kind in IMU:
+            by = {model: row(one, f"receiver.imu.{kind}") for model, one in found.items()}
+            assert by["strictest"].utilization == max(by["published"].utilization, by["full"].utilization)
+            assert by["published"].utilization != by["full"].utilization
+
+    def test_autofocus_raises_limits_of_the_quadratic_phase_alone(self) -> None:
+        plain, focused = (with_error({"imu": IMU}, autofocus={"n_pull": n}) for n in (0.25, 2))
+        for kind, grows in (("accelerometer_bias", 8), ("gyro_bias", 1)):
+            a, b = (row(one, f"receiver.imu.{kind}").allowable for one in (plain, focused))
+            assert b / a == pytest.approx(grows)
+
+    def test_a_bias_beside_an_acceleration_warns_that_they_add(self) -> None:
+        found = with_error({"imu": {"accelerometer_bias": "50 ug"}, "acceleration": "0.1 mm/s^2"})
+        assert [w.message for w in found.warnings if "they add" in w.message] == [
+            "platforms.receiver.motion_error: acceleration and the accelerometer bias are both stated; they add"
+        ]
+
+
+class TestPowers:
+    NOISE = {"vibration": {"wideband": {"rms": "100 um"}}, "imu": {"velocity_random_walk": "0.5 m/s/sqrt(h)"}}
+
+    def test_powers_add_up_against_each_share(self) -> None:
+        """Wideband vibration, a random walk and phase noise: variances add, exp(σ²) - 1 is the ISLR."""
+        found = check(
+            platforms={
+                "receiver": {"motion_error": self.NOISE, "oscillator": MASK},
+                "transmitter": {"oscillator": MASK},
+            },
+            allocation={"model": "full"},
+        )
+        walk = (0.5 / 60 * K * T**1.5) ** 2 / 6930
+        vibration = (K * 100e-6) ** 2
+        clock = math.log1p(10 ** (row(found, "receiver.oscillator").islr_db / 10))
+        for owner, variance in (
+            ("transmitter", clock),
+            ("receiver", walk + vibration + clock),
+            ("mission", walk + vibration + 2 * clock),
+        ):
+            one = row(found, f"{owner}.islr")
+            assert one.declared == pytest.approx(10 * math.log10(math.expm1(variance)), abs=1e-6)
+            share = 1.0 if owner == "mission" else 0.5
+            assert one.allowable == pytest.approx(10 * math.log10(math.expm1(math.log1p(0.01) * share)), abs=1e-9)
+            assert one.utilization == pytest.approx(math.sqrt(variance / (math.log1p(0.01) * share)))
+
+    def test_vibration_alone_keeps_its_row_and_makes_no_sum(self) -> None:
+        found = with_error({"vibration": {"wideband": {"rms": "100 um"}}})
+        assert not [one.id for one in found.rows if one.subject.kind == "islr"]
+
+    def test_without_a_requirement_there_is_no_sum(self) -> None:
+        mission = {key: value for key, value in MISSION.items() if key != "requirements"}
+        mission = merged(mission, {"platforms": {"receiver": {"motion_error": self.NOISE}}})
+        found = check_mission(parse_mission(json.dumps(mission)), TODAY)
+        assert not [one.id for one in found.rows if one.subject.kind == "islr"]
+        assert row(found, "receiver.imu.velocity_random_walk").islr_db is not None
+
+    def test_a_limit_of_powers_on_both_sides(self) -> None:
+        limit = math.sqrt(math.log1p(0.01) / 2) * math.sqrt(6930) / (K * T**1.5)
+        for factor, status in ((1 - 1e-6, "warn"), (1 + 1e-6, "fail")):
+            walk = {"imu": {"velocity_random_walk": f"{limit * factor!r} m/s/sqrt(s)"}}
+            found = with_error(walk, allocation={"model": "full"}, requirements={"quadratic_phase_error": "360 deg"})
+            assert row(found, "receiver.islr").status == status
+
+
+class TestSynchronisation:
+    def test_each_exchange_counts_against_the_clock(self) -> None:
+        """σ·√(11.25·T_s/T) of a fast link; ⅔σ² in all, of which four orders take σ²·T_s/T each."""
+        platforms = {"receiver": {"oscillator": MASK}, "transmitter": {"oscillator": MASK}}
+        free = check(platforms=platforms)
+        synced = check(platforms=platforms, synchronization={"interval": "20 ms", "error": "1 deg"})
+        link = row(synced, "timing.synchronization")
+        assert link.owner == "clock"
+        assert link.qpe_published_rad == pytest.approx(math.radians(1) * math.sqrt(11.25 * 0.02 / T), rel=0.01)
+        assert link.islr_db == pytest.approx(10 * math.log10(math.radians(1) ** 2 * (2 / 3 - 4 * 0.02 / T)), abs=0.01)
+        for name in ("transmitter", "receiver"):
+            before, after = (row(one, f"{name}.oscillator").qpe_published_rad for one in (free, synced))
+            assert after < before / 100
+
+    def test_waivers_and_requirement_ids_reach_the_rows(self) -> None:
+        found = with_error(
+            {"imu": {"attitude": "1 deg"}},
+            requirement_ids={"receiver.imu.attitude": "SYS-1"},
+            waivers=[{"id": "receiver.imu.*", "until": "2027-01-01", "reason": "a better one is ordered"}],
+        )
+        one = row(found, "receiver.imu.attitude")
+        assert (one.status, one.requirement_id) == ("waived", "SYS-1")
