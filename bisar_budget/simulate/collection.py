@@ -14,6 +14,7 @@ from bisar_budget.simulate.exact import ExactEffect, exact_effect
 from bisar_budget.simulate.image_formation import backprojection, bytes_held, kernel_within, taylor_window
 from bisar_budget.simulate.phase_history import (
     Complexes,
+    Course,
     Floats,
     Path,
     PathError,
@@ -40,19 +41,23 @@ class MemoryLimitError(ValueError):
 
 
 class Errors(NamedTuple):
-    """What is wrong in one image: both platforms, and the clock's t̃₀ … t̃₃ of (1). [s], [1], [1/s], [1/s²]"""
+    """What is wrong in one image: both platforms, the clock's t̃₀ … t̃₃ of (1), and any other history of it.
+
+    [s], [1], [1/s], [1/s²]; `clock_course` [s].
+    """
 
     transmitter: PathError = PathError()
     receiver: PathError = PathError()
     clock: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
+    clock_course: Course | None = None
 
     def of(self, platform: str, error: PathError) -> "Errors":
         """Give one platform an error."""
         return self._replace(transmitter=error) if platform == "transmitter" else self._replace(receiver=error)
 
     def smooth(self) -> "Errors":
-        """The polynomials alone: no vibration."""
-        return Errors(_still(self.transmitter), _still(self.receiver), self.clock)
+        """What is no vibration."""
+        return self._replace(transmitter=_still(self.transmitter), receiver=_still(self.receiver))
 
 
 def _still(error: PathError) -> PathError:
@@ -171,7 +176,7 @@ class PointCollection:
     def clock(self, errors: Errors, slow_time: Floats) -> Floats:
         """Clock error over slow time. [s]"""
         error: Floats = np.asarray(np.polynomial.polynomial.polyval(slow_time, errors.clock), dtype=float)
-        return error
+        return error if errors.clock_course is None else error + errors.clock_course.at(slow_time)
 
     def chip(
         self,

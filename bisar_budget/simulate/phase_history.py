@@ -30,12 +30,27 @@ class PathSinusoid(NamedTuple):
     phase: float = 0.0
 
 
+@dataclass(frozen=True, eq=False)
+class Course:
+    """An error over slow time: `times` (n,) [s] and `values` (n,) or (n, 3), joined by straight lines."""
+
+    times: Floats
+    values: Floats
+
+    def at(self, slow_time: Floats) -> Floats:
+        """Values at other times, (m,) or (m, 3)."""
+        if self.values.ndim == 1:
+            found: Floats = np.interp(slow_time, self.times, self.values)
+            return found
+        return np.stack([np.interp(slow_time, self.times, along) for along in self.values.T], axis=1)
+
+
 class PathError(NamedTuple):
     """Measured minus actual position of one platform, r̃(τ): (22) and what is faster.
 
-    Position [m], velocity [m/s] and acceleration [m/s²] are east-north-up; vibration is along the line of
-    sight, positive away from the scene. `wideband_rms` [m] is noise of the pulses, white or within
-    `wideband_band` (low, high) [Hz], and needs a generator.
+    Position [m], velocity [m/s], acceleration [m/s²] and `course` [m], which is any other history, are
+    east-north-up; vibration is along the line of sight, positive away from the scene. `wideband_rms` [m] is noise
+    of the pulses, white or within `wideband_band` (low, high) [Hz], and needs a generator.
     """
 
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -44,6 +59,7 @@ class PathError(NamedTuple):
     sinusoids: tuple[PathSinusoid, ...] = ()
     wideband_rms: float = 0.0
     wideband_band: tuple[float, float] | None = None
+    course: Course | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -123,6 +139,8 @@ def path(
     # (22): p̃ + ṽτ + ãτ²/2
     measured = actual + np.asarray(error.position) + np.asarray(error.velocity) * tau
     measured = measured + np.asarray(error.acceleration) * tau**2 / 2
+    if error.course is not None:
+        measured = measured + error.course.at(slow_time)
     along = np.zeros_like(slow_time)
     for sinusoid in error.sinusoids:
         along += sinusoid.amplitude * np.sin(2 * math.pi * sinusoid.frequency * slow_time + sinusoid.phase)

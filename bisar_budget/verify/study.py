@@ -9,7 +9,8 @@ import numpy as np
 from bisar_budget.analysis.analysis import Analysis, Model
 from bisar_budget.budget.error_rows import Allowed, allowed_by
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.effects.effect import ErrorSource
+from bisar_budget.effects.effect import PLATFORMS, ErrorSource
+from bisar_budget.effects.exact_arrays import aperture_nodes, exact_effects
 from bisar_budget.effects.models import QUADRATIC
 from bisar_budget.effects.subject import Subject
 from bisar_budget.mission.model import Mission
@@ -109,6 +110,19 @@ class Study:
     def effect(self, sizes: Sizes, scale: float = 1.0) -> ExactEffect:
         """What several errors do by exact ranges."""
         return self.collection.effect(self.together(sizes, scale))
+
+    def exact_phases(self, platform: str, courses: Floats) -> tuple[Floats, Floats]:
+        """Quadratic and cubic phases of many histories of one platform's position error, (draws, nodes, 3). [rad]
+
+        The nodes are those of `aperture_nodes`.
+        """
+        nodes = aperture_nodes(self.collection.aperture_time)
+        actual = {
+            name: flown.actual for name, flown in zip(PLATFORMS, self.collection.paths(Errors(), nodes), strict=True)
+        }
+        measured = {name: path + courses if name == platform else path for name, path in actual.items()}
+        found = exact_effects(*measured.values(), *actual.values(), 0.0, self.collection.wavelength)
+        return found.quadratic, found.cubic
 
     def worse_sign(self, sizes: Sizes, scale: float) -> float:
         """The scale with the sign that leaves more quadratic phase: a limit has two signs.
