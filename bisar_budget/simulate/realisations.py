@@ -10,12 +10,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import SPEED_OF_LIGHT, STANDARD_GRAVITY
+from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.effects.random_errors import RandomError
 from bisar_budget.effects.spectra import Piece
 from bisar_budget.mission.instruments import GaussMarkov
-from bisar_budget.mission.model import Mission
+from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.simulate.phase_history import Course, Floats
 
 _STEPS = 512  # from mid-aperture to the end of it, in which a walk is summed up
@@ -25,6 +27,7 @@ _SLOWEST = 1e-4  # of a tone per aperture; its quadratic phase is nothing
 _PERIODS = 4  # apertures in which phase noise repeats
 _PER_CYCLE = 4  # samples of the fastest tone, joined by straight lines
 _MAX_TONES = 1 << 18
+_FLOWN = 4097  # moments of a time series that is flown
 
 
 def position_courses(
@@ -65,6 +68,36 @@ def position_courses(
         if size:
             total += size * draw(times, draws, rng)[:, :, None] * axis
     return total
+
+
+class Flown(NamedTuple):
+    """One time series of every declared error of sensors and clocks together; None where there is none."""
+
+    transmitter: Course | None
+    receiver: Course | None
+    clock: Course | None  # [s]
+
+
+def flown_courses(analysis: Analysis) -> Flown:
+    """Draw each declared error once, by the seed of the file's simulation, with the coverage factor. [m], [s]"""
+    mission = analysis.mission
+    seed, factor = (mission.simulation or Simulation()).seed, mission.allocation.coverage_factor
+    half = mission.collection.aperture_time / 2
+    times: Floats = np.linspace(-half, half, _FLOWN)
+    moved: dict[str, Floats] = {}
+    phase: Floats = np.zeros(times.size)
+    for error in analysis.random:
+        if not error.declared:
+            continue
+        rng = np.random.default_rng([seed, *error.id.encode()])
+        if error.subject.kind in ("imu", "random"):
+            drawn = factor * position_courses(mission, error, times, 1, rng)[0]
+            moved[error.owner] = moved.get(error.owner, 0.0) + drawn
+        elif error.published.spread:
+            phase = phase + factor * phase_courses(mission, error, times, 1, rng)[0]
+    transmitter, receiver = (Course(times, moved[name]) if name in moved else None for name in PLATFORMS)
+    clock = Course(times, clock_seconds(phase, mission.radar.wavelength)) if phase.any() else None
+    return Flown(transmitter, receiver, clock)
 
 
 def _bias(order: int) -> Callable[[Floats, int, np.random.Generator], Floats]:
@@ -181,11 +214,12 @@ class _Tones:
 
     def __init__(self, pieces: tuple[Piece, ...], aperture_time: float) -> None:
         high, fine = max(piece.high for piece in pieces), 1 / (_PERIODS * aperture_time)
-        slow = np.geomspace(_SLOWEST / aperture_time, fine / 2, _SLOW_TONES + 1)
+        slow: Floats = np.geomspace(_SLOWEST / aperture_time, fine / 2, _SLOW_TONES + 1)
         self.slow: Floats = (slow[1:] + slow[:-1]) / 2
-        self.slow_size = self._size(pieces, self.slow, np.asarray(np.diff(slow), dtype=float))
+        widths: Floats = slow[1:] - slow[:-1]
+        self.slow_size = self._size(pieces, self.slow, widths)
         count = min(_MAX_TONES, max(1, math.ceil(high / fine)))
-        fast = fine * np.arange(1, count + 1)
+        fast: Floats = fine * np.arange(1.0, count + 1)
         self.fast_size = self._size(pieces, fast, np.full(count, fine))
         samples = 1 << (2 * _PER_CYCLE * count - 1).bit_length() - 1
         self.times: Floats = (np.arange(samples + 1) / samples - 0.5) / fine

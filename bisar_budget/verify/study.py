@@ -117,11 +117,12 @@ class Study:
         The nodes are those of `aperture_nodes`.
         """
         nodes = aperture_nodes(self.collection.aperture_time)
-        actual = {
-            name: flown.actual for name, flown in zip(PLATFORMS, self.collection.paths(Errors(), nodes), strict=True)
-        }
-        measured = {name: path + courses if name == platform else path for name, path in actual.items()}
-        found = exact_effects(*measured.values(), *actual.values(), 0.0, self.collection.wavelength)
+        flown = self.collection.paths(Errors(), nodes)
+        actual = (flown[0].actual, flown[1].actual)
+        transmitter, receiver = (
+            path + courses if name == platform else path for name, path in zip(PLATFORMS, actual, strict=True)
+        )
+        found = exact_effects(transmitter, receiver, *actual, 0.0, self.collection.wavelength)
         return found.quadratic, found.cubic
 
     def worse_sign(self, sizes: Sizes, scale: float) -> float:
