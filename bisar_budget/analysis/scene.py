@@ -89,6 +89,7 @@ class ScenePhases:
         mission = analysis.mission
         self.geometry, self.full = analysis.geometry, analysis.full
         self.wavelength, self.T = mission.radar.wavelength, mission.collection.aperture_time
+        self.has_direct_path = mission.has_direct_path
         self.combine, self.groups = mission.allocation.combine, analysis.groups
         self.members = [source for source in analysis.stated if source.is_motion]
         self.sizes = [source.declared or 0.0 for source in self.members]
@@ -118,7 +119,8 @@ class ScenePhases:
 
     def ranges_at(self, radius: float, azimuth: float) -> ExactRanges:
         """Exact ranges of a point of the ground."""
-        return ExactRanges(self.geometry, self.wavelength, self.T, at(radius, azimuth), self.count)
+        centre, heard = at(radius, azimuth), self.has_direct_path
+        return ExactRanges(self.geometry, self.wavelength, self.T, centre, self.count, has_direct_path=heard)
 
     def place(self, radius: float, azimuth: float) -> "RimPlace":
         """What there is at a point of the ground."""

@@ -195,7 +195,7 @@ def _line(
     case = _case(mission, allowed, "pslr", name, "sinusoidal", index, index, "amplitude")
     if line is None:
         return case
-    case = _with_doubt(case._replace(declared=line.amplitude), mission.allocation.model)
+    case = _with_doubt(case._replace(declared=line.amplitude), mission)
     notes = [*projected(error.vibration.sinusoidal[index].amplitude, error, line.amplitude), *case.notes]
     cycles = line.frequency * mission.collection.aperture_time
     phase = 2 * math.pi * line.amplitude / mission.radar.wavelength
@@ -234,7 +234,7 @@ def _together(
         f"entries {shown}, at {_band(members)}, are at most {NEAR_CYCLES:g} cycles per aperture apart: in the worst "
         f"phases their echoes together are as high as that of one vibration of {format_quantity(declared, 'm')}"
     )
-    return _with_doubt(case._replace(declared=declared, notes=(near, *case.notes)), mission.allocation.model)
+    return _with_doubt(case._replace(declared=declared, notes=(near, *case.notes)), mission)
 
 
 def _band(lines: Sequence[Line]) -> str:
@@ -251,7 +251,7 @@ def _noise(mission: Mission, allowed: VibrationLimits | None, name: str, error: 
     notes = (*projected(wideband.rms, error, rms), *case.notes)
     variance = (2 * math.pi * rms / mission.radar.wavelength) ** 2
     case = case._replace(declared=rms, notes=notes, islr_db=islr_db(variance))
-    return _with_doubt(case, mission.allocation.model)
+    return _with_doubt(case, mission)
 
 
 def islr_db(variance: float) -> float | None:
@@ -271,11 +271,12 @@ def _margin(allowed: VibrationLimits | None) -> tuple[str, ...]:
     return (f"the published rule is {abs(allowed.margin_db):.2f} dB {side} first principles",)
 
 
-def _with_doubt(case: VibrationCase, model: str) -> VibrationCase:
-    """Say that the model that does not gate fails it."""
-    if case.limits is None or case.declared is None:
+def _with_doubt(case: VibrationCase, mission: Mission) -> VibrationCase:
+    """Say that the model that does not gate fails it; the published one does not know a direct path."""
+    if case.limits is None or case.declared is None or mission.has_direct_path:
         return case
-    other, limit = ("full", case.limits.full) if model == "published" else ("published", case.limits.published)
+    is_published = mission.allocation.model == "published"
+    other, limit = ("full", case.limits.full) if is_published else ("published", case.limits.published)
     if case.declared <= limit * (1 + UTILIZATION_TOLERANCE):
         return case
     text = f"the {other} model says fail: {format_quantity(limit, 'm', 3, 'down')} allowed"

@@ -15,6 +15,7 @@ from bisar_budget.geometry import (
     PlatformState,
     UndefinedFrameError,
     Vector,
+    dot,
     norm,
     state_from_angles,
 )
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
     from bisar_budget.mission.instruments import GaussMarkov, Imu, Oscillator, Synchronization
 
 STILL = 1e-6  # m/s; slower than this no platform flies an aperture
+_LEAST_BASELINE = 1.0  # m, between platforms of which one hears the other
 
 FREQUENCY = Quantity(units.FREQUENCY, gt=0, ge=1e3, le=1e13)
 VIBRATION_FREQUENCY = Quantity(units.FREQUENCY, gt=0, le=1e9)
@@ -546,6 +548,8 @@ class Mission(NamedTuple):
             yield from _no_image(_geometry(platforms))
         if platforms is not None and collection is not None:
             yield from _dives(platforms, collection.aperture_time)
+            if values.get("synchronization") is not None and values["synchronization"].is_direct_path:
+                yield from _no_baseline(platforms, collection.aperture_time)
         seen: set[str] = set()
         for index, other in enumerate(values.get("other_errors", ())):
             if other.name in seen:
@@ -556,6 +560,16 @@ class Mission(NamedTuple):
     def geometry(self) -> BistaticGeometry:
         """Both platforms in the frame of the scene."""
         return _geometry(self.platforms)
+
+    @property
+    def has_direct_path(self) -> bool:
+        """Whether the receiver hears the transmitter and takes it as its clock."""
+        return self.synchronization is not None and self.synchronization.is_direct_path
+
+    @property
+    def gating_model(self) -> str:
+        """The model that gates: with a direct path the full one, since the published one does not know it."""
+        return "full" if self.has_direct_path else self.allocation.model
 
     def line(self, path: KeyPath) -> Place | None:
         """Line of a value in the mission file, from 1, else of the nearest key above it that exists.
@@ -594,6 +608,26 @@ def _dives(platforms: Platforms, aperture_time: float) -> Iterator[Problem]:
                 f"takes the platform below the ground within the aperture, to z = {lowest:.4g} m",
                 at=("platforms", name, *key),
             )
+
+
+def _no_baseline(platforms: Platforms, aperture_time: float) -> Iterator[Problem]:
+    half, (transmitter, receiver) = aperture_time / 2, (platforms.transmitter.state, platforms.receiver.state)
+    apart, closing = (
+        _minus(*both)
+        for both in ((transmitter.position, receiver.position), (transmitter.velocity, receiver.velocity))
+    )
+    nearest = max(-half, min(half, -dot(apart, closing) / (dot(closing, closing) or math.inf)))
+    least = min(math.dist(transmitter.at(tau)[0], receiver.at(tau)[0]) for tau in (-half, 0.0, nearest, half))
+    if least < _LEAST_BASELINE:
+        yield Problem(
+            f"the platforms come within {_LEAST_BASELINE:g} m of each other: the direct path has no direction",
+            "accepted: linear",
+            at=("synchronization", "method"),
+        )
+
+
+def _minus(a: Vector, b: Vector) -> Vector:
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
 def _turning_points(state: PlatformState, half: float) -> Iterator[float]:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.effects.exact_arrays import direct_path_clock
 from bisar_budget.geometry import PlatformState
 
 _FEW = 8  # scatterers are added one by one
@@ -154,6 +155,16 @@ def _noise(slow_time: Floats, band: tuple[float, float] | None, rng: np.random.G
         )
     noise: Floats = np.fft.irfft(np.fft.rfft(white) * inside, slow_time.size)
     return noise * math.sqrt(slow_time.size / float(weight))
+
+
+def direct_path_error(paths: tuple[Path, Path]) -> Floats:
+    """Clock error of a receiver that hears the transmitter, (pulses,): how much too far apart both are measured. [s]
+
+    Its clock is the direct signal, which is late by the actual distance; the processor takes the measured one off.
+    """
+    transmitter, receiver = paths
+    measured = (transmitter.measured, receiver.measured)
+    return direct_path_clock(*measured, transmitter.actual, receiver.actual) / SPEED_OF_LIGHT
 
 
 def phase_history(

@@ -31,6 +31,7 @@ from bisar_budget.simulate.phase_history import (
     PathSinusoid,
     PhaseHistory,
     cell_centres,
+    direct_path_error,
     path,
     phase_history,
 )
@@ -221,7 +222,8 @@ def simulate_point(
 
     def effect_at(place: GroundVector) -> ExactEffect:
         transmitter, receiver = (_seen_from(place, one) for one in at_nodes)
-        return exact_effect(nodes, transmitter, receiver, _clock(mission, nodes), wavelength, T)
+        clock = _clock(mission, nodes, at_nodes)
+        return exact_effect(nodes, transmitter, receiver, clock, wavelength, T)
 
     try:
         effect = effect_at((0.0, 0.0))
@@ -235,9 +237,9 @@ def simulate_point(
             (one.east + moved.displacement[0], one.north + moved.displacement[1])
             for one, moved in zip(targets.points, effects, strict=True)
         ]
-        left = _left_over(smooth, effect) + SPEED_OF_LIGHT * _clock(mission, fine)
-        recorded = [_recorded(smooth, (one.east, one.north)) for one in targets.points]
-        recorded = [one + SPEED_OF_LIGHT * _clock(mission, fine) for one in recorded]
+        by_clock = SPEED_OF_LIGHT * _clock(mission, fine, smooth)
+        left = _left_over(smooth, effect) + by_clock
+        recorded = [_recorded(smooth, (one.east, one.north)) + by_clock for one in targets.points]
         shown = [former.place(*one) for one in zip(displaced, recorded, strict=True)]
         in_scene_shown = [scene_former.place(*one) for one in zip(displaced, recorded, strict=True)]
         smear = former.left(shown[0], left, recorded[0])
@@ -291,7 +293,7 @@ def simulate_point(
     flown_as_declared = _paths(mission, geometry, slow_time, vibrating=True, rng=rng)
     data = history(
         flown_as_declared,
-        _clock(mission, slow_time),
+        _clock(mission, slow_time, flown_as_declared),
         np.concatenate((standing, clutter - np.asarray(effect.displacement))),
     )
     try:
@@ -313,7 +315,7 @@ def simulate_point(
     cells = former.offsets(np.array(shown), _middle(shown))
     windows = [_window(plan, cells, index) for index in range(len(shown))]
     pieces = [LinePiece(*map(float, one)) for one in zip(times, values, slopes, strict=True)]
-    model = mission.allocation.model
+    model = mission.gating_model
     return PointImages(
         slow_time=fine,
         range_error=bent,
@@ -514,7 +516,10 @@ def _likely_errors(mission: Mission) -> dict[str, tuple[Vector, Vector]]:
     return errors
 
 
-def _clock(mission: Mission, slow_time: Floats) -> Floats:
+def _clock(mission: Mission, slow_time: Floats, paths: tuple[Path, Path]) -> Floats:
+    """Clock error over slow time, that of the direct path where it is the clock. [s]"""
+    if mission.has_direct_path:
+        return direct_path_error(paths)
     error = mission.timing_error
     terms = (error.constant or 0.0, error.linear or 0.0, error.quadratic or 0.0, error.cubic or 0.0)
     polynomial = np.polynomial.polynomial.polyval(slow_time, terms)

@@ -49,7 +49,7 @@ class Study:
     def __init__(self, mission: Mission, analysis: Analysis | None = None) -> None:
         self.mission, self.analysis = mission, analysis or Analysis(mission)
         self.geometry, self.sources = self.analysis.geometry, self.analysis.sources
-        self.model = mission.allocation.model
+        self.model = mission.gating_model
         self.allocation = self.analysis.allocation
         self.plane = self.analysis.published.plane  # (25)
         self.collection = PointCollection(mission, self.geometry)
@@ -68,7 +68,8 @@ class Study:
     @property
     def declared(self) -> list[ErrorSource]:
         """Declared errors that an image can show; `other` errors are phases without a motion."""
-        return [s for s in self.analysis.stated if s.declared and s.is_motion]
+        is_heard_out = self.analysis.full.is_heard_out
+        return [s for s in self.analysis.stated if s.declared and s.is_motion and not is_heard_out(s)]
 
     def members(self, owner: str) -> list[ErrorSource]:
         """Declared errors that count against an owner's budget."""
@@ -198,7 +199,7 @@ class Study:
         half = self.collection.aperture_time / 2
         time = np.linspace(-half, half, 257)
         point = np.array([*effect.displacement, 0.0])
-        left: Floats = SPEED_OF_LIGHT * self.collection.clock(errors, time)
+        left: Floats = SPEED_OF_LIGHT * self.collection.clock(errors.smooth(), time)
         slopes: Floats = np.zeros((time.size, 2))
         for one in self.collection.paths(errors.smooth(), time):
             sight = one.measured - point

@@ -45,7 +45,7 @@ def cases(mission: Mission, allocation: Allocation, collection: PointCollection)
         Forms the images.
     """
     pslr, islr = mission.requirements.pslr, mission.requirements.islr
-    model, T = mission.allocation.model, collection.aperture_time
+    model, T = mission.gating_model, collection.aperture_time
     amplitude, rms = (
         {name: limit.by(model) for name, limit in vibration_limits(mission, allocation, metric).items()}
         for metric in ("pslr", "islr")

@@ -248,7 +248,7 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[S
     lines = equation("full", formulas.FULL_VIBRATION[row.metric], values, row.allowable_full, "m")
     yield from step(title, *known, *lines)
     limits = {"published": row.allowable_published, "full": row.allowable_full}
-    model = mission.allocation.model
+    model = mission.gating_model
     chosen = "min(published, full)" if model == "strictest" else model
     yield from step(
         f"Allowable, allocation.model {model}", *equation("allowable", chosen, limits, row.allowable or 0.0, "m")
