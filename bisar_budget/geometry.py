@@ -54,6 +54,10 @@ def without_rounding(a: Vector) -> Vector:
     return (x, y, z)
 
 
+def _minus(a: Vector, b: Vector) -> Vector:
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
 @dataclass(frozen=True, kw_only=True)
 class PlatformState:
     """Position [m] and velocity [m/s] of one platform at the aperture midpoint, and its acceleration [m/s²]."""
@@ -168,6 +172,14 @@ class BistaticGeometry:
 
     transmitter: PlatformState
     receiver: PlatformState
+
+    @cached_property
+    def apart(self) -> PlatformState:
+        """The transmitter as the receiver has it: its position is the baseline."""
+        (p, v, a), (q, w, b) = (
+            (state.position, state.velocity, state.acceleration) for state in (self.transmitter, self.receiver)
+        )
+        return PlatformState(position=_minus(p, q), velocity=_minus(v, w), acceleration=_minus(a, b))
 
     @cached_property
     def range_gradient(self) -> GroundVector:

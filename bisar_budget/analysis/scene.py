@@ -100,7 +100,7 @@ class ScenePhases:
             if size and not self.full.is_small(source, abs(size))
         ]
         self.nearest = min(self.geometry.transmitter.slant_range, self.geometry.receiver.slant_range)
-        self.count = nodes_for(self.geometry, self.T)
+        self.count = nodes_for(self.geometry, self.T, has_direct_path=self.has_direct_path)
         self.nowhere = RimPlace(self.centre, 0.0, (0.0, 0.0))  # without an image
         self.turn = math.copysign(1.0, analysis.exact.gradient_sine)
 
@@ -119,8 +119,14 @@ class ScenePhases:
 
     def ranges_at(self, radius: float, azimuth: float) -> ExactRanges:
         """Exact ranges of a point of the ground."""
-        centre, heard = at(radius, azimuth), self.has_direct_path
-        return ExactRanges(self.geometry, self.wavelength, self.T, centre, self.count, has_direct_path=heard)
+        return ExactRanges(
+            self.geometry,
+            self.wavelength,
+            self.T,
+            at(radius, azimuth),
+            self.count,
+            has_direct_path=self.has_direct_path,
+        )
 
     def place(self, radius: float, azimuth: float) -> "RimPlace":
         """What there is at a point of the ground."""

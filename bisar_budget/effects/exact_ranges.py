@@ -53,10 +53,11 @@ class ExactPhases(NamedTuple):
     turn: float = 1.0
 
 
-def nodes_for(geometry: BistaticGeometry, aperture_time_s: float) -> int:
-    """Number of nodes that a collection needs."""
+def nodes_for(geometry: BistaticGeometry, aperture_time_s: float, *, has_direct_path: bool = False) -> int:
+    """Number of nodes that a collection needs: of the lines of sight, and of the direct path where that counts."""
     half = aperture_time_s / 2
-    way = max(state.travelled(half) / state.slant_range for state in (geometry.transmitter, geometry.receiver))
+    turning = (geometry.transmitter, geometry.receiver, *((geometry.apart,) if has_direct_path else ()))
+    way = max(state.travelled(half) / state.slant_range for state in turning)
     return next(count for limit, count in _NODES if way <= limit)
 
 
@@ -79,7 +80,8 @@ class ExactRanges:
     ) -> None:
         self.wavelength, self.half = wavelength_m, aperture_time_s / 2
         self.k = 2 * math.pi / wavelength_m
-        self.nodes, *self.fit = LEGENDRE_FITS[count or nodes_for(geometry, aperture_time_s)]
+        count = count or nodes_for(geometry, aperture_time_s, has_direct_path=has_direct_path)
+        self.nodes, *self.fit = LEGENDRE_FITS[count]
         self.times = [node * self.half for node in self.nodes]
         east, north = centre
         self.tracks: dict[str, Track] = {}
