@@ -181,6 +181,17 @@ class BistaticGeometry:
         )
         return PlatformState(position=_minus(p, q), velocity=_minus(v, w), acceleration=_minus(a, b))
 
+    def sights(self, *, has_direct_path: bool) -> tuple[Vector, Vector]:
+        """What a metre of the transmitter's motion, and of the receiver's, takes from the range at mid-aperture. [-]
+
+        The lines of sight u_t, u_r; where the direct path is the clock u_t − b, u_r + b, b to the transmitter.
+        """
+        t, r = self.transmitter.look, self.receiver.look
+        if not has_direct_path:
+            return t, r
+        b = self.apart.look
+        return _minus(t, b), _minus(r, (-b[0], -b[1], -b[2]))
+
     @cached_property
     def range_gradient(self) -> GroundVector:
         """Sum s of the look vectors on the ground, (2,): range changes by −s·x. [-]"""

@@ -4,12 +4,12 @@ Nothing here comes from the package's own exact ranges, full model or theory. It
 of axes and the speed of light, and has its own quadrature (24 Gauss-Legendre nodes over the aperture).
 
 Recorded are the ranges of the true paths to the scene centre, and c·t̃(τ). Predicted are those of the measured paths,
-path + error, to a point x of the ground plane. With a direct path both are less the distance of the platforms, by the
-true and by the measured paths, and there is no clock error. The response stands at the x for which recorded − predicted
-has no P₀ and no P₁ part over the aperture. It is followed from the scene centre while the error grows from nothing, in
-short steps along its tangent, so that it is the response and no other solution. Then QPE = (2π/λ)·3/2·(coefficient of
-P₂) and cubic = (2π/λ)·5/2·(that of P₃), both at the aperture edge. Where the followed solution ends, no ground point
-has that range history.
+path + error, to a point x of the ground plane. With a direct path both are less the distance of the platforms, by
+the true and by the measured paths, and there is no clock error. The response stands at the x for which recorded −
+predicted has no P₀ and no P₁ part over the aperture. It is followed from the scene centre while the error grows from
+nothing, in short steps along its tangent, so that it is the response and no other solution. Then QPE = (2π/λ)·3/2·
+(coefficient of P₂) and cubic = (2π/λ)·5/2·(that of P₃), both at the aperture edge. Where the followed solution ends,
+no ground point has that range history.
 """
 
 import math

@@ -15,7 +15,7 @@ from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.models import CUBIC, QUADRATIC
 from bisar_budget.effects.slow_vibration import cubic_part, quadratic_part
 from bisar_budget.effects.subject import Subject, subject
-from bisar_budget.effects.vibration_lines import Line, along_line_of_sight, lines_of, projected
+from bisar_budget.effects.vibration_lines import Line, counted, lines_of, projected
 from bisar_budget.faults import KeyPath
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.model import Mission, MotionError
@@ -105,7 +105,7 @@ def _slow_row(mission: Mission, allocation: Allocation, name: str, index: int, l
         qpe_full=qpe,
         evidence=error.source,
         notes=(
-            *projected(error.vibration.sinusoidal[index].amplitude, error, line.amplitude),
+            *projected(mission, error.vibration.sinusoidal[index].amplitude, error, line.amplitude),
             f"{cycles:.2g} cycles per aperture: below one a vibration makes no echoes but, in its worst phase, a "
             f"quadratic phase of {qpe:.3g} rad or a cubic phase of {cubic:.3g} rad",
         ),
@@ -196,7 +196,7 @@ def _line(
     if line is None:
         return case
     case = _with_doubt(case._replace(declared=line.amplitude), mission)
-    notes = [*projected(error.vibration.sinusoidal[index].amplitude, error, line.amplitude), *case.notes]
+    notes = [*projected(mission, error.vibration.sinusoidal[index].amplitude, error, line.amplitude), *case.notes]
     cycles = line.frequency * mission.collection.aperture_time
     phase = 2 * math.pi * line.amplitude / mission.radar.wavelength
     if cycles >= ECHO_CYCLES:
@@ -247,8 +247,8 @@ def _noise(mission: Mission, allowed: VibrationLimits | None, name: str, error: 
     case = _case(mission, allowed, "islr", name, "wideband", None, "rms")
     if wideband is None:
         return case
-    rms = along_line_of_sight(wideband.rms, error, getattr(mission.platforms, name).state, "islr")
-    notes = (*projected(wideband.rms, error, rms), *case.notes)
+    rms = counted(mission, name, wideband.rms, "islr")
+    notes = (*projected(mission, wideband.rms, error, rms), *case.notes)
     variance = (2 * math.pi * rms / mission.radar.wavelength) ** 2
     case = case._replace(declared=rms, notes=notes, islr_db=islr_db(variance))
     return _with_doubt(case, mission)

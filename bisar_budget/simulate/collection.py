@@ -19,6 +19,7 @@ from bisar_budget.simulate.phase_history import (
     PathError,
     cell_centres,
     direct_path_error,
+    direct_path_ways,
     path,
     phase_history,
 )
@@ -147,9 +148,10 @@ class PointCollection:
 
     def paths(self, errors: Errors, slow_time: Floats, rng: np.random.Generator | None = None) -> tuple[Path, Path]:
         """Fly both platforms."""
+        ways = direct_path_ways(self.geometry, slow_time) if self.has_direct_path else (None, None)
         return (
-            path(self.geometry.transmitter, slow_time, errors.transmitter, rng),
-            path(self.geometry.receiver, slow_time, errors.receiver, rng),
+            path(self.geometry.transmitter, slow_time, errors.transmitter, rng, ways[0]),
+            path(self.geometry.receiver, slow_time, errors.receiver, rng, ways[1]),
         )
 
     def effect(self, errors: Errors) -> ExactEffect:

@@ -13,7 +13,7 @@ from bisar_budget.effects.correlation import correlated_errors, likely_error
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.exact_arrays import aperture_nodes
 from bisar_budget.effects.pieces import LinePiece, gradients_of, indicated_point
-from bisar_budget.effects.vibration_lines import along_line_of_sight, lines_of
+from bisar_budget.effects.vibration_lines import counted, lines_of
 from bisar_budget.geometry import BistaticGeometry, GroundVector, Vector
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.mission.model import MotionError as DeclaredError
@@ -32,6 +32,7 @@ from bisar_budget.simulate.phase_history import (
     PhaseHistory,
     cell_centres,
     direct_path_error,
+    direct_path_ways,
     path,
     phase_history,
 )
@@ -472,7 +473,8 @@ def _paths(
     common = mission.common_motion_error
     likely = _likely_errors(mission)
     flown = []
-    for name in ("transmitter", "receiver"):
+    ways = direct_path_ways(geometry, slow_time) if mission.has_direct_path else (None, None)
+    for name, way in zip(("transmitter", "receiver"), ways, strict=True):
         declared: DeclaredError = getattr(mission.platforms, name).motion_error
         state = getattr(geometry, name)
         axes = state.frame(declared.frame)
@@ -496,9 +498,9 @@ def _paths(
             wideband = declared.vibration.wideband
             error = error._replace(
                 sinusoids=tuple(PathSinusoid(*line) for line in lines_of(mission, name)),
-                wideband_rms=along_line_of_sight(wideband.rms, declared, state, "islr") if wideband else 0.0,
+                wideband_rms=counted(mission, name, wideband.rms, "islr") if wideband else 0.0,
             )
-        flown.append(path(state, slow_time, error, rng))
+        flown.append(path(state, slow_time, error, rng, way))
     return flown[0], flown[1]
 
 

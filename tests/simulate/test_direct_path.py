@@ -37,6 +37,28 @@ def test_autofocus_is_verified_with_a_phase_of_its_own() -> None:
     assert (row.verdict, row.verdict_autofocus) == ("confirmed", "confirmed")
 
 
+def test_vibration_is_imaged_as_the_change_of_range_less_distance() -> None:
+    """Echoes of both platforms in phase and noise of both fill the requirements, as without a direct path."""
+    vibration = {"sinusoidal": [{"amplitude": "20 um", "frequency": "4 Hz"}], "wideband": {"rms": "10 um"}}
+    lines = {f"platforms__{name}__motion_error": {"vibration": vibration} for name in ("transmitter", "receiver")}
+    requirements = {"requirements": {"pslr": "-30 dB", "islr": "-20 dB"}}
+    pulses = {"synchronization": {"method": "linear", "interval": "1 s", "error": "1 deg"}}
+    measured = []
+    for synchronization in (HEARD, {**HEARD, **pulses}):
+        mission = parse_mission(mission_text(**synchronization, **FULL, **lines, **requirements))
+        rows = verify_mission(mission, "mission.vibration.*").rows
+        assert [row.verdict for row in rows] == ["confirmed", "confirmed"]
+        measured.append([row.measured_db for row in rows])
+    assert measured[0] == pytest.approx(measured[1], abs=0.05)  # dB: ways across the line of sight turn it a little
+
+
+def test_a_slow_vibration_is_imaged_too() -> None:
+    slow = {"vibration": {"sinusoidal": [{"amplitude": "1 mm", "frequency": "0.1 Hz"}]}}
+    mission = parse_mission(mission_text(**HEARD, **FULL, platforms__receiver__motion_error=slow))
+    (row,) = verify_mission(mission, "receiver.vibration.sinusoidal.0").rows
+    assert row.verdict == "confirmed"
+
+
 def test_a_clock_error_is_in_no_image() -> None:
     """Declared, but heard out: the location is verified with the motion errors alone."""
     changes = {"timing_error": {"quadratic": 1e-9}, "requirements": {"location_error": "5 m"}}
