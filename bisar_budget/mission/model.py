@@ -15,7 +15,6 @@ from bisar_budget.geometry import (
     PlatformState,
     UndefinedFrameError,
     Vector,
-    dot,
     norm,
     state_from_angles,
 )
@@ -612,9 +611,8 @@ def _dives(platforms: Platforms, aperture_time: float) -> Iterator[Problem]:
 
 
 def _no_baseline(apart: PlatformState, half: float) -> Iterator[Problem]:
-    square, closing = norm(apart.velocity) ** 2, dot(apart.position, apart.velocity)
-    nearest = max(-half, min(half, -closing / square)) if square else 0.0
-    least = min(norm(apart.at(tau)[0]) for tau in (-half, 0.0, nearest, half))
+    # A 32nd of the way from one place to the next, the distance between is not smaller by as much as matters.
+    least = min(norm(apart.at(half * part / 32)[0]) for part in range(-32, 33))
     way = apart.travelled(half)
     if least < max(_LEAST_BASELINE, way / _FARTHEST_BY):
         yield Problem(
