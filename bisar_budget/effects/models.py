@@ -101,7 +101,8 @@ class FullModel:
 
     def __init__(self, exact: ExactRanges, geometry: BistaticGeometry) -> None:
         self.exact, self.plane = exact, exact.plane
-        self._nearest = min(min(exact.ranges[name]) for name in PLATFORMS)
+        self._nearest_of = {name: min(exact.ranges[name]) for name in PLATFORMS}
+        self._nearest = min(self._nearest_of.values())
         self._apart = min(exact.baselines, default=math.inf)
         self._slant_ranges = {
             "transmitter": geometry.transmitter.slant_range,
@@ -207,14 +208,24 @@ class FullModel:
     def _adds(self, source: ErrorSource, size: float, requirement: str) -> float:
         """Bound of what the second order adds to a phase [rad] or a displacement [m].
 
-        Of two platforms it is −Σ|P⊥(r̃ − x̂)|²/2R, at most |r̃ − x̂|²/R of the nearer one; of their distance, where that
-        is the clock, |P⊥r̃|²/2D of an error of one. They have opposite signs: no more than the larger is added.
+        Of two platforms it is −Σ|P⊥(r̃ − x̂)|²/2R, at most |r̃ − x̂|²/R of the nearer one.
         """
-        own = size * self._edge.get(source.unit, 0.0)
-        reach = size * (self._edge.get(source.unit, 0.0) + _per_unit(source.full, self.plane, LOCATION))
+        edge, moved = self._edge.get(source.unit, 0.0), _per_unit(source.full, self.plane, LOCATION)
         per_metre = {QUADRATIC: self._radians, CUBIC: self._cubic_radians, LOCATION: self._metres}[requirement]
-        of_ranges = per_metre * reach * reach / self._nearest
-        return max(of_ranges, per_metre * own * own / 2 / self._apart) if source.owner in PLATFORMS else of_ranges
+        if self.exact.has_direct_path and source.owner in PLATFORMS:
+            return per_metre * self._adds_heard(source.owner, size * edge, size * moved)
+        reach = size * (edge + moved)
+        return per_metre * reach * reach / self._nearest
+
+    def _adds_heard(self, platform: str, own: float, moved: float) -> float:
+        """Bound of the second order of an error of one platform, a displacement included, with a direct path. [m]
+
+        That of the ranges is kept apart by platform: of a distant one much cancels to first order. That of the
+        distance, |P⊥r̃|²/2D, has the other sign: no more than the larger is added.
+        """
+        (other,) = (name for name in PLATFORMS if name != platform)
+        of_ranges = (own + moved) ** 2 / self._nearest_of[platform] + moved**2 / self._nearest_of[other]
+        return max(of_ranges, own**2 / self._apart) / 2
 
     def at(self, source: ErrorSource, size: float) -> ExactPhases | None:
         """Phases and displacement of an error of a size, with its sign, by exact ranges; None: no ground point."""
