@@ -12,10 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.geometry import PlatformState
+from bisar_budget.effects.exact_arrays import direct_path_clock
+from bisar_budget.geometry import BistaticGeometry, PlatformState
 
 _FEW = 8  # scatterers are added one by one
 _HELD = 1 << 18  # complex numbers held at once, of many
+_NO_SIGHT = 1e-20  # square of what a metre of a platform changes; less is rounding
 _ROUNDING = 1e-14  # of a frequency: what numpy.linspace leaves
 
 Floats = NDArray[np.float64]
@@ -112,6 +114,7 @@ def path(
     slow_time: Floats,
     error: PathError | None = None,
     rng: np.random.Generator | None = None,
+    way: Floats | None = None,
 ) -> Path:
     """Fly one platform through its midpoint state, at its acceleration, and measure it with an error.
 
@@ -125,6 +128,8 @@ def path(
         None: the navigation is perfect.
     rng : numpy Generator, optional
         Needed for wideband vibration only.
+    way : (pulses, 3) ndarray, optional
+        By which a vibration of a metre moves; a metre along the line of sight. [m/m]
 
     Raises
     ------
@@ -148,7 +153,7 @@ def path(
         if rng is None:
             raise ValueError("wideband vibration needs a random generator")
         along += error.wideband_rms * _noise(slow_time, error.wideband_band, rng)
-    sight = actual / np.linalg.norm(actual, axis=1, keepdims=True)
+    sight = actual / np.linalg.norm(actual, axis=1, keepdims=True) if way is None else way
     return Path(actual=actual, measured=measured + sight * along[:, None])
 
 
@@ -172,6 +177,36 @@ def _noise(slow_time: Floats, band: tuple[float, float] | None, rng: np.random.G
         )
     noise: Floats = np.fft.irfft(np.fft.rfft(white) * inside, slow_time.size)
     return noise * math.sqrt(slow_time.size / float(weight))
+
+
+def direct_path_ways(geometry: BistaticGeometry, slow_time: Floats) -> tuple[Floats, Floats]:
+    """Shortest ways of both platforms that change the range less the direct path by a metre, each (pulses, 3). [m/m]
+
+    They lead along u_t − b and u_r + b. A platform that changes nothing has none.
+    """
+    transmitter, receiver = (path(state, slow_time).actual for state in (geometry.transmitter, geometry.receiver))
+
+    def unit(vectors: Floats) -> Floats:
+        units: Floats = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+        return units
+
+    def inverse(sight: Floats) -> Floats:
+        square = np.sum(sight**2, axis=1, keepdims=True)
+        ways: Floats = np.where(square > _NO_SIGHT, sight / np.maximum(square, _NO_SIGHT), 0.0)
+        return ways
+
+    b = unit(transmitter - receiver)
+    return inverse(unit(transmitter) - b), inverse(unit(receiver) + b)
+
+
+def direct_path_error(paths: tuple[Path, Path]) -> Floats:
+    """Clock error of a receiver that hears the transmitter, (pulses,): how much too far apart both are measured. [s]
+
+    Its clock is the direct signal, which is late by the actual distance; the processor takes the measured one off.
+    """
+    transmitter, receiver = paths
+    measured = (transmitter.measured, receiver.measured)
+    return direct_path_clock(*measured, transmitter.actual, receiver.actual) / SPEED_OF_LIGHT
 
 
 def phase_history(

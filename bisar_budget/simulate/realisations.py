@@ -70,7 +70,7 @@ def position_courses(
     return total
 
 
-class Flown(NamedTuple):
+class FlownErrors(NamedTuple):
     """One time series of every declared error of sensors and clocks together; None where there is none."""
 
     transmitter: Course | None
@@ -78,7 +78,7 @@ class Flown(NamedTuple):
     clock: Course | None  # [s]
 
 
-def flown_courses(analysis: Analysis) -> Flown:
+def flown_errors(analysis: Analysis) -> FlownErrors:
     """Draw each declared error once, by the seed of the file's simulation, with the coverage factor. [m], [s]"""
     mission = analysis.mission
     seed, factor = (mission.simulation or Simulation()).seed, mission.allocation.coverage_factor
@@ -97,7 +97,7 @@ def flown_courses(analysis: Analysis) -> Flown:
             phase = phase + factor * phase_courses(mission, error, times, 1, rng)[0]
     transmitter, receiver = (Course(times, moved[name]) if name in moved else None for name in PLATFORMS)
     clock = Course(times, clock_seconds(phase, mission.radar.wavelength)) if phase.any() else None
-    return Flown(transmitter, receiver, clock)
+    return FlownErrors(transmitter, receiver, clock)
 
 
 def _bias(order: int) -> Callable[[Floats, int, np.random.Generator], Floats]:

@@ -15,6 +15,7 @@ from bisar_budget.budget.vibration_rows import islr_db
 from bisar_budget.effects.exact_arrays import aperture_nodes
 from bisar_budget.effects.models import CUBIC, QUADRATIC
 from bisar_budget.effects.random_errors import RandomError
+from bisar_budget.effects.vibration_lines import sight_of
 from bisar_budget.findings.images import Verdict
 from bisar_budget.mission.model import Simulation
 from bisar_budget.simulate.collection import Errors
@@ -172,9 +173,8 @@ def _power(
     phases = white * rng.standard_normal((_POWER_DRAWS, times.size))
     for error in members:
         if error.subject.kind in ("imu", "random"):
-            state = getattr(study.geometry, error.owner)
             moved = position_courses(study.mission, error, times, _POWER_DRAWS, rng)
-            phases += k * moved @ np.array(state.look)
+            phases += k * moved @ np.array(sight_of(study.mission, error.owner))
         else:
             phases += phase_courses(study.mission, error, times, _POWER_DRAWS, rng)
     place = 2 * times / collection.aperture_time
