@@ -123,6 +123,33 @@ def full_motion(
     )
 
 
+def direct_motion(
+    x: float,
+    y: float,
+    z: float,
+    slant_range: float,
+    b_x: float,
+    b_y: float,
+    b_z: float,
+    tau: float,
+) -> tuple[tuple[float, ...], ...]:
+    """As full_motion, where the receiver hears the transmitter and takes it as its clock. [m/unit]
+
+    −(u − b)·r̃(τ), b the unit vector from the other platform to this one. Position, slant range and b
+    are those at the slow time. Derived here.
+    """
+    shared_0 = 1/slant_range
+    shared_1 = shared_0*x
+    shared_2 = shared_0*y
+    shared_3 = shared_0*z
+    shared_4 = 0.5*tau**2
+    return (
+        (b_x - shared_1, b_y - shared_2, b_z - shared_3),  # position x, y, z
+        (b_x*tau - shared_1*tau, b_y*tau - shared_2*tau, b_z*tau - shared_3*tau),  # velocity x, y, z
+        (b_x*shared_4 - shared_1*shared_4, b_y*shared_4 - shared_2*shared_4, b_z*shared_4 - shared_3*shared_4),  # acceleration x, y, z
+    )
+
+
 def full_ground_inverse(
     s_x: float,
     s_y: float,

@@ -54,6 +54,10 @@ def without_rounding(a: Vector) -> Vector:
     return (x, y, z)
 
 
+def _minus(a: Vector, b: Vector) -> Vector:
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
 @dataclass(frozen=True, kw_only=True)
 class PlatformState:
     """Position [m] and velocity [m/s] of one platform at the aperture midpoint, and its acceleration [m/s²]."""
@@ -168,6 +172,25 @@ class BistaticGeometry:
 
     transmitter: PlatformState
     receiver: PlatformState
+
+    @cached_property
+    def apart(self) -> PlatformState:
+        """The transmitter as the receiver has it: its position is the baseline."""
+        (p, v, a), (q, w, b) = (
+            (state.position, state.velocity, state.acceleration) for state in (self.transmitter, self.receiver)
+        )
+        return PlatformState(position=_minus(p, q), velocity=_minus(v, w), acceleration=_minus(a, b))
+
+    def sights(self, *, has_direct_path: bool) -> tuple[Vector, Vector]:
+        """What a metre of the transmitter's motion, and of the receiver's, takes from the range at mid-aperture. [-]
+
+        The lines of sight u_t, u_r; where the direct path is the clock u_t − b, u_r + b, b to the transmitter.
+        """
+        t, r = self.transmitter.look, self.receiver.look
+        if not has_direct_path:
+            return t, r
+        b = self.apart.look
+        return _minus(t, b), _minus(r, (-b[0], -b[1], -b[2]))
 
     @cached_property
     def range_gradient(self) -> GroundVector:

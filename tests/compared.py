@@ -83,7 +83,7 @@ def _allowables(
 ) -> Iterator[Compared]:
     """At the allowable the worse sign is at a limit, at no smaller size above one; none, where none is reached."""
     required = mission.requirements
-    is_full = mission.allocation.model == "full"
+    is_full = mission.gating_model == "full"
     limits = _limits(found, errors)
     caps = np.array([error.cap for error in errors])
     of_phase = np.array([_number(rows[error.id].allowable_full) for error in errors])
@@ -155,7 +155,7 @@ def _of_the_declared(
     declared = [error for error in errors if error.declared is not None]
     if not declared:
         return
-    is_full = mission.allocation.model == "full"
+    is_full = mission.gating_model == "full"
     responses = reference.at_declared(mission, declared)
     qpe, cubic = (np.abs(of).max(axis=0) for of in (responses.qpe, responses.cubic))
     for index, error in enumerate(declared):
@@ -200,7 +200,7 @@ def _together(
     """Aggregates by the contract's rules, from the reference's own rows."""
     rule, allocation = mission.allocation.combine, found.allocation
     owners = [error.owner for error in members]
-    is_full = mission.allocation.model == "full"
+    is_full = mission.gating_model == "full"
     qpe, cubic = (np.abs(of).max(axis=0) for of in (responses.qpe, responses.cubic))
     if is_full and mission.allocation.split == "balanced":
         weights = [

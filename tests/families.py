@@ -71,6 +71,9 @@ _FAMILIES = {
 }
 FAMILIES = tuple(_FAMILIES)
 
+# To be put behind the text of a mission: its receiver hears the transmitter.
+DIRECT_PATH = "synchronization: { method: direct_path, error: 1 deg }\n"
+
 
 def mission_text(family: str, seed: int) -> str:
     """Text of a mission file of a family, always the same for a seed; the loader accepts it.

@@ -4,11 +4,12 @@ Nothing here comes from the package's own exact ranges, full model or theory. It
 of axes and the speed of light, and has its own quadrature (24 Gauss-Legendre nodes over the aperture).
 
 Recorded are the ranges of the true paths to the scene centre, and c·t̃(τ). Predicted are those of the measured paths,
-path + error, to a point x of the ground plane. The response stands at the x for which recorded − predicted has no P₀
-and no P₁ part over the aperture. It is followed from the scene centre while the error grows from nothing, in short
-steps along its tangent, so that it is the response and no other solution. Then QPE = (2π/λ)·3/2·(coefficient of P₂)
-and cubic = (2π/λ)·5/2·(that of P₃), both at the aperture edge. Where the followed solution ends, no ground point has
-that range history.
+path + error, to a point x of the ground plane. With a direct path both are less the distance of the platforms, by
+the true and by the measured paths, and there is no clock error. The response stands at the x for which recorded −
+predicted has no P₀ and no P₁ part over the aperture. It is followed from the scene centre while the error grows from
+nothing, in short steps along its tangent, so that it is the response and no other solution. Then QPE = (2π/λ)·3/2·
+(coefficient of P₂) and cubic = (2π/λ)·5/2·(that of P₃), both at the aperture edge. Where the followed solution ends,
+no ground point has that range history.
 """
 
 import math
@@ -86,7 +87,8 @@ def errors_of(mission: Mission) -> Iterator[Error]:
         value = getattr(mission.timing_error, term)
         cap = near / SPEED_OF_LIGHT / (T / 2) ** order
         size = None if value is None else factor * value
-        yield Error(f"timing.{term}", "clock", still, np.eye(4)[order], size, cap)
+        clock = np.zeros(4) if _is_heard(mission) else np.eye(4)[order]
+        yield Error(f"timing.{term}", "clock", still, clock, size, cap)
     both = (0, 1)
     if mission.common_motion_error is not None:
         for order, kind in enumerate(KINDS):
@@ -99,6 +101,10 @@ def errors_of(mission: Mission) -> Iterator[Error]:
         # A scene that is higher than the processor takes it for: both platforms are measured too high above it.
         paths = _unit_path(both, 0, np.eye(3)[2])
         yield Error("mission.terrain", "mission", paths, np.zeros(4), mission.scene.height_error, near)
+
+
+def _is_heard(mission: Mission) -> bool:
+    return mission.synchronization is not None and mission.synchronization.method == "direct_path"
 
 
 def _states(mission: Mission) -> tuple[PlatformState, PlatformState]:
@@ -160,6 +166,8 @@ class Lanes:
             self.true = self.true - ground[:, None, None, :]  # (L, 2, n, 3)
         self.recorded = np.linalg.norm(self.true, axis=-1)
         self.error = np.einsum("lkof,on->lknf", np.array([e.paths for e in errors]), powers)
+        self.is_heard = _is_heard(mission)
+        self.apart, self.parted = self.true[:, 0] - self.true[:, 1], self.error[:, 0] - self.error[:, 1]
         clock = np.array([e.clock for e in errors])
         self.clock = SPEED_OF_LIGHT * clock @ np.array([tau**order for order in range(4)])  # (L, n)
         count = len(errors)
@@ -176,6 +184,10 @@ class Lanes:
         # |a| − |b| without the rounding of either: a satellite's range is 10⁶ m, what is left is 10⁻⁶ m.
         left = -np.einsum("lknf,lknf->lkn", off, true + measured) / (recorded + predicted)
         total = left.sum(axis=1) + size[:, None] * self.clock[lanes]
+        if self.is_heard:
+            apart, more = self.apart[at], size[:, None, None] * self.parted[lanes]
+            lengths = np.linalg.norm(apart + more, axis=-1) + np.linalg.norm(apart, axis=-1)
+            total += np.einsum("lnf,lnf->ln", more, 2 * apart + more) / lengths
         look = (measured[..., :2] / predicted[..., None]).sum(axis=1)  # (L, n, 2)
         slopes = np.einsum("lnf,no->lof", look, _PROJECT[:, :2])
         return total @ _PROJECT, slopes
@@ -187,6 +199,10 @@ class Lanes:
         measured[..., :2] -= place[:, None, None, :]
         look = measured / np.linalg.norm(measured, axis=-1)[..., None]
         grown = self.clock[lanes] - np.einsum("lknf,lknf->ln", look, self.error[lanes])
+        if self.is_heard:
+            parted = self.parted[lanes]
+            apart = self.apart[at] + size[:, None, None] * parted
+            grown += np.einsum("lnf,lnf->ln", apart, parted) / np.linalg.norm(apart, axis=-1)
         slopes = np.einsum("lnf,no->lof", look[..., :2].sum(axis=1), _PROJECT[:, :2])
         return _against(slopes, grown @ _PROJECT[:, :2]), _determinant(slopes)
 

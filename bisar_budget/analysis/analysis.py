@@ -40,7 +40,13 @@ class Analysis:
     @cached_property
     def exact(self) -> ExactRanges:
         """Exact ranges over the aperture."""
-        return ExactRanges(self.geometry, self.mission.radar.wavelength, self.mission.collection.aperture_time)
+        mission = self.mission
+        return ExactRanges(
+            self.geometry,
+            mission.radar.wavelength,
+            mission.collection.aperture_time,
+            has_direct_path=mission.has_direct_path,
+        )
 
     @cached_property
     def sources(self) -> list[ErrorSource]:
@@ -79,8 +85,8 @@ class Analysis:
 
     @cached_property
     def published(self) -> PublishedModel:
-        """Tables I and II, and (25)."""
-        return PublishedModel(self.geometry)
+        """Tables I and II, and (25); they do not know a direct path."""
+        return PublishedModel(self.geometry, is_blind=self.mission.has_direct_path)
 
     @cached_property
     def full(self) -> FullModel:
@@ -114,7 +120,7 @@ class Analysis:
     @cached_property
     def allocation(self) -> Allocation:
         """Budgets as divided; `balanced` weighs phases by the gating model, under `strictest` the larger of both."""
-        gating = self.mission.allocation.model
+        gating = self.mission.gating_model
         both: tuple[Model, ...] = (self.published, self.full)
         models = [model for model in both if gating in (model.name, "strictest")]
         phases = {

@@ -89,6 +89,7 @@ class ScenePhases:
         mission = analysis.mission
         self.geometry, self.full = analysis.geometry, analysis.full
         self.wavelength, self.T = mission.radar.wavelength, mission.collection.aperture_time
+        self.has_direct_path = mission.has_direct_path
         self.combine, self.groups = mission.allocation.combine, analysis.groups
         self.members = [source for source in analysis.stated if source.is_motion]
         self.sizes = [source.declared or 0.0 for source in self.members]
@@ -99,7 +100,7 @@ class ScenePhases:
             if size and not self.full.is_small(source, abs(size))
         ]
         self.nearest = min(self.geometry.transmitter.slant_range, self.geometry.receiver.slant_range)
-        self.count = nodes_for(self.geometry, self.T)
+        self.count = nodes_for(self.geometry, self.T, has_direct_path=self.has_direct_path)
         self.nowhere = RimPlace(self.centre, 0.0, (0.0, 0.0))  # without an image
         self.turn = math.copysign(1.0, analysis.exact.gradient_sine)
 
@@ -118,7 +119,14 @@ class ScenePhases:
 
     def ranges_at(self, radius: float, azimuth: float) -> ExactRanges:
         """Exact ranges of a point of the ground."""
-        return ExactRanges(self.geometry, self.wavelength, self.T, at(radius, azimuth), self.count)
+        return ExactRanges(
+            self.geometry,
+            self.wavelength,
+            self.T,
+            at(radius, azimuth),
+            self.count,
+            has_direct_path=self.has_direct_path,
+        )
 
     def place(self, radius: float, azimuth: float) -> "RimPlace":
         """What there is at a point of the ground."""

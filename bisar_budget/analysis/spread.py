@@ -7,7 +7,7 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.vibration_limits import spread_phase
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.subject import subject
-from bisar_budget.effects.vibration_lines import along_line_of_sight
+from bisar_budget.effects.vibration_lines import counted
 from bisar_budget.mission.model import Mission
 
 
@@ -27,7 +27,7 @@ def spread_powers(analysis: Analysis, gating: str) -> list[tuple[str, str, float
         error = getattr(mission.platforms, name).motion_error
         wideband = error.vibration.wideband
         if wideband is not None:
-            rms = along_line_of_sight(wideband.rms, error, getattr(mission.platforms, name).state, "islr")
+            rms = counted(mission, name, wideband.rms, "islr")
             variance = (2 * math.pi * rms / mission.radar.wavelength) ** 2
             found.append((subject(name, "vibration", "wideband").id, name, variance))
     for one in analysis.random:

@@ -208,7 +208,7 @@ def _judged(mission: Mission, *, declared: float | None, **of_row: Any) -> Row:
 
 def _doubt(other: Model, size: float | None, limit: float | None, unit: str, what: str = "fail:") -> str:
     """Say that the model that does not gate fails an aggregate; else nothing."""
-    if size is None or limit is None or size <= limit * (1 + UTILIZATION_TOLERANCE):
+    if size is None or limit is None or size <= limit * (1 + UTILIZATION_TOLERANCE) or other.is_blind:
         return ""
     return f"the {other.name} model says {what} {_said(size, unit)}, {format_limit(limit, unit)} allowed"
 

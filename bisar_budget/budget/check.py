@@ -48,7 +48,7 @@ def check_mission(mission: Mission, today: date, *, is_brief: bool = False) -> M
         Rows in the order of the contract, declared or not.
     """
     analysis = Analysis(mission, is_brief)
-    gating = mission.allocation.model
+    gating = mission.gating_model
     if gating == "strictest":
         checked = stricter(_checked(analysis, "published"), _checked(analysis, "full"))
     else:
@@ -75,6 +75,7 @@ def check_mission(mission: Mission, today: date, *, is_brief: bool = False) -> M
         rows=tuple(rows),
         warnings=(
             *_unknown_requirement_ids(mission, rows),
+            *_overruled_model(mission),
             *warnings,
             *_unused_correlations(mission),
             *straight_orbits(mission),
@@ -192,6 +193,15 @@ def _unknown_requirement_ids(mission: Mission, rows: Sequence[Row]) -> Iterator[
                 line=mission.line(("requirement_ids", row_id)),
                 message=f"requirement_ids: {row_id} is the id of no row",
             )
+
+
+def _overruled_model(mission: Mission) -> Iterator[FileWarning]:
+    if mission.gating_model != mission.allocation.model:
+        yield FileWarning(
+            line=mission.line(("synchronization", "method")),
+            message=f"allocation.model {mission.allocation.model}: the published model does not know the direct "
+            "path; the full model gates",
+        )
 
 
 def _nothing_declared(rows: Sequence[Row]) -> Iterator[FileWarning]:

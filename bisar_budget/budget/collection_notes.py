@@ -23,6 +23,11 @@ def collection_notes(analysis: Analysis) -> Iterator[str]:
                 f"the {name}'s line of sight turns by ±{turn:.2g} rad: the published model takes the phase for a "
                 "quadratic, the full model does not"
             )
+    if mission.has_direct_path:
+        yield (
+            "the direct path is the clock: the full model takes ranges less the distance of the platforms, and "
+            "timing errors have no effect; values of the published model are those without it"
+        )
     cell = phase_across_a_cell(analysis)
     if cell > COARSE_CELL_RAD:
         shown = 100 / (1 + (cell / _ABSORBED_RAD) ** 2)

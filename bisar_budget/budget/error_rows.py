@@ -186,7 +186,7 @@ def _doubt(analysis: Analysis, other: Model, source: ErrorSource, theirs: Declar
             if required is not None
         ]
     size, allowed, binding = max(held, key=lambda one: one[0] / one[1])
-    if size <= allowed * (1 + UTILIZATION_TOLERANCE):
+    if size <= allowed * (1 + UTILIZATION_TOLERANCE) or other.is_blind:
         return ""
     says = f"the {other.name} model says fail"
     if binding == LOCATION:

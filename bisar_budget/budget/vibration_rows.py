@@ -15,7 +15,7 @@ from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.models import CUBIC, QUADRATIC
 from bisar_budget.effects.slow_vibration import cubic_part, quadratic_part
 from bisar_budget.effects.subject import Subject, subject
-from bisar_budget.effects.vibration_lines import Line, along_line_of_sight, lines_of, projected
+from bisar_budget.effects.vibration_lines import Line, counted, lines_of, projected
 from bisar_budget.faults import KeyPath
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.model import Mission, MotionError
@@ -105,7 +105,7 @@ def _slow_row(mission: Mission, allocation: Allocation, name: str, index: int, l
         qpe_full=qpe,
         evidence=error.source,
         notes=(
-            *projected(error.vibration.sinusoidal[index].amplitude, error, line.amplitude),
+            *projected(mission, error.vibration.sinusoidal[index].amplitude, error, line.amplitude),
             f"{cycles:.2g} cycles per aperture: below one a vibration makes no echoes but, in its worst phase, a "
             f"quadratic phase of {qpe:.3g} rad or a cubic phase of {cubic:.3g} rad",
         ),
@@ -195,8 +195,8 @@ def _line(
     case = _case(mission, allowed, "pslr", name, "sinusoidal", index, index, "amplitude")
     if line is None:
         return case
-    case = _with_doubt(case._replace(declared=line.amplitude), mission.allocation.model)
-    notes = [*projected(error.vibration.sinusoidal[index].amplitude, error, line.amplitude), *case.notes]
+    case = _with_doubt(case._replace(declared=line.amplitude), mission)
+    notes = [*projected(mission, error.vibration.sinusoidal[index].amplitude, error, line.amplitude), *case.notes]
     cycles = line.frequency * mission.collection.aperture_time
     phase = 2 * math.pi * line.amplitude / mission.radar.wavelength
     if cycles >= ECHO_CYCLES:
@@ -234,7 +234,7 @@ def _together(
         f"entries {shown}, at {_band(members)}, are at most {NEAR_CYCLES:g} cycles per aperture apart: in the worst "
         f"phases their echoes together are as high as that of one vibration of {format_quantity(declared, 'm')}"
     )
-    return _with_doubt(case._replace(declared=declared, notes=(near, *case.notes)), mission.allocation.model)
+    return _with_doubt(case._replace(declared=declared, notes=(near, *case.notes)), mission)
 
 
 def _band(lines: Sequence[Line]) -> str:
@@ -247,11 +247,11 @@ def _noise(mission: Mission, allowed: VibrationLimits | None, name: str, error: 
     case = _case(mission, allowed, "islr", name, "wideband", None, "rms")
     if wideband is None:
         return case
-    rms = along_line_of_sight(wideband.rms, error, getattr(mission.platforms, name).state, "islr")
-    notes = (*projected(wideband.rms, error, rms), *case.notes)
+    rms = counted(mission, name, wideband.rms, "islr")
+    notes = (*projected(mission, wideband.rms, error, rms), *case.notes)
     variance = (2 * math.pi * rms / mission.radar.wavelength) ** 2
     case = case._replace(declared=rms, notes=notes, islr_db=islr_db(variance))
-    return _with_doubt(case, mission.allocation.model)
+    return _with_doubt(case, mission)
 
 
 def islr_db(variance: float) -> float | None:
@@ -271,11 +271,12 @@ def _margin(allowed: VibrationLimits | None) -> tuple[str, ...]:
     return (f"the published rule is {abs(allowed.margin_db):.2f} dB {side} first principles",)
 
 
-def _with_doubt(case: VibrationCase, model: str) -> VibrationCase:
-    """Say that the model that does not gate fails it."""
-    if case.limits is None or case.declared is None:
+def _with_doubt(case: VibrationCase, mission: Mission) -> VibrationCase:
+    """Say that the model that does not gate fails it; the published one does not know a direct path."""
+    if case.limits is None or case.declared is None or mission.has_direct_path:
         return case
-    other, limit = ("full", case.limits.full) if model == "published" else ("published", case.limits.published)
+    is_published = mission.allocation.model == "published"
+    other, limit = ("full", case.limits.full) if is_published else ("published", case.limits.published)
     if case.declared <= limit * (1 + UTILIZATION_TOLERANCE):
         return case
     text = f"the {other} model says fail: {format_quantity(limit, 'm', 3, 'down')} allowed"

@@ -32,7 +32,7 @@ def _of_oscillator(mission: Mission, name: str, oscillator: Oscillator, sync: Sy
     T, factor = mission.collection.aperture_time, mission.allocation.coverage_factor
     noise = noise_of(oscillator, mission.radar.center_frequency, T)
     notes, no_limit, warning = list(noise.notes), "no phase noise", ""
-    if sync is not None and sync.method == "direct_path":
+    if sync is not None and sync.is_direct_path:
         found, no_limit, notes = Parts(0.0, 0.0, 0.0), DIRECT, []
     else:
         if sync is not None and sync.interval is not None:

@@ -36,6 +36,19 @@ def aperture_nodes(aperture_time_s: float, count: int = NODES) -> Floats:
     return nodes
 
 
+def direct_path_clock(
+    transmitter: Floats, receiver: Floats, actual_transmitter: Floats, actual_receiver: Floats
+) -> Floats:
+    """What a receiver that hears the transmitter has for a clock error: measured less actual distance of both. [m]
+
+    Positions (..., 3) as in `exact_effects`, (...).
+    """
+    grown: Floats = np.linalg.norm(transmitter - receiver, axis=-1) - np.linalg.norm(
+        actual_transmitter - actual_receiver, axis=-1
+    )
+    return grown
+
+
 def exact_effects(
     transmitter: Floats,
     receiver: Floats,
@@ -54,7 +67,7 @@ def exact_effects(
     actual_transmitter, actual_receiver : (nodes, 3) ndarray
         Actual positions there. [m]
     clock_range : (..., nodes) ndarray or float
-        Clock error times the speed of light. [m]
+        Clock error times the speed of light; of a direct path `direct_path_clock`. [m]
     wavelength_m : float
         Of the centre frequency.
     near : (..., 2) ndarray, optional

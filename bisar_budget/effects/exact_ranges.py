@@ -5,18 +5,22 @@ over the whole aperture by Legendre polynomials Pₙ, at the nodes of Gauss-Lege
 response sits at the ground point for which nothing is left of P₀ and P₁; what then is left of P₂ and P₃ defocuses.
 `Linear` is the same for errors so small that their effects are proportional to them. `exact_arrays.py` does both on
 arrays. Derived here.
+
+A receiver that hears the transmitter takes the direct path as its clock: the data then hold R_t + R_r less the actual
+distance of the platforms, and the processor subtracts ranges less the measured one. No ground point changes that
+distance, so that it counts like a clock error, c·t̃ = |r̂_t − r̂_r| − |r_t − r_r|, and other clock errors have no part.
 """
 
 import math
 from collections.abc import Iterable, Sequence
 from functools import cached_property
 from math import sqrt
-from operator import add, mul
+from operator import add, mul, sub
 from typing import NamedTuple
 
 from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
 from bisar_budget.effects.effect import CLOCK_UNITS, PLATFORMS, Effect, ErrorSource, ImagePlane
-from bisar_budget.evaluators import LEGENDRE_FITS, full_ground_inverse, full_motion
+from bisar_budget.evaluators import LEGENDRE_FITS, direct_motion, full_ground_inverse, full_motion
 from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vector
 
 # Way of a platform in half an aperture, over its slant range, up to which so many nodes change phases by less than
@@ -49,10 +53,11 @@ class ExactPhases(NamedTuple):
     turn: float = 1.0
 
 
-def nodes_for(geometry: BistaticGeometry, aperture_time_s: float) -> int:
-    """Number of nodes that a collection needs."""
+def nodes_for(geometry: BistaticGeometry, aperture_time_s: float, *, has_direct_path: bool = False) -> int:
+    """Number of nodes that a collection needs: of the lines of sight, and of the direct path where that counts."""
     half = aperture_time_s / 2
-    way = max(state.travelled(half) / state.slant_range for state in (geometry.transmitter, geometry.receiver))
+    turning = (geometry.transmitter, geometry.receiver, *((geometry.apart,) if has_direct_path else ()))
+    way = max(state.travelled(half) / state.slant_range for state in turning)
     return next(count for limit, count in _NODES if way <= limit)
 
 
@@ -60,6 +65,7 @@ class ExactRanges:
     """The exact paths of one collection, sampled over the aperture.
 
     `centre` (2,) is the ground point [m] that stands for the scene centre: what errors do is asked there.
+    `has_direct_path` says that the direct path is the clock.
     """
 
     def __init__(
@@ -69,10 +75,13 @@ class ExactRanges:
         aperture_time_s: float,
         centre: GroundVector = (0.0, 0.0),
         count: int | None = None,
+        *,
+        has_direct_path: bool = False,
     ) -> None:
         self.wavelength, self.half = wavelength_m, aperture_time_s / 2
         self.k = 2 * math.pi / wavelength_m
-        self.nodes, *self.fit = LEGENDRE_FITS[count or nodes_for(geometry, aperture_time_s)]
+        count = count or nodes_for(geometry, aperture_time_s, has_direct_path=has_direct_path)
+        self.nodes, *self.fit = LEGENDRE_FITS[count]
         self.times = [node * self.half for node in self.nodes]
         east, north = centre
         self.tracks: dict[str, Track] = {}
@@ -85,8 +94,16 @@ class ExactRanges:
         )
         self.recorded = [t + r for t, r in zip(*self.ranges.values(), strict=True)]
 
+        # Distances of the platforms at the nodes, where they are the clock.
+        self.baselines = list(map(math.dist, *self.tracks.values())) if has_direct_path else []
+
         # Ranges in double precision hold no phase that is smaller.
-        self.rounding = _EPSILON * self.k * max(self.recorded)
+        self.rounding = _EPSILON * self.k * (max(self.recorded) + max(self.baselines, default=0.0))
+
+    @property
+    def has_direct_path(self) -> bool:
+        """Whether the direct path is the clock."""
+        return bool(self.baselines)
 
     # ------------------------------------------------------------------ small errors
     @cached_property
@@ -156,16 +173,22 @@ class ExactRanges:
         """Effects of a small unit error of each platform, nine: position, velocity, acceleration along x, y, z."""
         found = {}
         for name in PLATFORMS:
-            at_nodes = [
-                full_motion(*place, R, tau)
-                for place, R, tau in zip(self.tracks[name], self.ranges[name], self.times, strict=True)
-            ]
+            nodes = zip(self.tracks[name], self.ranges[name], self.times, strict=True)
+            if self.has_direct_path:
+                at_nodes = [
+                    direct_motion(*place, R, *b, tau)
+                    for (place, R, tau), b in zip(nodes, self._heard_along[name], strict=True)
+                ]
+            else:
+                at_nodes = [full_motion(*place, R, tau) for place, R, tau in nodes]
             kinds = zip(*at_nodes, strict=True)
             found[name] = [self.effect(along) for of_kind in kinds for along in zip(*of_kind, strict=True)]
         return found
 
     def clock_effects(self) -> list[Effect]:
         """Effects of a small unit of each power of the clock error, 1 to τ³."""
+        if self.has_direct_path:
+            return [Effect(0.0, 0.0, 0.0, 0.0)] * 4
         return [self.effect([SPEED_OF_LIGHT * tau**n for tau in self.times]) for n in range(4)]
 
     def effect_of(self, source: ErrorSource) -> Effect:
@@ -181,15 +204,33 @@ class ExactRanges:
         return along if source.unit == "m" else list(map(mul, along, self.powers[source.unit]))
 
     def along(self, name: str, direction: Vector) -> list[float]:
-        """What a metre along a direction does to the range of a platform at the nodes, −u·d."""
+        """What a metre along a direction does to the range of a platform at the nodes, −u·d; if heard, −(u − b)·d."""
         key = (name, direction)
         if key not in self._known_along:
             x, y, z = direction
-            self._known_along[key] = [
+            along = [
                 -(a * x + b * y + c * z) / R
                 for (a, b, c), R in zip(self.tracks[name], self.ranges[name], strict=True)
             ]
+            if self.has_direct_path:
+                heard = (a * x + b * y + c * z for a, b, c in self._heard_along[name])
+                along = list(map(add, along, heard))
+            self._known_along[key] = along
         return self._known_along[key]
+
+    @cached_property
+    def _heard_along(self) -> dict[str, Track]:
+        """Unit vectors along the direct path at the nodes, b from the other platform to each."""
+        transmitter, receiver = self.tracks.values()
+        b = [
+            ((x - u) / D, (y - v) / D, (z - w) / D)
+            for (x, y, z), (u, v, w), D in zip(transmitter, receiver, self.baselines, strict=True)
+        ]
+        return {"transmitter": b, "receiver": [(-x, -y, -z) for x, y, z in b]}
+
+    def _heard(self, measured: dict[str, Track]) -> list[float]:
+        """What measured tracks put for c·t̃ at the nodes where the direct path is the clock. [m]"""
+        return list(map(sub, map(math.dist, *measured.values()), self.baselines))
 
     @cached_property
     def _known_along(self) -> dict[tuple[str, Vector], list[float]]:
@@ -240,6 +281,11 @@ class ExactRanges:
                 [sum(map(mul, of_unit, along)) for along in of_axes]
                 for of_unit, of_axes in zip((list(map(mul, powers, one)) for one in metres), axes, strict=True)
             )
+            if self.has_direct_path:
+                of_unit = list(map(mul, powers, self._quadratic_weights))
+                along_axes = zip(*self._heard_along["transmitter"], strict=True)
+                x, y, z = (sum(map(mul, of_unit, along)) for along in along_axes)
+                (a, b, c), (u, v, w) = (a + x, b + y, c + z), (u - x, v - y, w - z)
             most = whole * powers[-1]
             found["transmitter", unit], found["receiver", unit] = ((a, b, c), most), ((u, v, w), most)
             found["mission", unit] = ((a + u, b + v, c + w), 2 * most)
@@ -289,6 +335,8 @@ class ExactRanges:
             else:  # a clock, or a phase as such
                 shape = self.shape(source)
                 recorded = [whole + size * metres for whole, metres in zip(recorded, shape, strict=True)]
+        if self.has_direct_path:
+            recorded = list(map(add, recorded, self._heard(measured)))
         reach = self._reach if bend * self.half < self._bend else 0.0
         return self._settled(recorded, measured["transmitter"], measured["receiver"], near, reach)
 
@@ -316,6 +364,8 @@ class ExactRanges:
                     ]
         else:
             recorded = [whole + size * metres for whole, metres in zip(recorded, self.shape(source), strict=True)]
+        if self.has_direct_path:
+            recorded = list(map(add, recorded, self._heard(measured)))
         east, north = place
         return [
             whole
@@ -353,11 +403,25 @@ class ExactRanges:
                 by_north[j] += b / R
                 if moves:
                     change[j] -= p * (a * x + b * y + c * z) / R
+        if self.has_direct_path and source.moves("transmitter") != source.moves("receiver"):
+            change = list(map(add, change, self._way_heard(source, size)))
         value, slope = self.fit[0], self.fit[1]
         a, b, c, d = _sum(value, by_east), _sum(value, by_north), _sum(slope, by_east), _sum(slope, by_north)
         constant, linear = _sum(value, change), _sum(slope, change)
         determinant = a * d - b * c
         return ((b * linear - d * constant) / determinant, (c * constant - a * linear) / determinant)
+
+    def _way_heard(self, source: ErrorSource, size: float) -> list[float]:
+        """How a larger error of one platform changes the measured distance to the other at the nodes. [m/unit]"""
+        x, y, z = source.direction
+        own, other = sorted(PLATFORMS, key=source.moves, reverse=True)
+        found = []
+        nodes = zip(self.tracks[own], self.tracks[other], self.powers[source.unit], strict=True)
+        for (a, b, c), (u, v, w), p in nodes:
+            a, b, c = a + size * p * x - u, b + size * p * y - v, c + size * p * z - w
+            apart = sqrt(a * a + b * b + c * c)
+            found.append(p * (a * x + b * y + c * z) / apart if apart else 0.0)
+        return found
 
     @cached_property
     def powers(self) -> dict[str, list[float]]:
@@ -367,6 +431,8 @@ class ExactRanges:
     def shape(self, source: ErrorSource) -> list[float]:
         """Range error at the nodes of a unit of a clock error, or of a phase as such. [m/unit]"""
         if source.owner == "clock":
+            if self.has_direct_path:
+                return [0.0] * len(self.times)
             power = _CLOCK_POWERS[source.unit]
             return [SPEED_OF_LIGHT * tau**power for tau in self.times]
         return [(node * node - 1 / 3) / self.k for node in self.nodes]  # a quadratic that displaces nothing

@@ -58,8 +58,9 @@ class PublishedModel:
 
     name = "published"
 
-    def __init__(self, geometry: BistaticGeometry) -> None:
+    def __init__(self, geometry: BistaticGeometry, *, is_blind: bool = False) -> None:
         self.plane = image_plane(geometry)
+        self.is_blind = is_blind  # to what the collection has: a direct path
 
     def effect(self, source: ErrorSource) -> Effect:
         """Effect of a unit of an error."""
@@ -96,10 +97,13 @@ class FullModel:
     """The full model of one collection, for errors of any size."""
 
     name = "full"
+    is_blind = False
 
     def __init__(self, exact: ExactRanges, geometry: BistaticGeometry) -> None:
         self.exact, self.plane = exact, exact.plane
-        self._nearest = min(min(exact.ranges[name]) for name in PLATFORMS)
+        self._nearest_of = {name: min(exact.ranges[name]) for name in PLATFORMS}
+        self._nearest = min(self._nearest_of.values())
+        self._apart = min(exact.baselines, default=math.inf)
         self._slant_ranges = {
             "transmitter": geometry.transmitter.slant_range,
             "receiver": geometry.receiver.slant_range,
@@ -125,6 +129,8 @@ class FullModel:
 
     def no_limit(self, source: ErrorSource) -> str:
         """Say why an error has no limit from its quadratic phase."""
+        if self.is_heard_out(source):
+            return "the direct path is the clock: a timing error has no effect"
         return (
             "no error up to a tenth of the slant range reaches the limit"
             if source.is_motion
@@ -161,7 +167,7 @@ class FullModel:
         """
         per_unit = _per_unit(source.full, self.plane, requirement)
         linear = _size(limit, per_unit)
-        if not source.is_motion:
+        if not source.is_motion or self.is_heard_out(source):
             return linear
         farthest = min(upto, max(self.farthest(source), abs(source.declared or 0.0)))
         first = farthest if linear is None else min(linear, farthest)
@@ -172,16 +178,24 @@ class FullModel:
 
     def is_linear_at(self, source: ErrorSource, requirement: str, limit: float) -> bool:
         """Whether effects of an error are proportional to its size up to a limit."""
+        if self.is_heard_out(source):
+            return True
         linear, farthest = _size(limit, _per_unit(source.full, self.plane, requirement)), self.farthest(source)
         first = farthest if linear is None else min(linear, farthest)
         return self._adds(source, first, requirement) <= _SHARE * limit
 
     def farthest(self, source: ErrorSource) -> float:
-        """Size beyond which an error is none of navigation. [unit]"""
+        """Size beyond which an error is none of navigation; infinite: it has no effect whatever its size. [unit]"""
+        if self.is_heard_out(source):
+            return math.inf
         if source.owner == "clock":
             return FARTHEST * min(self._slant_ranges.values()) / max(map(abs, self.exact.shape(source)))
         reached = [R for name, R in self._slant_ranges.items() if source.moves(name)]
         return FARTHEST * min(reached) / self._edge[source.unit]
+
+    def is_heard_out(self, source: ErrorSource) -> bool:
+        """Whether an error is one of a clock that the direct path stands in for."""
+        return source.owner == "clock" and self.exact.has_direct_path
 
     def is_small(self, source: ErrorSource, size: float) -> bool:
         """Whether effects of an error are proportional to its size, as far as anybody can see."""
@@ -194,11 +208,24 @@ class FullModel:
     def _adds(self, source: ErrorSource, size: float, requirement: str) -> float:
         """Bound of what the second order adds to a phase [rad] or a displacement [m].
 
-        Of two platforms it is Σ|P⊥(r̃ − x̂)|²/2R, at most |r̃ − x̂|²/R of the nearer one.
+        Of two platforms it is −Σ|P⊥(r̃ − x̂)|²/2R, at most |r̃ − x̂|²/R of the nearer one.
         """
-        reach = size * (self._edge.get(source.unit, 0.0) + _per_unit(source.full, self.plane, LOCATION))
+        edge, moved = self._edge.get(source.unit, 0.0), _per_unit(source.full, self.plane, LOCATION)
         per_metre = {QUADRATIC: self._radians, CUBIC: self._cubic_radians, LOCATION: self._metres}[requirement]
+        if self.exact.has_direct_path and source.owner in PLATFORMS:
+            return per_metre * self._adds_heard(source.owner, size * edge, size * moved)
+        reach = size * (edge + moved)
         return per_metre * reach * reach / self._nearest
+
+    def _adds_heard(self, platform: str, own: float, moved: float) -> float:
+        """Bound of the second order of an error of one platform, a displacement included, with a direct path. [m]
+
+        That of the ranges is kept apart by platform: of a distant one much cancels to first order. That of the
+        distance, |P⊥r̃|²/2D, has the other sign: no more than the larger is added.
+        """
+        (other,) = (name for name in PLATFORMS if name != platform)
+        of_ranges = (own + moved) ** 2 / self._nearest_of[platform] + moved**2 / self._nearest_of[other]
+        return max(of_ranges, own**2 / self._apart) / 2
 
     def at(self, source: ErrorSource, size: float) -> ExactPhases | None:
         """Phases and displacement of an error of a size, with its sign, by exact ranges; None: no ground point."""

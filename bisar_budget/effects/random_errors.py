@@ -3,7 +3,8 @@
 Biases of an inertial sensor are one error over the aperture, noise is another at every moment; both have a sigma and
 no sign. They contribute from the quadratic order on: the constant and linear part of a position is what aiding
 leaves, and the mission declares it. To the published model the line of sight is that of mid-aperture
-(`theory.random_errors`); the full model lets it turn, and counts what the displacement of the image adds.
+(`theory.random_errors`); the full model lets it turn, knows a direct path, and counts what the displacement of the
+image adds.
 """
 
 import math
@@ -17,8 +18,9 @@ from bisar_budget.constants import ROUNDING, STANDARD_GRAVITY
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.exact_ranges import ExactRanges
 from bisar_budget.effects.subject import Subject, subject
+from bisar_budget.effects.vibration_lines import sight_of
 from bisar_budget.faults import KeyPath
-from bisar_budget.geometry import BistaticGeometry, PlatformState, Vector
+from bisar_budget.geometry import BistaticGeometry, PlatformState, Vector, dot
 from bisar_budget.mission.instruments import IMU_KINDS, GaussMarkov, Imu
 from bisar_budget.mission.model import Mission, MotionError
 
@@ -84,7 +86,13 @@ def random_errors(mission: Mission, geometry: BistaticGeometry) -> list[RandomEr
     found: list[RandomError] = []
     states = (geometry.transmitter, geometry.receiver)
     if any(getattr(mission.platforms, name).motion_error.imu for name in PLATFORMS):
-        exact = ExactRanges(geometry, mission.radar.wavelength, mission.collection.aperture_time, count=_NODES)
+        exact = ExactRanges(
+            geometry,
+            mission.radar.wavelength,
+            mission.collection.aperture_time,
+            count=_NODES,
+            has_direct_path=mission.has_direct_path,
+        )
         for name, state in zip(PLATFORMS, states, strict=True):
             found += _of_imu(mission, name, state, exact)
     for name, state in zip(PLATFORMS, states, strict=True):
@@ -110,7 +118,7 @@ def _of_imu(mission: Mission, name: str, state: PlatformState, exact: ExactRange
         directions = [
             _scaled(_leak(axis) if kind in _BY_GRAVITY else axis, p) for axis, p in zip(axes, parts, strict=True)
         ]
-        along = math.hypot(*(_dot(state.look, direction) for direction in directions))
+        along = math.hypot(*(dot(state.look, direction) for direction in directions))
         row = evaluators.inertial_phases(
             along, along, STANDARD_GRAVITY, mission.radar.wavelength, mission.collection.aperture_time
         )[index]
@@ -137,10 +145,6 @@ def _leak(axis: Vector) -> Vector:
 
 def _scaled(vector: Vector, factor: float) -> Vector:
     return (vector[0] * factor, vector[1] * factor, vector[2] * factor)
-
-
-def _dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def _over_aperture(
@@ -196,13 +200,13 @@ def _of_position(mission: Mission, name: str, state: PlatformState) -> Iterator[
     from bisar_budget.effects.tones import gauss_markov
 
     k, factor = 2 * math.pi / mission.radar.wavelength, mission.allocation.coverage_factor
-    axes = state.frame(error.frame)
+    axes, sight = state.frame(error.frame), sight_of(mission, name)
     is_of_part = "random" in dict(error.of_parts)
     process: GaussMarkov
     for index, process in enumerate(error.random):
         largest = max(process.sigma)
         sizes = [sigma / largest if largest else 1.0 for sigma in process.sigma]
-        along = k * math.hypot(*(_dot(state.look, axis) * size for axis, size in zip(axes, sizes, strict=True)))
+        along = k * math.hypot(*(dot(sight, axis) * size for axis, size in zip(axes, sizes, strict=True)))
         parts = gauss_markov(mission.collection.aperture_time, process.correlation_time)
         effect = RandomEffect(
             along * math.sqrt(parts.quadratic), along * math.sqrt(parts.cubic), along * math.sqrt(parts.left) / factor

@@ -33,7 +33,12 @@ def error_sources(
 ) -> list[ErrorSource]:
     """List every position, velocity, acceleration, clock and other error, declared or not, in a fixed order."""
     sources: list[ErrorSource] = []
-    exact = exact or ExactRanges(geometry, mission.radar.wavelength, mission.collection.aperture_time)
+    exact = exact or ExactRanges(
+        geometry,
+        mission.radar.wavelength,
+        mission.collection.aperture_time,
+        has_direct_path=mission.has_direct_path,
+    )
     full = exact.motion_effects()
     states = (geometry.transmitter, geometry.receiver)
     for name, state in zip(PLATFORMS, states, strict=True):

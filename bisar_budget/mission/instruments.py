@@ -227,6 +227,11 @@ class Synchronization(NamedTuple):
     ] = "linear"
     source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
 
+    @property
+    def is_direct_path(self) -> bool:
+        """Whether the receiver hears the transmitter, and no pulses are exchanged."""
+        return self.method == "direct_path"
+
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
         """Hold exchanged pulses to an interval."""

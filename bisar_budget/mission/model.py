@@ -44,6 +44,8 @@ if TYPE_CHECKING:
     from bisar_budget.mission.instruments import GaussMarkov, Imu, Oscillator, Synchronization
 
 STILL = 1e-6  # m/s; slower than this no platform flies an aperture
+_LEAST_BASELINE = 1.0  # m, between platforms of which one hears the other
+_FARTHEST_BY = 3  # times the least baseline, that they move by in half an aperture: so far a fit of 16 nodes is true
 
 FREQUENCY = Quantity(units.FREQUENCY, gt=0, ge=1e3, le=1e13)
 VIBRATION_FREQUENCY = Quantity(units.FREQUENCY, gt=0, le=1e9)
@@ -546,6 +548,8 @@ class Mission(NamedTuple):
             yield from _no_image(_geometry(platforms))
         if platforms is not None and collection is not None:
             yield from _dives(platforms, collection.aperture_time)
+            if values.get("synchronization") is not None and values["synchronization"].is_direct_path:
+                yield from _no_baseline(_geometry(platforms).apart, collection.aperture_time / 2)
         seen: set[str] = set()
         for index, other in enumerate(values.get("other_errors", ())):
             if other.name in seen:
@@ -556,6 +560,16 @@ class Mission(NamedTuple):
     def geometry(self) -> BistaticGeometry:
         """Both platforms in the frame of the scene."""
         return _geometry(self.platforms)
+
+    @property
+    def has_direct_path(self) -> bool:
+        """Whether the receiver hears the transmitter and takes it as its clock."""
+        return self.synchronization is not None and self.synchronization.is_direct_path
+
+    @property
+    def gating_model(self) -> str:
+        """The model that gates: with a direct path the full one, since the published one does not know it."""
+        return "full" if self.has_direct_path else self.allocation.model
 
     def line(self, path: KeyPath) -> Place | None:
         """Line of a value in the mission file, from 1, else of the nearest key above it that exists.
@@ -594,6 +608,19 @@ def _dives(platforms: Platforms, aperture_time: float) -> Iterator[Problem]:
                 f"takes the platform below the ground within the aperture, to z = {lowest:.4g} m",
                 at=("platforms", name, *key),
             )
+
+
+def _no_baseline(apart: PlatformState, half: float) -> Iterator[Problem]:
+    # A 32nd of the way from one place to the next, the distance between is not smaller by as much as matters.
+    least = min(norm(apart.at(half * part / 32)[0]) for part in range(-32, 33))
+    way = apart.travelled(half)
+    if least < max(_LEAST_BASELINE, way / _FARTHEST_BY):
+        yield Problem(
+            f"there is no direct path to follow: the platforms come within {least:.3g} m of each other, and move "
+            f"{way:.3g} m against each other in half an aperture",
+            f"accepted: at least {_LEAST_BASELINE:g} m and a {_FARTHEST_BY}rd of that way, or linear",
+            at=("synchronization", "method"),
+        )
 
 
 def _turning_points(state: PlatformState, half: float) -> Iterator[float]:

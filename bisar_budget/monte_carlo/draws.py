@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
 from bisar_budget.effects.effect import CLOCK_UNITS, PLATFORMS, ErrorSource
-from bisar_budget.effects.exact_arrays import ExactEffects, exact_effects
+from bisar_budget.effects.exact_arrays import ExactEffects, direct_path_clock, exact_effects
 
 Floats = NDArray[np.float64]
 
@@ -218,6 +218,8 @@ class _Sums:
         transmitter, receiver = (
             track + np.einsum("kad,kn->dna", motion[platform], powers) for platform, track in enumerate(actual)
         )
+        if exact.has_direct_path:
+            clock_range = direct_path_clock(transmitter, receiver, *actual)
         found = exact_effects(transmitter, receiver, *actual, clock_range, exact.wavelength)
         if found.quadratic.size == self.size:
             return found

@@ -294,8 +294,8 @@ def _notes(mission: Mission, declared: Sequence[ErrorSource], is_exact: bool) ->
     """Say what is drawn by a rule of ours, and what is not drawn."""
     if is_exact:
         yield "every draw goes through exact ranges: the declared errors are too large for sums of their effects"
-    if mission.allocation.model != "full":
-        yield f"drawn by the full model; the rows are judged by allocation.model, {mission.allocation.model}"
+    if mission.gating_model != "full":
+        yield f"drawn by the full model; the rows are judged by allocation.model, {mission.gating_model}"
     if mission.allocation.combine == "each":
         yield "a draw is the sum of all errors at once; the rows are judged one by one, allocation.combine being each"
     bounds = [source.id for source in declared if source.owner == "mission" and not source.is_common]

@@ -14,10 +14,13 @@ from bisar_budget.simulate.exact import ExactEffect, exact_effect
 from bisar_budget.simulate.image_formation import backprojection, bytes_held, kernel_within, taylor_window
 from bisar_budget.simulate.phase_history import (
     Complexes,
+    Course,
     Floats,
     Path,
     PathError,
     cell_centres,
+    direct_path_error,
+    direct_path_ways,
     path,
     phase_history,
 )
@@ -40,19 +43,23 @@ class MemoryLimitError(ValueError):
 
 
 class Errors(NamedTuple):
-    """What is wrong in one image: both platforms, and the clock's t̃₀ … t̃₃ of (1). [s], [1], [1/s], [1/s²]"""
+    """What is wrong in one image: both platforms, the clock's t̃₀ … t̃₃ of (1), and any other history of it.
+
+    [s], [1], [1/s], [1/s²]; `clock_course` [s].
+    """
 
     transmitter: PathError = PathError()
     receiver: PathError = PathError()
     clock: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
+    clock_course: Course | None = None
 
     def of(self, platform: str, error: PathError) -> "Errors":
         """Give one platform an error."""
         return self._replace(transmitter=error) if platform == "transmitter" else self._replace(receiver=error)
 
     def smooth(self) -> "Errors":
-        """The polynomials alone: no vibration."""
-        return Errors(_still(self.transmitter), _still(self.receiver), self.clock)
+        """What is no vibration."""
+        return self._replace(transmitter=_still(self.transmitter), receiver=_still(self.receiver))
 
 
 def _still(error: PathError) -> PathError:
@@ -121,6 +128,7 @@ class PointCollection:
         self.radar, self.geometry = mission.radar, geometry
         self.wavelength = mission.radar.wavelength
         self.aperture_time = mission.collection.aperture_time
+        self.has_direct_path = mission.has_direct_path
         self.pulses = mission.collection.pulses
         self.memory_limit = (mission.simulation or Simulation()).memory_limit
         self.kernel = kernel_within(self.memory_limit)
@@ -145,9 +153,10 @@ class PointCollection:
 
     def paths(self, errors: Errors, slow_time: Floats, rng: np.random.Generator | None = None) -> tuple[Path, Path]:
         """Fly both platforms."""
+        ways = direct_path_ways(self.geometry, slow_time) if self.has_direct_path else (None, None)
         return (
-            path(self.geometry.transmitter, slow_time, errors.transmitter, rng),
-            path(self.geometry.receiver, slow_time, errors.receiver, rng),
+            path(self.geometry.transmitter, slow_time, errors.transmitter, rng, ways[0]),
+            path(self.geometry.receiver, slow_time, errors.receiver, rng, ways[1]),
         )
 
     def effect(self, errors: Errors) -> ExactEffect:
@@ -169,8 +178,12 @@ class PointCollection:
         return Flown(transmitter.measured, receiver.measured)
 
     def clock(self, errors: Errors, slow_time: Floats) -> Floats:
-        """Clock error over slow time. [s]"""
+        """Clock error over slow time, and what measured paths add where the direct path is the clock. [s]"""
         error: Floats = np.asarray(np.polynomial.polynomial.polyval(slow_time, errors.clock), dtype=float)
+        if errors.clock_course is not None:
+            error = error + errors.clock_course.at(slow_time)
+        if self.has_direct_path:
+            error = error + direct_path_error(self.paths(errors, slow_time))
         return error
 
     def chip(
@@ -213,7 +226,7 @@ class PointCollection:
         if is_reference:
             transmitter, receiver = (Path(actual=p.measured, measured=p.measured) for p in (transmitter, receiver))
             clock = 0 * clock
-        frequencies = self._frequencies(grid, transmitter, receiver, scatterer)
+        frequencies = self._frequencies(grid, transmitter, receiver, scatterer, clock)
         self._require_memory(grid.shape[0] * grid.shape[1], slow_time.size, frequencies)
         history = phase_history(
             np.array([[*scatterer, 0.0]]),
@@ -252,12 +265,16 @@ class PointCollection:
             self._kept = (key, flown.grid(centre, spacing, shape), spacing)
         return self._kept[1:]
 
-    def _frequencies(self, grid: Floats, transmitter: Path, receiver: Path, scatterer: GroundVector) -> int:
+    def _frequencies(
+        self, grid: Floats, transmitter: Path, receiver: Path, scatterer: GroundVector, clock: Floats
+    ) -> int:
         """How many keep a range profile from repeating within a patch: its range walk sets that."""
         farthest = 0.0
         point = np.array([*scatterer, 0.0])
         for pulse in (0, -1):
             off = np.zeros(grid.shape[:-1])
+            if self.has_direct_path:  # takes out most of what a distant platform's error puts in
+                off -= SPEED_OF_LIGHT * clock[pulse]
             for one in (transmitter, receiver):
                 off += np.linalg.norm(grid - one.measured[pulse], axis=-1)
                 off -= np.linalg.norm(point - one.actual[pulse])

@@ -12,10 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.geometry import PlatformState
+from bisar_budget.effects.exact_arrays import direct_path_clock
+from bisar_budget.geometry import BistaticGeometry, PlatformState
 
 _FEW = 8  # scatterers are added one by one
 _HELD = 1 << 18  # complex numbers held at once, of many
+_NO_SIGHT = 1e-20  # square of what a metre of a platform changes; less is rounding
 _ROUNDING = 1e-14  # of a frequency: what numpy.linspace leaves
 
 Floats = NDArray[np.float64]
@@ -30,12 +32,27 @@ class PathSinusoid(NamedTuple):
     phase: float = 0.0
 
 
+@dataclass(frozen=True, eq=False)
+class Course:
+    """An error over slow time: `times` (n,) [s] and `values` (n,) or (n, 3), joined by straight lines."""
+
+    times: Floats
+    values: Floats
+
+    def at(self, slow_time: Floats) -> Floats:
+        """Values at other times, (m,) or (m, 3)."""
+        if self.values.ndim == 1:
+            found: Floats = np.interp(slow_time, self.times, self.values)
+            return found
+        return np.stack([np.interp(slow_time, self.times, along) for along in self.values.T], axis=1)
+
+
 class PathError(NamedTuple):
     """Measured minus actual position of one platform, r̃(τ): (22) and what is faster.
 
-    Position [m], velocity [m/s] and acceleration [m/s²] are east-north-up; vibration is along the line of
-    sight, positive away from the scene. `wideband_rms` [m] is noise of the pulses, white or within
-    `wideband_band` (low, high) [Hz], and needs a generator.
+    Position [m], velocity [m/s], acceleration [m/s²] and `course` [m], which is any other history, are
+    east-north-up; vibration is along the line of sight, positive away from the scene. `wideband_rms` [m] is noise
+    of the pulses, white or within `wideband_band` (low, high) [Hz], and needs a generator.
     """
 
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -44,6 +61,7 @@ class PathError(NamedTuple):
     sinusoids: tuple[PathSinusoid, ...] = ()
     wideband_rms: float = 0.0
     wideband_band: tuple[float, float] | None = None
+    course: Course | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -96,6 +114,7 @@ def path(
     slow_time: Floats,
     error: PathError | None = None,
     rng: np.random.Generator | None = None,
+    way: Floats | None = None,
 ) -> Path:
     """Fly one platform through its midpoint state, at its acceleration, and measure it with an error.
 
@@ -109,6 +128,8 @@ def path(
         None: the navigation is perfect.
     rng : numpy Generator, optional
         Needed for wideband vibration only.
+    way : (pulses, 3) ndarray, optional
+        By which a vibration of a metre moves; a metre along the line of sight. [m/m]
 
     Raises
     ------
@@ -123,6 +144,8 @@ def path(
     # (22): p̃ + ṽτ + ãτ²/2
     measured = actual + np.asarray(error.position) + np.asarray(error.velocity) * tau
     measured = measured + np.asarray(error.acceleration) * tau**2 / 2
+    if error.course is not None:
+        measured = measured + error.course.at(slow_time)
     along = np.zeros_like(slow_time)
     for sinusoid in error.sinusoids:
         along += sinusoid.amplitude * np.sin(2 * math.pi * sinusoid.frequency * slow_time + sinusoid.phase)
@@ -130,7 +153,7 @@ def path(
         if rng is None:
             raise ValueError("wideband vibration needs a random generator")
         along += error.wideband_rms * _noise(slow_time, error.wideband_band, rng)
-    sight = actual / np.linalg.norm(actual, axis=1, keepdims=True)
+    sight = actual / np.linalg.norm(actual, axis=1, keepdims=True) if way is None else way
     return Path(actual=actual, measured=measured + sight * along[:, None])
 
 
@@ -154,6 +177,36 @@ def _noise(slow_time: Floats, band: tuple[float, float] | None, rng: np.random.G
         )
     noise: Floats = np.fft.irfft(np.fft.rfft(white) * inside, slow_time.size)
     return noise * math.sqrt(slow_time.size / float(weight))
+
+
+def direct_path_ways(geometry: BistaticGeometry, slow_time: Floats) -> tuple[Floats, Floats]:
+    """Shortest ways of both platforms that change the range less the direct path by a metre, each (pulses, 3). [m/m]
+
+    They lead along u_t − b and u_r + b. A platform that changes nothing has none.
+    """
+    transmitter, receiver = (path(state, slow_time).actual for state in (geometry.transmitter, geometry.receiver))
+
+    def unit(vectors: Floats) -> Floats:
+        units: Floats = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+        return units
+
+    def inverse(sight: Floats) -> Floats:
+        square = np.sum(sight**2, axis=1, keepdims=True)
+        ways: Floats = np.where(square > _NO_SIGHT, sight / np.maximum(square, _NO_SIGHT), 0.0)
+        return ways
+
+    b = unit(transmitter - receiver)
+    return inverse(unit(transmitter) - b), inverse(unit(receiver) + b)
+
+
+def direct_path_error(paths: tuple[Path, Path]) -> Floats:
+    """Clock error of a receiver that hears the transmitter, (pulses,): how much too far apart both are measured. [s]
+
+    Its clock is the direct signal, which is late by the actual distance; the processor takes the measured one off.
+    """
+    transmitter, receiver = paths
+    measured = (transmitter.measured, receiver.measured)
+    return direct_path_clock(*measured, transmitter.actual, receiver.actual) / SPEED_OF_LIGHT
 
 
 def phase_history(

@@ -13,7 +13,7 @@ from bisar_budget.effects.correlation import correlated_errors, likely_error
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.exact_arrays import aperture_nodes
 from bisar_budget.effects.pieces import LinePiece, gradients_of, indicated_point
-from bisar_budget.effects.vibration_lines import along_line_of_sight, lines_of
+from bisar_budget.effects.vibration_lines import counted, lines_of
 from bisar_budget.geometry import BistaticGeometry, GroundVector, Vector
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.mission.model import MotionError as DeclaredError
@@ -31,10 +31,13 @@ from bisar_budget.simulate.phase_history import (
     PathSinusoid,
     PhaseHistory,
     cell_centres,
+    direct_path_error,
+    direct_path_ways,
     path,
     phase_history,
 )
 from bisar_budget.simulate.range_lines import Flown
+from bisar_budget.simulate.realisations import FlownErrors, flown_errors
 from bisar_budget.simulate.resampling import between
 from bisar_budget.simulate.targets import Target, Targets
 
@@ -216,18 +219,20 @@ def simulate_point(
     geometry, settings = mission.geometry, mission.simulation
     T, wavelength = mission.collection.aperture_time, mission.radar.wavelength
     nodes, fine = aperture_nodes(T), cell_centres(T, 2049)
-    at_nodes = _paths(mission, geometry, nodes, vibrating=False)
-    smooth = _paths(mission, geometry, fine, vibrating=False)
+    drawn = flown_errors(Analysis(mission))
+    at_nodes = _paths(mission, geometry, nodes, vibrating=False, drawn=drawn)
+    smooth = _paths(mission, geometry, fine, vibrating=False, drawn=drawn)
 
     def effect_at(place: GroundVector) -> ExactEffect:
         transmitter, receiver = (_seen_from(place, one) for one in at_nodes)
-        return exact_effect(nodes, transmitter, receiver, _clock(mission, nodes), wavelength, T)
+        clock = _clock(mission, nodes, at_nodes, drawn)
+        return exact_effect(nodes, transmitter, receiver, clock, wavelength, T)
 
     try:
         effect = effect_at((0.0, 0.0))
         effects = [effect_at((one.east, one.north)) for one in targets.points]
         begin, middle, end = (
-            _paths(mission, geometry, np.array([tau]), vibrating=False) for tau in (-T / 2, 0.0, T / 2)
+            _paths(mission, geometry, np.array([tau]), vibrating=False, drawn=drawn) for tau in (-T / 2, 0.0, T / 2)
         )
         flown = Flown(*(np.concatenate([at[leg].measured for at in (begin, middle, end)]) for leg in (0, 1)))
         former, scene_former = _formers(mission, image_former, flown, smooth)
@@ -235,9 +240,9 @@ def simulate_point(
             (one.east + moved.displacement[0], one.north + moved.displacement[1])
             for one, moved in zip(targets.points, effects, strict=True)
         ]
-        left = _left_over(smooth, effect) + SPEED_OF_LIGHT * _clock(mission, fine)
-        recorded = [_recorded(smooth, (one.east, one.north)) for one in targets.points]
-        recorded = [one + SPEED_OF_LIGHT * _clock(mission, fine) for one in recorded]
+        by_clock = SPEED_OF_LIGHT * _clock(mission, fine, smooth, drawn)
+        left = _left_over(smooth, effect) + by_clock
+        recorded = [_recorded(smooth, (one.east, one.north)) + by_clock for one in targets.points]
         shown = [former.place(*one) for one in zip(displaced, recorded, strict=True)]
         in_scene_shown = [scene_former.place(*one) for one in zip(displaced, recorded, strict=True)]
         smear = former.left(shown[0], left, recorded[0])
@@ -275,7 +280,7 @@ def simulate_point(
 
     standing = [(one.east, one.north) for one in targets.points]
     begun, few = time.perf_counter(), cell_centres(T, _FEW_PULSES)
-    still = _paths(mission, geometry, few, vibrating=False)
+    still = _paths(mission, geometry, few, vibrating=False, drawn=drawn)
     places = np.pad(np.concatenate((standing, clutter)), ((0, 0), (0, 1)))
     some = phase_history(
         places,
@@ -288,16 +293,16 @@ def simulate_point(
     recording = 2 * (time.perf_counter() - begun) * plan.pulses / few.size
     rotating = 2 * former.seconds(some, plan.pulses, lines)
     foreseen(recording + rotating + scene_former.seconds(some, plan.pulses, scene))
-    flown_as_declared = _paths(mission, geometry, slow_time, vibrating=True, rng=rng)
+    flown_as_declared = _paths(mission, geometry, slow_time, vibrating=True, rng=rng, drawn=drawn)
     data = history(
         flown_as_declared,
-        _clock(mission, slow_time),
+        _clock(mission, slow_time, flown_as_declared, drawn),
         np.concatenate((standing, clutter - np.asarray(effect.displacement))),
     )
     try:
         rotated, in_scene = image(former, data, lines), image(scene_former, data, scene)
         del data
-        measured = [one.measured for one in _paths(mission, geometry, slow_time, vibrating=False)]
+        measured = [one.measured for one in _paths(mission, geometry, slow_time, vibrating=False, drawn=drawn)]
         as_measured = (Path(actual=measured[0], measured=measured[0]), Path(actual=measured[1], measured=measured[1]))
         error_free = image(former, history(as_measured, 0 * slow_time, np.concatenate((displaced, clutter))), lines)
     except ValueError as error:
@@ -313,7 +318,7 @@ def simulate_point(
     cells = former.offsets(np.array(shown), _middle(shown))
     windows = [_window(plan, cells, index) for index in range(len(shown))]
     pieces = [LinePiece(*map(float, one)) for one in zip(times, values, slopes, strict=True)]
-    model = mission.allocation.model
+    model = mission.gating_model
     return PointImages(
         slow_time=fine,
         range_error=bent,
@@ -465,12 +470,14 @@ def _paths(
     *,
     vibrating: bool,
     rng: np.random.Generator | None = None,
+    drawn: FlownErrors,
 ) -> tuple[Path, Path]:
     factor = mission.allocation.coverage_factor
     common = mission.common_motion_error
     likely = _likely_errors(mission)
     flown = []
-    for name in ("transmitter", "receiver"):
+    ways = direct_path_ways(geometry, slow_time) if mission.has_direct_path else (None, None)
+    for name, way in zip(("transmitter", "receiver"), ways, strict=True):
         declared: DeclaredError = getattr(mission.platforms, name).motion_error
         state = getattr(geometry, name)
         axes = state.frame(declared.frame)
@@ -494,9 +501,10 @@ def _paths(
             wideband = declared.vibration.wideband
             error = error._replace(
                 sinusoids=tuple(PathSinusoid(*line) for line in lines_of(mission, name)),
-                wideband_rms=along_line_of_sight(wideband.rms, declared, state, "islr") if wideband else 0.0,
+                wideband_rms=counted(mission, name, wideband.rms, "islr") if wideband else 0.0,
             )
-        flown.append(path(state, slow_time, error, rng))
+        error = error._replace(course=getattr(drawn, name))
+        flown.append(path(state, slow_time, error, rng, way))
     return flown[0], flown[1]
 
 
@@ -514,11 +522,15 @@ def _likely_errors(mission: Mission) -> dict[str, tuple[Vector, Vector]]:
     return errors
 
 
-def _clock(mission: Mission, slow_time: Floats) -> Floats:
+def _clock(mission: Mission, slow_time: Floats, paths: tuple[Path, Path], drawn: FlownErrors) -> Floats:
+    """Clock error over slow time, that of the direct path where it is the clock. [s]"""
+    noise = 0.0 if drawn.clock is None else drawn.clock.at(slow_time)
+    if mission.has_direct_path:
+        return direct_path_error(paths) + noise
     error = mission.timing_error
     terms = (error.constant or 0.0, error.linear or 0.0, error.quadratic or 0.0, error.cubic or 0.0)
     polynomial = np.polynomial.polynomial.polyval(slow_time, terms)
-    clock: Floats = np.asarray(mission.allocation.coverage_factor * polynomial, dtype=float)
+    clock: Floats = np.asarray(mission.allocation.coverage_factor * polynomial + noise, dtype=float)
     return clock
 
 

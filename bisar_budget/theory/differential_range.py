@@ -26,6 +26,7 @@ from bisar_budget.theory.symbols import (
     AXES,
     PLATFORMS,
     PlatformSymbols,
+    baseline,
     c,
     clock_coefficients,
     point,
@@ -55,6 +56,16 @@ def observed_differential_range(platforms: tuple[PlatformSymbols, ...] = PLATFOR
 def measured_error(platform: PlatformSymbols) -> Matrix:
     """Error of a platform's measured position at one slow time, r̃ of (1), (3,). [m]"""
     return ImmutableMatrix([real(f"{axis}tilde_{platform.subscript}") for axis in AXES])
+
+
+def direct_path_clock(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Expr:
+    """What a receiver that hears the transmitter puts for c·t̃ of (1): measured less actual distance of both. [m]
+
+    Its clock is the direct signal, which is late by the actual distance; the processor takes the measured one off.
+    """
+    transmitter, receiver = (platform.position + measured_error(platform) for platform in platforms)
+    actual = distance(*(platform.position for platform in platforms))
+    return distance(transmitter, receiver) - actual
 
 
 def exact_differential_range(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Expr:
@@ -137,9 +148,29 @@ def error_track(platform: PlatformSymbols) -> Matrix:
 
 def _first_order(platform: PlatformSymbols) -> Expr:
     """What (1) holds of a platform for a scatterer at the scene centre, to first order in its error. [m]"""
-    grown = dict(zip(measured_error(platform), _EPSILON * error_track(platform), strict=True))
-    leg = observed_differential_range((platform,)).subs(dict.fromkeys(scatterer, 0)).subs(grown)
-    return diff(leg, _EPSILON).subs(_EPSILON, 0)
+    return _grown(observed_differential_range((platform,)).subs(dict.fromkeys(scatterer, 0)), (platform,))
+
+
+def _grown(expression: Expr, platforms: tuple[PlatformSymbols, ...]) -> Expr:
+    """First order of an expression in the errors of platforms, as functions of slow time."""
+    for platform in platforms:
+        grown = zip(measured_error(platform), _EPSILON * error_track(platform), strict=True)
+        expression = expression.subs(dict(grown))
+    return diff(expression, _EPSILON).subs(_EPSILON, 0)
+
+
+@cache
+def direct_path_range_error(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Expr:
+    """First order of (1) for the scene centre where the direct path is the clock, errors of any course. [m]
+
+    Slant ranges and the distance of the platforms are written R_t, R_r and D.
+    """
+    observed = observed_differential_range(platforms).subs(dict.fromkeys(scatterer, 0))
+    total = _grown(observed.subs(c * Function("ttilde")(tau), direct_path_clock(platforms)), platforms)
+    total = total.subs(distance(*(platform.position for platform in platforms)), baseline)
+    for platform in platforms:
+        total = total.subs(platform.exact_slant_range(), platform.slant_range)
+    return expand(total)
 
 
 @cache

@@ -180,6 +180,28 @@ def evaluators() -> tuple[Evaluator, ...]:
             ),
         ),
         Evaluator(
+            name="direct_motion",
+            summary="As full_motion, where the receiver hears the transmitter and takes it as its clock. [m/unit]",
+            details=(
+                "−(u − b)·r̃(τ), b the unit vector from the other platform to this one. Position, slant range and b "
+                "are those at the slow time. Derived here."
+            ),
+            arguments=(
+                *platform_arguments(TRANSMITTER)[:3],
+                (TRANSMITTER.slant_range, "slant_range"),
+                *zip(full.DIRECT_PATH, ("b_x", "b_y", "b_z"), strict=True),
+                (tau, "tau"),
+            ),
+            rows=tuple(
+                tuple(
+                    published.sensitivity(full.direct_range_error_at(TRANSMITTER), error)
+                    for error in motion[k : k + 3]
+                )
+                for k in (0, 3, 6)
+            ),
+            row_names=tuple(f"{kind} x, y, z" for kind in published.KINDS),
+        ),
+        Evaluator(
             name="full_ground_inverse",
             summary="Adjugate and determinant of Q = −[s; ṡ], by the true gradients of range and Doppler.",
             details="As published_ground_inverse has them with the range held constant. Derived here.",

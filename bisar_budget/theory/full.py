@@ -40,7 +40,10 @@ from bisar_budget.theory.published import Equation, Table, TableRow
 from bisar_budget.theory.symbols import (
     AXES,
     PLATFORMS,
+    RECEIVER,
+    TRANSMITTER,
     PlatformSymbols,
+    baseline,
     c,
     islr,
     positive,
@@ -52,6 +55,7 @@ from bisar_budget.theory.symbols import (
 
 ORDER = 4  # of slow time: the quartic term of a long aperture is in part a quadratic phase
 
+DIRECT_PATH = ImmutableMatrix([real(f"b_{axis}") for axis in AXES])  # unit vector from receiver to transmitter
 DISPLACEMENT = ImmutableMatrix([real("xhat"), real("yhat")])
 
 
@@ -96,6 +100,29 @@ def range_error_at(platform: PlatformSymbols) -> Expr:
     """Range error of one platform at one slow time to first order, −u·r̃(τ), its position being that at τ. [m]"""
     first_order = dr.first_order_range_error(platform)
     return first_order.subs(platform.exact_slant_range(), platform.slant_range)
+
+
+def direct_range_error(platform: PlatformSymbols) -> Expr:
+    """The same where the direct path is the clock, of errors of any course: −(u_t − b)·r̃_t or −(u_r + b)·r̃_r. [m]
+
+    b is the unit vector from receiver to transmitter at that time.
+    """
+    (other,) = (one for one in PLATFORMS if one is not platform)
+    b = DIRECT_PATH if platform is TRANSMITTER else -DIRECT_PATH
+    total = dr.direct_path_range_error().subs(dict.fromkeys(dr.error_track(other), 0))
+    return expand(total.subs(dict(zip(other.position, platform.position - baseline * b, strict=True))))
+
+
+def direct_range_error_at(platform: PlatformSymbols) -> Expr:
+    """The same with r̃ of (22). [m]"""
+    of_errors = dict(zip(dr.error_track(platform), dr.error_polynomial(platform), strict=True))
+    return direct_range_error(platform).subs(of_errors)
+
+
+def direct_sight(platform: PlatformSymbols) -> Matrix:
+    """What a metre of each error takes from the range where the direct path is the clock: u_t − b or u_r + b."""
+    own = dict(zip(platform.position, platform.slant_range * platform.look[0], strict=True))
+    return Matrix([-direct_range_error(platform).coeff(e).subs(own) for e in dr.error_track(platform)])
 
 
 def legendre_fit(count: int, digits: int = 17) -> tuple[tuple[Expr, ...], ...]:
@@ -208,6 +235,7 @@ def table() -> Table:
         rows=tuple(rows),
         notes=(
             "Derived here. u and its derivatives are those of the unit vector to the platform at τ = 0.",
+            "With synchronization.method direct_path w_t, w_r stand for u_t, u_r, and there is no clock.",
             "A check does not stop at a power of τ: it fits exact ranges over the aperture (docs/full-model.md).",
         ),
     )
@@ -240,6 +268,24 @@ def equations() -> tuple[Equation, ...]:
         Equation("", "Quartic coefficient at the displaced point", real("beta_4"), _collected(fourth)),
         Equation("", "Quadratic phase error, of the quadratic fitted over the aperture", real("phi_2"), fitted),
         Equation("", "Cubic phase at the aperture edge", real("phi_3"), cubic_phase(left)),
+        *_of_the_direct_path(),
+    )
+
+
+def _of_the_direct_path() -> tuple[Equation, ...]:
+    """Where the receiver hears the transmitter: what stands for u_t, u_r and t̃ in every term."""
+    apart = (TRANSMITTER.position - RECEIVER.position) / baseline
+    return (
+        Equation("", "Direct path, from receiver to transmitter", Symbol("b"), apart),
+        *(
+            Equation(
+                "",
+                f"Direct path: in place of the {platform.name}'s line of sight",
+                Symbol(f"w_{platform.subscript}"),
+                direct_sight(platform),
+            )
+            for platform in PLATFORMS
+        ),
     )
 
 

@@ -33,6 +33,7 @@ total_qpe = positive("q")  # total budget for the quadratic phase error [rad]
 share = positive("s")  # share of one platform in a budget [-]
 pslr = positive("PSLR")  # power ratio [-]
 islr = positive("ISLR")  # power ratio [-]
+baseline = positive("D")  # distance of both platforms [m]
 n_pull = positive("N_pull")  # autofocus corrects π·N_pull radians
 
 

@@ -103,6 +103,20 @@ def _order(one: Subject) -> tuple[int, int]:
     return (("sinusoidal", "sinusoidal.sum", "wideband").index(one.axis), one.entry or 0)
 
 
+def _of_instruments(study: Study) -> Iterator[tuple[str, Case]]:
+    """Sensors and clocks that have a limit, and what all noise spreads together."""
+    if not study.analysis.random:
+        return
+    from bisar_budget.budget.random_rows import islr_rows
+    from bisar_budget.verify.random_cases import verify_islr, verify_random
+
+    for error in study.analysis.random:
+        if any(max(error.effect(model.name)[:3]) for model in study.models):
+            yield error.id, partial(verify_random, study, error)
+    for row in islr_rows(study.analysis, study.models[-1].name, study.allocation):
+        yield row.id, partial(verify_islr, study, row.owner)
+
+
 def _cases(study: Study) -> Iterator[tuple[str, Case]]:
     mission, allocation = study.mission, study.allocation
     for source in study.sources:
@@ -120,6 +134,7 @@ def _cases(study: Study) -> Iterator[tuple[str, Case]]:
     for owner in (*PLATFORMS, "mission"):
         for one in sorted((one for one in swaying if one.owner == owner), key=_order):
             yield one.id, swaying[one]
+    yield from _of_instruments(study)
     requirements = mission.requirements
     if mission.allocation.combine == "each":
         # The row exists only where it warns.

@@ -9,7 +9,8 @@ import numpy as np
 from bisar_budget.analysis.analysis import Analysis, Model
 from bisar_budget.budget.error_rows import Allowed, allowed_by
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.effects.effect import ErrorSource
+from bisar_budget.effects.effect import PLATFORMS, ErrorSource
+from bisar_budget.effects.exact_arrays import aperture_nodes, direct_path_clock, exact_effects
 from bisar_budget.effects.models import QUADRATIC
 from bisar_budget.effects.subject import Subject
 from bisar_budget.mission.model import Mission
@@ -49,7 +50,7 @@ class Study:
     def __init__(self, mission: Mission, analysis: Analysis | None = None) -> None:
         self.mission, self.analysis = mission, analysis or Analysis(mission)
         self.geometry, self.sources = self.analysis.geometry, self.analysis.sources
-        self.model = mission.allocation.model
+        self.model = mission.gating_model
         self.allocation = self.analysis.allocation
         self.plane = self.analysis.published.plane  # (25)
         self.collection = PointCollection(mission, self.geometry)
@@ -68,7 +69,8 @@ class Study:
     @property
     def declared(self) -> list[ErrorSource]:
         """Declared errors that an image can show; `other` errors are phases without a motion."""
-        return [s for s in self.analysis.stated if s.declared and s.is_motion]
+        is_heard_out = self.analysis.full.is_heard_out
+        return [s for s in self.analysis.stated if s.declared and s.is_motion and not is_heard_out(s)]
 
     def members(self, owner: str) -> list[ErrorSource]:
         """Declared errors that count against an owner's budget."""
@@ -109,6 +111,23 @@ class Study:
     def effect(self, sizes: Sizes, scale: float = 1.0) -> ExactEffect:
         """What several errors do by exact ranges."""
         return self.collection.effect(self.together(sizes, scale))
+
+    def exact_phases(self, platform: str, courses: Floats) -> tuple[Floats, Floats]:
+        """Quadratic and cubic phases of many histories of one platform's position error, (draws, nodes, 3). [rad]
+
+        The nodes are those of `aperture_nodes`.
+        """
+        nodes = aperture_nodes(self.collection.aperture_time)
+        flown = self.collection.paths(Errors(), nodes)
+        actual = (flown[0].actual, flown[1].actual)
+        transmitter, receiver = (
+            path + courses if name == platform else path for name, path in zip(PLATFORMS, actual, strict=True)
+        )
+        clock: Floats | float = 0.0
+        if self.collection.has_direct_path:
+            clock = direct_path_clock(transmitter, receiver, *actual)
+        found = exact_effects(transmitter, receiver, *actual, clock, self.collection.wavelength)
+        return found.quadratic, found.cubic
 
     def worse_sign(self, sizes: Sizes, scale: float) -> float:
         """The scale with the sign that leaves more quadratic phase: a limit has two signs.
@@ -198,7 +217,7 @@ class Study:
         half = self.collection.aperture_time / 2
         time = np.linspace(-half, half, 257)
         point = np.array([*effect.displacement, 0.0])
-        left: Floats = SPEED_OF_LIGHT * self.collection.clock(errors, time)
+        left: Floats = SPEED_OF_LIGHT * self.collection.clock(errors.smooth(), time)
         slopes: Floats = np.zeros((time.size, 2))
         for one in self.collection.paths(errors.smooth(), time):
             sight = one.measured - point

@@ -15,6 +15,7 @@ from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.vibration_limits import vibration_limits
 from bisar_budget.effects.echoes import SLOWEST, near_lines, sinc, worst_phases
 from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.exact_arrays import direct_path_clock
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.vibration_lines import Line, lines_of
 from bisar_budget.findings.images import Verdict
@@ -45,7 +46,7 @@ def cases(mission: Mission, allocation: Allocation, collection: PointCollection)
         Forms the images.
     """
     pslr, islr = mission.requirements.pslr, mission.requirements.islr
-    model, T = mission.allocation.model, collection.aperture_time
+    model, T = mission.gating_model, collection.aperture_time
     amplitude, rms = (
         {name: limit.by(model) for name, limit in vibration_limits(mission, allocation, metric).items()}
         for metric in ("pslr", "islr")
@@ -183,6 +184,10 @@ def _wideband(
                 np.linalg.norm(now.measured, axis=1) - np.linalg.norm(before.measured, axis=1)
                 for now, before in zip(flown, clean, strict=True)
             ]
+            if collection.has_direct_path:  # of each platform alone
+                (t, r), (still_t, still_r) = ([one.measured for one in both] for both in (flown, clean))
+                shifts[0] -= direct_path_clock(t, still_r, still_t, still_r)
+                shifts[1] -= direct_path_clock(still_t, r, still_t, still_r)
             if is_common:  # the second platform makes the first one's motion, at its own limit
                 first, second = limits.values()
                 shifts[1] = shifts[0] * second / first

@@ -513,6 +513,13 @@ def _phase(value: float) -> str:
 
 def _validity(mission: Mission, found: MissionFindings) -> Iterator[tuple[str, str]]:
     yield "Model", _VALIDITY[found.model]
+    if mission.has_direct_path:
+        yield (
+            "Direct path",
+            "the receiver hears the transmitter and takes it as its clock: ranges are less the distance of the "
+            "platforms, and timing errors have no effect. The published model does not know that: its values are "
+            "those without, and a row that it fails is no warning",
+        )
     yield "Combination", _RULES[found.combine]
     yield "Phases", f"at the centre frequency, c = {SPEED_OF_LIGHT / 1e3:.3f} km/s; at the aperture edge, ±T/2"
     factor = f"{found.coverage_factor:g} times the file’s value" if found.coverage_factor != 1 else "the file’s value"
@@ -586,8 +593,9 @@ def _inputs(mission: Mission, found: MissionFindings, file: str) -> Iterator[Inp
     split = allocation.split
     yield given("split", split if isinstance(split, str) else "shares of the file", ("allocation", "split"))
     yield given("combination", allocation.combine, ("allocation", "combine"))
-    model = given("model", allocation.model, ("allocation", "model"))
-    yield model
+    yield given("model", allocation.model, ("allocation", "model"))
+    if mission.has_direct_path:
+        yield given("clock", "the direct path; the full model gates", ("synchronization", "method"))
     yield given("coverage factor", f"{allocation.coverage_factor:g}", ("allocation", "coverage_factor"))
     yield given("warning above", f"{100 * allocation.warn_above:g} % of a limit", ("allocation", "warn_above"))
 

@@ -94,7 +94,8 @@ def effect(analysis: Analysis, found: MissionFindings, source: ErrorSource, mode
     platform, kind, axis = source.owner, source.subject.kind, source.subject.axis
     gates_by_full = model == "full"
     if gates_by_full and source.is_motion and source.owner != "mission":
-        yield from step("The published model, for comparison; what gates, the full model, comes after it")
+        unaware = ", which does not know the direct path" if mission.has_direct_path else ""
+        yield from step(f"The published model, for comparison{unaware}; what gates, the full model, comes after it")
     if not source.is_motion:
         yield from step("Quadratic phase error, as declared", f"QPE = {size:.6g} rad")
     elif source.is_common:

@@ -70,8 +70,11 @@ def full_chain(analysis: Analysis, source: ErrorSource, size: float, each: str) 
     each : str
         Said of what is not declared.
     """
-    left = worse(analysis, source, size)
     each = each.replace(" of ", ", for ")
+    if analysis.full.is_heard_out(source):
+        yield from step(f"Full model{each}: {analysis.full.no_limit(source)}")
+        return
+    left = worse(analysis, source, size)
     if not left.ranges:
         yield from step(f"Full model{each}: no ground point has the range history that this error leaves")
         return
@@ -82,7 +85,7 @@ def full_chain(analysis: Analysis, source: ErrorSource, size: float, each: str) 
     )
     times = [node * analysis.exact.half for node in analysis.exact.nodes]
     yield from step(
-        "Range error left there, |r_t| + |r_r| + c·t̃ − |r̂_t − x̂| − |r̂_r − x̂|, at the nodes of the fit",
+        f"Range error left there, {_left_of(analysis.exact)}, at the nodes of the fit",
         *(f"{time:+.6g} s: {metres:.6g} m" for time, metres in zip(times, left.ranges, strict=True)),
     )
     yield from step(
@@ -92,6 +95,12 @@ def full_chain(analysis: Analysis, source: ErrorSource, size: float, each: str) 
     if source.is_motion and analysis.mission.requirements.cubic_phase_error is not None:
         by_cubic = worse(analysis, source, size, _CUBIC)
         yield from step("Cubic phase there, 5/2 of P₃", by_cubic.sum("cubic_full", _CUBIC))
+
+
+def _left_of(exact: ExactRanges) -> str:
+    if exact.has_direct_path:  # which is the clock
+        return "|r_t| + |r_r| − |r_t − r_r| − (|r̂_t − x̂| + |r̂_r − x̂| − |r̂_t − r̂_r|)"
+    return "|r_t| + |r_r| + c·t̃ − |r̂_t − x̂| − |r̂_r − x̂|"
 
 
 def for_comparison(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:

@@ -15,7 +15,7 @@ from bisar_budget.effects.echoes import near_lines, sinc, worst_phases
 from bisar_budget.effects.effect import ErrorSource, image_plane
 from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.slow_vibration import cubic_part, quadratic_part
-from bisar_budget.effects.vibration_lines import lines_of
+from bisar_budget.effects.vibration_lines import lines_of, sight_of
 from bisar_budget.faults import KeyPath, printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import Row
@@ -235,7 +235,7 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[S
     lines = equation("full", formulas.FULL_VIBRATION[row.metric], values, row.allowable_full, "m")
     yield from step(title, *known, *lines)
     limits = {"published": row.allowable_published, "full": row.allowable_full}
-    model = mission.allocation.model
+    model = mission.gating_model
     chosen = "min(published, full)" if model == "strictest" else model
     yield from step(
         f"Allowable, allocation.model {model}", *equation("allowable", chosen, limits, row.allowable or 0.0, "m")
@@ -265,20 +265,26 @@ def _slow_vibration(mission: Mission, allocation: Allocation, row: Row, cycles: 
 
 
 def _line_of_sight(mission: Mission, platform: str, is_sinusoid: bool, entry: int, declared: float) -> Iterator[Step]:
-    """What of a vibration along three axes is along the line of sight."""
+    """What of a vibration along three axes is along the line of sight; of any, in the range less the direct path."""
     body = getattr(mission.platforms, platform)
     vibration = body.motion_error.vibration
     value = vibration.sinusoidal[entry].amplitude if is_sinusoid else vibration.wideband.rms
+    sight, whither = sight_of(mission, platform), "Along the line of sight"
+    if mission.has_direct_path:
+        whither = "In the range less the direct path, u_t − b or u_r + b in place of the line of sight"
     if not isinstance(value, tuple):
+        if mission.has_direct_path:
+            text = f"{number(value)}*{number(abs(dot(body.state.look, sight)))}"
+            yield from step(whither, Sum(f"declared = {text} = {with_unit(declared, 'm')}"))
         return
-    u, v, w = (dot(axis, body.state.look) for axis in body.state.frame(body.motion_error.frame))
+    u, v, w = (dot(axis, sight) for axis in body.state.frame(body.motion_error.frame))
     axes = without_rounding((u, v, w))
     parts = [f"{number(size)}*{number(along)}" for size, along in zip(value, axes, strict=True)]
     if is_sinusoid:
         text, how = " + ".join(f"|{part}|" for part in parts), "axes may vibrate in any phase: projections add"
     else:
         text, how = "sqrt(" + " + ".join(f"({part})^2" for part in parts) + ")", "independent axes: squares add"
-    yield from step(f"Along the line of sight, {how}", Sum(f"declared = {text} = {with_unit(declared, 'm')}"))
+    yield from step(f"{whither}, {how}", Sum(f"declared = {text} = {with_unit(declared, 'm')}"))
 
 
 def _near_lines(mission: Mission, platform: str, index: int, total: float) -> Iterator[Step]:

@@ -1,0 +1,195 @@
+"""Verdicts on the limits of sensors and clocks: many time series at the limit, and images of a few of them.
+
+A sigma speaks of many flights. Whole time series go through exact ranges for it, and images of some of them say
+whether a response shows the phase that exact ranges find. What spreads is measured in the aperture, as for vibration:
+by Parseval the power beside the coherent response is the variance of the aperture's phasor.
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from bisar_budget.analysis.spread import spread_limit, spread_powers
+from bisar_budget.budget.vibration_rows import islr_db
+from bisar_budget.effects.exact_arrays import aperture_nodes
+from bisar_budget.effects.models import CUBIC, QUADRATIC
+from bisar_budget.effects.random_errors import RandomError
+from bisar_budget.effects.vibration_lines import sight_of
+from bisar_budget.findings.images import Verdict
+from bisar_budget.mission.model import Simulation
+from bisar_budget.simulate.collection import Errors
+from bisar_budget.simulate.phase_history import Course, Floats, PathError
+from bisar_budget.simulate.realisations import clock_seconds, phase_courses, position_courses
+from bisar_budget.verify.phase_cases import TOLERANCE, compare
+from bisar_budget.verify.study import Study
+from bisar_budget.verify.vibration_cases import TOLERANCE_DB
+
+ISLR = "islr"
+_DRAWS, _CLOCK_DRAWS = 4000, 1000  # know a sigma to 1.1 %, and to 2.2 %
+_SURE = 3.0  # standard errors of a sigma
+_IMAGES = 6
+_FINE = 513  # moments of a time series in an image
+_POWER_DRAWS = 64
+_MOMENTS = 4096  # at most, of an aperture whose spread power is measured
+_ORDER = 3  # up to which a phase moves and defocuses; the rest spreads
+
+
+def verify_random(study: Study, error: RandomError) -> Verdict:
+    """Limit of one figure: the smallest of what quadratic phase, cubic phase and ISLR allow, autofocus left out."""
+    mission, allocation = study.mission, study.allocation
+    model = max((one.name for one in study.models), key=lambda name: max(error.effect(name)[:2]))
+    effect = error.effect(model)
+    rms = spread_limit(mission, allocation, error.owner, model)
+    held = (
+        (QUADRATIC, effect.quadratic, allocation.qpe_limit(error.owner)),
+        (CUBIC, effect.cubic, mission.requirements.cubic_phase_error),
+        (ISLR, effect.spread, rms),
+    )
+    sizes = {name: limit / per_unit for name, per_unit, limit in held if per_unit and limit is not None}
+    binding = min(sizes, key=lambda name: sizes[name])
+    size = sizes[binding]
+    at_limit = error._replace(declared=size)
+    blank = Verdict(
+        id=error.id,
+        model=study.model,
+        boundary_error=20 * math.log10(size) if error.unit == "dB" else size,
+        unit=error.unit,
+    )
+    rng = _stream(study, error.id)
+    if binding == ISLR:
+        return _power(study, blank, [at_limit], rms or 0.0, rng)
+    return _phase(study, blank, at_limit, binding, rng)
+
+
+def _phase(study: Study, blank: Verdict, error: RandomError, binding: str, rng: np.random.Generator) -> Verdict:
+    """Sigma of quadratic or cubic phase at the limit, coverage factor included, against the budget."""
+    is_cubic = binding == CUBIC
+    required = study.mission.requirements.cubic_phase_error
+    budget = (required or 0.0) if is_cubic else study.allocation.qpe_limit(error.owner)
+    factor = study.mission.allocation.coverage_factor
+    sigma, draws = _sigma(study, error, rng, is_cubic)
+    predicted = factor * sigma
+    drawn, seen = [], []
+    try:
+        for errors in _series(study, error, rng):
+            effect = study.collection.effect(errors)
+            reading = study.read(errors, effect, *study.chips(errors, effect))
+            drawn.append(effect.cubic if is_cubic else effect.quadratic)
+            seen.append(reading.cubic if is_cubic else reading.quadratic)
+    except (ValueError, np.linalg.LinAlgError) as fault:
+        return blank._replace(budget_rad=budget, reason=f"no image of a time series: {fault}")
+    # How much of a phase images show: readings over exact ranges, the large ones counting more.
+    shown = float(np.dot(drawn, seen) / np.dot(drawn, drawn))
+    measured = predicted * shown
+    tolerance = TOLERANCE + _SURE / math.sqrt(2 * draws)
+    verdict = blank._replace(
+        budget_rad=budget,
+        verdict=compare(measured / budget - 1, tolerance),
+        reason=f"one sigma of {draws} time series{_times(factor)}, {_IMAGES} of them in images"
+        + (", bound by the cubic phase" if is_cubic else ""),
+    )
+    if is_cubic:
+        return verdict._replace(measured_cubic_rad=measured, predicted_cubic_rad=predicted)
+    return verdict._replace(measured_qpe_rad=measured, predicted_qpe_rad=predicted)
+
+
+def _stream(study: Study, row_id: str) -> np.random.Generator:
+    """Draws of a row, its own whatever else is verified."""
+    return np.random.default_rng([(study.mission.simulation or Simulation()).seed, *row_id.encode()])
+
+
+def _times(factor: float) -> str:
+    return "" if factor == 1 else f" times the coverage factor {factor:g}"
+
+
+def _sigma(study: Study, error: RandomError, rng: np.random.Generator, is_cubic: bool) -> tuple[float, int]:
+    """Standard deviation of a phase over many time series, and their number. [rad]"""
+    mission, nodes = study.mission, aperture_nodes(study.collection.aperture_time)
+    if error.subject.kind in ("imu", "random"):
+        courses = position_courses(mission, error, nodes, _DRAWS, rng)
+        found = study.exact_phases(error.owner, courses)
+        return float(np.nanstd(found[1] if is_cubic else found[0])), _DRAWS
+    times = _moments(study, 257)
+    phases = phase_courses(mission, error, times, _CLOCK_DRAWS, rng)
+    fit = np.polynomial.legendre.legfit(2 * times / study.collection.aperture_time, phases.T, _ORDER)
+    return float(np.std(2.5 * fit[3] if is_cubic else 1.5 * fit[2])), _CLOCK_DRAWS
+
+
+def _moments(study: Study, count: int) -> Floats:
+    half = study.collection.aperture_time / 2
+    moments: Floats = np.linspace(-half, half, count)
+    return moments
+
+
+def _series(study: Study, error: RandomError, rng: np.random.Generator) -> list[Errors]:
+    """A few time series as errors of an image."""
+    times = _moments(study, _FINE)
+    if error.subject.kind in ("imu", "random"):
+        courses = position_courses(study.mission, error, times, _IMAGES, rng)
+        return [Errors().of(error.owner, PathError(course=Course(times, one))) for one in courses]
+    phases = phase_courses(study.mission, error, times, _IMAGES, rng)
+    return [Errors(clock_course=Course(times, clock_seconds(one, study.collection.wavelength))) for one in phases]
+
+
+# ---------------------------------------------------------------------- what spreads
+def verify_islr(study: Study, owner: str) -> Verdict:
+    """Everything that spreads, scaled together to an owner's limit."""
+    model = study.models[-1].name
+    limit = spread_limit(study.mission, study.allocation, owner, model) or 0.0
+    blank = Verdict(id=f"{owner}.{ISLR}", model=study.model, boundary_error=islr_db(limit**2) or 0.0, unit="dB")
+    powers = [
+        (row_id, power)
+        for row_id, whose, power in spread_powers(study.analysis, model)
+        if owner == "mission" or study.allocation.islr.includes(whose, owner)
+    ]
+    total = math.fsum(power for _, power in powers)
+    if not total:
+        return blank._replace(reason="nothing that spreads is declared")
+    scale = limit / math.sqrt(total)
+    random = {error.id: error for error in study.analysis.random}
+    declared = [random[row_id] for row_id, _ in powers if row_id in random]
+    members = [error._replace(declared=scale * (error.declared or 0.0)) for error in declared]
+    white = scale * math.sqrt(math.fsum(power for row_id, power in powers if row_id not in random))
+    rng = np.random.default_rng(
+        [study.mission.simulation.seed if study.mission.simulation else 1, *blank.id.encode()]
+    )
+    return _power(study, blank, members, limit, rng, white)
+
+
+def _power(
+    study: Study,
+    blank: Verdict,
+    members: Sequence[RandomError],
+    limit: float,
+    rng: np.random.Generator,
+    white: float = 0.0,
+) -> Verdict:
+    """Mean power that time series spread beside the response, in the aperture, against a limit [rad rms]."""
+    collection = study.collection
+    k = 2 * math.pi / collection.wavelength
+    times = _moments(study, _MOMENTS)
+    # Each moment stands for a step: a time series is not faster than that.
+    phases = white * rng.standard_normal((_POWER_DRAWS, times.size))
+    for error in members:
+        if error.subject.kind in ("imu", "random"):
+            moved = position_courses(study.mission, error, times, _POWER_DRAWS, rng)
+            phases += k * moved @ np.array(sight_of(study.mission, error.owner))
+        else:
+            phases += phase_courses(study.mission, error, times, _POWER_DRAWS, rng)
+    place = 2 * times / collection.aperture_time
+    fit = np.polynomial.legendre.legfit(place, phases.T, _ORDER)
+    phasor = np.exp(1j * (phases - np.polynomial.legendre.legval(place, fit)))
+    coherent = np.abs(phasor.mean(axis=1)) ** 2
+    ratios = (1 - coherent) / coherent
+    mean, spread = float(np.mean(ratios)), float(np.std(ratios, ddof=1)) / math.sqrt(_POWER_DRAWS)
+    level, required = 10 * math.log10(mean), islr_db(limit**2) or 0.0
+    excess = level - required
+    verdict = "confirmed" if abs(excess) <= TOLERANCE_DB else "optimistic" if excess > 0 else "conservative"
+    return blank._replace(
+        requirement_db=required,
+        measured_db=level,
+        measured_db_error=10 / math.log(10) * spread / mean,
+        verdict=verdict,
+        reason=f"mean power that {_POWER_DRAWS} time series spread",
+    )
