@@ -131,6 +131,9 @@ VARIANTS = (
     ("tandem_x_synchronized", "200 ms", "500 ms", "receiver.islr", "warn"),
     ("tandem_x_synchronized", "200 ms", "1 s", "receiver.islr", "fail"),
     ("tandem_x_synchronized", "200 ms", "1 s", "receiver.quadratic_phase_error", "pass"),
+    ("ocxo_direct_path", "error: 3 deg", "error: 4 deg", "receiver.islr", "warn"),
+    ("ocxo_direct_path", "error: 3 deg", "error: 5 deg", "receiver.islr", "fail"),
+    ("ocxo_direct_path", "position: 10 cm", "position: 100 m", "mission.location_error", "pass"),
     ("tandem_x_synchronized", "error: 1 deg", "error: 4 deg", "timing.islr", "warn"),
 )  # fmt: skip
 
