@@ -7,6 +7,7 @@ bytes. It is drawn from `random.Random` by its seed.
 """
 
 import json
+import math
 import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -196,7 +197,66 @@ def original(random: Random) -> str:
     """A mission that can be used."""
     if random.random() < 0.7:
         return random.choice(_known())
-    return mission_text(random.choice(FAMILIES), random.randrange(10_000))
+    text = mission_text(random.choice(FAMILIES), random.randrange(10_000))
+    if random.random() < 0.5:
+        return text
+    tree = yaml.load(text, yaml.BaseLoader)
+    _with_instruments(tree, random)
+    return yaml.dump(tree, Dumper=_Plain, sort_keys=False, width=1000)
+
+
+def _mask(random: Random) -> dict[str, str]:
+    first, level = random.choice((0.01, 1, 3)), random.uniform(-140, -100)  # at 10 Hz
+    return {
+        f"{first} Hz": f"{level + 30 * math.log10(10 / first):.1f} dBc/Hz",
+        "10 Hz": f"{level:.1f} dBc/Hz",
+        f"{random.choice((1, 20))} kHz": f"{level - 25:.1f} dBc/Hz",
+    }
+
+
+def _with_instruments(tree: Any, random: Random) -> None:
+    """Add figures of data sheets, each of a size that a part has, to a mission that can be used."""
+
+    def near(size: float, unit: str) -> Any:
+        values = [f"{size * 10 ** random.uniform(-1, 1):.3g} {unit}" for _ in range(3)]
+        return values if random.random() < 0.3 else values[0]
+
+    figures = {
+        "accelerometer_bias": (50, "ug"),
+        "attitude": (0.02, "deg"),
+        "gyro_bias": (0.5, "deg/h"),
+        "velocity_random_walk": (0.05, "m/s/sqrt(h)"),
+        "angle_random_walk": (0.1, "deg/sqrt(h)"),
+    }
+    oscillators: tuple[Callable[[], dict[str, Any]], ...] = (
+        lambda: {"sensor": random.choice(("ettus-gpsdo-ocxo", "bva", "gps-3500", "sit5358"))},
+        lambda: {"frequency": "10 MHz", "phase_noise": _mask(random)},
+        lambda: {"allan_deviation": {f"{tau} s": f"{10 ** random.uniform(-13, -10):.2g}" for tau in (0.1, 1, 10)}},
+        lambda: {"power_law": {f"h{n}": f"{10 ** random.uniform(-30, -20):.2g}" for n in range(-2, 3)}},
+    )
+    for platform in tree["platforms"].values():
+        error = platform.setdefault("motion_error", {})
+        if random.random() < 0.7:
+            chosen = random.sample(sorted(figures), random.randint(1, len(figures)))
+            error["imu"] = {name: near(*figures[name]) for name in chosen}
+        if random.random() < 0.3 and error.get("frame", "scene") == "scene":
+            error["sensor"] = random.choice(("stim300", "hg9900", ["imx6", "mosaic-x5-rtk"]))
+        if random.random() < 0.4:
+            lasts = f"{10 ** random.uniform(-2, 2):.3g} s"
+            error["random"] = [{"name": "GNSS", "sigma": near(0.003, "m"), "correlation_time": lasts}]
+        if random.random() < 0.6:
+            platform["oscillator"] = random.choice(oscillators)()
+    if random.random() < 0.5:
+        interval = float(tree["collection"]["aperture_time"]) / random.choice(
+            (0.5, 1, 2, 5, 50, random.uniform(1, 9))
+        )
+        tree["synchronization"] = (
+            {"method": "direct_path", "error": "3 deg"}
+            if random.random() < 0.3
+            else {"interval": f"{interval:.6g} s", "error": f"{random.uniform(0, 9):.2g} deg"}
+        )
+    if random.random() < 0.5:
+        tree["requirements"]["islr"] = f"{random.uniform(-30, -15):.3g} dB"
 
 
 def case(seed: int) -> Case:
@@ -246,7 +306,11 @@ def _misspelt(text: str, random: Random) -> Case:
     """A key with one letter changed, in a section whose keys are known."""
     tree = yaml.load(text, yaml.BaseLoader)
     free = id(tree.get("requirement_ids"))
-    places = [(node, key) for node, key in _places(tree) if isinstance(node, dict) and id(node) != free]
+    places = [
+        (node, key)
+        for node, key in _places(tree)
+        if isinstance(node, dict) and id(node) != free and not key[0].isdigit()  # 1 mHz for 1 kHz is no slip to find
+    ]
     node, key = random.choice(places)
     known = {name for _, name in places}
     wrong = key
@@ -383,6 +447,34 @@ def _section(tree: Any, node: Any, key: Any, random: Random) -> None:
         "name": lambda: tree.update(name=random.choice(_TEXTS), document={"number": random.choice(_TEXTS)}),
         "vibration": lambda: platform.update(motion_error={"vibration": vibration}),
         "covariance": lambda: platform.update(motion_error={"covariance": covariance}),
+        "imu": lambda: platform.update(
+            motion_error={
+                "imu": {"accelerometer_bias": f"{number} ug", "attitude": f"{_number(random)} deg"},
+                "random": [
+                    {"name": _value(random), "sigma": f"{_number(random)} m", "correlation_time": f"{number} s"}
+                ],
+                "sensor": random.choice(("stim300", "bva", random.choice(_TEXTS))),
+            }
+        ),
+        "oscillator": lambda: platform.update(
+            oscillator={
+                "frequency": f"{_number(random)} MHz",
+                "phase_noise": {f"{abs(_number(random))} Hz": f"{_number(random)} dBc/Hz" for _ in range(3)},
+                "bandwidth": f"{_number(random)} Hz",
+            }
+        ),
+        "allan deviation": lambda: platform.update(
+            oscillator={
+                "allan_deviation": {f"{abs(_number(random))} s": f"{_number(random) * 1e-12}" for _ in range(4)}
+            }
+        ),
+        "synchronization": lambda: tree.update(
+            synchronization={
+                "interval": f"{_number(random)} s",
+                "error": f"{_number(random)} deg",
+                "method": random.choice(("linear", "direct_path")),
+            }
+        ),
         "acceleration": lambda: platform.update(acceleration=[f"{_number(random)} m/s^2"] * 3),
     }
     choices[random.choice(list(choices))]()

@@ -112,6 +112,8 @@ _COEFFICIENT = Quantity(units.RATIO, ge=0, le=1)
 class _PowerLawReader(Reader):
     """A mapping of h-2 … h2 to coefficients."""
 
+    what = "{h-2: 4e-23, h-1: 2e-21, h0: 8e-20} and the like"
+
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
         """Read each coefficient at its own place."""
         if not isinstance(value, dict) or not value:

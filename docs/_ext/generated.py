@@ -256,6 +256,7 @@ def _form(reader: readers.Reader) -> str:
         return "list, each a section"
     words = {
         readers.Section: "section",
+        readers.TextList: "list of texts",
         readers.TextMap: "row id: text",
         readers.Version: "`1`",
         readers.Day: "date, such as `2027-03-31`",
@@ -265,6 +266,8 @@ def _form(reader: readers.Reader) -> str:
     for kind, word in words.items():
         if isinstance(reader, kind):
             return word
+    if example := getattr(reader, "what", ""):
+        return f"such as `{example.removesuffix(' and the like')}`"
     # Of a reader that only its own module knows, the schema says what it takes.
     schema = reader.schema({})
     words_of_json = {"array": "6 × 6 matrix", "object": "`ERROR-ERROR: number` for each pair"}

@@ -122,6 +122,7 @@ def test_section_v_around_its_least_n_pull(run, tmp_path, n_pull, status, use) -
 # What the findings of the examples with sensors and clocks say of other values than theirs.
 VARIANTS = (
     ("uav_stim300", "attitude: 0.015 deg", "attitude: 0.02 deg", "receiver.quadratic_phase_error", "fail"),
+    ("uav_stim300", "imu:\n", "imu:\n        accelerometer_bias: 1.1 mg\n", "receiver.quadratic_phase_error", "fail"),
     ("uav_stim300", "sigma: 0.5 mm", "sigma: 6 mm", "receiver.islr", "fail"),
     ("ocxo_free_running", "time: 2.48 s", "time: 0.5 s", "receiver.quadratic_phase_error", "warn"),
     ("ocxo_free_running", "time: 2.48 s", "time: 0.6 s", "receiver.quadratic_phase_error", "fail"),

@@ -112,6 +112,9 @@ class TestView:
                 assert line.use == row.utilization
             if row.status == "not_evaluated":
                 assert line.margin == "–"
+            elif row.unit == "dB" and row.margin is not None:
+                levels = float(line.margin.replace("−", "-").removesuffix(" dB"))
+                assert -0.1 <= levels - (row.allowable - row.declared) <= 1e-9  # rounded down
             elif row.margin is not None and abs(row.margin) < 1e4:
                 percent = float(line.margin.replace("−", "-").removesuffix(" %"))
                 # Three digits, rounded down.

@@ -241,6 +241,26 @@ def test_rows_that_limit_nothing_are_a_count_and_all_shows_them(run) -> None:
     assert [row_id in long for row_id in hidden] == [True] * 3
 
 
+def test_an_oscillator_as_declared_is_0_db_and_stands_in_the_table(run) -> None:
+    """The largest error of a mission was counted among those that limit nothing: declared is 0, of a level."""
+    text = run("check", "specs/missions/ocxo_free_running.yaml").stdout
+    assert re.search(r"(?m)^info     receiver\.oscillator +0 dB +-16 dB", text)
+    assert "that limit nothing" not in text
+
+
+def test_what_a_mask_is_extrapolated_by_stands_in_a_report(run) -> None:
+    text = run("check", "specs/missions/ocxo_free_running.yaml", "--format", "markdown").stdout
+    assert "Oscillator of the receiver: the mask begins at 1 Hz; below, it continues as f^-3.5" in text
+
+
+def test_a_cubic_phase_without_requirement_is_not_called_none(run) -> None:
+    """By the published model a gyro's bias has nothing but a cubic phase; the line of sight was said to miss it."""
+    rows = json.loads(run("check", "specs/missions/uav_stim300.yaml", "--model", "published", "--format", "json").stdout)
+    (row,) = [row for row in rows["missions"][0]["rows"] if row["id"] == "receiver.imu.gyro_bias"]
+    assert row["allowable"] is None
+    assert row["reason"] == "no requirement limits its cubic phase"
+
+
 def test_a_file_that_declares_nothing_shows_its_allowables() -> None:
     text = render("text", Report("1", (findings(),)), Style())
     assert "not decl receiver.acceleration.x" in text
