@@ -126,8 +126,8 @@ def _flown(mission: Mission) -> str:
     seed = (mission.simulation or Simulation()).seed
     drawn = f"; of sensors and clocks one time series each, seed {seed}" if has_instruments(mission) else ""
     return (
-        f"the declared ones together, with the signs of the file{times}{likely}{drawn}. Some may cancel: the worst case is "
-        "that of check"
+        f"the declared ones together, with the signs of the file{times}{likely}{drawn}. Some may cancel: the worst "
+        "case is that of check"
     )
 
 
