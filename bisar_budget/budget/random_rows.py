@@ -69,7 +69,7 @@ def _row(analysis: Analysis, error: RandomError, gating: str, other: str, alloca
         gain=_gain(binding, qpe, limits, gain, size, allowable),
         over=over,
         doubt=doubt,
-        no_limit=error.no_limit if allowable is None else "",
+        no_limit=_no_limit(error, mine) if allowable is None else "",
         info=info,
         limits=tuple(limits.quadratic / effect.quadratic if effect.quadratic else None for effect in by_model),  # type: ignore[arg-type]
         qpe=None if size is None else by_model[0].quadratic * size,
@@ -84,6 +84,12 @@ def _row(analysis: Analysis, error: RandomError, gating: str, other: str, alloca
         model=gating,
     )
     return in_decibel(row) if error.unit == "dB" else row
+
+
+def _no_limit(error: RandomError, effect: RandomEffect) -> str:
+    """Say why nothing limits an error: it does nothing, or what it does is not required."""
+    parts = [name for name, size in (("cubic phase", effect.cubic), ("ISLR", effect.spread)) if size]
+    return f"no requirement limits its {' and '.join(parts)}" if parts else error.no_limit
 
 
 def _gain(

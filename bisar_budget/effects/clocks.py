@@ -36,7 +36,7 @@ def _of_oscillator(mission: Mission, name: str, oscillator: Oscillator, sync: Sy
         found, no_limit, notes = Parts(0.0, 0.0, 0.0), DIRECT, []
     else:
         if sync is not None and sync.interval is not None:
-            notes.append(f"what synchronisation each {format_quantity(sync.interval, 's')} leaves of it")
+            notes.append(f"only what synchronisation every {format_quantity(sync.interval, 's')} leaves of it counts")
             found = synchronized_parts(noise.pieces, T, sync.interval)
         else:
             found = parts(noise.pieces, T)

@@ -131,7 +131,15 @@ def _edges(aperture_time: float) -> list[float]:
 
 
 def _panels(low: float, high: float, edges: Sequence[float]) -> Iterator[tuple[float, float]]:
-    return pairwise([low, *sorted({edge for edge in edges if low < edge < high}), high])
+    """Neighbouring edges; of two that are the same, computed in two ways, one.
+
+    Between the two a tone would be folded on 0 Hz, where a spectrum has no value.
+    """
+    kept = [low]
+    for edge in sorted(edges):
+        if kept[-1] * _SAME < edge < high / _SAME:
+            kept.append(edge)
+    return pairwise([*kept, high])
 
 
 def _panel(density: Callable[[float], float], low: float, high: float, scale: float) -> Parts:

@@ -119,6 +119,36 @@ def test_section_v_around_its_least_n_pull(run, tmp_path, n_pull, status, use) -
     assert row["utilization"] == pytest.approx(use, abs=1e-3)
 
 
+# What the findings of the examples with sensors and clocks say of other values than theirs.
+VARIANTS = (
+    ("uav_stim300", "attitude: 0.015 deg", "attitude: 0.02 deg", "receiver.quadratic_phase_error", "fail"),
+    ("uav_stim300", "sigma: 0.5 mm", "sigma: 6 mm", "receiver.islr", "fail"),
+    ("ocxo_free_running", "time: 2.48 s", "time: 0.5 s", "receiver.quadratic_phase_error", "warn"),
+    ("ocxo_free_running", "time: 2.48 s", "time: 0.6 s", "receiver.quadratic_phase_error", "fail"),
+    ("ocxo_free_running", "allocation:", "autofocus: {n_pull: 2}\nallocation:", "receiver.quadratic_phase_error",
+     "pass_with_autofocus"),
+    ("ocxo_free_running", "allocation:", "autofocus: {n_pull: 2}\nallocation:", "receiver.islr", "fail"),
+    ("tandem_x_synchronized", "200 ms", "500 ms", "receiver.islr", "warn"),
+    ("tandem_x_synchronized", "200 ms", "1 s", "receiver.islr", "fail"),
+    ("tandem_x_synchronized", "200 ms", "1 s", "receiver.quadratic_phase_error", "pass"),
+    ("ocxo_direct_path", "error: 3 deg", "error: 4 deg", "receiver.islr", "warn"),
+    ("ocxo_direct_path", "error: 3 deg", "error: 5 deg", "receiver.islr", "fail"),
+    ("ocxo_direct_path", "position: 10 cm", "position: 100 m", "mission.location_error", "pass"),
+    ("tandem_x_synchronized", "error: 1 deg", "error: 4 deg", "timing.islr", "warn"),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("stem", "here", "there", "row", "status"), VARIANTS)
+def test_findings_about_sensors_and_clocks(run, tmp_path, stem, here, there, row, status) -> None:
+    text = (ROOT / f"specs/missions/{stem}.yaml").read_text(encoding="utf-8")
+    assert here in text
+    path = tmp_path / "m.yaml"
+    path.write_text(text.replace(here, there), encoding="utf-8")
+    _, mission = check(run, path)
+    (found,) = [one for one in mission["rows"] if one["id"] == row]
+    assert found["status"] == status
+
+
 class _Core(yaml.SafeLoader):
     """YAML 1.2's numbers, as editors read them; dates stay text."""
 

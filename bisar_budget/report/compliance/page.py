@@ -179,7 +179,7 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
             declared=_quantity(row.declared, row.unit),
             use=None if row.status == "not_evaluated" or row.allowable is None else row.utilization,
             use_text=_use(row),
-            margin=_margin(None if row.status == "not_evaluated" else row.margin),
+            margin="–" if row.status == "not_evaluated" else _margin(row),
             status=row.status,
             waiver="; ".join(waiver.words for waiver in row.waivers),
             line=row.line,
@@ -349,11 +349,14 @@ def _use(row: Row) -> str:
     return "–" if has_none else percent(row.utilization or 0.0)
 
 
-def _margin(margin: float | None) -> str:
-    """Write allowable over declared less one, rounded down: no margin is larger than it is."""
-    if margin is None:
+def _margin(row: Row) -> str:
+    """Write allowable over declared less one, or the levels' difference, rounded down: never more than there is."""
+    if row.margin is None:
         return "–"
-    value = 100 * margin
+    if row.unit == "dB" and row.allowable is not None and row.declared is not None:
+        tenths = math.floor(10 * (row.allowable - row.declared) + 1e-9)
+        return f"{tenths / 10:+.1f} dB".replace("-", "−")
+    value = 100 * row.margin
     if value >= 1e6:
         return "> 1e6 %"
     size = abs(value)
@@ -454,7 +457,8 @@ def _power_shares(mission: Mission, allocation: Allocation) -> Iterator[PowerSha
         ("ISLR", mission.requirements.islr, allocation.islr),
     ):
         if value is not None:
-            yield PowerShare(name, f"{value:g} dB", f"{split.transmitter:.3g}", f"{split.receiver:.3g}")
+            clock = "" if split.clock is None else f"{split.clock:.3g}"
+            yield PowerShare(name, f"{value:g} dB", f"{split.transmitter:.3g}", f"{split.receiver:.3g}", clock)
 
 
 def _contributions(analysis: Analysis, rows: Sequence[Row], model: str) -> tuple[Contribution, ...]:
@@ -544,7 +548,7 @@ def _validity(mission: Mission, found: MissionFindings) -> Iterator[tuple[str, s
     )
     yield (
         "Sidelobes",
-        "PSLR and ISLR bound what vibration adds along the line of sight, not the sidelobes of the window",
+        "PSLR and ISLR bound what vibration and noise add along the line of sight, not the sidelobes of the window",
     )
     if any(platform.motion_error.imu or platform.motion_error.random for platform in mission.platforms):
         yield (
@@ -555,6 +559,9 @@ def _validity(mission: Mission, found: MissionFindings) -> Iterator[tuple[str, s
         )
     if any(platform.oscillator for platform in mission.platforms) or mission.synchronization:
         yield "Clocks", "spectra of phase are one-sided, and count up to the oscillator’s bandwidth or the mask’s end"
+    for row in found.rows:
+        if row.subject.kind == "oscillator" and row.remarks:
+            yield f"Oscillator of the {row.owner}", "; ".join(row.remarks)
 
 
 def _inputs(mission: Mission, found: MissionFindings, file: str) -> Iterator[Input]:

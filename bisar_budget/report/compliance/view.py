@@ -63,12 +63,13 @@ class Share(NamedTuple):
 
 
 class PowerShare(NamedTuple):
-    """Shares of the power that vibration may add."""
+    """Shares of the power that vibration and noise may add; that of the clock only where it has one."""
 
     metric: str
     requirement: str
     transmitter: str
     receiver: str
+    clock: str
 
 
 class Contribution(NamedTuple):

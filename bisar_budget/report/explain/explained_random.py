@@ -138,8 +138,9 @@ def _oscillator(mission: Mission, error: RandomError) -> Iterator[Step]:
     oscillator = getattr(mission.platforms, error.owner).oscillator
     sync = mission.synchronization
     noise = noise_of(oscillator, mission.radar.center_frequency, mission.collection.aperture_time)
+    spectrum = "S = f_0²·S_y(f)/f²" if oscillator.phase_noise is None else "S = 2·L(f)·(f_0/f_osc)²"
     yield from step(
-        f"One-sided spectrum of phase at {mission.radar.center_frequency:.6g} Hz, S = 2·L(f)·(f_0/f_osc)^2 [rad²/Hz]",
+        f"One-sided spectrum of phase at {mission.radar.center_frequency:.6g} Hz, {spectrum} [rad²/Hz]",
         *(
             f"{piece.low:.6g} Hz to {piece.high:.6g} Hz: {piece.density:.6g} * f^-{piece.slope:.6g}"
             for piece in noise.pieces
@@ -196,26 +197,35 @@ def _link(mission: Mission, error: RandomError) -> Iterator[Step]:
     effect = error.published
     k = mission.allocation.coverage_factor
     lines = [f"{part}/unit = {with_unit(value * (k if part == 'left' else 1.0), 'rad per rad')}"
-             for part, value in zip(_PARTS, effect, strict=True)]  # fmt: skip
+             for part, value in zip(_PARTS, effect[:3], strict=True)]  # fmt: skip
     yield from step("Integrated with the squares of 7.5·j₂(πfT), of 17.5·j₃(πfT), and 1 − Σ(2n+1)·jₙ²(πfT)", *lines)
 
 
 def _phases(mission: Mission, error: RandomError, model: str) -> Iterator[Step]:
     if error.declared is None:
         return
-    effect, k = error.effect(model), _covered(mission, error)
-    lines: list[WorkedEquation] = []
-    for symbol, per_unit in zip(_PARTS, effect, strict=True):
-        if not per_unit:
-            continue
-        values = {f"{symbol}/unit": per_unit, "declared": error.declared}
-        if symbol == "left" and k != 1:  # a mean power has no coverage factor
-            values |= {"left/unit": per_unit * k, "k": k}
-            lines += equation(symbol, "left/unit*declared/k", values, per_unit * error.declared, "rad")
-        else:
-            lines += equation(symbol, f"{symbol}/unit*declared", values, per_unit * error.declared, "rad")
-    if lines:
-        yield from step(f"Of what is declared, by the {model} model", *lines)
+    other = "full" if model == "published" else "published"
+    is_same = error.published[:3] == error.full[:3]
+    for name in (model,) if is_same else (model, other):
+        effect, k = error.effect(name), _covered(mission, error)
+        mark = "_full" if name == "full" and not is_same else ""
+        lines: list[WorkedEquation] = []
+        for symbol, per_unit in zip(_PARTS, effect[:3], strict=True):
+            if not per_unit:
+                continue
+            result = per_unit * error.declared
+            values = {f"{symbol}/unit": per_unit, "declared": error.declared}
+            if symbol == "left" and k != 1:  # a mean power has no coverage factor
+                values |= {"left/unit": per_unit * k, "k": k}
+                lines += equation(symbol, "left/unit*declared/k", values, result, "rad")
+            elif symbol != "left" or name == model:  # both models have what is left alike
+                lines += equation(symbol if symbol == "left" else f"{symbol}{mark}",
+                                  f"{symbol}/unit*declared", values, result, "rad")  # fmt: skip
+            if symbol == "QPE" and is_same:
+                lines += equation("QPE_full", "QPE", {"QPE": result}, result, "rad")
+        by = "both models" if is_same else f"the {name} model{'' if name == model else ', for comparison'}"
+        if lines:
+            yield from step(f"Of what is declared, by {by}", *lines)
 
 
 def _covered(mission: Mission, error: RandomError) -> float:
@@ -267,7 +277,7 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
         f"{title}: a factor of the noise's amplitude", Sum(f"factor = {text} = {with_unit(smallest, '')}")
     )
     lines = equation("allowable", "20*log(factor)/log(10)", {"factor": smallest}, row.allowable, "dB")
-    yield from step("Its noise may rise by", *lines)
+    yield from step("As a level, against the noise that is declared: it may rise by that much", *lines)
     yield from step("Utilization", *equation("utilization", "1/factor", {"factor": smallest}, 1 / smallest, ""))
 
 
@@ -283,17 +293,19 @@ def explained_islr(
     members = [
         (name, power) for name, whose, power in powers if owner == "mission" or allocation.islr.includes(whose, owner)
     ]
-    if not members or row.declared is None or row.allowable is None:
-        yield from step("Nothing that spreads is declared")
-        return
     total = math.fsum(power for _, power in members)
-    width = max(len(name) for name, _ in members)
-    listed = [f"{printable(name):<{width}}  {power:.6g} rad²" for name, power in members]
-    terms = " + ".join(number(power) for _, power in members)
-    yield from step("Squares of the rms phases that are left after the cubic: independent, so they add", *listed,
-                    Sum(f"v = {terms} = {with_unit(total, 'rad²')}"))  # fmt: skip
-    lines = equation("declared", "10*log(e^v - 1)/log(10)", {"v": total, "e": math.e}, row.declared, "dB")
-    yield from step("As ISLR: a phase of variance v leaves e^-v of the power in the response", *lines)
+    if row.declared is None:
+        yield from step("Nothing that spreads is declared")
+    else:
+        width = max(len(name) for name, _ in members)
+        listed = [f"{printable(name):<{width}}  {power:.6g} rad²" for name, power in members]
+        terms = " + ".join(number(power) for _, power in members)
+        yield from step("Squares of the rms phases that are left after the cubic: independent, so they add", *listed,
+                        Sum(f"v = {terms} = {with_unit(total, 'rad²')}"))  # fmt: skip
+        lines = equation("declared", "10*log(e^v - 1)/log(10)", {"v": total, "e": math.e}, row.declared, "dB")
+        yield from step("As ISLR: a phase of variance v leaves e^-v of the power in the response", *lines)
+    if row.allowable is None:
+        return
     power, share = 10 ** ((mission.requirements.islr or 0.0) / 10), allocation.islr.of(owner)
     rule, whole = ("ISLR", power) if model == "published" else ("log(ISLR + 1)", spread_phase(power) ** 2)
     limit = whole * share
@@ -301,6 +313,7 @@ def explained_islr(
     yield from step("Variance that requirements.islr allows, share s of the power", *lines)
     lines = equation("allowable", "10*log(e^v_max - 1)/log(10)", {"v_max": limit, "e": math.e}, row.allowable, "dB")
     yield from step("As ISLR", *lines)
-    values = {"v": total, "v_max": limit}
-    lines = equation("utilization", "sqrt(v/v_max)", values, row.utilization or 0.0, "")
-    yield from step("Utilization, of amplitudes", *lines)
+    if row.utilization is not None:
+        values = {"v": total, "v_max": limit}
+        lines = equation("utilization", "sqrt(v/v_max)", values, row.utilization, "")
+        yield from step("Utilization, of amplitudes", *lines)

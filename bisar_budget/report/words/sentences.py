@@ -17,7 +17,8 @@ BINDING_WORDS = {
 def matters(row: Row) -> bool:
     """Whether a row is declared or limits something; along other axes than the file's, only if it does not pass."""
     if row.status in ("info", "pass"):
-        return row.is_independent and (row.status == "pass" or bool(row.declared))
+        is_some = row.declared is not None if row.unit == "dB" else bool(row.declared)  # 0 dB is a noise as it is
+        return row.is_independent and (row.status == "pass" or is_some)
     return row.status != "not_declared"
 
 
