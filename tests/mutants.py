@@ -156,8 +156,8 @@ MUTANTS = (
     Mutant(
         "simulate: the clock without coverage factor",
         _POINT,
-        "np.asarray(mission.allocation.coverage_factor * polynomial, dtype=float)",
-        "np.asarray(polynomial, dtype=float)",
+        "np.asarray(mission.allocation.coverage_factor * polynomial + noise, dtype=float)",
+        "np.asarray(polynomial + noise, dtype=float)",
         (f"{_IMAGES}test_the_clock_of_a_simulated_image_has_the_coverage_factor",),
     ),
     Mutant(

@@ -8,5 +8,7 @@ __all__ = [
     "error_rows",
     "fleet",
     "pull_in",
+    "random_rows",
     "verdicts",
+    "vibration_rows",
 ]

@@ -109,7 +109,7 @@ def _of_imu(mission: Mission, name: str, state: PlatformState, exact: ExactRange
     imu: Imu | None = error.imu
     if imu is None:
         return
-    axes = state.frame(error.frame)
+    axes, sight = state.frame(error.frame), sight_of(mission, name)
     factor = mission.allocation.coverage_factor
     for index, (kind, unit) in enumerate(IMU_UNITS.items()):
         values: Vector | None = getattr(imu, kind)
@@ -124,6 +124,7 @@ def _of_imu(mission: Mission, name: str, state: PlatformState, exact: ExactRange
         )[index]
         published = RandomEffect(row[0], row[1], row[2] / factor)
         quadratic, cubic, covariance = _over_aperture(exact, name, kind, directions)
+        heard = math.hypot(*(dot(sight, direction) for direction in directions))
         is_of_part = kind in dict(error.of_parts)
         yield RandomError(
             subject=subject(name, "imu", kind),
@@ -131,7 +132,7 @@ def _of_imu(mission: Mission, name: str, state: PlatformState, exact: ExactRange
             declared=None if largest is None else largest * factor,
             path=("platforms", name, "motion_error", *(("sensor",) if is_of_part else ("imu", kind))),
             published=published,
-            full=RandomEffect(quadratic, cubic, published.spread, covariance),
+            full=RandomEffect(quadratic, cubic, published.spread * (heard / along if along else 0.0), covariance),
             equation="inertial sensor",
             evidence=error.evidence(kind) if is_of_part else imu.source or error.source,
             no_limit="the line of sight has no part in it: no phase",

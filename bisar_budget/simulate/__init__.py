@@ -9,6 +9,7 @@ __all__ = [
     "impulse_response",
     "phase_history",
     "point",
+    "realisations",
     "resampling",
     "targets",
 ]

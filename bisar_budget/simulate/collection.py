@@ -59,7 +59,20 @@ class Errors(NamedTuple):
 
     def smooth(self) -> "Errors":
         """What is no vibration."""
-        return self._replace(transmitter=_still(self.transmitter), receiver=_still(self.receiver))
+        slow = self.slow()
+        return slow._replace(transmitter=_still(slow.transmitter), receiver=_still(slow.receiver))
+
+    def slow(self) -> "Errors":
+        """The same with what is smooth of other histories: noise between a few nodes would pass for a phase."""
+        return self._replace(
+            transmitter=_slow(self.transmitter),
+            receiver=_slow(self.receiver),
+            clock_course=self.clock_course and self.clock_course.smooth(),
+        )
+
+
+def _slow(error: PathError) -> PathError:
+    return error if error.course is None else error._replace(course=error.course.smooth())
 
 
 def _still(error: PathError) -> PathError:
@@ -167,6 +180,7 @@ class PointCollection:
         ValueError
             No ground point has the recorded range history.
         """
+        errors = errors.slow()
         clock = self.clock(errors, self._nodes)
         flown = self.paths(errors, self._nodes)
         return exact_effect(self._nodes, *flown, clock, self.wavelength, self.aperture_time)

@@ -220,19 +220,20 @@ def simulate_point(
     T, wavelength = mission.collection.aperture_time, mission.radar.wavelength
     nodes, fine = aperture_nodes(T), cell_centres(T, 2049)
     drawn = flown_errors(Analysis(mission))
-    at_nodes = _paths(mission, geometry, nodes, vibrating=False, drawn=drawn)
-    smooth = _paths(mission, geometry, fine, vibrating=False, drawn=drawn)
+    slow = drawn.smooth()
+    at_nodes = _paths(mission, geometry, nodes, vibrating=False, drawn=slow)
+    smooth = _paths(mission, geometry, fine, vibrating=False, drawn=slow)
 
     def effect_at(place: GroundVector) -> ExactEffect:
         transmitter, receiver = (_seen_from(place, one) for one in at_nodes)
-        clock = _clock(mission, nodes, at_nodes, drawn)
+        clock = _clock(mission, nodes, at_nodes, slow)
         return exact_effect(nodes, transmitter, receiver, clock, wavelength, T)
 
     try:
         effect = effect_at((0.0, 0.0))
         effects = [effect_at((one.east, one.north)) for one in targets.points]
         begin, middle, end = (
-            _paths(mission, geometry, np.array([tau]), vibrating=False, drawn=drawn) for tau in (-T / 2, 0.0, T / 2)
+            _paths(mission, geometry, np.array([tau]), vibrating=False, drawn=slow) for tau in (-T / 2, 0.0, T / 2)
         )
         flown = Flown(*(np.concatenate([at[leg].measured for at in (begin, middle, end)]) for leg in (0, 1)))
         former, scene_former = _formers(mission, image_former, flown, smooth)
@@ -240,7 +241,7 @@ def simulate_point(
             (one.east + moved.displacement[0], one.north + moved.displacement[1])
             for one, moved in zip(targets.points, effects, strict=True)
         ]
-        by_clock = SPEED_OF_LIGHT * _clock(mission, fine, smooth, drawn)
+        by_clock = SPEED_OF_LIGHT * _clock(mission, fine, smooth, slow)
         left = _left_over(smooth, effect) + by_clock
         recorded = [_recorded(smooth, (one.east, one.north)) + by_clock for one in targets.points]
         shown = [former.place(*one) for one in zip(displaced, recorded, strict=True)]
@@ -280,7 +281,7 @@ def simulate_point(
 
     standing = [(one.east, one.north) for one in targets.points]
     begun, few = time.perf_counter(), cell_centres(T, _FEW_PULSES)
-    still = _paths(mission, geometry, few, vibrating=False, drawn=drawn)
+    still = _paths(mission, geometry, few, vibrating=False, drawn=slow)
     places = np.pad(np.concatenate((standing, clutter)), ((0, 0), (0, 1)))
     some = phase_history(
         places,
@@ -302,7 +303,7 @@ def simulate_point(
     try:
         rotated, in_scene = image(former, data, lines), image(scene_former, data, scene)
         del data
-        measured = [one.measured for one in _paths(mission, geometry, slow_time, vibrating=False, drawn=drawn)]
+        measured = [one.measured for one in _paths(mission, geometry, slow_time, vibrating=False, drawn=slow)]
         as_measured = (Path(actual=measured[0], measured=measured[0]), Path(actual=measured[1], measured=measured[1]))
         error_free = image(former, history(as_measured, 0 * slow_time, np.concatenate((displaced, clutter))), lines)
     except ValueError as error:

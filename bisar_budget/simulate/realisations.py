@@ -77,6 +77,10 @@ class FlownErrors(NamedTuple):
     receiver: Course | None
     clock: Course | None  # [s]
 
+    def smooth(self) -> "FlownErrors":
+        """What moves and defocuses a response."""
+        return FlownErrors(*(one and one.smooth() for one in self))
+
 
 def flown_errors(analysis: Analysis) -> FlownErrors:
     """Draw each declared error once, by the seed of the file's simulation, with the coverage factor. [m], [s]"""

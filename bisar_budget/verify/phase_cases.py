@@ -370,16 +370,22 @@ def _remark(study: Study, coverage: float) -> str | None:
 
 
 def _scale_of_cubic(study: Study, sizes: Sizes, scale: float, requirement: float) -> float:
-    """Scale at which exact ranges give the cubic phase, from a first guess."""
-    largest = math.inf  # beyond, no ground point has the range history
-    for _ in range(40):
+    """Scale at which exact ranges give the cubic phase, from a first guess.
+
+    Raises
+    ------
+    ValueError
+        None was found: the phase goes past the requirement where the point has no image, or never reaches it.
+    """
+    low, high = 0.0, math.inf  # scales with less phase, and with more or without a point
+    for _ in range(60):
         try:
             found = abs(study.effect(sizes, scale).cubic)
         except ValueError:
-            largest, scale = scale, scale / 2
-            continue
-        if not found or abs(found / requirement - 1) < 1e-4:
-            break
-        ahead = scale * min(4.0, max(0.25, requirement / found))
-        scale = ahead if ahead < largest else (scale + largest) / 2
-    return scale
+            found = math.inf
+        if abs(found / requirement - 1) < 1e-4:
+            return scale
+        low, high = (scale, high) if found < requirement else (low, min(high, scale))
+        ahead = scale * min(4.0, max(0.25, requirement / found)) if 0 < found < math.inf else low
+        scale = ahead if low < ahead < high else (low + high) / 2 if high < math.inf else 2 * scale
+    raise ValueError("no scale of the declared errors has this cubic phase")

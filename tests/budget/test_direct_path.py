@@ -164,3 +164,9 @@ def test_a_satellite_known_to_2_km_is_usable_by_the_direct_path_alone() -> None:
             for one in (heard, without)
         ]
         assert phases[0] / phases[1] == pytest.approx(times, abs=0.005)
+
+
+def test_a_report_has_the_formulas_of_a_direct_path_where_there_is_one(run) -> None:
+    for path, times in ((EXAMPLE, 3), (EXAMPLE.with_name("tandem_x.yaml"), 0)):
+        text = run("check", path, "--format", "html", "--detail", "full").stdout
+        assert text.count("Full model, direct path") == times

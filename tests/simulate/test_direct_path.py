@@ -99,8 +99,9 @@ def test_simulate_puts_the_response_where_exact_ranges_do() -> None:
         "platforms__transmitter__motion_error": {"position": [0, "50 m", 0]},
         "platforms__receiver__motion_error": {"velocity": [0, 0, "30 cm/s"]},
     }
-    images = images_of(mission_text(**HEARD, **FULL, **errors), rotated_only=True)
-    mission = parse_mission(mission_text(**HEARD, **FULL, **errors))
+    quiet = {**HEARD, "synchronization": {"method": "direct_path", "error": 0}}
+    images = images_of(mission_text(**quiet, **FULL, **errors), rotated_only=True)
+    mission = parse_mission(mission_text(**quiet, **FULL, **errors))
     declared = [one for one in reference.errors_of(mission) if one.declared]
     paths = sum(one.declared * one.paths for one in declared)
     together = reference.at_declared(mission, [declared[0]._replace(paths=paths, declared=1.0)])

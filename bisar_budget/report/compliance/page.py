@@ -236,7 +236,7 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
         sources=_sources(found.rows),
         unsourced=tuple(row.id for row in found.rows if _may_have_a_source(row) and not row.evidence),
         collection=tuple(collection_chain(found)) if is_full else (),
-        general=tuple(General(*equation) for equation in EQUATIONS if equation[0] not in ("(11)", "(31)")),
+        general=tuple(_general(mission)),
         derivations=tuple(
             Derivation(row.id, row.status, row.line, tuple(chain(placed, found, row)))
             for row in rows
@@ -509,6 +509,14 @@ def _kind(subject: Subject) -> tuple[str, str, str]:
 
 def _phase(value: float) -> str:
     return format_quantity(value, "rad") if math.isfinite(value) else "no image"
+
+
+def _general(mission: Mission) -> Iterator[General]:
+    """Formulas of the image plane and of the full model; of a direct path where there is one."""
+    for equation in (General(*one) for one in EQUATIONS):
+        is_of_direct_path = equation.title.startswith("Direct path")
+        if equation.number not in ("(11)", "(31)") and (mission.has_direct_path or not is_of_direct_path):
+            yield equation
 
 
 def _validity(mission: Mission, found: MissionFindings) -> Iterator[tuple[str, str]]:

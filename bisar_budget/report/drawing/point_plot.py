@@ -10,7 +10,7 @@ import numpy as np
 
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.faults import printable
-from bisar_budget.mission.model import Mission
+from bisar_budget.mission.model import Mission, Simulation, has_instruments
 from bisar_budget.report.drawing.point_figures import FLOOR_DB, ImagePanel, Limits, Sheet, rotated_back, sheet
 from bisar_budget.report.words.layout import wrapped
 from bisar_budget.simulate.impulse_response import ImpulseResponse
@@ -123,9 +123,11 @@ def _flown(mission: Mission) -> str:
     times = f", {factor:g} times the file's values" if factor != 1 else ""
     errors = (getattr(mission.platforms, name).motion_error for name in PLATFORMS)
     likely = "; of a covariance its most probable one" if any(error.covariance for error in errors) else ""
+    seed = (mission.simulation or Simulation()).seed
+    drawn = f"; of sensors and clocks one time series each, seed {seed}" if has_instruments(mission) else ""
     return (
-        f"the declared ones together, with the signs of the file{times}{likely}. Some may cancel: the worst case is "
-        "that of check"
+        f"the declared ones together, with the signs of the file{times}{likely}{drawn}. Some may cancel: the worst "
+        "case is that of check"
     )
 
 

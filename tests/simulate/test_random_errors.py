@@ -1,0 +1,80 @@
+"""Limits of sensors and clocks against time series and images; a limit that is off by a quarter is found."""
+
+import math
+
+import numpy as np
+import pytest
+
+from bisar_budget.effects.random_errors import RandomError
+from bisar_budget.mission.load import parse_mission
+from bisar_budget.simulate.point import simulate_point
+from bisar_budget.verify.random_cases import verify_islr, verify_random
+from bisar_budget.verify.study import Study
+from tests.effects.test_random_errors import MISSION, OSCILLATORS
+
+REST = """requirements: {cubic_phase_error: 45 deg, islr: -20 dB}
+allocation: {model: full, combine: rss, coverage_factor: 2}
+"""
+LOOSE = REST.replace("-20 dB", "-1 dB")
+
+
+def study(text: str) -> Study:
+    return Study(parse_mission(text))
+
+
+def of(one: Study, row_id: str) -> RandomError:
+    return next(error for error in one.analysis.random if error.id == row_id)
+
+
+def off(error: RandomError, factor: float) -> RandomError:
+    """An error whose formulas say so much less than is true."""
+    effect = error.full
+    wrong = effect._replace(
+        quadratic=effect.quadratic * factor, cubic=effect.cubic * factor, spread=effect.spread * factor
+    )
+    return error._replace(full=wrong, published=wrong)
+
+
+@pytest.mark.parametrize(
+    "row_id", ["receiver.imu.attitude", "receiver.imu.velocity_random_walk", "receiver.imu.gyro_bias"]
+)
+def test_a_limit_of_an_inertial_sensor_is_confirmed_and_a_wrong_one_is_not(row_id: str) -> None:
+    one = study(MISSION + LOOSE)
+    right = verify_random(one, of(one, row_id))
+    assert right.verdict == "confirmed"
+    measured = right.measured_cubic_rad if "gyro_bias" in row_id else right.measured_qpe_rad
+    assert measured == pytest.approx(right.budget_rad, rel=0.05)
+    assert verify_random(one, off(of(one, row_id), 0.8)).verdict == "optimistic"
+    assert verify_random(one, off(of(one, row_id), 1.25)).verdict == "conservative"
+
+
+def test_the_power_that_noise_spreads_is_confirmed_within_half_a_decibel() -> None:
+    one = study(MISSION.rstrip() + OSCILLATORS + REST)
+    right = verify_random(one, of(one, "receiver.random.GNSS"))
+    assert (right.verdict, right.requirement_db) == ("confirmed", pytest.approx(-23.02, abs=0.01))
+    assert abs(right.measured_db - right.requirement_db) < 0.5
+    assert verify_random(one, off(of(one, "receiver.random.GNSS"), 0.8)).verdict == "optimistic"
+    assert verify_islr(one, "receiver").verdict == "confirmed"
+    assert verify_islr(one, "mission").requirement_db == pytest.approx(-20, abs=0.01)
+
+
+def test_the_limit_of_a_clock_is_in_decibels() -> None:
+    one = study(MISSION.rstrip() + OSCILLATORS + LOOSE)
+    found = verify_random(one, of(one, "receiver.oscillator"))
+    assert (found.unit, found.verdict) == ("dB", "confirmed")
+    factor = 10 ** (found.boundary_error / 20)
+    assert of(one, "receiver.oscillator").full.quadratic * factor == pytest.approx(found.budget_rad)
+
+
+def test_one_time_series_is_flown_and_a_seed_names_it() -> None:
+    text = MISSION.rstrip() + OSCILLATORS
+    phases = [
+        simulate_point(parse_mission(text + f"simulation: {{seed: {seed}}}\n")).effect.quadratic for seed in (1, 1, 2)
+    ]
+    assert phases[0] == phases[1] != phases[2]
+    still = text[: text.index("    motion_error")]
+    assert abs(simulate_point(parse_mission(still)).effect.quadratic) < 1e-6
+    one = study(text)
+    sigma = math.hypot(*(e.full.quadratic * (e.declared or 0) for e in one.analysis.random))
+    assert 0 < abs(phases[0]) < 5 * sigma
+    assert np.isfinite(phases).all()
