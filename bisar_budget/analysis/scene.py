@@ -41,6 +41,7 @@ _TURNS = 2  # of the azimuth along which it is searched; then it is the whole ci
 _PROBES = 3
 _FLOOR_RAD, _SHARE = 1e-4, 3e-4  # of the largest difference: what one error may differ by and be taken as small
 _FINEST = 1e-3  # rad, of the azimuth of a largest difference: a cosine loses half its square
+_MAY_FOLD = 0.7  # of what gradients span without an error: with less left of it a point may have no image nearby
 
 
 class SceneEdge(NamedTuple):
@@ -144,10 +145,13 @@ class ScenePhases:
         clearances = (self.turn * sine / _MIN_SINE, there.range_gradient / MIN_GROUND_GRADIENT)
         return RimPlace(phases, self.combined(phases), clearances)
 
-    def differences(self, radius: float, azimuth: float, exact: Sequence[int] | None = None) -> list[float]:
+    def differences(
+        self, radius: float, azimuth: float, exact: Sequence[int] | None = None, turns: list[float] | None = None
+    ) -> list[float]:
         """Of each error, its phase there less that at the centre; by the worse sign of those taken exactly. [rad]
 
-        Exactly taken are all large ones, or some of the members, by their indices.
+        Exactly taken are all large ones, or some of the members, by their indices. `turns` is given what range and
+        Doppler gradients span where each of these leads, over what they span without it: 0 where there is no image.
         """
         there = self.ranges_at(radius, azimuth)
         phases = self.place_of(there).phases
@@ -159,6 +163,8 @@ class ScenePhases:
                 path = PointPath(there, source, math.copysign(1.0, size), per_unit)
                 here, away = self.full.at(source, size), path.to(abs(size))
                 of_both.append(math.inf if here is None or away is None else away.quadratic - here.quadratic)
+                if turns is not None:
+                    turns.append(0.0 if away is None else away.turn)
             found[i] = math.copysign(max(map(abs, of_both)), found[i])
         return found
 
@@ -185,10 +191,18 @@ class ScenePhases:
         return self.together(self.differences(radius, azimuth)), azimuth
 
     def _climbed(self, rim: "Rim", radius: float, bent: list[int]) -> float:
-        """Azimuth of the largest difference, some errors taken exactly. [rad]"""
+        """Azimuth of the largest difference, or of a place without an image, some errors taken exactly. [rad]
+
+        Where gradients become parallel the image ends, on an arc that may lie between the places that are looked at:
+        it is also sought where they are nearest to parallel.
+        """
+        seen: list[tuple[float, float]] = []  # least turn, and azimuth
 
         def size_at(azimuth: float) -> float:
-            return self.together(self.differences(radius, azimuth, bent))
+            turns: list[float] = []
+            size = self.together(self.differences(radius, azimuth, bent, turns))
+            seen.append((min(turns, default=1.0), azimuth))
+            return size
 
         arc = math.pi / RIM_POINTS
         places = [rim.azimuth, *(2 * arc * place for place in range(RIM_POINTS))]
@@ -197,6 +211,15 @@ class ScenePhases:
             sides = [(size_at(azimuth + step), azimuth + step) for step in (-arc, arc)]
             if max(sides)[0] > size:
                 size, azimuth = max(sides)
+            else:
+                arc /= 4
+        turn, lowest = min(seen)
+        arc = math.pi / RIM_POINTS
+        while math.isfinite(size) and turn < _MAY_FOLD and arc > _FINEST:
+            sides = [(size_at(lowest + step), lowest + step) for step in (-arc, arc)]
+            size, azimuth = max((size, azimuth), *sides)
+            if min(seen)[0] < turn:
+                turn, lowest = min(seen)
             else:
                 arc /= 4
         return azimuth % (2 * math.pi)

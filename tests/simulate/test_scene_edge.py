@@ -353,3 +353,13 @@ def test_the_radius_where_a_size_passes_a_total_is_between_its_bounds(power: flo
 def test_a_radius_is_found_below_a_place_without_an_image() -> None:
     low, _ = _where(lambda radius: radius if radius < 0.7 else math.inf, 1.0, (0.0, 0.0), (2.0, math.inf))
     assert 0.699 <= low < 0.7
+
+
+def test_an_arc_of_the_rim_without_an_image_between_two_places_is_found() -> None:
+    """A height error of 49 m ends the image of the rim on an arc of 5 degrees: the row had passed over it."""
+    from tests.families import mission_text as of_family
+
+    found = check_mission(parse_mission(of_family("geostationary_drone", 1102)), TODAY)
+    variance = row(found, "mission.spatial_variance")
+    assert (variance.status, variance.declared) == ("not_evaluated", None)
+    assert "no ground point" in (variance.reason or "")

@@ -305,7 +305,7 @@ def ticks(lower: float, upper: float, step: float) -> Iterable[float]:
     return [index * step for index in range(first, last + 1)]
 
 
-_LEAST = 1e-300  # of a step: what is drawn may all be at one place
+_LEAST = 1e-9  # of a step: what is drawn may all be at one place
 
 
 def round_step(least: float) -> float:
