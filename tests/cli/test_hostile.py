@@ -16,7 +16,8 @@ from bisar_budget.budget.check import check_mission
 from bisar_budget.cli.streams import harmless
 from bisar_budget.faults import MissionError
 from bisar_budget.findings.mission import Report
-from bisar_budget.mission.load import MAX_FAULTS, parse_mission
+from bisar_budget.mission.load import parse_mission
+from bisar_budget.mission.tree import MAX_FAULTS
 from bisar_budget.report import FORMATS, Style, render
 from tests.conftest import ROOT, TODAY, findings, heed_signals, mission_text
 from tests.fuzz import RAW, RUN, case

@@ -305,7 +305,11 @@ def ticks(lower: float, upper: float, step: float) -> Iterable[float]:
     return [index * step for index in range(first, last + 1)]
 
 
+_LEAST = 1e-300  # of a step: what is drawn may all be at one place
+
+
 def round_step(least: float) -> float:
     """Smallest of 1, 2, 5 times a power of ten that is not below a value."""
+    least = max(least, _LEAST)
     power = 10.0 ** math.floor(math.log10(least))
     return next(factor * power for factor in (1, 2, 5, 10) if factor * power >= least * (1 - 1e-9))
