@@ -558,7 +558,11 @@ def _validity(mission: Mission, found: MissionFindings) -> Iterator[tuple[str, s
             "start at mid-aperture",
         )
     if any(platform.oscillator for platform in mission.platforms) or mission.synchronization:
-        yield "Clocks", "spectra of phase are one-sided, and count up to the oscillator’s bandwidth or the mask’s end"
+        yield (
+            "Clocks",
+            "spectra of phase are one-sided, and count up to the oscillator’s bandwidth or the mask’s end. The level "
+            "of an oscillator is that of its noise against the noise declared, 0 dB",
+        )
     for row in found.rows:
         if row.subject.kind == "oscillator" and row.remarks:
             yield f"Oscillator of the {row.owner}", "; ".join(row.remarks)
