@@ -81,6 +81,27 @@ def cold(runs: int) -> None:
         )
 
 
+def sensors(runs: int) -> None:
+    """A mission with everything that data sheets say, against the same without it."""
+    import yaml
+
+    source = ROOT / "tests" / "acceptance" / "good" / "sensors_and_clocks.yaml"
+    mission = yaml.safe_load(source.read_text(encoding="utf-8"))
+    mission.pop("synchronization", None)
+    for platform in mission["platforms"].values():
+        platform.pop("oscillator", None)
+        for key in ("sensor", "imu", "random"):
+            platform.get("motion_error", {}).pop(key, None)
+    script = str(Path(sys.executable).with_name("bisar-budget"))
+    with tempfile.TemporaryDirectory() as folder:
+        bare = Path(folder) / "without.yaml"
+        bare.write_text(yaml.safe_dump(mission, sort_keys=False), encoding="utf-8")
+        found = in_turn(runs, process(script, "check", str(source)), process(script, "check", str(bare)))
+    print("check of a mission with sensors, oscillators and synchronisation ÷ without them, cold (at most 1.3)")
+    for label, a, b in zip(("clock", "CPU"), *found, strict=True):
+        print(f"  {label:5} {a * 1e3:6.0f} ms ÷ {b * 1e3:6.0f} ms = {a / b:.2f}")
+
+
 PARSE = """import sys, yaml
 for name in sys.argv[1:]:
     with open(name, "rb") as file:
@@ -332,6 +353,7 @@ def montecarlo(runs: int) -> None:
 
 TASKS = {
     "cold": (cold, 21),
+    "sensors": (sensors, 21),
     "gate": (gate, 5),
     "formats": (formats, 11),
     "report": (report, 11),
