@@ -125,6 +125,7 @@ ANGLE_RANDOM_WALK = Dimension(
     usual=("deg/sqrt(h)", "rad/sqrt(s)"),
 )
 PHASE_NOISE = Dimension("a phase noise L(f)", "dBc/Hz", {"dBc/Hz": 1.0}, usual=("dBc/Hz",))
+TONE = Dimension("the level of a tone", "dBc", {"dBc": 1.0}, usual=("dBc",))
 MEMORY = Dimension("an amount of memory", "B", _scaled("B", "kMGT") | {"KB": 1e3, "MiB": 2.0**20, "GiB": 2.0**30})
 
 DIMENSIONS = (
@@ -145,6 +146,7 @@ DIMENSIONS = (
     VELOCITY_RANDOM_WALK,
     ANGLE_RANDOM_WALK,
     PHASE_NOISE,
+    TONE,
     MEMORY,
 )
 

@@ -117,9 +117,10 @@ def _instrument_rows(analysis: Analysis, gating: str, allocation: Allocation) ->
     """Rows of sensors and clocks, which few missions name."""
     if not analysis.random:
         return []
-    from bisar_budget.budget.random_rows import islr_rows, random_rows
+    from bisar_budget.budget.random_rows import islr_rows, random_rows, spur_rows
 
-    return [*random_rows(analysis, gating, allocation), *islr_rows(analysis, gating, allocation)]
+    rows = (random_rows, spur_rows, islr_rows)
+    return [row for of_kind in rows for row in of_kind(analysis, gating, allocation)]
 
 
 def stricter(published: _Checked, full: _Checked) -> _Checked:

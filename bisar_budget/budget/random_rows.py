@@ -11,10 +11,12 @@ from typing import NamedTuple
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.spread import spread_limit, spread_powers
+from bisar_budget.analysis.vibration_limits import vibration_limits
 from bisar_budget.budget.judgement import judged
 from bisar_budget.budget.pull_in import caps, needed_sentence
-from bisar_budget.budget.vibration_rows import islr_db
+from bisar_budget.budget.vibration_rows import ECHO_CYCLES, islr_db
 from bisar_budget.constants import UTILIZATION_TOLERANCE
+from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.models import CUBIC, QUADRATIC
 from bisar_budget.effects.random_errors import RandomEffect, RandomError
 from bisar_budget.effects.subject import subject
@@ -159,6 +161,73 @@ def _doubt(other: str, effect: RandomEffect, limits: _Limits, size: float) -> st
     allowed = format_limit((limits.quadratic if is_quadratic else limits.cubic) or 0.0, "rad")
     what = "QPE" if is_quadratic else "cubic phase"
     return f"the {other} model says fail: {what} {phase:.3g} rad, {allowed} allowed"
+
+
+# ---------------------------------------------------------------------- tones
+class Spur(NamedTuple):
+    """A tone of an oscillator: platform, entry by frequency, frequency [Hz], peak phase at centre frequency [rad]."""
+
+    name: str
+    entry: int
+    frequency: float
+    phase: float
+
+
+def spurs_of(mission: Mission) -> list[Spur]:
+    """Tones that reach the image: none where the direct path is the receiver's clock."""
+    if mission.has_direct_path:
+        return []
+    found = []
+    for name in PLATFORMS:
+        oscillator = getattr(mission.platforms, name).oscillator
+        for index, (frequency, level) in enumerate(oscillator.spurs if oscillator is not None else ()):
+            scale = mission.radar.center_frequency / (oscillator.frequency or mission.radar.center_frequency)
+            # A sideband of a phase φ has the amplitude φ/2 of the carrier.
+            found.append(Spur(name, index, frequency, 2 * 10 ** (level / 20) * scale))
+    return found
+
+
+def spur_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterator[Row]:
+    """Rows of the oscillators' tones, which make paired echoes as vibrations do. [dB of an echo to the response]"""
+    mission = analysis.mission
+    limits = vibration_limits(mission, allocation, "pslr")
+    k = 2 * math.pi / mission.radar.wavelength
+    for spur in spurs_of(mission):
+        cycles = spur.frequency * mission.collection.aperture_time
+        allowed = limits.get(spur.name)
+        phases = None if allowed is None else (k * allowed.published, k * allowed.full)
+        limit = None if phases is None or allowed is None else k * allowed.by(gating)
+        over = doubt = ""
+        if limit is not None and phases is not None:
+            over = f"paired echoes of {_echo(spur.phase)}, {_echo(limit, 'down')} allowed"
+            other = phases[0] if gating == "full" else phases[1]
+            if spur.phase > other * (1 + UTILIZATION_TOLERANCE) and not mission.has_direct_path:
+                name = "published" if gating == "full" else "full"
+                doubt = f"the {name} model says fail: {_echo(other, 'down')} allowed"
+        missing = "" if limit is not None else "no requirements.pslr to hold it to"
+        slow = f"{cycles:.3g} cycles per aperture: below {ECHO_CYCLES:g} its echoes lie on the mainlobe"
+        row = judged(
+            mission,
+            subject=subject(spur.name, "oscillator", "spur", entry=spur.entry),
+            metric="pslr",
+            unit="dB",
+            declared=spur.phase / 2,
+            allowable=None if limit is None else limit / 2,
+            path=("platforms", spur.name, "oscillator", "spurs"),
+            equation="first principles" if gating == "full" else "Section V, sinusoidal",
+            no_limit=missing,
+            not_evaluated=missing or (slow if cycles < ECHO_CYCLES else ""),
+            over=over,
+            doubt=doubt,
+            limits=(None, None) if phases is None else (phases[0] / 2, phases[1] / 2),
+            evidence=getattr(mission.platforms, spur.name).oscillator.source,
+            notes=(f"at {format_quantity(spur.frequency, 'Hz')}, {cycles:.3g} cells from the response",),
+        )
+        yield in_decibel(row._replace(model=gating))
+
+
+def _echo(phase: float, rounding: str = "nearest") -> str:
+    return format_quantity(20 * math.log10(phase / 2), "dB", 3, rounding)
 
 
 # ---------------------------------------------------------------------- powers together

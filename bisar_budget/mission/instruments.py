@@ -181,6 +181,18 @@ class Oscillator(NamedTuple):
             "Phase noise counts up to here, of a mask up to its last point if that is lower.",
         ),
     ] = 1e3
+    spurs: Annotated[
+        Points,
+        Key(
+            _Curve(
+                Quantity(units.FREQUENCY, gt=0, ge=1e-3, le=1e12),
+                Quantity(units.TONE, ge=-250, le=0),
+                "{50 Hz: -90 dBc} and the like",
+                1,
+            ),
+            "Tones of the oscillator, single sideband at its frequency: each makes paired echoes.",
+        ),
+    ] = ()
     sensor: Annotated[str | None, Key(Text(), "A part of the catalogue, or a file; keys beside it override.")] = None
     source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
 
@@ -196,6 +208,8 @@ class Oscillator(NamedTuple):
                 yield Problem("says nothing of its noise", f"{ways}, or sensor: a part of the catalogue")
             if values["phase_noise"] is not None and values.get("frequency", 0.0) is None:
                 yield Problem("is missing", "accepted: the frequency at which the mask is stated", at=("frequency",))
+        if values.get("spurs") and values.get("sensor") is None and values.get("frequency", 0.0) is None:
+            yield Problem("is missing", "accepted: the frequency at which the tones are stated", at=("frequency",))
         for (f, level), (g, next_level) in pairwise(values.get("phase_noise") or ()):
             slope = (next_level - level) / math.log10(g / f)
             if slope < -_STEEPEST or slope > _RISE:

@@ -322,3 +322,34 @@ class TestSynchronisation:
         )
         one = row(found, "receiver.imu.attitude")
         assert (one.status, one.requirement_id) == ("waived", "SYS-1")
+
+
+class TestTones:
+    """-30 dB, shared equally: by the paper's rule a phase of √(10⁻³/2), whose echoes have half of its amplitude."""
+
+    LIMIT = 20 * math.log10(math.sqrt(1e-3 / 2) / 2)
+
+    def tone(self, level: float, frequency: str = "50 Hz", **changes: Any) -> Row:
+        oscillator = {**MASK, "spurs": {frequency: f"{level - 60!r} dBc"}}  # 10 MHz to 10 GHz: 60 dB
+        found = check(platforms={"receiver": {"oscillator": oscillator}}, requirements={"pslr": "-30 dB"}, **changes)
+        return row(found, "receiver.oscillator.spur.0")
+
+    def test_both_sides_of_the_limit(self) -> None:
+        below, above = self.tone(self.LIMIT - 0.001), self.tone(self.LIMIT + 0.001)
+        assert (below.status, above.status) == ("warn", "fail")
+        assert below.allowable == pytest.approx(self.LIMIT)
+        assert below.declared == pytest.approx(self.LIMIT - 0.001)
+        assert above.utilization == pytest.approx(10 ** (0.001 / 20))
+
+    def test_below_three_cycles_its_echoes_lie_on_the_mainlobe(self) -> None:
+        assert self.tone(-80, "0.7 Hz").status == "not_evaluated"
+        assert self.tone(-80, "0.8 Hz").status == "pass"
+
+    def test_a_direct_path_takes_it_away(self) -> None:
+        with pytest.raises(StopIteration):
+            self.tone(-80, synchronization={"method": "direct_path", "error": 0})
+
+    def test_without_a_requirement_it_is_not_evaluated(self) -> None:
+        oscillator = {**MASK, "spurs": {"50 Hz": "-90 dBc"}}
+        found = check(platforms={"receiver": {"oscillator": oscillator}})
+        assert row(found, "receiver.oscillator.spur.0").status == "not_evaluated"

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.analysis.vibration_limits import spread_phase
+from bisar_budget.analysis.vibration_limits import spread_phase, vibration_limits
 from bisar_budget.constants import STANDARD_GRAVITY
 from bisar_budget.effects.models import CUBIC, QUADRATIC
 from bisar_budget.effects.oscillators import noise_of
@@ -316,4 +316,29 @@ def explained_islr(
     if row.utilization is not None:
         values = {"v": total, "v_max": limit}
         lines = equation("utilization", "sqrt(v/v_max)", values, row.utilization, "")
+        yield from step("Utilization, of amplitudes", *lines)
+
+
+def explained_spur(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
+    """From the tone of an oscillator to its paired echoes, and to what the platform's share of PSLR allows."""
+    oscillator = getattr(mission.platforms, row.owner).oscillator
+    path = ("platforms", row.owner, "oscillator", "spurs")
+    frequency, level = oscillator.spurs[row.subject.entry or 0]
+    yield from step(f"Declared in {place(mission, path)}", f"{frequency:.6g} Hz: {level:.6g} dBc")
+    f_0 = mission.radar.center_frequency
+    values = {"L": level, "f_0": f_0, "f_osc": oscillator.frequency or f_0}
+    lines = equation("declared", "L + 20*log(f_0/f_osc)/log(10)", values, row.declared or 0.0, "dB")
+    yield from step("At the centre frequency; an echo has the amplitude of the sideband", *lines)
+    limits = vibration_limits(mission, allocation, "pslr").get(row.owner)
+    if limits is None or row.allowable is None:
+        yield from step("Allowable: no limit", printable(row.reason or "no requirement limits this error"))
+        return
+    values = {"A": limits.by(row.model or "published"), "λ": mission.radar.wavelength}
+    lines = equation("φ", "2*π*A/λ", values, 2 * math.pi * values["A"] / values["λ"], "rad")
+    yield from step(f"Phase of a vibration at the limit of {row.owner}.vibration.sinusoidal", *lines)
+    phase = {"φ": 2 * math.pi * values["A"] / values["λ"]}
+    yield from step("Its echoes", *equation("allowable", "20*log(φ/2)/log(10)", phase, row.allowable, "dB"))
+    if row.utilization is not None:
+        values = {"declared": row.declared or 0.0, "allowable": row.allowable}
+        lines = equation("utilization", "10^((declared - allowable)/20)", values, row.utilization, "")
         yield from step("Utilization, of amplitudes", *lines)

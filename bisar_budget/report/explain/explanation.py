@@ -81,6 +81,10 @@ def chain(mission: Mission, found: MissionFindings, row: Row) -> Iterator[Step]:
         from bisar_budget.report.explain.explained_random import explained_random
 
         yield from explained_random(analysis, found.allocation, random, row)
+    elif row.subject.axis == "spur":
+        from bisar_budget.report.explain.explained_random import explained_spur
+
+        yield from explained_spur(mission, found.allocation, row)
     elif row.subject.kind == "islr":
         from bisar_budget.report.explain.explained_random import explained_islr
 
