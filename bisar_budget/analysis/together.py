@@ -21,6 +21,7 @@ class Together:
         self.stated = analysis.stated
         self.motion = [source for source in self.stated if source.is_motion]
         self.own = analysis.own_phases(model.name)
+        self.extrapolated = {error.id: error.extrapolated for error in analysis.random if error.extrapolated}
 
     def members(self, allocation: Allocation, owner: str) -> list[ErrorSource]:
         """Those that count against the share of an owner; against the mission's all."""

@@ -1,7 +1,7 @@
 """What the declared errors add up to: phases of platforms and mission, cubic phase, location, autofocus pull-in."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -63,7 +63,9 @@ def _qpe_rows(analysis: Analysis, mine: Together, theirs: Together, allocation: 
         limit = allocation.qpe_limit(owner) * gain
         over = ""
         if qpe is not None:
-            over = _exceeded("QPE", qpe, limit, "rad", partial(phase_parts, phases, combine, groups))
+            over = _exceeded(
+                "QPE", qpe, limit, "rad", partial(phase_parts, phases, combine, groups), mine.extrapolated
+            )
             if over and math.isfinite(qpe):
                 over += f"; {needed_sentence(allocation.n_pull_needed(qpe, owner), caps(mission))}"
         yield _judged(
@@ -117,7 +119,9 @@ def _cubic_row(analysis: Analysis, mine: Together, theirs: Together) -> Row:
     combine, limit = mission.allocation.combine, mission.requirements.cubic_phase_error
     phases = mine.all_cubics()
     cubic, by_other = (combined_phase(of, combine, groups) if of else None for of in (phases, theirs.all_cubics()))
-    over = _exceeded("cubic phase", cubic, limit, "rad", lambda: phase_parts(phases, combine, groups))
+    over = _exceeded(
+        "cubic phase", cubic, limit, "rad", lambda: phase_parts(phases, combine, groups), mine.extrapolated
+    )
     doubt = _doubt(theirs.model, by_other, limit, "rad")
     if combine == "each":
         doubt = _of_all("cubic phase", combined_phase(phases, "rss", groups), limit, "rad") or doubt
@@ -224,14 +228,24 @@ def _of_all(what: str, size: float, limit: float | None, unit: str) -> str:
 
 
 def _exceeded(
-    what: str, size: float | None, limit: float | None, unit: str, members: Callable[[], Sequence[tuple[str, float]]]
+    what: str,
+    size: float | None,
+    limit: float | None,
+    unit: str,
+    members: Callable[[], Sequence[tuple[str, float]]],
+    extrapolated: Mapping[str, str] | None = None,
 ) -> str:
-    """Say how large an aggregate is, what is allowed, and which of its members is the largest; nothing if inside."""
+    """Say how large an aggregate is, what is allowed, and which of its members is the largest; nothing if inside.
+
+    `extrapolated` says of members what they rest on beside the file.
+    """
     if size is None or limit is None or size <= limit:
         return ""
     row_id, largest = max(members(), key=lambda member: abs(member[1]))
     allowed = f"{_said(size, unit)}, {format_limit(limit, unit)} allowed"
-    return f"{what} {allowed}; largest: {row_id}, {_said(abs(largest), unit)}"
+    text = f"{what} {allowed}; largest: {row_id}, {_said(abs(largest), unit)}"
+    beyond = (extrapolated or {}).get(row_id)
+    return f"{text} ({beyond})" if beyond else text
 
 
 def _said(size: float, unit: str) -> str:

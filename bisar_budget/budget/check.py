@@ -173,7 +173,14 @@ def _scene_row(analysis: Analysis, model: str, allocation: Allocation) -> tuple[
 
 def _of_instruments(analysis: Analysis) -> Iterator[FileWarning]:
     """Warn of what sensors and clocks are stated by, and of what is stated twice."""
-    mission = analysis.mission
+    mission, sync = analysis.mission, analysis.mission.synchronization
+    T = mission.collection.aperture_time
+    if sync is not None and not sync.is_direct_path and (sync.interval or 0.0) > T:
+        yield FileWarning(
+            line=mission.line(("synchronization", "interval")),
+            message=f"synchronization.interval: pulses are exchanged less than once in an aperture of {T:g} s; "
+            "straight lines between them may make the phase worse than it is without",
+        )
     for error in analysis.random:
         if error.warning:
             yield FileWarning(line=mission.line(error.path), message=error.warning)

@@ -56,7 +56,9 @@ def _row(analysis: Analysis, error: RandomError, gating: str, other: str, alloca
         if mission.allocation.combine != "each":
             info = f"combine is {mission.allocation.combine}: the aggregate decides"
         elif allowable is not None and size > allowable:
-            over = _over(mission, error, mine, limits, binding or "", allocation)
+            over = "; ".join(
+                filter(None, (_over(mission, error, mine, limits, binding or "", allocation), error.extrapolated))
+            )
         doubt = _doubt(other, theirs, others, size)
     by_model = (mine, theirs) if gating == "published" else (theirs, mine)
     row = judged(

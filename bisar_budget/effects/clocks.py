@@ -31,7 +31,7 @@ def clock_noise(mission: Mission) -> Iterator[RandomError]:
 def _of_oscillator(mission: Mission, name: str, oscillator: Oscillator, sync: Synchronization | None) -> RandomError:
     T, factor = mission.collection.aperture_time, mission.allocation.coverage_factor
     noise = noise_of(oscillator, mission.radar.center_frequency, T)
-    notes, no_limit, warning = list(noise.notes), "no phase noise", ""
+    notes, no_limit, warning = list(filter(None, (noise.extrapolated, *noise.notes))), "no phase noise", ""
     if sync is not None and sync.is_direct_path:
         found, no_limit, notes = Parts(0.0, 0.0, 0.0), DIRECT, []
     else:
@@ -60,6 +60,7 @@ def _of_oscillator(mission: Mission, name: str, oscillator: Oscillator, sync: Sy
         evidence=oscillator.source,
         no_limit=no_limit,
         notes=tuple(notes),
+        extrapolated=noise.extrapolated,
         warning=warning,
     )
 

@@ -16,6 +16,7 @@ class Noise(NamedTuple):
 
     pieces: tuple[Piece, ...]
     notes: tuple[str, ...] = ()
+    extrapolated: str = ""  # how it goes on beyond what is stated
     misfit: float = 0.0  # of a power law to an Allan deviation, the worst point's
 
 
@@ -27,14 +28,12 @@ def noise_of(oscillator: Oscillator, center_frequency: float, aperture_time: flo
         return Noise(_of_power_law(oscillator.power_law, center_frequency, oscillator.bandwidth))
     points = oscillator.allan_deviation or ()
     law, misfit = fitted(points, oscillator.bandwidth)
-    notes = []
-    if points[-1][0] < aperture_time:
-        notes.append(
-            f"the Allan deviation ends at {points[-1][0]:g} s; up to the aperture time its power law continues"
-        )
+    notes, beyond, last = [], "", points[-1][0]
+    if last < aperture_time:
+        beyond = f"the Allan deviation ends at {last:g} s; up to the aperture time its power law continues"
     if law.flicker_phase:
         notes.append("an Allan deviation does not tell white from flicker phase noise: flicker is assumed")
-    return Noise(_of_power_law(law, center_frequency, oscillator.bandwidth), tuple(notes), misfit)
+    return Noise(_of_power_law(law, center_frequency, oscillator.bandwidth), tuple(notes), beyond, misfit)
 
 
 def _of_mask(oscillator: Oscillator, center_frequency: float, aperture_time: float) -> Noise:
@@ -48,11 +47,11 @@ def _of_mask(oscillator: Oscillator, center_frequency: float, aperture_time: flo
     first, density = densities[0]
     slope = min(_STEEPEST, max(_LEAST_STEEP, pieces[0].slope))
     pieces.insert(0, Piece(0.0, min(first, oscillator.bandwidth), density * first**slope, slope))
-    notes: tuple[str, ...] = ()
     # The quadratic phase is made of tones of about a cycle per aperture.
+    below = ""
     if first * aperture_time > 0.5:
-        notes = (f"the mask begins at {first:g} Hz; below, it continues as f^-{slope:.3g}",)
-    return Noise(tuple(piece for piece in pieces if piece.low < piece.high), notes)
+        below = f"the mask begins at {first:g} Hz; below, it continues as f^-{slope:.3g}"
+    return Noise(tuple(piece for piece in pieces if piece.low < piece.high), extrapolated=below)
 
 
 def _of_power_law(law: PowerLaw, center_frequency: float, bandwidth: float) -> tuple[Piece, ...]:

@@ -48,7 +48,8 @@ class RandomError(NamedTuple):
     """One error of a sensor or a clock: what it is, how large it is declared, what one unit of it does.
 
     `declared` is the largest of the axes, coverage factor included, and all axes grow with it; None where the file is
-    silent. The unit of an oscillator is `dB`: its noise as a factor of amplitude, declared 1.
+    silent. The unit of an oscillator is `dB`: its noise as a factor of amplitude, declared 1. `extrapolated` says how
+    its noise goes on beyond what the file states.
     """
 
     subject: Subject
@@ -61,6 +62,7 @@ class RandomError(NamedTuple):
     evidence: str | None
     no_limit: str = NO_PHASE
     notes: tuple[str, ...] = ()
+    extrapolated: str = ""
     warning: str = ""
 
     @property

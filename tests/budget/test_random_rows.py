@@ -314,6 +314,21 @@ class TestSynchronisation:
             before, after = (row(one, f"{name}.oscillator").qpe_published_rad for one in (free, synced))
             assert after < before / 100
 
+    def test_an_interval_beyond_the_aperture_warns(self) -> None:
+        for interval, warns in (("4.1 s", True), ("3.9 s", False)):
+            found = check(
+                platforms={"receiver": {"oscillator": MASK}}, synchronization={"interval": interval, "error": "1 deg"}
+            )
+            assert any("less than once in an aperture" in one.message for one in found.warnings) is warns
+
+    def test_a_failure_that_rests_on_what_is_extrapolated_says_so(self) -> None:
+        loud = {"frequency": "10 MHz", "phase_noise": {"1 Hz": "-75 dBc/Hz", "10 Hz": "-105 dBc/Hz"}}
+        for combine, row_id in (("each", "receiver.oscillator"), ("rss", "receiver.quadratic_phase_error")):
+            found = check(platforms={"receiver": {"oscillator": loud}}, allocation={"combine": combine})
+            one = row(found, row_id)
+            assert one.status == "fail"
+            assert "the mask begins at 1 Hz; below, it continues as f^-3" in (one.reason or "")
+
     def test_waivers_and_requirement_ids_reach_the_rows(self) -> None:
         found = with_error(
             {"imu": {"attitude": "1 deg"}},
