@@ -20,6 +20,7 @@ from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.models import CUBIC, QUADRATIC
 from bisar_budget.effects.random_errors import RandomEffect, RandomError
 from bisar_budget.effects.subject import subject
+from bisar_budget.effects.tones import held
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.model import Mission
 from bisar_budget.units import format_limit, format_quantity
@@ -183,10 +184,21 @@ def spurs_of(mission: Mission) -> list[Spur]:
     for name in PLATFORMS:
         oscillator = getattr(mission.platforms, name).oscillator
         for index, (frequency, level) in enumerate(oscillator.spurs if oscillator is not None else ()):
-            scale = mission.radar.center_frequency / (oscillator.frequency or mission.radar.center_frequency)
+            scale = mission.radar.center_frequency / oscillator.frequency * _left_of(frequency, mission)
             # A sideband of a phase φ has the amplitude φ/2 of the carrier.
             found.append(Spur(name, index, frequency, 2 * 10 ** (level / 20) * scale))
     return found
+
+
+def _left_of(frequency: float, mission: Mission) -> float:
+    """Largest part of a tone that exchanged pulses leave, at its own frequency or at one that it is folded to."""
+    sync = mission.synchronization
+    if sync is None or sync.interval is None:
+        return 1.0
+    nearest = round(frequency * sync.interval)
+    turns = [frequency * sync.interval - n for n in range(nearest - 1, nearest + 2) if n]
+    passed = [math.sqrt(held(2 * math.pi * turn)) for turn in (frequency * sync.interval, *turns)]
+    return max(1 - passed[0], *passed[1:])
 
 
 def spur_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterator[Row]:

@@ -5,9 +5,11 @@ from collections.abc import Sequence
 from itertools import combinations, pairwise
 from typing import NamedTuple
 
+from bisar_budget import evaluators
 from bisar_budget.effects.spectra import Piece
 from bisar_budget.mission.instruments import Oscillator, PowerLaw
 
+_EXACT, _DESCRIBES = 1e-6, 0.01  # misfits of an Allan deviation: nothing, and so little that no term is added
 _STEEPEST, _LEAST_STEEP = 4.0, 3.0  # slopes of a mask below its first point
 
 
@@ -27,8 +29,14 @@ def noise_of(oscillator: Oscillator, center_frequency: float, aperture_time: flo
     if oscillator.power_law is not None:
         return Noise(_of_power_law(oscillator.power_law, center_frequency, oscillator.bandwidth))
     points = oscillator.allan_deviation or ()
-    law, misfit = fitted(points, oscillator.bandwidth)
+    law, misfit = fitted(points, oscillator.bandwidth, aperture_time)
     notes, beyond, last = [], "", points[-1][0]
+    if len(points) == 1:
+        notes.append("one point of an Allan deviation tells no kind of noise: it is the worst for this aperture")
+    if points[0][0] > aperture_time:
+        beyond = (
+            f"the Allan deviation begins at {points[0][0]:g} s; down to the aperture time its power law continues"
+        )
     if last < aperture_time:
         beyond = f"the Allan deviation ends at {last:g} s; up to the aperture time its power law continues"
     if law.flicker_phase:
@@ -73,29 +81,39 @@ def allan_variances(tau: float, bandwidth: float) -> tuple[float, ...]:
     )
 
 
-def fitted(points: Sequence[tuple[float, float]], bandwidth: float) -> tuple[PowerLaw, float]:
+def fitted(points: Sequence[tuple[float, float]], bandwidth: float, aperture_time: float) -> tuple[PowerLaw, float]:
     """Fit h₋₂ … h₁, none negative, to an Allan deviation; and the largest misfit, of a deviation.
 
-    Least squares of relative variances. As few terms as points, of equal fits that with the fewest.
+    Least squares of relative variances, of as few terms as describe the points. Of terms that do it equally well
+    those with the largest quadratic phase over the aperture.
     """
     terms = 4  # white and flicker phase noise have nearly the same Allan variance
     basis = [allan_variances(tau, bandwidth) for tau, _ in points]
     scaled = [[one / deviation**2 for one in row[:terms]] for row, (_, deviation) in zip(basis, points, strict=True)]
-    best: tuple[float, list[float]] = (math.inf, [])
+    per_term = evaluators.power_law_parts(aperture_time)[0]
+    best: tuple[float, float, list[float]] = (math.inf, 0.0, [0.0] * 5)  # misfit, phase, coefficients
     for count in range(1, min(terms, len(points)) + 1):
+        found = []
         for chosen in combinations(range(terms), count):
-            found = _least_squares([[row[index] for index in chosen] for row in scaled])
-            if found is None or min(found) <= 0:
+            if any(row[index] <= 0 for row in scaled for index in chosen):  # of a narrow band
+                continue
+            solved = _least_squares([[row[index] for index in chosen] for row in scaled])
+            if solved is None or min(solved) <= 0:
                 continue
             h = [0.0] * 5
-            for index, value in zip(chosen, found, strict=True):
+            for index, value in zip(chosen, solved, strict=True):
                 h[index] = value
             worst = max(
                 abs(math.sqrt(math.fsum(a * b for a, b in zip(row, h[:terms], strict=True))) - 1) for row in scaled
             )
-            if worst < 0.9 * best[0] and best[0] > 0.01:
-                best = (worst, h)
-    return PowerLaw(*best[1]), best[0]
+            phase = math.fsum(value * part for value, part in zip(h, reversed(per_term), strict=True))
+            found.append((max(worst, _EXACT), phase, h))
+        if found:
+            least = min(found)[0]
+            fits = max((one for one in found if one[0] <= 1.1 * least), key=lambda one: one[1])
+            if fits[0] < 0.9 * best[0] and best[0] > _DESCRIBES:
+                best = fits
+    return PowerLaw(*best[2]), best[0]
 
 
 def _least_squares(rows: Sequence[Sequence[float]]) -> list[float] | None:

@@ -18,6 +18,7 @@ from bisar_budget.constants import ROUNDING, STANDARD_GRAVITY
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.exact_ranges import ExactRanges
 from bisar_budget.effects.subject import Subject, subject
+from bisar_budget.effects.tones import Parts, gauss_markov
 from bisar_budget.effects.vibration_lines import sight_of
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import BistaticGeometry, PlatformState, Vector, dot
@@ -121,12 +122,14 @@ def _of_imu(mission: Mission, name: str, state: PlatformState, exact: ExactRange
             _scaled(_leak(axis) if kind in _BY_GRAVITY else axis, p) for axis, p in zip(axes, parts, strict=True)
         ]
         along = math.hypot(*(dot(state.look, direction) for direction in directions))
-        row = evaluators.inertial_phases(
-            along, along, STANDARD_GRAVITY, mission.radar.wavelength, mission.collection.aperture_time
-        )[index]
+        row, heard = (
+            evaluators.inertial_phases(
+                part, part, STANDARD_GRAVITY, mission.radar.wavelength, mission.collection.aperture_time
+            )[index]
+            for part in (along, math.hypot(*(dot(sight, direction) for direction in directions)))
+        )
         published = RandomEffect(row[0], row[1], row[2] / factor)
         quadratic, cubic, covariance = _over_aperture(exact, name, kind, directions)
-        heard = math.hypot(*(dot(sight, direction) for direction in directions))
         is_of_part = kind in dict(error.of_parts)
         yield RandomError(
             subject=subject(name, "imu", kind),
@@ -134,7 +137,7 @@ def _of_imu(mission: Mission, name: str, state: PlatformState, exact: ExactRange
             declared=None if largest is None else largest * factor,
             path=("platforms", name, "motion_error", *(("sensor",) if is_of_part else ("imu", kind))),
             published=published,
-            full=RandomEffect(quadratic, cubic, published.spread * (heard / along if along else 0.0), covariance),
+            full=RandomEffect(quadratic, cubic, heard[2] / factor, covariance),
             equation="inertial sensor",
             evidence=error.evidence(kind) if is_of_part else imu.source or error.source,
             no_limit="the line of sight has no part in it: no phase",
@@ -200,8 +203,6 @@ def _of_position(mission: Mission, name: str, state: PlatformState) -> Iterator[
     error: MotionError = getattr(mission.platforms, name).motion_error
     if not error.random:
         return
-    from bisar_budget.effects.tones import gauss_markov
-
     k, factor = 2 * math.pi / mission.radar.wavelength, mission.allocation.coverage_factor
     axes, sight = state.frame(error.frame), sight_of(mission, name)
     is_of_part = "random" in dict(error.of_parts)
@@ -209,10 +210,10 @@ def _of_position(mission: Mission, name: str, state: PlatformState) -> Iterator[
     for index, process in enumerate(error.random):
         largest = max(process.sigma)
         sizes = [sigma / largest if largest else 1.0 for sigma in process.sigma]
-        along = k * math.hypot(*(dot(sight, axis) * size for axis, size in zip(axes, sizes, strict=True)))
         parts = gauss_markov(mission.collection.aperture_time, process.correlation_time)
-        effect = RandomEffect(
-            along * math.sqrt(parts.quadratic), along * math.sqrt(parts.cubic), along * math.sqrt(parts.left) / factor
+        moved = [_scaled(axis, size) for axis, size in zip(axes, sizes, strict=True)]
+        published, full = (
+            _correlated(parts, k * math.hypot(*(dot(by, one) for one in moved)), factor) for by in (state.look, sight)
         )
         own: KeyPath = ("sensor",) if is_of_part else ("random", index, "sigma")
         yield RandomError(
@@ -220,9 +221,15 @@ def _of_position(mission: Mission, name: str, state: PlatformState) -> Iterator[
             unit="m",
             declared=largest * factor,
             path=("platforms", name, "motion_error", *own),
-            published=effect,
-            full=effect,
+            published=published,
+            full=full,
             equation="Gauss-Markov",
             evidence=error.evidence("random") if is_of_part else process.source or error.source,
             no_limit="the line of sight has no part in it: no phase",
         )
+
+
+def _correlated(parts: Parts, along: float, factor: float) -> RandomEffect:
+    """Sigmas of a metre of a process, by what it changes of the phase. [rad/m]"""
+    quadratic, cubic, left = (along * math.sqrt(part) for part in parts)
+    return RandomEffect(quadratic, cubic, left / factor)

@@ -75,8 +75,9 @@ def synchronized_parts(pieces: Sequence[Piece], aperture_time: float, interval: 
     """
     end = max(piece.high for piece in pieces)
     rate = 1 / interval
-    edges = _edges(aperture_time) + [rate * n / 4 for n in range(1, 4 * _FOLDED + 1)]
+    edges = _exchange_edges(aperture_time, rate)
     edges += [edge for piece in pieces for edge in (piece.low, piece.high)]
+    edges += [abs(n * rate + sign * end) for n in range(_FOLDED + 1) for sign in (1, -1)]  # where its images end
     scale, total = math.pi * aperture_time, Parts(0.0, 0.0, 0.0)
     beyond = [_beyond(piece, rate) for piece in pieces]
 
@@ -84,7 +85,7 @@ def synchronized_parts(pieces: Sequence[Piece], aperture_time: float, interval: 
         return _left(pieces, beyond, f, rate)
 
     last = max(_FOLDED * rate, _FAST / scale)
-    for low, high in _panels(0.0, min(end, last), edges):
+    for low, high in _panels(0.0, last, edges):
         total = total.plus(_panel(left, low, high, scale))
     # Where straight lines pass nothing any more.
     for piece in pieces:
@@ -121,6 +122,16 @@ def _beyond(piece: Piece, rate: float) -> float:
         return 0.0
     rise = -piece.slope * piece.at(low) / low  # of the spectrum, at the integral's beginning
     return 2 * (piece.integral(low, piece.high) / rate + rise * rate / 24)
+
+
+def _exchange_edges(aperture_time: float, rate: float) -> list[float]:
+    """Frequencies between which a tone's parts, and what straight lines pass, are smooth. [Hz]"""
+    edges = _edges(aperture_time) + [rate * n / 4 for n in range(1, 4 * _FOLDED + 1)]
+    octave = _TURNS / aperture_time
+    while octave < rate / 4:
+        edges.append(octave)
+        octave *= _OCTAVE
+    return edges
 
 
 def _edges(aperture_time: float) -> list[float]:
@@ -181,7 +192,7 @@ def _fast(piece: Piece, low: float, high: float, scale: float) -> Parts:
 def link_parts(aperture_time: float, interval: float) -> Parts:
     """Parts of samples of variance 1 with straight lines between: one-sided 2·T_s·sinc⁴(f·T_s), ⅔ in all."""
     rate, scale = 1 / interval, math.pi * aperture_time
-    edges = _edges(aperture_time) + [rate * n / 4 for n in range(1, 4 * _FOLDED + 1)]
+    edges = _exchange_edges(aperture_time, rate)
     total = Parts(0.0, 0.0, 0.0)
     for low, high in _panels(0.0, _FOLDED * rate, edges):
         total = total.plus(_panel(lambda f: 2 * interval * held(2 * math.pi * f * interval), low, high, scale))

@@ -196,6 +196,11 @@ class Oscillator(NamedTuple):
     sensor: Annotated[str | None, Key(Text(), "A part of the catalogue, or a file; keys beside it override.")] = None
     source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
 
+    @property
+    def needs_frequency(self) -> bool:
+        """Whether what it says is stated at its own frequency: a power law is of fractional frequency."""
+        return self.phase_noise is not None or bool(self.spurs)
+
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
         """Hold it to one form, and a mask to slopes that an oscillator can have."""
@@ -253,6 +258,8 @@ class Synchronization(NamedTuple):
         """Hold exchanged pulses to an interval."""
         if values.keys() >= {"method", "interval"} and values["method"] == "linear" and values["interval"] is None:
             yield Problem("is missing", "accepted: the time between exchanged pulses", at=("interval",))
+        if values.get("method") == "direct_path" and values.get("interval") is not None:
+            yield Problem("a direct path is heard with every pulse", "accepted: no interval", at=("interval",))
 
 
 IMU = Section(Imu)

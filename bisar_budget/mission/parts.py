@@ -222,7 +222,7 @@ def _find(name: str, beside: str) -> Part:
             file = os.path.join(folder, name + suffix)
             if os.sep not in name and os.path.exists(file):
                 return read_part(file)
-    near = did_you_mean(name, tuple(catalogue(places)))
+    near = did_you_mean(name.lower(), tuple(catalogue(places)))
     raise PartError(f"is no part of the catalogue; `bisar-budget sensors` lists them. {near}".rstrip())
 
 
@@ -250,6 +250,10 @@ def with_parts(mission: Mission, beside: str, report: Report) -> Any:
             path = ("platforms", name, "oscillator", "sensor")
             parts = _parts_of(oscillator.sensor, path, ("oscillator",), beside, report)
             oscillator = INVALID if parts is INVALID else _oscillator_of(oscillator, parts[0])
+            if oscillator is not INVALID and oscillator.needs_frequency and oscillator.frequency is None:
+                problem = f"{shown(parts[0].name)} states no frequency, at which the mask or the tones are stated"
+                report(path[:-1], Problem(problem, "accepted: oscillator.frequency", at=("frequency",)))
+                oscillator = INVALID
         if INVALID in (error, oscillator):
             is_valid = False
             continue
@@ -302,11 +306,11 @@ def _motion_of(error: MotionError, parts: Sequence[Part], path: KeyPath, report:
                     if getattr(error, figure) is None and getattr(part, figure) is not None
                 }
             )
+            if part.random and not error.random:
+                taken["random"] = part.random
             if taken and error.frame != "scene":
                 report(path, Problem(f"{shown(part.name)} is stated east, north, up", "accepted: frame: scene"))
                 return INVALID
-            if part.random and not error.random:
-                taken["random"] = part.random
             error = error._replace(**taken)
         else:
             continue

@@ -27,6 +27,7 @@ _SLOWEST = 1e-4  # of a tone per aperture; its quadratic phase is nothing
 _PERIODS = 4  # apertures in which phase noise repeats
 _PER_CYCLE = 4  # samples of the fastest tone, joined by straight lines
 _MAX_TONES = 1 << 18
+_MOST_KNOTS = 1 << 13  # exchanges in an aperture that are drawn
 _FLOWN = 4097  # moments of a time series that is flown
 
 
@@ -159,11 +160,17 @@ _INERTIAL = {
 
 
 def phase_courses(
-    mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
+    mission: Mission,
+    error: RandomError,
+    times: Floats,
+    draws: int,
+    rng: np.random.Generator,
+    highest: float = math.inf,
 ) -> Floats:
     """Phases of one oscillator, or of the link, at the centre frequency, (draws, times), of one sigma. [rad]
 
-    Parameters are those of `position_courses`; of an oscillator `declared` is a factor on its amplitude.
+    Parameters are those of `position_courses`; of an oscillator `declared` is a factor on its amplitude. Tones above
+    `highest` [Hz] may be left out, where no exchange of pulses folds them.
     """
     sync, T = mission.synchronization, mission.collection.aperture_time
     size = error.declared or 0.0
@@ -172,13 +179,16 @@ def phase_courses(
         if sync is None or sync.interval is None:
             white: Floats = size * rng.standard_normal((draws, times.size))
             return white
-        joined = []
+        joined, drawn_at = [], max(sync.interval, T / _MOST_KNOTS)
         for _ in range(draws):
-            knots = _knots(times, sync.interval, rng)
+            knots = _knots(times, drawn_at, rng)
             joined.append(np.interp(times, knots, rng.standard_normal(knots.size)))
-        return size * np.stack(joined)
+        # More exchanges than are drawn: of the same spectrum where it is flat.
+        return size * math.sqrt(sync.interval / drawn_at) * np.stack(joined)
     oscillator = getattr(mission.platforms, error.owner).oscillator
     pieces = noise_of(oscillator, mission.radar.center_frequency, T).pieces
+    if sync is None:
+        pieces = tuple(piece._replace(high=min(piece.high, highest)) for piece in pieces if piece.low < highest)
     tones = _Tones(pieces, T)
     interval = sync.interval if sync is not None and sync.method == "linear" else None
     found = np.empty((draws, times.size))
@@ -186,7 +196,8 @@ def phase_courses(
         drawn = tones.draw(rng)
         found[index] = drawn.at(times)
         if interval is not None:
-            knots = _knots(times, interval, rng)
+            # Pulses that follow each other faster take the phase away to nothing that an image shows.
+            knots = _knots(times, max(interval, T / _MOST_KNOTS), rng)
             found[index] -= np.interp(times, knots, drawn.at(knots))
     return size * found
 

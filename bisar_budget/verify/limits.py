@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from fnmatch import fnmatchcase
 from functools import partial
 
+from bisar_budget.analysis.vibration_limits import vibration_limits
 from bisar_budget.budget.aggregates import aggregate_rows
 from bisar_budget.effects.echoes import SLOWEST
 from bisar_budget.effects.effect import PLATFORMS
@@ -107,14 +108,19 @@ def _of_instruments(study: Study) -> Iterator[tuple[str, Case]]:
     """Sensors and clocks that have a limit, and what all noise spreads together."""
     if not study.analysis.random:
         return
-    from bisar_budget.budget.random_rows import islr_rows
-    from bisar_budget.verify.random_cases import verify_islr, verify_random
+    from bisar_budget.budget.random_rows import islr_rows, spurs_of
+    from bisar_budget.verify.random_cases import limits_of, verify_islr, verify_random, verify_spur
 
     for error in study.analysis.random:
-        if any(max(error.effect(model.name)[:3]) for model in study.models):
+        if limits_of(study, error):
             yield error.id, partial(verify_random, study, error)
+    for spur in spurs_of(study.mission):
+        limit = vibration_limits(study.mission, study.allocation, "pslr").get(spur.name)
+        if limit is not None:
+            row_id = subject(spur.name, "oscillator", "spur", entry=spur.entry).id
+            yield row_id, partial(verify_spur, study, spur, row_id, limit.by(study.model))
     for row in islr_rows(study.analysis, study.models[-1].name, study.allocation):
-        yield row.id, partial(verify_islr, study, row.owner)
+        yield row.id, partial(verify_islr, study, row.subject)
 
 
 def _cases(study: Study) -> Iterator[tuple[str, Case]]:

@@ -11,42 +11,67 @@ from collections.abc import Sequence
 import numpy as np
 
 from bisar_budget.analysis.spread import spread_limit, spread_powers
+from bisar_budget.budget.random_rows import Spur
 from bisar_budget.budget.vibration_rows import islr_db
 from bisar_budget.effects.exact_arrays import aperture_nodes
 from bisar_budget.effects.models import CUBIC, QUADRATIC
 from bisar_budget.effects.random_errors import RandomError
+from bisar_budget.effects.subject import Subject
 from bisar_budget.effects.vibration_lines import sight_of
 from bisar_budget.findings.images import Verdict
 from bisar_budget.mission.model import Simulation
 from bisar_budget.simulate.collection import Errors
-from bisar_budget.simulate.phase_history import Course, Floats, PathError
+from bisar_budget.simulate.phase_history import Course, Floats, PathError, PathSinusoid
 from bisar_budget.simulate.realisations import clock_seconds, phase_courses, position_courses
 from bisar_budget.verify.phase_cases import TOLERANCE, compare
 from bisar_budget.verify.study import Study
-from bisar_budget.verify.vibration_cases import TOLERANCE_DB
+from bisar_budget.verify.vibration_cases import TOLERANCE_DB, echo
 
 ISLR = "islr"
 _DRAWS, _CLOCK_DRAWS = 4000, 1000  # know a sigma to 1.1 %, and to 2.2 %
+_SYNCHRONIZED_DRAWS = 400  # whose fast tones are drawn too, because they are folded
+_TURNS = 100  # of a tone per aperture, beyond which it has no quadratic phase to speak of
 _SURE = 3.0  # standard errors of a sigma
 _IMAGES = 6
 _FINE = 513  # moments of a time series in an image
-_POWER_DRAWS = 64
+_POWER_DRAWS = 48
 _MOMENTS = 4096  # at most, of an aperture whose spread power is measured
 _ORDER = 3  # up to which a phase moves and defocuses; the rest spreads
 
 
+def limits_of(study: Study, error: RandomError) -> dict[str, float]:
+    """Size at which each requirement that an error touches is reached, autofocus left out; empty: none limits it."""
+    effect, model = error.effect(_model(study, error)), _model(study, error)
+    held = (
+        (QUADRATIC, effect.quadratic, study.allocation.qpe_limit(error.owner)),
+        (CUBIC, effect.cubic, study.mission.requirements.cubic_phase_error),
+        (ISLR, effect.spread, spread_limit(study.mission, study.allocation, error.owner, model)),
+    )
+    return {name: limit / per_unit for name, per_unit, limit in held if per_unit and limit is not None}
+
+
+def _model(study: Study, error: RandomError) -> str:
+    """The gating model by which an error does more."""
+    return max((one.name for one in study.models), key=lambda name: max(error.effect(name)[:2]))
+
+
+def verify_spur(study: Study, spur: Spur, row_id: str, amplitude: float) -> Verdict:
+    """A tone at its limit: the motion of the platform that makes the same phase. [m]"""
+    level = 20 * math.log10(math.pi * amplitude / study.collection.wavelength)
+    blank = Verdict(
+        id=row_id,
+        model=study.model,
+        boundary_error=level,
+        unit="dB",
+        requirement_db=study.mission.requirements.pslr,
+    )
+    sinusoids = {spur.name: (PathSinusoid(amplitude, spur.frequency),)}
+    return echo(study.collection, blank, sinusoids, "the tone alone")
+
+
 def verify_random(study: Study, error: RandomError) -> Verdict:
     """Limit of one figure: the smallest of what quadratic phase, cubic phase and ISLR allow, autofocus left out."""
-    mission, allocation = study.mission, study.allocation
-    model = max((one.name for one in study.models), key=lambda name: max(error.effect(name)[:2]))
-    effect = error.effect(model)
-    rms = spread_limit(mission, allocation, error.owner, model)
-    held = (
-        (QUADRATIC, effect.quadratic, allocation.qpe_limit(error.owner)),
-        (CUBIC, effect.cubic, mission.requirements.cubic_phase_error),
-        (ISLR, effect.spread, rms),
-    )
-    sizes = {name: limit / per_unit for name, per_unit, limit in held if per_unit and limit is not None}
+    sizes = limits_of(study, error)
     binding = min(sizes, key=lambda name: sizes[name])
     size = sizes[binding]
     at_limit = error._replace(declared=size)
@@ -58,7 +83,7 @@ def verify_random(study: Study, error: RandomError) -> Verdict:
     )
     rng = _stream(study, error.id)
     if binding == ISLR:
-        return _power(study, blank, [at_limit], rms or 0.0, rng)
+        return _power(study, blank, [at_limit], size * error.effect(_model(study, error)).spread, rng)
     return _phase(study, blank, at_limit, binding, rng)
 
 
@@ -111,9 +136,10 @@ def _sigma(study: Study, error: RandomError, rng: np.random.Generator, is_cubic:
         found = study.exact_phases(error.owner, courses)
         return float(np.nanstd(found[1] if is_cubic else found[0])), _DRAWS
     times = _moments(study, 257)
-    phases = phase_courses(mission, error, times, _CLOCK_DRAWS, rng)
+    draws = _CLOCK_DRAWS if mission.synchronization is None else _SYNCHRONIZED_DRAWS
+    phases = phase_courses(mission, error, times, draws, rng, _TURNS / study.collection.aperture_time)
     fit = np.polynomial.legendre.legfit(2 * times / study.collection.aperture_time, phases.T, _ORDER)
-    return float(np.std(2.5 * fit[3] if is_cubic else 1.5 * fit[2])), _CLOCK_DRAWS
+    return float(np.std(2.5 * fit[3] if is_cubic else 1.5 * fit[2])), draws
 
 
 def _moments(study: Study, count: int) -> Floats:
@@ -133,11 +159,12 @@ def _series(study: Study, error: RandomError, rng: np.random.Generator) -> list[
 
 
 # ---------------------------------------------------------------------- what spreads
-def verify_islr(study: Study, owner: str) -> Verdict:
-    """Everything that spreads, scaled together to an owner's limit."""
+def verify_islr(study: Study, of: Subject) -> Verdict:
+    """Everything that spreads, scaled together to the limit of a row's owner."""
+    owner = of.owner
     model = study.models[-1].name
     limit = spread_limit(study.mission, study.allocation, owner, model) or 0.0
-    blank = Verdict(id=f"{owner}.{ISLR}", model=study.model, boundary_error=islr_db(limit**2) or 0.0, unit="dB")
+    blank = Verdict(id=of.id, model=study.model, boundary_error=islr_db(limit**2) or 0.0, unit="dB")
     powers = [
         (row_id, power)
         for row_id, whose, power in spread_powers(study.analysis, model)

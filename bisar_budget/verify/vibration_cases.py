@@ -97,7 +97,7 @@ def _sinusoidal(
     sinusoids = {name: (PathSinusoid(amplitude=size, frequency=frequency),) for name, size in limits.items()}
     who = "one platform alone" if len(limits) == 1 else "both platforms in phase"
     assumed = ", a frequency assumed: the file declares no vibration" if declared is None else ""
-    return _echo(collection, _blank(row_id, model, limits, requirement_db), sinusoids, who, assumed)
+    return echo(collection, _blank(row_id, model, limits, requirement_db), sinusoids, who, assumed)
 
 
 def _near(
@@ -120,16 +120,17 @@ def _near(
         PathSinusoid(scale * line.amplitude, line.frequency, 0.0 if sinc(worst.cycles - n) >= 0 else math.pi)
         for line, n in zip(lines, cycles, strict=True)
     )
-    return _echo(collection, blank, {name: sinusoids}, "one platform's lines in their worst phases")
+    return echo(collection, blank, {name: sinusoids}, "one platform's lines in their worst phases")
 
 
-def _echo(
+def echo(
     collection: PointCollection,
     blank: Verdict,
     sinusoids: Mapping[str, tuple[PathSinusoid, ...]],
     who: str,
     assumed: str = "",
 ) -> Verdict:
+    """Measure the paired echoes of sinusoids against the requirement of a verdict that is yet blank."""
     every = [sinusoid.frequency * collection.aperture_time for those in sinusoids.values() for sinusoid in those]
     slowest, cycles = min(every), max(every)
     if slowest < 3:

@@ -4,10 +4,13 @@ import json
 import math
 from typing import Any
 
+import numpy as np
 import pytest
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.effects.models import QUADRATIC
+from bisar_budget.effects.spectra import Piece, synchronized_parts
+from bisar_budget.faults import MissionError
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.load import parse_mission
@@ -368,3 +371,56 @@ class TestTones:
         oscillator = {**MASK, "spurs": {"50 Hz": "-90 dBc"}}
         found = check(platforms={"receiver": {"oscillator": oscillator}})
         assert row(found, "receiver.oscillator.spur.0").status == "not_evaluated"
+
+    def test_exchanged_pulses_take_a_slow_tone_away_and_leave_a_fast_one(self) -> None:
+        """1 − sinc² of a slow one, (πfT_s)²/3; of one that is folded on itself, all of it."""
+        pulses = {"interval": "10 ms", "error": 0}
+        assert self.tone(-80, "2 Hz", synchronization=pulses).declared == pytest.approx(
+            -80 + 20 * math.log10((math.pi * 0.02) ** 2 / 3), abs=0.01
+        )
+        assert self.tone(-80, "100 Hz", synchronization=pulses).declared == pytest.approx(-80)
+
+
+class TestWhatAReviewFound:
+    def test_a_part_without_a_frequency_takes_no_mask_and_no_tones(self) -> None:
+        """Noise at 10 MHz was taken for noise at 10 GHz, 60 dB too little."""
+        for own in ({"spurs": {"50 Hz": "-90 dBc"}}, {"phase_noise": {"1 Hz": "-95 dBc/Hz", "10 Hz": "-125 dBc/Hz"}}):
+            with pytest.raises(MissionError) as caught:
+                check(platforms={"receiver": {"oscillator": {"sensor": "grail-uso", **own}}})
+            assert "states no frequency" in str(caught.value.faults[0])
+            check(platforms={"receiver": {"oscillator": {"sensor": "grail-uso", "frequency": "10 MHz", **own}}})
+
+    def test_a_direct_path_has_no_interval(self) -> None:
+        """Its error, another one at each pulse, was taken for one at each exchange."""
+        with pytest.raises(MissionError) as caught:
+            check(synchronization={"method": "direct_path", "interval": "1 s", "error": "5 deg"})
+        assert "a direct path is heard with every pulse" in str(caught.value.faults[0])
+
+    def test_one_point_of_an_allan_deviation_is_the_worst_noise_for_the_aperture(self) -> None:
+        """It was taken for a random walk, 31 dB less over 0.1 s than white noise."""
+        one = row(check(platforms={"receiver": {"oscillator": {"allan_deviation": {"1 s": 3e-10}}}},
+                        collection={"aperture_time": "0.1 s"}), "receiver.oscillator")  # fmt: skip
+        white = {"power_law": {"h0": 2 * 3e-10**2}}
+        two = row(check(platforms={"receiver": {"oscillator": white}}, collection={"aperture_time": "0.1 s"}),
+                  "receiver.oscillator")  # fmt: skip
+        assert one.qpe_published_rad >= two.qpe_published_rad
+        assert any("one point" in note for note in one.notes)
+        assert any("begins at 1 s" in note for note in one.notes)
+
+    @pytest.mark.parametrize("product", [0.2, 0.5, 0.75])
+    def test_images_above_the_band_of_the_noise_are_counted(self, product: float) -> None:
+        """All that straight lines leave of noise in a band B, by the share of each tone; 1.6 dB were cut at 0.5."""
+        interval = 0.05
+        pieces = [Piece(0.0, product / interval, 1.0, 0.0)]
+        found = synchronized_parts(pieces, 20.0, interval)
+        y = np.linspace(1e-6, 2 * math.pi * product, 20_001)
+        shares = 5 / 3 + np.cos(y) / 3 - 4 * (1 - np.cos(y)) / y**2
+        whole = np.trapezoid(shares, y) / (2 * math.pi * interval)
+        assert found.left == pytest.approx(whole, rel=0.02)  # the four orders that do not spread
+
+    def test_a_part_of_gnss_has_the_axes_of_the_scene_for_its_noise_too(self, tmp_path) -> None:
+        noise = "random: [{name: N, sigma: [0, 0, 1 mm], correlation_time: 1 s}]"
+        (tmp_path / "part.yaml").write_text(f"kind: gnss\nname: Ours\nsource: a test\n{noise}\n")
+        with pytest.raises(MissionError) as caught:
+            with_error({"frame": "look", "sensor": str(tmp_path / "part.yaml")})
+        assert "stated east, north, up" in str(caught.value.faults[0])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from bisar_budget.effects.random_errors import RandomError
+from bisar_budget.effects.subject import subject
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.simulate.point import simulate_point
 from bisar_budget.verify.random_cases import verify_islr, verify_random
@@ -54,8 +55,8 @@ def test_the_power_that_noise_spreads_is_confirmed_within_half_a_decibel() -> No
     assert (right.verdict, right.requirement_db) == ("confirmed", pytest.approx(-23.02, abs=0.01))
     assert abs(right.measured_db - right.requirement_db) < 0.5
     assert verify_random(one, off(of(one, "receiver.random.GNSS"), 0.8)).verdict == "optimistic"
-    assert verify_islr(one, "receiver").verdict == "confirmed"
-    assert verify_islr(one, "mission").requirement_db == pytest.approx(-20, abs=0.01)
+    assert verify_islr(one, subject("receiver", "islr")).verdict == "confirmed"
+    assert verify_islr(one, subject("mission", "islr")).requirement_db == pytest.approx(-20, abs=0.01)
 
 
 def test_the_limit_of_a_clock_is_in_decibels() -> None:

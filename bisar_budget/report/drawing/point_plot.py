@@ -125,6 +125,8 @@ def _flown(mission: Mission) -> str:
     likely = "; of a covariance its most probable one" if any(error.covariance for error in errors) else ""
     seed = (mission.simulation or Simulation()).seed
     drawn = f"; of sensors and clocks one time series each, seed {seed}" if has_instruments(mission) else ""
+    if any(platform.oscillator and platform.oscillator.spurs for platform in mission.platforms):
+        drawn += "; tones of oscillators are left out"
     return (
         f"the declared ones together, with the signs of the file{times}{likely}{drawn}. Some may cancel: the worst "
         "case is that of check"
