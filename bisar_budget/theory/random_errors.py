@@ -28,7 +28,6 @@ from sympy import (
     integrate,
     legendre,
     pi,
-    series,
     simplify,
     sin,
     sqrt,
@@ -141,16 +140,26 @@ def inertial() -> tuple[Figure, ...]:
 
 
 # ---------------------------------------------------------------------- Gauss-Markov
+def _with_exponential(polynomial: Poly, rate: Expr) -> Expr:
+    """What times exp(rate·x) has the derivative polynomial·exp(rate·x): by parts, over and over."""
+    total, sign = Integer(0), 1
+    for order in range(polynomial.degree() + 1):
+        total += sign * polynomial.as_expr() / rate ** (order + 1)
+        polynomial, sign = polynomial.diff(), -sign
+    return total
+
+
 @cache
 def gauss_markov() -> Moments:
     """Mean squares of a stationary process of variance 1 and correlation exp(−|t|/τ_c), in `ratio` and `decay`."""
     squares = []
     for n in range(ORDERS):
-        earlier = integrate(expand(legendre(n, _m) * exp(ratio * _m)), _m)
-        earlier = expand((earlier - earlier.subs(_m, -1)).subs(_m, _x) * exp(-ratio * _x))
-        both = integrate(expand(legendre(n, _x) * earlier), _x)
-        square = Rational(2 * n + 1, 2) ** 2 * 2 * expand(both.subs(_x, 1) - both.subs(_x, -1))
-        squares.append(expand(square).subs(exp(-2 * ratio), decay))
+        polynomial = Poly(legendre(n, _x), _x)
+        # ∫ Pₙ(t)·exp(−a(s − t)) dt from −1 to s is q(s) − q(−1)·exp(−a(s + 1)); r is q for −a, and integrates that.
+        q, r = _with_exponential(polynomial, ratio), _with_exponential(polynomial, -ratio)
+        both = integrate(expand(polynomial.as_expr() * q), (_x, -1, 1))
+        both -= q.subs(_x, -1) * (r.subs(_x, 1) * decay - r.subs(_x, -1))
+        squares.append(expand(Rational(2 * n + 1, 2) ** 2 * 2 * both))
     return moments(tuple(squares), Integer(1))
 
 
@@ -161,10 +170,21 @@ def gauss_markov_slow() -> Moments:
 
 
 def _series(expression: Expr, variable: Symbol) -> Expr:
-    """Series about zero of an expression whose terms cancel there."""
-    exact = Poly(series(expression, variable, 0, 2 * ORDERS + TERMS).removeO(), variable)
-    first = min(power for (power,) in exact.monoms())
-    return sum(coefficient * variable**power for (power,), coefficient in exact.terms() if power < first + TERMS)
+    """Series about zero of an expression whose terms cancel there: powers of the variable times e, sine and cosine.
+
+    Taylor's polynomials in their place are exact as far as they go, and sums of powers are what SymPy is quick at.
+    """
+    powers = range(4 * ORDERS + 2 * TERMS)
+    taylor = {
+        exp(-2 * variable): sum((-2 * variable) ** n / factorial(n) for n in powers),
+        sin(variable): sum(Integer(-1) ** (n // 2) * variable**n / factorial(n) for n in powers if n % 2),
+        cos(variable): sum(Integer(-1) ** (n // 2) * variable**n / factorial(n) for n in powers if n % 2 == 0),
+    }
+    # No term has the variable to more than this power below it.
+    exact = Poly(expand(expand(expression).subs(taylor) * variable ** (2 * ORDERS)), variable)
+    known = [(power - 2 * ORDERS, coefficient) for (power,), coefficient in exact.terms()]
+    first = min(power for power, _ in known)
+    return sum(coefficient * variable**power for power, coefficient in known if power < first + TERMS)
 
 
 # ---------------------------------------------------------------------- spectra

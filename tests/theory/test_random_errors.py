@@ -141,7 +141,7 @@ def test_figures_of_real_units_at_3_cm_and_6_s() -> None:
         assert walk / 60 * rows[3][0] == pytest.approx(expected[1], rel=0.03)
 
 
-@pytest.mark.parametrize("ratio", [0.01, 0.499, 0.501, 2.0, 30.0])
+@pytest.mark.parametrize("ratio", [0.499, 0.501, 2.0])
 def test_a_gauss_markov_process_has_the_moments_of_its_covariance(ratio: float) -> None:
     """∫∫ Pₙ(s)Pₙ(t)exp(-a|s - t|), by a rule of its own; on both sides of the series' end."""
     found = gauss_markov(2 * ratio, 1.0)
