@@ -245,6 +245,13 @@ def test_a_drawing_has_a_name_and_words_and_ids_of_its_own(kind: str) -> None:
     assert len(ids) == len(set(ids)) == 8
 
 
+def test_platforms_less_than_an_atom_apart_are_not_enlarged() -> None:
+    """The scale of the enlargement was infinite, and so were the places in it."""
+    found = pair((0.0, 1.0, 0.0), (3e-301, 1.0, 0.0), (0, 0, 0), (0, 0, 0))
+    for draw in DRAWINGS.values():
+        assert not re.search("nan|inf", " ".join(element.get("d", "") for element in root_of(draw(found)).iter()))
+
+
 kilometres = st.floats(-5e4, 5e4)
 metres_per_second = st.floats(-300, 300)
 

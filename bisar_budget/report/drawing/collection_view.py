@@ -16,6 +16,7 @@ _WIDTH = 520.0  # px, of a drawing
 _AXIS, _EDGE = (54.0, 34.0), 8.0  # px, beside and below a panel for its axes; elsewhere
 _APART = 30.0  # px; nearer than this two things are one spot of the drawing
 _CLOSE = 60.0  # px; what is nearer than this in space too deserves an enlargement
+_SAME = 1e-6  # px; no enlargement tells apart what is nearer
 _SPREAD = 0.15  # of a distance: an enlargement shows at least this much each way, however things line up
 _ENLARGED = 2.0  # times; less is not worth a panel
 _VELOCITY, _LOOK, _SMEAR = 44.0, 62.0, 40.0  # px, lengths of arrows
@@ -132,7 +133,7 @@ def _enlargement(view: View, main: _Panel) -> _Panel | None:
         reach = max(p.state.slant_range for p in beside)
         places = [_SCENE, *(place for p in beside for place in (p.at, *p.path))]
         places += _extent(view, _SCENE, view.radius if view.radius <= 2 * reach else 0.0)
-    elif 0 < separation * main.scale < _CLOSE and _pixels_apart(main, first, second) < _APART:
+    elif _SAME < separation * main.scale < _CLOSE and _pixels_apart(main, first, second) < _APART:
         reach = separation
         places = [first.at, second.at]
     else:
