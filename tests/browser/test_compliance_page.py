@@ -88,6 +88,20 @@ def show(browser, files) -> Iterator[Callable[..., "playwright.Page"]]:
         context.close()
 
 
+AS_TEXT = """() => {
+    const own = e => { const s = getComputedStyle(e); return s.color + s.opacity + s.visibility; };
+    const maths = [...document.querySelectorAll("math")];
+    const others = maths.flatMap(m => [m, ...m.querySelectorAll("*")].filter(e => own(e) !== own(m.parentElement)
+        || getComputedStyle(e).backgroundColor !== "rgba(0, 0, 0, 0)"));
+    maths.forEach(m => m.replaceWith(m.textContent));
+    return others.length;
+}"""  # every formula becomes text; how many elements of them had colours of their own
+
+
+def asked(page: "playwright.Page", options: dict[str, object]) -> dict[str, list[dict]]:
+    return axe.Axe().run(page, options=options).response
+
+
 @pytest.mark.parametrize(
     ("name", "width", "scheme"),
     [
@@ -97,15 +111,18 @@ def show(browser, files) -> Iterator[Callable[..., "playwright.Page"]]:
     ],
 )
 def test_axe_finds_nothing_serious(show, name: str, width: int, scheme: str) -> None:
-    # Formulas are elements by the thousand, of which axe has nothing to say.
-    results = axe.Axe().run(show(name, width, scheme), context={"exclude": [["math"]]})
+    page = show(name, width, scheme)
+    shape = asked(page, {"resultTypes": ["violations"], "rules": {"color-contrast": {"enabled": False}}})
+    # Symbols have the colours of the text that they stand in; asked for each of ten thousand, axe takes a minute.
+    assert page.evaluate(AS_TEXT) == 0
+    contrast = asked(page, {"resultTypes": ["violations"], "runOnly": ["color-contrast"]})
     serious = [
         (found["id"], found["impact"], [node["html"][:200] for node in found["nodes"][:3]])
-        for found in results.response["violations"]
+        for found in shape["violations"] + contrast["violations"]
         if found["impact"] in ("serious", "critical")
     ]
     assert serious == []
-    checked = {found["id"] for found in results.response["passes"]}
+    checked = {found["id"] for found in shape["passes"] + contrast["passes"]}
     assert {"color-contrast", "heading-order", "image-alt", "document-title", "html-has-lang"} <= checked | {
         "image-alt"
     }

@@ -141,21 +141,20 @@ def test_figures_of_real_units_at_3_cm_and_6_s() -> None:
         assert walk / 60 * rows[3][0] == pytest.approx(expected[1], rel=0.03)
 
 
-@pytest.mark.parametrize("ratio", [0.499, 0.501, 2.0])
+@pytest.mark.parametrize("ratio", [0.01, 0.4, 0.499, 0.501, 2.0, 10.0, 300.0])
 def test_a_gauss_markov_process_has_the_moments_of_its_covariance(ratio: float) -> None:
     """∫∫ Pₙ(s)Pₙ(t)exp(-a|s - t|), by a rule of its own; on both sides of the series' end."""
     found = gauss_markov(2 * ratio, 1.0)
+    nodes, weights = np.polynomial.legendre.leggauss(40)
+    edges = np.concatenate([[0.0], np.geomspace(1e-3 / max(1, ratio), 2, 30)])  # of the lag, finer than it decays
+    width, start = np.diff(edges)[:, None], edges[:-1, None]
+    lag, by_lag = (start + width * (nodes + 1) / 2).ravel(), (width * weights / 2).ravel()
+    early = -1 + np.outer(2 - lag, (nodes + 1) / 2)  # from -1 to 1 - lag
     squares = []
     for n in range(4):
         legendre = np.polynomial.legendre.Legendre.basis(n)
-
-        def half(s: float, legendre=legendre) -> float:
-            near = max(-1, s - 20 / ratio)  # beyond it the exponential is nothing
-            inner = mpmath.quad(lambda t: float(legendre(float(t))) * mpmath.exp(-ratio * (s - t)), [-1, near, s])
-            return float(legendre(float(s))) * inner
-
-        whole = 2 * mpmath.quad(half, np.linspace(-1, 1, 5))
-        squares.append(((2 * n + 1) / 2) ** 2 * float(whole))
+        together = (legendre(early) * legendre(early + lag[:, None])) @ weights * (2 - lag) / 2
+        squares.append(((2 * n + 1) / 2) ** 2 * 2 * float(by_lag @ (np.exp(-ratio * lag) * together)))
     assert found.quadratic == pytest.approx(9 / 4 * squares[2], rel=1e-6)
     assert found.cubic == pytest.approx(25 / 4 * squares[3], rel=1e-6)
     assert found.left == pytest.approx(1 - sum(s / (2 * n + 1) for n, s in enumerate(squares)), rel=1e-5, abs=1e-12)
