@@ -20,17 +20,17 @@ def spread_limit(mission: Mission, allocation: Allocation, owner: str, model: st
     return whole * math.sqrt(allocation.islr.of(owner))
 
 
-def spread_powers(analysis: Analysis, gating: str) -> list[tuple[str, str, float]]:
-    """Row id, owner and phase variance of everything that spreads. [rad²]"""
+def spread_powers(analysis: Analysis, allocation: Allocation, owner: str, model: str) -> list[tuple[str, float]]:
+    """Row id and phase variance of what spreads and counts against an owner’s share; all, for the mission. [rad²]"""
     mission, found = analysis.mission, []
     for name in PLATFORMS:
-        error = getattr(mission.platforms, name).motion_error
-        wideband = error.vibration.wideband
+        wideband = getattr(mission.platforms, name).motion_error.vibration.wideband
         if wideband is not None:
             rms = counted(mission, name, wideband.rms, "islr")
             variance = (2 * math.pi * rms / mission.radar.wavelength) ** 2
             found.append((subject(name, "vibration", "wideband").id, name, variance))
     for one in analysis.random:
-        if one.declared is not None and one.effect(gating).spread:
-            found.append((one.id, one.owner, (one.effect(gating).spread * one.declared) ** 2))
-    return found
+        spread = one.effect(model).spread
+        if one.declared is not None and spread:
+            found.append((one.id, one.owner, (spread * one.declared) ** 2))
+    return [(row_id, v) for row_id, whose, v in found if owner == "mission" or allocation.islr.includes(whose, owner)]

@@ -16,11 +16,10 @@ from bisar_budget.budget.judgement import judged
 from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.budget.vibration_rows import ECHO_CYCLES, islr_db
 from bisar_budget.constants import UTILIZATION_TOLERANCE
-from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.clocks import spurs_of
 from bisar_budget.effects.models import CUBIC, QUADRATIC
 from bisar_budget.effects.random_errors import RandomEffect, RandomError
 from bisar_budget.effects.subject import subject
-from bisar_budget.effects.tones import held
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.model import Mission
 from bisar_budget.units import format_limit, format_quantity
@@ -28,12 +27,24 @@ from bisar_budget.units import format_limit, format_quantity
 ISLR = "islr"
 
 
-class _Limits(NamedTuple):
-    """What an error is held to. [rad]"""
+class Limits(NamedTuple):
+    """What the errors of an owner are held to, each alone: quadratic and cubic phase, rms of what spreads. [rad]"""
 
-    quadratic: float  # with autofocus
+    quadratic: float
     cubic: float | None
-    spread: float | None  # rms
+    spread: float | None
+
+
+def limits_for(mission: Mission, allocation: Allocation, owner: str, model: str, gain: float = 1.0) -> Limits:
+    """What the errors of an owner are held to by a model; `gain` is that of autofocus."""
+    spread = spread_limit(mission, allocation, owner, model)
+    return Limits(allocation.qpe_limit(owner) * gain, mission.requirements.cubic_phase_error, spread)
+
+
+def sizes_at(effect: RandomEffect, limits: Limits) -> dict[str, float]:
+    """Size at which an error reaches each requirement that it touches. [unit]"""
+    parts = zip((QUADRATIC, CUBIC, ISLR), effect[:3], limits, strict=True)
+    return {name: limit / per_unit for name, per_unit, limit in parts if per_unit and limit is not None}
 
 
 def random_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterator[Row]:
@@ -46,8 +57,8 @@ def random_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iter
 def _row(analysis: Analysis, error: RandomError, gating: str, other: str, allocation: Allocation) -> Row:
     mission, gain, size = analysis.mission, allocation.autofocus_gain, error.declared
     mine, theirs = error.effect(gating), error.effect(other)
-    limits, others = (_limits(mission, allocation, error.owner, model) for model in (gating, other))
-    sizes = _sizes(mine, limits)
+    limits, others = (limits_for(mission, allocation, error.owner, model, gain) for model in (gating, other))
+    sizes = sizes_at(mine, limits)
     allowable = min(sizes.values(), default=None)
     binding = min(sizes, key=lambda name: sizes[name]) if sizes else None
     qpe = cubic = None
@@ -98,7 +109,7 @@ def _no_limit(error: RandomError, effect: RandomEffect) -> str:
 
 
 def _gain(
-    binding: str | None, qpe: float | None, limits: _Limits, gain: float, size: float | None, allowable: float | None
+    binding: str | None, qpe: float | None, limits: Limits, gain: float, size: float | None, allowable: float | None
 ) -> float:
     """Autofocus gain within an allowable: of one that the quadratic phase does not set, how far that is used."""
     if gain == 1 or not qpe or not size or allowable is None:
@@ -120,21 +131,8 @@ def in_decibel(row: Row) -> Row:
     )
 
 
-def _limits(mission: Mission, allocation: Allocation, owner: str, model: str) -> _Limits:
-    spread = spread_limit(mission, allocation, owner, model)
-    quadratic = allocation.qpe_limit(owner) * allocation.autofocus_gain
-    return _Limits(quadratic, mission.requirements.cubic_phase_error, spread)
-
-
-def _sizes(effect: RandomEffect, limits: _Limits) -> dict[str, float]:
-    """Size at which an error reaches each requirement that it touches. [unit]"""
-    held = ((QUADRATIC, effect.quadratic, limits.quadratic), (CUBIC, effect.cubic, limits.cubic),
-            (ISLR, effect.spread, limits.spread))  # fmt: skip
-    return {name: limit / per_unit for name, per_unit, limit in held if per_unit and limit is not None}
-
-
 def _over(
-    mission: Mission, error: RandomError, effect: RandomEffect, limits: _Limits, binding: str, allocation: Allocation
+    mission: Mission, error: RandomError, effect: RandomEffect, limits: Limits, binding: str, allocation: Allocation
 ) -> str:
     size = error.declared or 0.0
     if binding == CUBIC:
@@ -151,9 +149,9 @@ def _level(variance: float, rounding: str = "nearest") -> str:
     return format_quantity(islr_db(variance) or 0.0, "dB", 3, rounding)
 
 
-def _doubt(other: str, effect: RandomEffect, limits: _Limits, size: float) -> str:
+def _doubt(other: str, effect: RandomEffect, limits: Limits, size: float) -> str:
     """Say that the model that does not gate fails a declared error; else nothing."""
-    sizes = _sizes(effect, limits)
+    sizes = sizes_at(effect, limits)
     if not sizes or size <= min(sizes.values()) * (1 + UTILIZATION_TOLERANCE):
         return ""
     name = min(sizes, key=lambda one: sizes[one])
@@ -167,73 +165,40 @@ def _doubt(other: str, effect: RandomEffect, limits: _Limits, size: float) -> st
 
 
 # ---------------------------------------------------------------------- tones
-class Spur(NamedTuple):
-    """A tone of an oscillator: platform, entry by frequency, frequency [Hz], peak phase at centre frequency [rad]."""
-
-    name: str
-    entry: int
-    frequency: float
-    phase: float
-
-
-def spurs_of(mission: Mission) -> list[Spur]:
-    """Tones that reach the image: none where the direct path is the receiver's clock."""
-    if mission.has_direct_path:
-        return []
-    found = []
-    for name in PLATFORMS:
-        oscillator = getattr(mission.platforms, name).oscillator
-        for index, (frequency, level) in enumerate(oscillator.spurs if oscillator is not None else ()):
-            scale = mission.radar.center_frequency / oscillator.frequency * _left_of(frequency, mission)
-            # A sideband of a phase φ has the amplitude φ/2 of the carrier.
-            found.append(Spur(name, index, frequency, 2 * 10 ** (level / 20) * scale))
-    return found
-
-
-def _left_of(frequency: float, mission: Mission) -> float:
-    """Largest part of a tone that exchanged pulses leave, at its own frequency or at one that it is folded to."""
-    sync = mission.synchronization
-    if sync is None or sync.interval is None:
-        return 1.0
-    nearest = round(frequency * sync.interval)
-    turns = [frequency * sync.interval - n for n in range(nearest - 1, nearest + 2) if n]
-    passed = [math.sqrt(held(2 * math.pi * turn)) for turn in (frequency * sync.interval, *turns)]
-    return max(1 - passed[0], *passed[1:])
-
-
 def spur_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterator[Row]:
     """Rows of the oscillators' tones, which make paired echoes as vibrations do. [dB of an echo to the response]"""
     mission = analysis.mission
     limits = vibration_limits(mission, allocation, "pslr")
+    other = "full" if gating == "published" else "published"
     k = 2 * math.pi / mission.radar.wavelength
     for spur in spurs_of(mission):
         cycles = spur.frequency * mission.collection.aperture_time
         allowed = limits.get(spur.name)
-        phases = None if allowed is None else (k * allowed.published, k * allowed.full)
-        limit = None if phases is None or allowed is None else k * allowed.by(gating)
         over = doubt = ""
-        if limit is not None and phases is not None:
+        not_evaluated = missing = "" if allowed else "no requirements.pslr to hold it to"
+        if allowed is not None:
+            limit, by_other = k * allowed.by(gating), k * allowed.by(other)
             over = f"paired echoes of {_echo(spur.phase)}, {_echo(limit, 'down')} allowed"
-            other = phases[0] if gating == "full" else phases[1]
-            if spur.phase > other * (1 + UTILIZATION_TOLERANCE) and not mission.has_direct_path:
-                name = "published" if gating == "full" else "full"
-                doubt = f"the {name} model says fail: {_echo(other, 'down')} allowed"
-        missing = "" if limit is not None else "no requirements.pslr to hold it to"
-        slow = f"{cycles:.3g} cycles per aperture: below {ECHO_CYCLES:g} its echoes lie on the mainlobe"
+            if spur.phase > by_other * (1 + UTILIZATION_TOLERANCE):
+                doubt = f"the {other} model says fail: {_echo(by_other, 'down')} allowed"
+            if cycles < ECHO_CYCLES:
+                not_evaluated = (
+                    f"{cycles:.3g} cycles per aperture: below {ECHO_CYCLES:g} its echoes lie on the mainlobe"
+                )
         row = judged(
             mission,
             subject=subject(spur.name, "oscillator", "spur", entry=spur.entry),
             metric="pslr",
             unit="dB",
-            declared=spur.phase / 2,
-            allowable=None if limit is None else limit / 2,
+            declared=spur.phase / 2,  # amplitude of an echo over that of the response
+            allowable=None if allowed is None else limit / 2,
             path=("platforms", spur.name, "oscillator", "spurs"),
             equation="first principles" if gating == "full" else "Section V, sinusoidal",
             no_limit=missing,
-            not_evaluated=missing or (slow if cycles < ECHO_CYCLES else ""),
+            not_evaluated=not_evaluated,
             over=over,
             doubt=doubt,
-            limits=(None, None) if phases is None else (phases[0] / 2, phases[1] / 2),
+            limits=(None, None) if allowed is None else (k * allowed.published / 2, k * allowed.full / 2),
             evidence=getattr(mission.platforms, spur.name).oscillator.source,
             notes=(f"at {format_quantity(spur.frequency, 'Hz')}, {cycles:.3g} cells from the response",),
         )
@@ -253,11 +218,9 @@ def islr_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterat
     owners = ["transmitter", "receiver", "mission"]
     if allocation.islr.clock is not None:
         owners.insert(2, "clock")
-    powers = spread_powers(analysis, gating)
     other = "full" if gating == "published" else "published"
     for owner in owners:
-        members = [(row_id, power) for row_id, whose, power in powers
-                   if owner == "mission" or allocation.islr.includes(whose, owner)]  # fmt: skip
+        members = spread_powers(analysis, allocation, owner, gating)
         variance = math.fsum(power for _, power in members)
         limit, by_other = (spread_limit(mission, allocation, owner, model) or 0.0 for model in (gating, other))
         rms = math.sqrt(variance)

@@ -1,19 +1,20 @@
-"""Phase noise of both oscillators, and of the link that synchronises them, over one aperture."""
+"""Phase noise and tones of both oscillators, and of the link that synchronises them, over one aperture."""
 
 import math
 from collections.abc import Iterator
+from typing import NamedTuple
 
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.effects.random_errors import RandomEffect, RandomError
 from bisar_budget.effects.spectra import link_parts, parts, synchronized_parts
 from bisar_budget.effects.subject import subject
-from bisar_budget.effects.tones import Parts
+from bisar_budget.effects.tones import Parts, held
 from bisar_budget.mission.instruments import Oscillator, Synchronization
 from bisar_budget.mission.model import Mission
 from bisar_budget.units import format_quantity
 
-DIRECT = "the direct path is the receiver's clock: oscillators drop out"
+_DIRECT = "the direct path is the receiver's clock: oscillators drop out"
 _MISFIT = 0.2  # of an Allan deviation, from where a power law does not describe it
 
 
@@ -33,7 +34,7 @@ def _of_oscillator(mission: Mission, name: str, oscillator: Oscillator, sync: Sy
     noise = noise_of(oscillator, mission.radar.center_frequency, T)
     notes, no_limit, warning = list(filter(None, (noise.extrapolated, *noise.notes))), "no phase noise", ""
     if sync is not None and sync.is_direct_path:
-        found, no_limit, notes = Parts(0.0, 0.0, 0.0), DIRECT, []
+        found, no_limit, notes = Parts(0.0, 0.0, 0.0), _DIRECT, []
     else:
         if sync is not None and sync.interval is not None:
             notes.append(f"only what synchronisation every {format_quantity(sync.interval, 's')} leaves of it counts")
@@ -85,3 +86,42 @@ def _of_link(mission: Mission, sync: Synchronization) -> RandomError:
         evidence=sync.source,
         notes=(note,) if note else (),
     )
+
+
+class Spur(NamedTuple):
+    """A tone of an oscillator: platform, entry by frequency, frequency [Hz], peak phase at centre frequency [rad].
+
+    `left` is the part of it that exchanged pulses leave, which the phase has.
+    """
+
+    name: str
+    entry: int
+    frequency: float
+    phase: float
+    left: float = 1.0
+
+
+def spurs_of(mission: Mission) -> list[Spur]:
+    """Tones that reach the image: none where the direct path is the receiver's clock."""
+    if mission.has_direct_path:
+        return []
+    found = []
+    for name in PLATFORMS:
+        oscillator = getattr(mission.platforms, name).oscillator
+        for index, (frequency, level) in enumerate(oscillator.spurs if oscillator is not None else ()):
+            scale = mission.radar.center_frequency / oscillator.frequency
+            left = _left_of(frequency, mission)
+            # A sideband of a phase φ has the amplitude φ/2 of the carrier.
+            found.append(Spur(name, index, frequency, 2 * 10 ** (level / 20) * scale * left, left))
+    return found
+
+
+def _left_of(frequency: float, mission: Mission) -> float:
+    """Largest part of a tone that exchanged pulses leave, at its own frequency or at one that it is folded to."""
+    sync = mission.synchronization
+    if sync is None or sync.interval is None:
+        return 1.0
+    nearest = round(frequency * sync.interval)
+    turns = [frequency * sync.interval - n for n in range(nearest - 1, nearest + 2) if n]
+    passed = [math.sqrt(held(2 * math.pi * turn)) for turn in (frequency * sync.interval, *turns)]
+    return max(1 - passed[0], *passed[1:])

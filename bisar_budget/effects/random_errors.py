@@ -29,7 +29,6 @@ IMU_UNITS = dict(zip(IMU_KINDS, ("m/s^2", "rad", "rad/s", "m/s/sqrt(s)", "rad/sq
 _BY_GRAVITY = ("attitude", "gyro_bias", "angle_random_walk")
 _NODES = 16  # a walk has a covariance with an edge, which fewer nodes miss by a percent
 _CANCELS = ROUNDING * 1e-2  # of a square: below it, its root is rounding
-NO_PHASE = "no quadratic phase, no cubic phase and nothing that spreads"
 
 
 class RandomEffect(NamedTuple):
@@ -61,7 +60,7 @@ class RandomError(NamedTuple):
     full: RandomEffect
     equation: str
     evidence: str | None
-    no_limit: str = NO_PHASE
+    no_limit: str = "no quadratic phase, no cubic phase and nothing that spreads"
     notes: tuple[str, ...] = ()
     extrapolated: str = ""
     warning: str = ""
@@ -130,16 +129,16 @@ def _of_imu(mission: Mission, name: str, state: PlatformState, exact: ExactRange
         )
         published = RandomEffect(row[0], row[1], row[2] / factor)
         quadratic, cubic, covariance = _over_aperture(exact, name, kind, directions)
-        is_of_part = kind in dict(error.of_parts)
+        key = error.key_of(kind)
         yield RandomError(
             subject=subject(name, "imu", kind),
             unit=unit,
             declared=None if largest is None else largest * factor,
-            path=("platforms", name, "motion_error", *(("sensor",) if is_of_part else ("imu", kind))),
+            path=("platforms", name, "motion_error", *(("imu", kind) if key == kind else (key,))),
             published=published,
             full=RandomEffect(quadratic, cubic, heard[2] / factor, covariance),
             equation="inertial sensor",
-            evidence=error.evidence(kind) if is_of_part else imu.source or error.source,
+            evidence=(imu.source if key == kind else None) or error.evidence(kind),
             no_limit="the line of sight has no part in it: no phase",
         )
 
@@ -205,7 +204,7 @@ def _of_position(mission: Mission, name: str, state: PlatformState) -> Iterator[
         return
     k, factor = 2 * math.pi / mission.radar.wavelength, mission.allocation.coverage_factor
     axes, sight = state.frame(error.frame), sight_of(mission, name)
-    is_of_part = "random" in dict(error.of_parts)
+    key = error.key_of("random")
     process: GaussMarkov
     for index, process in enumerate(error.random):
         largest = max(process.sigma)
@@ -215,7 +214,7 @@ def _of_position(mission: Mission, name: str, state: PlatformState) -> Iterator[
         published, full = (
             _correlated(parts, k * math.hypot(*(dot(by, one) for one in moved)), factor) for by in (state.look, sight)
         )
-        own: KeyPath = ("sensor",) if is_of_part else ("random", index, "sigma")
+        own: KeyPath = (key, index, "sigma") if key == "random" else (key,)
         yield RandomError(
             subject=subject(name, "random", process.name),
             unit="m",
@@ -224,7 +223,7 @@ def _of_position(mission: Mission, name: str, state: PlatformState) -> Iterator[
             published=published,
             full=full,
             equation="Gauss-Markov",
-            evidence=error.evidence("random") if is_of_part else process.source or error.source,
+            evidence=process.source or error.evidence("random"),
             no_limit="the line of sight has no part in it: no phase",
         )
 

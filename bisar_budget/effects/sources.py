@@ -63,7 +63,8 @@ def _motion(mission: Mission, name: str, state: PlatformState, full_effects: lis
         covariance = error.covariance if kind != "acceleration" else None
         values: Vector | None = getattr(error, kind) if covariance is None else covariance.of(kind)
         declared = None if values is None else tuple([value * factor for value in values])
-        path: KeyPath = ("platforms", name, "motion_error", kind if covariance is None else "covariance")
+        key = "covariance" if covariance is not None else error.key_of(kind)
+        path: KeyPath = ("platforms", name, "motion_error", key)
         for axis, (what, own_path, equation, no_limit) in enumerate(_scene_axes(name, kind)):
             on_axis = None
             if declared is not None:
@@ -79,13 +80,13 @@ def _motion(mission: Mission, name: str, state: PlatformState, full_effects: lis
                 subject=what,
                 unit=unit,
                 declared=on_axis,
-                path=own_path if in_scene and declared is not None else path,
+                path=own_path if in_scene and declared is not None and key != "sensor" else path,
                 effect=effects[axis],
                 full=full[axis],
                 direction=_AXES[axis],
                 equation=equation,
                 no_limit=no_limit,
-                evidence=error.source,
+                evidence=error.evidence(kind),
                 is_independent=in_scene,
             )
         if in_scene or declared is None:
@@ -101,7 +102,7 @@ def _motion(mission: Mission, name: str, state: PlatformState, full_effects: lis
                 direction=direction,
                 equation=_equation(kind, None),
                 no_limit=_no_limit(kind, f"the {error.frame} frame's {axis_name} axis"),
-                evidence=error.source,
+                evidence=error.evidence(kind),
             )
 
 

@@ -15,10 +15,6 @@ class Parts(NamedTuple):
     cubic: float
     left: float
 
-    def times(self, factor: float) -> "Parts":
-        """Scale them."""
-        return Parts(self.quadratic * factor, self.cubic * factor, self.left * factor)
-
     def plus(self, other: "Parts") -> "Parts":
         """Parts of two independent processes together."""
         return Parts(self.quadratic + other.quadratic, self.cubic + other.cubic, self.left + other.left)

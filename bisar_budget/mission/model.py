@@ -231,6 +231,10 @@ class MotionError(NamedTuple):
         """Where a figure comes from: a part of the catalogue, else what the file says of all."""
         return dict(self.of_parts).get(figure, self.source)
 
+    def key_of(self, figure: str) -> str:
+        """Key under which the file states a figure, or the part that it is taken from."""
+        return "sensor" if figure in dict(self.of_parts) else figure
+
 
 class CommonMotionError(NamedTuple):
     """The same error on both platforms, such as the bias of one GNSS service. A scalar means each axis."""

@@ -18,7 +18,7 @@ from bisar_budget.geometry import BistaticGeometry, PlatformState
 _FEW = 8  # scatterers are added one by one
 _HELD = 1 << 18  # complex numbers held at once, of many
 _NO_SIGHT = 1e-20  # square of what a metre of a platform changes; less is rounding
-_SMOOTH = 12  # order of what is smooth of a history
+SMOOTH = 12  # order of what is smooth of a history
 _ROUNDING = 1e-14  # of a frequency: what numpy.linspace leaves
 
 Floats = NDArray[np.float64]
@@ -47,10 +47,10 @@ class Course:
             return found
         return np.stack([np.interp(slow_time, self.times, along) for along in self.values.T], axis=1)
 
-    def smooth(self) -> "Course":
+    def smooth(self, order: int = SMOOTH) -> "Course":
         """What moves and defocuses a response: the polynomial fitted to it, without what is faster."""
         place = 2 * (self.times - self.times[0]) / (self.times[-1] - self.times[0]) - 1
-        fit = np.polynomial.legendre.legfit(place, self.values, _SMOOTH)
+        fit = np.polynomial.legendre.legfit(place, self.values, order)
         return Course(self.times, np.polynomial.legendre.legval(place, fit).T)
 
 

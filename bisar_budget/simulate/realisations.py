@@ -17,7 +17,7 @@ from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.effects.random_errors import RandomError
 from bisar_budget.effects.spectra import Piece
 from bisar_budget.mission.instruments import GaussMarkov
-from bisar_budget.mission.model import Mission, Simulation
+from bisar_budget.mission.model import Mission, MotionError, Simulation
 from bisar_budget.simulate.phase_history import Course, Floats
 
 _STEPS = 512  # from mid-aperture to the end of it, in which a walk is summed up
@@ -53,12 +53,8 @@ def position_courses(
     motion, kind = platform.motion_error, error.subject.axis
     factor = mission.allocation.coverage_factor
     axes = np.array(platform.state.frame(motion.frame))
-    process: GaussMarkov | None = None
-    if error.subject.kind == "random":
-        process = next(one for one in motion.random if one.name == kind)
-        values = process.sigma
-    else:
-        values = getattr(motion.imu, kind) or (1.0, 1.0, 1.0)
+    process = _process(mission, error)
+    values = process.sigma if process is not None else getattr(motion.imu, kind) or (1.0, 1.0, 1.0)
     sizes = np.array(values) / max(values) if max(values) else np.ones(3)
     sizes = sizes * (error.declared or 0.0) / factor
     if kind in ("attitude", "gyro_bias", "angle_random_walk") and process is None:
@@ -105,6 +101,19 @@ def flown_errors(analysis: Analysis) -> FlownErrors:
     return FlownErrors(transmitter, receiver, clock)
 
 
+def correlation_time(mission: Mission, error: RandomError) -> float:
+    """Of an error that is correlated noise; infinite of another. [s]"""
+    process = _process(mission, error)
+    return math.inf if process is None else process.correlation_time
+
+
+def _process(mission: Mission, error: RandomError) -> GaussMarkov | None:
+    if error.subject.kind != "random":
+        return None
+    motion: MotionError = getattr(mission.platforms, error.owner).motion_error
+    return next(one for one in motion.random if one.name == error.subject.axis)
+
+
 def _bias(order: int) -> Callable[[Floats, int, np.random.Generator], Floats]:
     def draw(times: Floats, draws: int, rng: np.random.Generator) -> Floats:
         found: Floats = rng.standard_normal((draws, 1)) * times**order / math.factorial(order)
@@ -141,11 +150,11 @@ def _correlated(process: GaussMarkov) -> Callable[[Floats, int, np.random.Genera
     """First-order Gauss-Markov noise of variance 1, by its recursion from time to time."""
 
     def draw(times: Floats, draws: int, rng: np.random.Generator) -> Floats:
-        found = rng.standard_normal((draws, times.size))
-        for index in range(1, times.size):
-            decay = math.exp(-float(times[index] - times[index - 1]) / process.correlation_time)
-            found[:, index] = decay * found[:, index - 1] + math.sqrt(1 - decay**2) * found[:, index]
-        return found
+        found = rng.standard_normal((times.size, draws))
+        for index, step in enumerate(np.diff(times).tolist(), 1):
+            decay = math.exp(-step / process.correlation_time)
+            found[index] = decay * found[index - 1] + math.sqrt(1 - decay**2) * found[index]
+        return found.T
 
     return draw
 
@@ -210,18 +219,23 @@ def _knots(times: Floats, interval: float, rng: np.random.Generator) -> Floats:
 
 
 class _Drawn(NamedTuple):
-    """One draw of a spectrum: slow tones, (n,) each, and the fast ones over a time in which they repeat."""
+    """One draw of a spectrum: slow tones, (n,) each, and the fast ones over a time in which they repeat.
+
+    What is faster still is another number at every moment, of the sigma `rest`.
+    """
 
     frequency: Floats
     cosine: Floats
     sine: Floats
     fast: Course
+    rest: float
+    rng: np.random.Generator
 
     def at(self, times: Floats) -> Floats:
         """Sum of the tones. [rad]"""
         turn = 2 * math.pi * np.multiply.outer(times, self.frequency)
         found: Floats = np.cos(turn) @ self.cosine + np.sin(turn) @ self.sine + self.fast.at(times)
-        return found
+        return found + self.rest * self.rng.standard_normal(times.size) if self.rest else found
 
 
 class _Tones:
@@ -236,6 +250,9 @@ class _Tones:
         count = min(_MAX_TONES, max(1, math.ceil(high / fine)))
         fast: Floats = fine * np.arange(1.0, count + 1)
         self.fast_size = self._size(pieces, fast, np.full(count, fine))
+        top = float(fast[-1]) + fine / 2
+        beyond = [piece.integral(max(piece.low, top), piece.high) for piece in pieces if piece.high > top]
+        self.rest = math.sqrt(math.fsum(beyond))
         samples = 1 << (2 * _PER_CYCLE * count - 1).bit_length() - 1
         self.times: Floats = (np.arange(samples + 1) / samples - 0.5) / fine
 
@@ -257,7 +274,7 @@ class _Tones:
         both = rng.standard_normal((2, self.fast_size.size)) * self.fast_size
         spectrum[1 : both.shape[1] + 1] = (both[0] - 1j * both[1]) * samples / 2
         fast = np.fft.irfft(spectrum, samples)
-        return _Drawn(self.slow, cosine, sine, Course(self.times, np.append(fast, fast[0])))
+        return _Drawn(self.slow, cosine, sine, Course(self.times, np.append(fast, fast[0])), self.rest, rng)
 
 
 def clock_seconds(phase: Floats, wavelength_m: float) -> Floats:

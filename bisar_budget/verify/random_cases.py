@@ -11,23 +11,23 @@ from collections.abc import Sequence
 import numpy as np
 
 from bisar_budget.analysis.spread import spread_limit, spread_powers
-from bisar_budget.budget.random_rows import Spur
+from bisar_budget.budget.random_rows import ISLR, limits_for, sizes_at
 from bisar_budget.budget.vibration_rows import islr_db
+from bisar_budget.effects.clocks import Spur
 from bisar_budget.effects.exact_arrays import aperture_nodes
-from bisar_budget.effects.models import CUBIC, QUADRATIC
+from bisar_budget.effects.models import CUBIC
 from bisar_budget.effects.random_errors import RandomError
 from bisar_budget.effects.subject import Subject
 from bisar_budget.effects.vibration_lines import sight_of
 from bisar_budget.findings.images import Verdict
 from bisar_budget.mission.model import Simulation
 from bisar_budget.simulate.collection import Errors
-from bisar_budget.simulate.phase_history import Course, Floats, PathError, PathSinusoid
-from bisar_budget.simulate.realisations import clock_seconds, phase_courses, position_courses
+from bisar_budget.simulate.phase_history import SMOOTH, Course, Floats, PathError, PathSinusoid
+from bisar_budget.simulate.realisations import clock_seconds, correlation_time, phase_courses, position_courses
 from bisar_budget.verify.phase_cases import TOLERANCE, compare
 from bisar_budget.verify.study import Study
 from bisar_budget.verify.vibration_cases import TOLERANCE_DB, echo
 
-ISLR = "islr"
 _DRAWS, _CLOCK_DRAWS = 4000, 1000  # know a sigma to 1.1 %, and to 2.2 %
 _SYNCHRONIZED_DRAWS = 400  # whose fast tones are drawn too, because they are folded
 _TURNS = 100  # of a tone per aperture, beyond which it has no quadratic phase to speak of
@@ -35,19 +35,15 @@ _SURE = 3.0  # standard errors of a sigma
 _IMAGES = 6
 _FINE = 513  # moments of a time series in an image
 _POWER_DRAWS = 48
-_MOMENTS = 4096  # at most, of an aperture whose spread power is measured
+_MOMENTS = 4096  # of an aperture whose spread power is measured
+_AT_ONCE = 250  # draws in memory
 _ORDER = 3  # up to which a phase moves and defocuses; the rest spreads
 
 
 def limits_of(study: Study, error: RandomError) -> dict[str, float]:
     """Size at which each requirement that an error touches is reached, autofocus left out; empty: none limits it."""
-    effect, model = error.effect(_model(study, error)), _model(study, error)
-    held = (
-        (QUADRATIC, effect.quadratic, study.allocation.qpe_limit(error.owner)),
-        (CUBIC, effect.cubic, study.mission.requirements.cubic_phase_error),
-        (ISLR, effect.spread, spread_limit(study.mission, study.allocation, error.owner, model)),
-    )
-    return {name: limit / per_unit for name, per_unit, limit in held if per_unit and limit is not None}
+    model = _model(study, error)
+    return sizes_at(error.effect(model), limits_for(study.mission, study.allocation, error.owner, model))
 
 
 def _model(study: Study, error: RandomError) -> str:
@@ -132,7 +128,10 @@ def _sigma(study: Study, error: RandomError, rng: np.random.Generator, is_cubic:
     """Standard deviation of a phase over many time series, and their number. [rad]"""
     mission, nodes = study.mission, aperture_nodes(study.collection.aperture_time)
     if error.subject.kind in ("imu", "random"):
-        courses = position_courses(mission, error, nodes, _DRAWS, rng)
+        is_walk = error.subject.kind == "imu"  # smooth between the nodes; correlated noise may not be
+        courses = (
+            position_courses(mission, error, nodes, _DRAWS, rng) if is_walk else _smooth_noise(study, error, rng)
+        )
         found = study.exact_phases(error.owner, courses)
         return float(np.nanstd(found[1] if is_cubic else found[0])), _DRAWS
     times = _moments(study, 257)
@@ -142,6 +141,25 @@ def _sigma(study: Study, error: RandomError, rng: np.random.Generator, is_cubic:
     return float(np.std(2.5 * fit[3] if is_cubic else 1.5 * fit[2])), draws
 
 
+def _smooth_noise(study: Study, error: RandomError, rng: np.random.Generator) -> Floats:
+    """Correlated noise at the nodes of exact ranges, (draws, nodes, 3), without what they cannot tell. [m]
+
+    At the nodes alone noise of a short correlation time would pass for a larger phase.
+    """
+    T, time = study.collection.aperture_time, correlation_time(study.mission, error)
+    times = _moments(study, _FINE)
+    legendre, found = np.polynomial.legendre, []
+    for _ in range(_DRAWS // _AT_ONCE):
+        drawn = np.moveaxis(position_courses(study.mission, error, times, _AT_ONCE, rng), 1, 0)
+        fit = legendre.legfit(2 * times / T, drawn.reshape(times.size, -1), SMOOTH)
+        found.append(legendre.legval(2 * aperture_nodes(T) / T, fit).reshape(*drawn.shape[1:], -1))
+    # Samples a step Δ apart have more power at low frequencies than the noise: Δ·coth(Δ/2τ_c), not 2τ_c.
+    step = float(times[1] - times[0])
+    power = 2 * time / step * math.tanh(step / (2 * time))
+    courses: Floats = (np.moveaxis(np.concatenate(found), 2, 1) * math.sqrt(power)).astype(float)
+    return courses
+
+
 def _moments(study: Study, count: int) -> Floats:
     half = study.collection.aperture_time / 2
     moments: Floats = np.linspace(-half, half, count)
@@ -149,27 +167,23 @@ def _moments(study: Study, count: int) -> Floats:
 
 
 def _series(study: Study, error: RandomError, rng: np.random.Generator) -> list[Errors]:
-    """A few time series as errors of an image."""
+    """A few time series as errors of an image, up to the cubic phase: what is left spreads, and would hide it."""
     times = _moments(study, _FINE)
     if error.subject.kind in ("imu", "random"):
         courses = position_courses(study.mission, error, times, _IMAGES, rng)
-        return [Errors().of(error.owner, PathError(course=Course(times, one))) for one in courses]
+        return [Errors().of(error.owner, PathError(course=Course(times, one).smooth(_ORDER))) for one in courses]
     phases = phase_courses(study.mission, error, times, _IMAGES, rng)
-    return [Errors(clock_course=Course(times, clock_seconds(one, study.collection.wavelength))) for one in phases]
+    delays = [clock_seconds(one, study.collection.wavelength) for one in phases]
+    return [Errors(clock_course=Course(times, one).smooth(_ORDER)) for one in delays]
 
 
 # ---------------------------------------------------------------------- what spreads
 def verify_islr(study: Study, of: Subject) -> Verdict:
     """Everything that spreads, scaled together to the limit of a row's owner."""
-    owner = of.owner
     model = study.models[-1].name
-    limit = spread_limit(study.mission, study.allocation, owner, model) or 0.0
+    limit = spread_limit(study.mission, study.allocation, of.owner, model) or 0.0
     blank = Verdict(id=of.id, model=study.model, boundary_error=islr_db(limit**2) or 0.0, unit="dB")
-    powers = [
-        (row_id, power)
-        for row_id, whose, power in spread_powers(study.analysis, model)
-        if owner == "mission" or study.allocation.islr.includes(whose, owner)
-    ]
+    powers = spread_powers(study.analysis, study.allocation, of.owner, model)
     total = math.fsum(power for _, power in powers)
     if not total:
         return blank._replace(reason="nothing that spreads is declared")
@@ -178,10 +192,7 @@ def verify_islr(study: Study, of: Subject) -> Verdict:
     declared = [random[row_id] for row_id, _ in powers if row_id in random]
     members = [error._replace(declared=scale * (error.declared or 0.0)) for error in declared]
     white = scale * math.sqrt(math.fsum(power for row_id, power in powers if row_id not in random))
-    rng = np.random.default_rng(
-        [study.mission.simulation.seed if study.mission.simulation else 1, *blank.id.encode()]
-    )
-    return _power(study, blank, members, limit, rng, white)
+    return _power(study, blank, members, limit, _stream(study, of.id), white)
 
 
 def _power(

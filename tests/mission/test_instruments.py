@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from bisar_budget.constants import STANDARD_GRAVITY
+from bisar_budget.effects.sources import error_sources
 from bisar_budget.faults import MissionError
 from bisar_budget.mission.instruments import PowerLaw
 from bisar_budget.mission.load import load_mission, parse_mission
@@ -210,6 +211,18 @@ class TestCatalogue:
         assert error.position == pytest.approx((0.006, 0.006, 0.01))
         assert error.evidence("angle_random_walk") == evidence(part, "angle_random_walk")
         assert error.evidence("gyro_bias") is None
+
+    def test_figures_of_a_part_have_its_evidence_and_the_line_of_its_key(self) -> None:
+        """Position and velocity of a GNSS part had none, and pointed at a key that the file does not have."""
+        text = receiver("motion_error: {sensor: [stim300, mosaic-x5-rtk], velocity: 1 cm/s, source: survey 3}")
+        mission = parse_mission(text)
+        sources = {one.id: one for one in error_sources(mission, mission.geometry)}
+        part = read_part(str(resource("specs", "sensors") / "mosaic-x5-rtk.yaml"))
+        position, velocity = sources["receiver.position.x"], sources["receiver.velocity.x"]
+        assert position.evidence == evidence(part, "position")
+        assert position.path == ("platforms", "receiver", "motion_error", "sensor")
+        assert velocity.evidence == "survey 3"
+        assert velocity.path[:4] == ("platforms", "receiver", "motion_error", "velocity")
 
     def test_a_noise_of_the_file_replaces_that_of_the_part(self) -> None:
         text = "oscillator: {sensor: sit5358, power_law: {h0: 1e-24}}"

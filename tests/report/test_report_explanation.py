@@ -8,10 +8,14 @@ import pytest
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.mission.load import load_mission, parse_mission
+from bisar_budget.mission.model import Mission
 from bisar_budget.report.explain import formulas
 from bisar_budget.report.explain.explanation import explain
 from bisar_budget.theory import render
 from tests.conftest import ROOT, TODAY, mission_text
+from tests.effects.test_random_errors import MISSION as SENSORS
+from tests.effects.test_random_errors import OSCILLATORS
+from tests.simulate.test_random_errors import REST
 
 LAMBDA = 299_792_458.0 / 10e9
 MISSIONS = [
@@ -117,8 +121,11 @@ def sums(text: str) -> list[tuple[str, str, float]]:
 @pytest.mark.parametrize("model", ["published", "full", "strictest"])
 @pytest.mark.parametrize("path", MISSIONS, ids=lambda path: path.stem)
 def test_every_row_can_be_repeated_by_hand(path, model: str) -> None:
+    repeat_by_hand(load_mission(str(path), model))
+
+
+def repeat_by_hand(mission: Mission) -> None:
     """Six digits are put in, so a sum agrees to 1e-5 of its terms' sizes."""
-    mission = load_mission(str(path), model)
     found = check_mission(mission, TODAY)
     for row in found.rows:
         results: dict[str, float] = {}
@@ -136,6 +143,28 @@ def test_every_row_can_be_repeated_by_hand(path, model: str) -> None:
             assert results["utilization"] == pytest.approx(row.utilization, rel=1e-5, abs=1e-12), row.id
         if row.allowable is not None and row.unit not in ("rad",) and row.metric != "location_error":
             assert results["allowable"] == pytest.approx(row.allowable, rel=1e-5), row.id
+
+
+@pytest.mark.parametrize("model", ["published", "full"])
+@pytest.mark.parametrize("factor", [1, 2])
+def test_tones_and_sensors_under_a_link_can_be_repeated_by_hand(model: str, factor: int) -> None:
+    """A direct path changes what is left of a sensor's noise, and exchanged pulses what is left of a tone."""
+    rest = REST.replace("model: full", f"model: {model}").replace("coverage_factor: 2", f"coverage_factor: {factor}")
+    tones = "      spurs: {2 Hz: -90 dBc, 130 Hz: -120 dBc}\n"
+    exchanged = "synchronization: {interval: 10 ms, error: 0.1 deg}\n"
+    heard = "synchronization: {method: direct_path, error: 0.1 deg}\n"
+    pslr = rest.replace("islr: -20 dB", "islr: -20 dB, pslr: -30 dB")
+    repeat_by_hand(parse_mission(SENSORS.rstrip() + OSCILLATORS + tones + exchanged + pslr))
+    mission = parse_mission(SENSORS.rstrip() + OSCILLATORS + heard + rest)
+    repeat_by_hand(mission)
+    found = check_mission(mission, TODAY)
+    for error in found.analysed().random:
+        if error.declared and error.published.spread != error.full.spread:
+            (mine, other) = ("left_full", "left") if model == "full" else ("left", "left_full")
+            results = {symbol: value for symbol, _, value in sums(explain(mission, found, error.id))}
+            other_model = "published" if model == "full" else "full"
+            assert results[mine] == pytest.approx(error.effect(model).spread * error.declared, rel=1e-5)
+            assert results[other] == pytest.approx(error.effect(other_model).spread * error.declared, rel=1e-5)
 
 
 def explained(row_id: str, **changes) -> str:

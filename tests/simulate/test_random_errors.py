@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from bisar_budget.effects.random_errors import RandomError
+from bisar_budget.effects.spectra import Piece
 from bisar_budget.effects.subject import subject
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.simulate.point import simulate_point
+from bisar_budget.simulate.realisations import _Tones
 from bisar_budget.verify.random_cases import verify_islr, verify_random
 from bisar_budget.verify.study import Study
 from tests.effects.test_random_errors import MISSION, OSCILLATORS
@@ -57,6 +59,24 @@ def test_the_power_that_noise_spreads_is_confirmed_within_half_a_decibel() -> No
     assert verify_random(one, off(of(one, "receiver.random.GNSS"), 0.8)).verdict == "optimistic"
     assert verify_islr(one, subject("receiver", "islr")).verdict == "confirmed"
     assert verify_islr(one, subject("mission", "islr")).requirement_db == pytest.approx(-20, abs=0.01)
+
+
+@pytest.mark.parametrize("time", ["1 ms", "40 ms", "0.4 s"])
+def test_a_limit_of_noise_of_a_short_correlation_time_is_confirmed(time: str) -> None:
+    """Drawn at the nodes of the exact ranges alone, 40 ms of 6 s had twice the phase that a whole time series has."""
+    one = study(MISSION.replace("1.5 s", time) + LOOSE.replace(", islr: -1 dB", ""))
+    right = verify_random(one, of(one, "receiver.random.GNSS"))
+    assert right.verdict == "confirmed"
+    assert right.measured_qpe_rad == pytest.approx(right.budget_rad, rel=0.05)
+    assert verify_random(one, off(of(one, "receiver.random.GNSS"), 0.8)).verdict == "optimistic"
+
+
+def test_noise_faster_than_every_drawn_tone_has_its_power() -> None:
+    """Flat from 1 Hz to 1 GHz, which no tones resolve; it was left out and no longer spread anything."""
+    tones = _Tones((Piece(1.0, 1e9, 1e-12, 0.0),), 6.0)
+    moments = np.linspace(-3, 3, 4001)
+    drawn = tones.draw(np.random.default_rng(5)).at(moments)
+    assert np.var(drawn) == pytest.approx(1e-12 * 1e9, rel=0.1)  # 4001 samples: 2.2 % of a variance
 
 
 def test_the_limit_of_a_clock_is_in_decibels() -> None:

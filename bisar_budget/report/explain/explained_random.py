@@ -5,8 +5,10 @@ from collections.abc import Iterator, Sequence
 
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.spread import spread_powers
 from bisar_budget.analysis.vibration_limits import spread_phase, vibration_limits
 from bisar_budget.constants import STANDARD_GRAVITY
+from bisar_budget.effects.clocks import spurs_of
 from bisar_budget.effects.models import CUBIC, QUADRATIC
 from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.effects.random_errors import RandomError
@@ -47,7 +49,7 @@ def explained_random(analysis: Analysis, allocation: Allocation, error: RandomEr
     if kind == "imu":
         yield from _imu(analysis, error, model)
     elif kind == "random":
-        yield from _position(analysis, error)
+        yield from _position(analysis, error, model)
     elif kind == "oscillator":
         yield from _oscillator(mission, error)
     else:
@@ -94,9 +96,12 @@ def _imu(analysis: Analysis, error: RandomError, model: str) -> Iterator[Step]:
             )
     if model == "full":
         full = error.full
+        # What is left turns with the line of sight of mid-aperture; only a direct path changes it.
+        count = 3 if full.spread != unit.spread else 2
+        factors = (1.0, 1.0, mission.allocation.coverage_factor)
         lines = [
-            f"{part}/unit = {with_unit(value, f'rad per {error.unit}')}"
-            for part, value in zip(_PARTS, full[:2], strict=False)
+            f"{part}/unit = {with_unit(value * factor, f'rad per {error.unit}')}"
+            for part, value, factor in zip(_PARTS[:count], full[:count], factors, strict=False)
             if value
         ]
         yield from step(
@@ -113,8 +118,8 @@ def _of_one(kind: str, which: int, wavelength: float, T: float) -> float:
     return row[which]
 
 
-def _position(analysis: Analysis, error: RandomError) -> Iterator[Step]:
-    mission = analysis.mission
+def _position(analysis: Analysis, error: RandomError, model: str) -> Iterator[Step]:
+    mission, effect = analysis.mission, error.effect(model)
     motion = getattr(mission.platforms, error.owner).motion_error
     process = next(one for one in motion.random if one.name == error.subject.axis)
     T, tau = mission.collection.aperture_time, process.correlation_time
@@ -128,10 +133,17 @@ def _position(analysis: Analysis, error: RandomError) -> Iterator[Step]:
         "Mean squares of a process of variance 1 with the spectrum 4·τ_c/(1 + (2πf·τ_c)²)",
         *(f"{word} = {number(value)}" for word, value in zip(words, found, strict=True)),
     )
-    values = {"λ": mission.radar.wavelength, "u": error.published.quadratic * mission.radar.wavelength
-              / (2 * math.pi * math.sqrt(found.quadratic)), "q": found.quadratic}  # fmt: skip
-    lines = equation("QPE/unit", "2*π*u*sqrt(q)/λ", values, error.published.quadratic, "rad per m")
-    yield from step("Along the line of sight, u; of three values the root-sum-square of what each has", *lines)
+    k = 2 * math.pi / mission.radar.wavelength
+    values = {"λ": mission.radar.wavelength, "u": effect.quadratic / (k * math.sqrt(found.quadratic)),
+              "q": found.quadratic}  # fmt: skip
+    lines = equation("QPE/unit", "2*π*u*sqrt(q)/λ", values, effect.quadratic, "rad per m")
+    sight = "the line of sight less that of the direct path" if _has_direct(mission, model) else "the line of sight"
+    yield from step(f"Along {sight}, u; of three values the root-sum-square of what each has", *lines)
+
+
+def _has_direct(mission: Mission, model: str) -> bool:
+    """Does the direct path cancel a part of what a platform moves? The published model does not know of it."""
+    return mission.has_direct_path and model == "full"
 
 
 def _oscillator(mission: Mission, error: RandomError) -> Iterator[Step]:
@@ -206,21 +218,21 @@ def _phases(mission: Mission, error: RandomError, model: str) -> Iterator[Step]:
         return
     other = "full" if model == "published" else "published"
     is_same = error.published[:3] == error.full[:3]
+    is_left_same = error.published.spread == error.full.spread
     for name in (model,) if is_same else (model, other):
         effect, k = error.effect(name), _covered(mission, error)
         mark = "_full" if name == "full" and not is_same else ""
         lines: list[WorkedEquation] = []
         for symbol, per_unit in zip(_PARTS, effect[:3], strict=True):
-            if not per_unit:
+            if not per_unit or (symbol == "left" and is_left_same and name != model):
                 continue
             result = per_unit * error.declared
-            values = {f"{symbol}/unit": per_unit, "declared": error.declared}
+            values, formula = {f"{symbol}/unit": per_unit, "declared": error.declared}, f"{symbol}/unit*declared"
             if symbol == "left" and k != 1:  # a mean power has no coverage factor
                 values |= {"left/unit": per_unit * k, "k": k}
-                lines += equation(symbol, "left/unit*declared/k", values, result, "rad")
-            elif symbol != "left" or name == model:  # both models have what is left alike
-                lines += equation(symbol if symbol == "left" else f"{symbol}{mark}",
-                                  f"{symbol}/unit*declared", values, result, "rad")  # fmt: skip
+                formula += "/k"
+            marked = symbol if symbol == "left" and is_left_same else f"{symbol}{mark}"
+            lines += equation(marked, formula, values, result, "rad")
             if symbol == "QPE" and is_same:
                 lines += equation("QPE_full", "QPE", {"QPE": result}, result, "rad")
         by = "both models" if is_same else f"the {name} model{'' if name == model else ', for comparison'}"
@@ -285,14 +297,10 @@ def _unit(error: RandomError) -> str:
     return "" if error.unit == "dB" else error.unit
 
 
-def explained_islr(
-    powers: Sequence[tuple[str, str, float]], mission: Mission, allocation: Allocation, row: Row
-) -> Iterator[Step]:
+def explained_islr(analysis: Analysis, allocation: Allocation, row: Row) -> Iterator[Step]:
     """Powers of everything that spreads, together."""
-    model, owner = row.model or "published", row.owner
-    members = [
-        (name, power) for name, whose, power in powers if owner == "mission" or allocation.islr.includes(whose, owner)
-    ]
+    mission, model, owner = analysis.mission, row.model or "published", row.owner
+    members = spread_powers(analysis, allocation, owner, model)
     total = math.fsum(power for _, power in members)
     if row.declared is None:
         yield from step("Nothing that spreads is declared")
@@ -323,12 +331,17 @@ def explained_spur(mission: Mission, allocation: Allocation, row: Row) -> Iterat
     """From the tone of an oscillator to its paired echoes, and to what the platform's share of PSLR allows."""
     oscillator = getattr(mission.platforms, row.owner).oscillator
     path = ("platforms", row.owner, "oscillator", "spurs")
-    frequency, level = oscillator.spurs[row.subject.entry or 0]
+    entry = row.subject.entry or 0
+    frequency, level = oscillator.spurs[entry]
     yield from step(f"Declared in {place(mission, path)}", f"{frequency:.6g} Hz: {level:.6g} dBc")
     f_0 = mission.radar.center_frequency
-    values = {"L": level, "f_0": f_0, "f_osc": oscillator.frequency or f_0}
-    lines = equation("declared", "L + 20*log(f_0/f_osc)/log(10)", values, row.declared or 0.0, "dB")
-    yield from step("At the centre frequency; an echo has the amplitude of the sideband", *lines)
+    values, formula = {"L": level, "f_0": f_0, "f_osc": oscillator.frequency or f_0}, "L + 20*log(f_0/f_osc)/log(10)"
+    left = next(one.left for one in spurs_of(mission) if (one.name, one.entry) == (row.owner, entry))
+    title = "At the centre frequency; an echo has the amplitude of the sideband"
+    if left != 1:
+        values, formula = {**values, "left": left}, f"{formula} + 20*log(left)/log(10)"
+        title += ", of which the exchanged pulses leave a part"
+    yield from step(title, *equation("declared", formula, values, row.declared or 0.0, "dB"))
     limits = vibration_limits(mission, allocation, "pslr").get(row.owner)
     if limits is None or row.allowable is None:
         yield from step("Allowable: no limit", printable(row.reason or "no requirement limits this error"))

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.scene import ScenePhases, at
-from bisar_budget.analysis.spread import spread_powers
 from bisar_budget.analysis.together import Together
 from bisar_budget.analysis.vibration_limits import amplitude_share, echo_phase, slow_limits
 from bisar_budget.constants import ROUNDING
@@ -88,7 +87,7 @@ def chain(mission: Mission, found: MissionFindings, row: Row) -> Iterator[Step]:
     elif row.subject.kind == "islr":
         from bisar_budget.report.explain.explained_random import explained_islr
 
-        yield from explained_islr(spread_powers(analysis, row.model or ""), mission, found.allocation, row)
+        yield from explained_islr(analysis, found.allocation, row)
     elif row.subject.kind == "vibration":
         yield from _vibration(mission, found.allocation, row)
     elif row.subject.kind in (QUADRATIC, "autofocus_pull_in"):
