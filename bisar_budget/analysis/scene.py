@@ -16,6 +16,7 @@ from functools import cached_property, partial
 from operator import add, mul
 from typing import NamedTuple
 
+from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT, UTILIZATION_TOLERANCE
@@ -24,7 +25,8 @@ from bisar_budget.effects.correlation import phase_parts
 from bisar_budget.effects.exact_ranges import ExactRanges, nodes_for
 from bisar_budget.effects.point_path import PointPath
 from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState
-from bisar_budget.units import format_limit, format_quantity
+from bisar_budget.phrases import NOTHING, Note
+from bisar_budget.units import format_quantity
 
 RIM_POINTS = 16
 _WIDE = 0.1  # of the nearest slant range; beyond, twice as many
@@ -58,17 +60,16 @@ class SceneEdge(NamedTuple):
     azimuth: float
     autofocus_radius: float | None
     searched: float
-    degeneracy: str
-    doubt: str
+    degeneracy: Note
+    doubt: Note
 
-    def notes(self, total: float) -> tuple[str, ...]:
+    def notes(self, total: float) -> tuple[Note, ...]:
         """Where the difference is largest, and how far one autofocus correction serves."""
         if not self.difference:
-            return ("the declared errors have the same quadratic phase at the edge and at the centre",)
+            return (phrases.same_at_the_edge(),)
         return (
-            f"largest between the centre and azimuth {math.degrees(self.azimuth):.0f} deg, "
-            f"{format_quantity(self.radius, 'm')} away",
-            f"one autofocus correction serves {self.served}, by the total of {format_limit(total, 'rad')}",
+            phrases.largest_at_the_edge(math.degrees(self.azimuth), self.radius),
+            phrases.one_correction_serves(self.served, total),
         )
 
     @property
@@ -387,23 +388,22 @@ def scene_edge(analysis: Analysis, allocation: Allocation) -> SceneEdge | None:
     searched = _FARTHEST * edge.nearest
     rim = edge.rim(radius)
     if math.isinf(rim.difference):
-        reason = f"no image at the scene's edge, azimuth {math.degrees(rim.azimuth):.0f} deg: "
-        reason += _degeneracy(edge.geometry_at(at(radius, rim.azimuth)))
-        return SceneEdge(radius, math.nan, 0.0, None, searched, reason, "")
+        why = _degeneracy(edge.geometry_at(at(radius, rim.azimuth)))
+        reason = phrases.no_image_at_the_edge(math.degrees(rim.azimuth), why)
+        return SceneEdge(radius, math.nan, 0.0, None, searched, reason, NOTHING)
     searched = max(searched, radius)
     difference, azimuth = edge.largest(rim, radius)
     if math.isinf(difference):
-        reason = "a declared error leaves no ground point with its range history: there is no image"
-        return SceneEdge(radius, math.nan, 0.0, None, searched, reason, "")
+        return SceneEdge(radius, math.nan, 0.0, None, searched, phrases.no_image(), NOTHING)
     reach = _autofocus_radius(edge, radius, rim, allocation.qpe_total, searched)
     doubt = _over_at_the_edge(edge, allocation, rim)
-    return SceneEdge(radius, difference, azimuth, reach, searched, "", doubt)
+    return SceneEdge(radius, difference, azimuth, reach, searched, NOTHING, doubt)
 
 
 def _degeneracy(there: BistaticGeometry) -> str:
     if min(there.transmitter.slant_range, there.receiver.slant_range) < _NEAREST_M:
-        return f"a platform is within {_NEAREST_M:g} m of it"
-    return there.degeneracy() or "on the way there range and Doppler gradients become parallel"
+        return phrases.platform_at_the_edge(_NEAREST_M)
+    return there.degeneracy() or phrases.gradients_become_parallel()
 
 
 def _autofocus_radius(edge: ScenePhases, radius: float, rim: Rim, total: float, searched: float) -> float | None:
@@ -482,7 +482,7 @@ def _where(
     return low, high
 
 
-def _over_at_the_edge(edge: ScenePhases, allocation: Allocation, rim: Rim) -> str:
+def _over_at_the_edge(edge: ScenePhases, allocation: Allocation, rim: Rim) -> Note:
     """Say which error is inside its limit at the centre and over it at the edge; else nothing."""
     gain, rule = allocation.autofocus_gain, edge.combine
     centre, *around, worst_place = (edge.exactly(phases) for phases in (edge.centre, *rim.phases, rim.worst))
@@ -513,4 +513,4 @@ def _over_at_the_edge(edge: ScenePhases, allocation: Allocation, rim: Rim) -> st
         if phase > limit * (1 + UTILIZATION_TOLERANCE) and phase > worst[1]:
             worst = (name, phase, limit)
     name, phase, limit = worst
-    return f"{name} is {phase:.3g} rad at the scene's edge, {format_limit(limit, 'rad')} allowed" if name else ""
+    return phrases.over_at_the_edge(name, phase, limit) if name else NOTHING

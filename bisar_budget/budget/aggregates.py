@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
+from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis, Model
 from bisar_budget.analysis.together import Together
@@ -22,9 +23,7 @@ from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.subject import subject
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.model import Mission
-from bisar_budget.units import format_limit, format_quantity
-
-NO_REQUIREMENT = "no requirement in the file: computed, not judged"
+from bisar_budget.phrases import NOTHING, Note
 
 
 def aggregate_rows(analysis: Analysis, model: Model, other: Model, allocation: Allocation) -> Iterator[Row]:
@@ -61,13 +60,13 @@ def _qpe_rows(analysis: Analysis, mine: Together, theirs: Together, allocation: 
         qpe, by_other = (combined_phase(of, combine, groups) if of else None for of in (phases, others))
         published, full = (qpe, by_other) if mine.model.name == "published" else (by_other, qpe)
         limit = allocation.qpe_limit(owner) * gain
-        over = ""
+        over = NOTHING
         if qpe is not None:
             over = _exceeded(
                 "QPE", qpe, limit, "rad", partial(phase_parts, phases, combine, groups), mine.extrapolated
             )
             if over and math.isfinite(qpe):
-                over += f"; {needed_sentence(allocation.n_pull_needed(qpe, owner), caps(mission))}"
+                over = over.then(needed_sentence(allocation.n_pull_needed(qpe, owner), caps(mission)))
         yield _judged(
             mission,
             subject=subject(owner, QUADRATIC),
@@ -134,9 +133,9 @@ def _cubic_row(analysis: Analysis, mine: Together, theirs: Together) -> Row:
         allowable=limit,
         path=("requirements", "cubic_phase_error"),
         equation="Table I, cubic column" if mine.model.name == "published" else "full model",
-        no_limit=NO_REQUIREMENT,
-        info="" if limit is not None else NO_REQUIREMENT,
-        over=f"{over}; autofocus gain does not apply",
+        no_limit=phrases.no_requirement(),
+        info=NOTHING if limit is not None else phrases.no_requirement(),
+        over=over.then(phrases.no_gain()),
         doubt=doubt,
         notes=correlation_notes(combine, groups) if combine != "each" else (),
     )
@@ -152,7 +151,6 @@ def _location_row(analysis: Analysis, mine: Together, theirs: Together) -> Row:
     if combine == "each" and moves is not None:
         doubt = _of_all("displacement", combined_displacement(moves, "rss", groups), limit, "m") or doubt
     is_published = mine.model.name == "published"
-    no_image = "with a declared error no ground point has the recorded range history: there is no image"
     return judged(
         mission,
         subject=subject("mission", LOCATION),
@@ -162,10 +160,12 @@ def _location_row(analysis: Analysis, mine: Together, theirs: Together) -> Row:
         allowable=limit,
         path=("requirements", "location_error"),
         equation="(25)" if is_published else "full model",
-        no_limit=NO_REQUIREMENT,
-        not_evaluated="" if moved is not None or not mine.motion else mine.model.plane.degeneracy or no_image,
+        no_limit=phrases.no_requirement(),
+        not_evaluated=NOTHING
+        if moved is not None or not mine.motion
+        else mine.model.plane.degeneracy or phrases.no_image_to_place(),
         is_declared=bool(mine.motion),
-        info="" if limit is not None else NO_REQUIREMENT,
+        info=NOTHING if limit is not None else phrases.no_requirement(),
         over=_exceeded(
             "displacement of the image",
             moved,
@@ -193,9 +193,10 @@ def _pull_in_row(analysis: Analysis, mine: Together, theirs: Together, pull_in: 
         path=("autofocus", "n_pull"),
         equation="Section VI",
         never_fails=True,
-        over=_exceeded("QPE", total, pull_in, "rad", lambda: phases)
-        + "; autofocus corrects one total, not each error separately",
-        doubt=_doubt(theirs.model, by_other, pull_in, "rad", "beyond it: QPE"),
+        over=_exceeded("QPE", total, pull_in, "rad", lambda: phases).then(phrases.one_total()),
+        doubt=phrases.other_model_is_beyond(theirs.model.name, by_other or 0.0, pull_in)
+        if _doubt(theirs.model, by_other, pull_in, "rad")
+        else NOTHING,
     )
 
 
@@ -207,24 +208,21 @@ def _judged(mission: Mission, *, declared: float | None, **of_row: Any) -> Row:
     row = judged(mission, declared=None, **known)
     if of_row.get("info"):
         return row
-    return row._replace(status="fail", reason="a declared error leaves no ground point with its range history")
+    return row._replace(status="fail", reason=phrases.no_ground_point())
 
 
-def _doubt(other: Model, size: float | None, limit: float | None, unit: str, what: str = "fail:") -> str:
+def _doubt(other: Model, size: float | None, limit: float | None, unit: str) -> Note:
     """Say that the model that does not gate fails an aggregate; else nothing."""
     if size is None or limit is None or size <= limit * (1 + UTILIZATION_TOLERANCE) or other.is_blind:
-        return ""
-    return f"the {other.name} model says {what} {_said(size, unit)}, {format_limit(limit, unit)} allowed"
+        return NOTHING
+    return phrases.other_model_fails(other.name, size, limit, unit)
 
 
-def _of_all(what: str, size: float, limit: float | None, unit: str) -> str:
+def _of_all(what: str, size: float, limit: float | None, unit: str) -> Note:
     """Say that all declared errors together exceed what each alone is held to; else nothing."""
     if limit is None or size <= limit * (1 + UTILIZATION_TOLERANCE):
-        return ""
-    return (
-        f"each error alone is judged. All declared errors together have a root-sum-square {what} of "
-        f"{_said(size, unit)}, {format_limit(limit, unit)} allowed: combine: rss judges that"
-    )
+        return NOTHING
+    return phrases.all_together_over(what, size, limit, unit)
 
 
 def _exceeded(
@@ -233,23 +231,14 @@ def _exceeded(
     limit: float | None,
     unit: str,
     members: Callable[[], Sequence[tuple[str, float]]],
-    extrapolated: Mapping[str, str] | None = None,
-) -> str:
+    extrapolated: Mapping[str, Note] | None = None,
+) -> Note:
     """Say how large an aggregate is, what is allowed, and which of its members is the largest; nothing if inside.
 
     `extrapolated` says of members what they rest on beside the file.
     """
     if size is None or limit is None or size <= limit:
-        return ""
+        return NOTHING
     row_id, largest = max(members(), key=lambda member: abs(member[1]))
-    allowed = f"{_said(size, unit)}, {format_limit(limit, unit)} allowed"
-    text = f"{what} {allowed}; largest: {row_id}, {_said(abs(largest), unit)}"
-    beyond = (extrapolated or {}).get(row_id)
-    return f"{text} ({beyond})" if beyond else text
-
-
-def _said(size: float, unit: str) -> str:
-    """Metres with a prefix, as everywhere; phases in radians, to be compared with π/4."""
-    if not math.isfinite(size):
-        return "without a value (no ground point has this range history)"
-    return format_quantity(size, unit) if unit == "m" else f"{size:.3g} {unit}"
+    beyond = (extrapolated or {}).get(row_id, NOTHING)
+    return phrases.aggregate_over(what, size, limit, unit, row_id, largest, beyond)

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from datetime import date
 from typing import TYPE_CHECKING, NamedTuple
 
+from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.aggregates import aggregate_rows
@@ -23,7 +24,7 @@ from bisar_budget.findings.mission import FileWarning, MissionFindings, Resoluti
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import RANK
 from bisar_budget.mission.model import Mission
-from bisar_budget.units import format_limit
+from bisar_budget.phrases import NOTHING, Note
 
 if TYPE_CHECKING:
     from bisar_budget.analysis.scene import SceneEdge
@@ -144,11 +145,11 @@ def _scene_row(analysis: Analysis, model: str, allocation: Allocation) -> tuple[
     edge = scene_edge(analysis, allocation)
     is_published = model == "published"
     difference: float | None = None
-    doubt, notes = "", tuple[str, ...]()
+    doubt, notes = NOTHING, tuple[Note, ...]()
     if edge is not None and not edge.degeneracy:
         difference, doubt, notes = edge.difference, edge.doubt, edge.notes(total)
         if is_published and difference > total * (1 + UTILIZATION_TOLERANCE):
-            doubt = f"the full model says fail: {difference:.3g} rad, {format_limit(total, 'rad')} allowed"
+            doubt = phrases.other_model_fails("full", difference, total, "rad")
     row = judged(
         mission,
         subject=subject("mission", "spatial_variance"),
@@ -158,10 +159,10 @@ def _scene_row(analysis: Analysis, model: str, allocation: Allocation) -> tuple[
         allowable=None if is_published else total,
         path=("scene", "radius"),
         equation="full model",
-        no_limit="to the published model an error is the same all over the scene",
-        not_evaluated="" if edge is None else edge.degeneracy,
+        no_limit=phrases.same_all_over_the_scene(),
+        not_evaluated=NOTHING if edge is None else edge.degeneracy,
         is_declared=edge is not None,
-        over="quadratic phase at the scene's edge and at its centre differ by more than the total budget",
+        over=phrases.edge_over(),
         doubt=doubt,
         limits=(None, total),
         qpe=None if difference is None else 0.0,
@@ -221,7 +222,7 @@ def _unused_correlations(mission: Mission) -> Iterator[FileWarning]:
     return (FileWarning(line, message) for line, message in unused_correlations(mission))
 
 
-def _unused_keys(mission: Mission) -> Iterator[str]:
+def _unused_keys(mission: Mission) -> Iterator[Note]:
     """Say which keys that the file gives have no part in this check."""
     keys = {
         "collection.pulses": mission.collection.pulses is not None,
@@ -229,4 +230,4 @@ def _unused_keys(mission: Mission) -> Iterator[str]:
     }
     given = [key for key, is_given in keys.items() if is_given]
     if given:
-        yield f"not used by this check: {', '.join(given)}"
+        yield phrases.keys_not_used(given)

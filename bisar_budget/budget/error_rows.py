@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis, Model
 from bisar_budget.budget.judgement import judgement
@@ -13,7 +14,7 @@ from bisar_budget.effects.effect import ErrorSource
 from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC, Declared
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import FRAME_AXES
-from bisar_budget.units import format_limit, format_quantity
+from bisar_budget.phrases import NOTHING, Note
 
 
 class Allowed(NamedTuple):
@@ -56,7 +57,7 @@ def error_rows(analysis: Analysis, model: Model, other: Model, allocation: Alloc
         allowed = allowed_by(analysis, model, source, limit)
         allowed_other = NOT_ASKED if is_brief else allowed_by(analysis, other, source, limit)
         published, full = (allowed, allowed_other) if model.name == "published" else (allowed_other, allowed)
-        info = over = doubt = ""
+        info = over = doubt = NOTHING
         notes = source.notes
         qpe_published = qpe_full = cubic = displacement = None
         qpe = 0.0
@@ -72,7 +73,7 @@ def error_rows(analysis: Analysis, model: Model, other: Model, allocation: Alloc
             if not source.is_independent:
                 info = _stated_elsewhere(analysis, source)
             elif combine != "each":
-                info = f"combine is {combine}: the aggregate decides"
+                info = phrases.aggregate_decides(combine)
             else:
                 if allowed.smallest is not None and declared > allowed.smallest:
                     over = _over(analysis, model, source, mine, allowed, limit, allocation)
@@ -84,7 +85,7 @@ def error_rows(analysis: Analysis, model: Model, other: Model, allocation: Alloc
             without_autofocus=qpe / (limit / gain) if gain > 1 else 0.0,
             over=over,
             doubt=doubt,
-            no_limit=model.no_limit(source) if allowed.smallest is None else "",
+            no_limit=model.no_limit(source) if allowed.smallest is None else NOTHING,
             info=info,
         )
         yield Row(
@@ -144,34 +145,23 @@ def _over(
     allowed: Allowed,
     limit: float,
     allocation: Allocation,
-) -> str:
+) -> Note:
     """Say which requirement the declared error breaks, should it break one."""
     requirements = analysis.mission.requirements
     if allowed.binding == CUBIC and requirements.cubic_phase_error is not None:
-        return (
-            f"cubic phase {_phase(mine.cubic)}, {format_limit(requirements.cubic_phase_error, 'rad')} allowed "
-            f"({model.equation(source)}); autofocus gain does not apply"
-        )
+        return phrases.cubic_phase_over(mine.cubic, requirements.cubic_phase_error, model.equation(source))
     if allowed.binding == LOCATION and requirements.location_error is not None:
-        moved = "out of sight" if mine.farthest is None else f"by {format_quantity(math.hypot(*mine.farthest), 'm')}"
+        moved = None if mine.farthest is None else math.hypot(*mine.farthest)
         by = "equation (25)" if model.name == "published" else "full model"
-        return f"moves the image {moved}, {format_limit(requirements.location_error, 'm')} allowed ({by})"
+        return phrases.location_over(moved, requirements.location_error, by)
     qpe = abs(mine.qpe)
-    text = f"QPE {_phase(qpe)}, {format_limit(limit, 'rad')} allowed ({model.equation(source)})"
+    over = phrases.quadratic_phase_over(qpe, limit, model.equation(source))
     if not math.isfinite(qpe):
-        return text
-    return f"{text}; {needed_sentence(allocation.n_pull_needed(qpe, source.owner), caps(analysis.mission))}"
+        return over
+    return over.then(needed_sentence(allocation.n_pull_needed(qpe, source.owner), caps(analysis.mission)))
 
 
-def _phase(phase: float) -> str:
-    return (
-        f"{abs(phase):.3g} rad"
-        if math.isfinite(phase)
-        else "without a value (no ground point has this range history)"
-    )
-
-
-def _doubt(analysis: Analysis, other: Model, source: ErrorSource, theirs: Declared, limit: float) -> str:
+def _doubt(analysis: Analysis, other: Model, source: ErrorSource, theirs: Declared, limit: float) -> Note:
     """Say that the model that does not gate fails the declared error, and why it thinks otherwise; else nothing."""
     requirements = analysis.mission.requirements
     moved = 0.0 if theirs.farthest is None else math.hypot(*theirs.farthest)
@@ -187,15 +177,14 @@ def _doubt(analysis: Analysis, other: Model, source: ErrorSource, theirs: Declar
         ]
     size, allowed, binding = max(held, key=lambda one: one[0] / one[1])
     if size <= allowed * (1 + UTILIZATION_TOLERANCE) or other.is_blind:
-        return ""
-    says = f"the {other.name} model says fail"
+        return NOTHING
     if binding == LOCATION:
-        return f"{says}: displacement {format_quantity(moved, 'm')}, {format_limit(allowed, 'm')} allowed"
-    what = "cubic phase" if binding == CUBIC else "QPE"
-    text = f"{says}: {what} {_phase(size)}, {format_limit(allowed, 'rad')} allowed"
+        return phrases.other_model_fails(other.name, moved, allowed, "m", "displacement")
     if binding == CUBIC:
-        return text
-    return f"{text}; {_cause(source)}" if other.name == "full" else f"{text} ({source.equation})"
+        return phrases.other_model_fails(other.name, size, allowed, "rad", "cubic phase")
+    if other.name == "published":
+        return phrases.other_model_fails(other.name, size, allowed, "rad", "QPE", source.equation)
+    return phrases.other_model_fails(other.name, size, allowed, "rad", "QPE").then(_cause(source))
 
 
 def _unseen(analysis: Analysis, model: Model, source: ErrorSource, declared: float | None) -> Row:
@@ -225,18 +214,17 @@ def _unseen(analysis: Analysis, model: Model, source: ErrorSource, declared: flo
     )
 
 
-def _cause(source: ErrorSource) -> str:
+def _cause(source: ErrorSource) -> Note:
     """Say what the full model counts and the published one does not."""
     if source.subject.kind == "terrain":
-        return "a bistatic image defocuses on a wrong height"
+        return phrases.wrong_height_defocuses()
     if source.unit == "m":
-        return "the line of sight turns over a position error, and its displacement defocuses"
+        return phrases.position_defocuses()
     if not source.is_position:
-        return "the displaced response has a quadratic phase of its own"
-    return "the line of sight turns, and the displaced response has a quadratic phase of its own"
+        return phrases.displacement_defocuses()
+    return phrases.turning_defocuses()
 
 
-def _stated_elsewhere(analysis: Analysis, source: ErrorSource) -> str:
+def _stated_elsewhere(analysis: Analysis, source: ErrorSource) -> Note:
     frame = getattr(analysis.mission.platforms, source.owner).motion_error.frame
-    axes = ", ".join(axis.replace("_", " ") for axis in FRAME_AXES[frame])
-    return f"the file states this error along other axes ({axes}): those rows decide"
+    return phrases.stated_along_other_axes([axis.replace("_", " ") for axis in FRAME_AXES[frame]])

@@ -3,12 +3,14 @@
 import math
 from typing import NamedTuple
 
+from bisar_budget import phrases
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.effects.subject import Subject
 from bisar_budget.faults import KeyPath
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.model import Mission
+from bisar_budget.phrases import NOTHING, Note
 
 
 def judged(
@@ -22,11 +24,11 @@ def judged(
     path: KeyPath,  # of the declared value in the mission file
     equation: str,
     gain: float = 1.0,  # of autofocus, within `allowable`
-    over: str = "",  # what to say when over the limit
-    doubt: str = "",  # what the model that does not gate says against a pass
-    no_limit: str = "",  # why there is no allowable
-    not_evaluated: str = "",  # why a declared value cannot be judged
-    info: str = "",  # why the row judges nothing
+    over: Note = NOTHING,  # what to say when over the limit
+    doubt: Note = NOTHING,  # what the model that does not gate says against a pass
+    no_limit: Note = NOTHING,  # why there is no allowable
+    not_evaluated: Note = NOTHING,  # why a declared value cannot be judged
+    info: Note = NOTHING,  # why the row judges nothing
     is_declared: bool = True,  # with `declared` None: something is declared, but its effect has no value
     never_fails: bool = False,
     limits: tuple[float | None, float | None] | None = None,  # by the published and the full model; None: one rule
@@ -35,7 +37,7 @@ def judged(
     displacement: GroundVector | None = None,
     evidence: str | None = None,
     is_independent: bool = True,
-    notes: tuple[str, ...] = (),
+    notes: tuple[Note, ...] = (),
     published_margin_db: float | None = None,
 ) -> Row:
     """Judge one row; see `judgement`."""
@@ -84,8 +86,8 @@ class Judgement(NamedTuple):
     utilization: float | None
     margin: float | None
     status: str
-    reason: str
-    remarks: tuple[str, ...] = ()
+    reason: Note
+    remarks: tuple[Note, ...] = ()
 
 
 def judgement(
@@ -94,11 +96,11 @@ def judgement(
     declared: float | None,
     allowable: float | None,
     without_autofocus: float = 0.0,
-    over: str = "",
-    doubt: str = "",
-    no_limit: str = "",
-    not_evaluated: str = "",
-    info: str = "",
+    over: Note = NOTHING,
+    doubt: Note = NOTHING,
+    no_limit: Note = NOTHING,
+    not_evaluated: Note = NOTHING,
+    info: Note = NOTHING,
     is_declared: bool = True,
     never_fails: bool = False,
 ) -> Judgement:
@@ -110,7 +112,7 @@ def judgement(
     The status is the first that applies, in the order of the contract; waivers come after.
     """
     utilization = margin = None
-    reason, remarks = no_limit if allowable is None else "", tuple[str, ...]()
+    reason, remarks = no_limit if allowable is None else NOTHING, tuple[Note, ...]()
     if declared is not None:
         utilization = 0.0 if allowable is None else declared / allowable
         margin = None if allowable is None else _margin(allowable, declared)
@@ -125,11 +127,11 @@ def judgement(
     elif doubt:
         status, reason = "warn", doubt
     elif without_autofocus > 1 + UTILIZATION_TOLERANCE:
-        status, reason = "pass_with_autofocus", f"{without_autofocus:.3g} times the limit without autofocus"
+        status, reason = "pass_with_autofocus", phrases.over_the_limit_without_autofocus(without_autofocus)
         if utilization > warn_above:
-            remarks = (f"uses {100 * utilization:.3g} % of the limit with autofocus",)
+            remarks = (phrases.near_the_limit_with_autofocus(utilization),)
     elif utilization > warn_above:
-        status, reason = "warn", f"above {100 * warn_above:g} % of the limit"
+        status, reason = "warn", phrases.above_warn_above(warn_above)
     else:
         status = "pass"
     return Judgement(utilization, margin, status, reason, remarks)

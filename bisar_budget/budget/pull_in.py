@@ -11,8 +11,10 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from bisar_budget import phrases
 from bisar_budget.findings.mission import FileWarning, Resolution
 from bisar_budget.mission.model import Mission
+from bisar_budget.phrases import Note
 from bisar_budget.units import format_quantity
 
 WALK_CELLS = 0.5
@@ -35,7 +37,7 @@ def caps(mission: Mission) -> Caps:
     return Caps(walk, 2 * mission.scene.radius / (4 * cell * ROOM[mission.autofocus.algorithm]))
 
 
-def needed_sentence(n_pull: float, caps: Caps) -> str:
+def needed_sentence(n_pull: float, caps: Caps) -> Note:
     """Say from which N_pull an error would pass, or that none can correct it.
 
     Parameters
@@ -50,8 +52,8 @@ def needed_sentence(n_pull: float, caps: Caps) -> str:
     elif n_pull > caps.walk:
         allowed = f"range walk allows {_down(caps.walk)}"
     else:
-        return f"passes with autofocus from n_pull {n_pull:g}"
-    return f"no autofocus corrects this: N_pull would have to be {_up(n_pull)}, {allowed}"
+        return phrases.passes_from(n_pull)
+    return phrases.beyond_autofocus(_up(n_pull), allowed)
 
 
 def _up(number: float) -> str:

@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.spread import spread_limit, spread_powers
@@ -22,7 +23,7 @@ from bisar_budget.effects.random_errors import RandomEffect, RandomError
 from bisar_budget.effects.subject import subject
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.model import Mission
-from bisar_budget.units import format_limit, format_quantity
+from bisar_budget.phrases import NOTHING, Note
 
 ISLR = "islr"
 
@@ -62,15 +63,13 @@ def _row(analysis: Analysis, error: RandomError, gating: str, other: str, alloca
     allowable = min(sizes.values(), default=None)
     binding = min(sizes, key=lambda name: sizes[name]) if sizes else None
     qpe = cubic = None
-    over = doubt = info = ""
+    over = doubt = info = NOTHING
     if size is not None:
         qpe, cubic = mine.quadratic * size, mine.cubic * size
         if mission.allocation.combine != "each":
-            info = f"combine is {mission.allocation.combine}: the aggregate decides"
+            info = phrases.aggregate_decides(mission.allocation.combine)
         elif allowable is not None and size > allowable:
-            over = "; ".join(
-                filter(None, (_over(mission, error, mine, limits, binding or "", allocation), error.extrapolated))
-            )
+            over = _over(mission, error, mine, limits, binding or "", allocation).then(error.extrapolated)
         doubt = _doubt(other, theirs, others, size)
     by_model = (mine, theirs) if gating == "published" else (theirs, mine)
     row = judged(
@@ -85,7 +84,7 @@ def _row(analysis: Analysis, error: RandomError, gating: str, other: str, alloca
         gain=_gain(binding, qpe, limits, gain, size, allowable),
         over=over,
         doubt=doubt,
-        no_limit=_no_limit(error, mine) if allowable is None else "",
+        no_limit=_no_limit(error, mine) if allowable is None else NOTHING,
         info=info,
         limits=tuple(limits.quadratic / effect.quadratic if effect.quadratic else None for effect in by_model),  # type: ignore[arg-type]
         qpe=None if size is None else by_model[0].quadratic * size,
@@ -102,10 +101,10 @@ def _row(analysis: Analysis, error: RandomError, gating: str, other: str, alloca
     return in_decibel(row) if error.unit == "dB" else row
 
 
-def _no_limit(error: RandomError, effect: RandomEffect) -> str:
+def _no_limit(error: RandomError, effect: RandomEffect) -> Note:
     """Say why nothing limits an error: it does nothing, or what it does is not required."""
     parts = [name for name, size in (("cubic phase", effect.cubic), ("ISLR", effect.spread)) if size]
-    return f"no requirement limits its {' and '.join(parts)}" if parts else error.no_limit
+    return phrases.no_requirement_limits(parts) if parts else error.no_limit
 
 
 def _gain(
@@ -133,35 +132,33 @@ def in_decibel(row: Row) -> Row:
 
 def _over(
     mission: Mission, error: RandomError, effect: RandomEffect, limits: Limits, binding: str, allocation: Allocation
-) -> str:
+) -> Note:
     size = error.declared or 0.0
     if binding == CUBIC:
-        allowed = format_limit(limits.cubic or 0.0, "rad")
-        return f"cubic phase {effect.cubic * size:.3g} rad, {allowed} allowed; autofocus gain does not apply"
+        return phrases.cubic_phase_over(effect.cubic * size, limits.cubic or 0.0)
     if binding == ISLR:
-        return f"spreads {_level((effect.spread * size) ** 2)}, {_level((limits.spread or 0.0) ** 2, 'down')} allowed"
+        return phrases.spreads_too_much(_level(effect.spread * size), _level(limits.spread or 0.0))
     qpe = effect.quadratic * size
     needed = needed_sentence(allocation.n_pull_needed(qpe, error.owner), caps(mission))
-    return f"QPE {qpe:.3g} rad, {format_limit(limits.quadratic, 'rad')} allowed; {needed}"
+    return phrases.quadratic_phase_over(qpe, limits.quadratic).then(needed)
 
 
-def _level(variance: float, rounding: str = "nearest") -> str:
-    return format_quantity(islr_db(variance) or 0.0, "dB", 3, rounding)
+def _level(rms: float) -> float:
+    """ISLR of a phase. [dB]"""
+    return islr_db(rms**2) or 0.0
 
 
-def _doubt(other: str, effect: RandomEffect, limits: Limits, size: float) -> str:
+def _doubt(other: str, effect: RandomEffect, limits: Limits, size: float) -> Note:
     """Say that the model that does not gate fails a declared error; else nothing."""
     sizes = sizes_at(effect, limits)
     if not sizes or size <= min(sizes.values()) * (1 + UTILIZATION_TOLERANCE):
-        return ""
+        return NOTHING
     name = min(sizes, key=lambda one: sizes[one])
     if name == ISLR:
-        return f"the {other} model says fail: it spreads {_level((effect.spread * size) ** 2)}"
-    is_quadratic = name == QUADRATIC
-    phase = (effect.quadratic if is_quadratic else effect.cubic) * size
-    allowed = format_limit((limits.quadratic if is_quadratic else limits.cubic) or 0.0, "rad")
-    what = "QPE" if is_quadratic else "cubic phase"
-    return f"the {other} model says fail: {what} {phase:.3g} rad, {allowed} allowed"
+        return phrases.other_model_spreads(other, _level(effect.spread * size))
+    if name == QUADRATIC:
+        return phrases.other_model_fails(other, effect.quadratic * size, limits.quadratic, "rad", "QPE")
+    return phrases.other_model_fails(other, effect.cubic * size, limits.cubic or 0.0, "rad", "cubic phase")
 
 
 # ---------------------------------------------------------------------- tones
@@ -174,17 +171,15 @@ def spur_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterat
     for spur in spurs_of(mission):
         cycles = spur.frequency * mission.collection.aperture_time
         allowed = limits.get(spur.name)
-        over = doubt = ""
-        not_evaluated = missing = "" if allowed else "no requirements.pslr to hold it to"
+        over = doubt = NOTHING
+        not_evaluated = missing = NOTHING if allowed else phrases.no_requirement_of("pslr")
         if allowed is not None:
             limit, by_other = k * allowed.by(gating), k * allowed.by(other)
-            over = f"paired echoes of {_echo(spur.phase)}, {_echo(limit, 'down')} allowed"
+            over = phrases.echoes_over(_echo(spur.phase), _echo(limit))
             if spur.phase > by_other * (1 + UTILIZATION_TOLERANCE):
-                doubt = f"the {other} model says fail: {_echo(by_other, 'down')} allowed"
+                doubt = phrases.other_model_allows(other, _echo(by_other), "dB")
             if cycles < ECHO_CYCLES:
-                not_evaluated = (
-                    f"{cycles:.3g} cycles per aperture: below {ECHO_CYCLES:g} its echoes lie on the mainlobe"
-                )
+                not_evaluated = phrases.echoes_on_the_mainlobe(cycles, ECHO_CYCLES)
         row = judged(
             mission,
             subject=subject(spur.name, "oscillator", "spur", entry=spur.entry),
@@ -200,13 +195,14 @@ def spur_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterat
             doubt=doubt,
             limits=(None, None) if allowed is None else (k * allowed.published / 2, k * allowed.full / 2),
             evidence=getattr(mission.platforms, spur.name).oscillator.source,
-            notes=(f"at {format_quantity(spur.frequency, 'Hz')}, {cycles:.3g} cells from the response",),
+            notes=(phrases.tone_lies(spur.frequency, cycles),),
         )
         yield in_decibel(row._replace(model=gating))
 
 
-def _echo(phase: float, rounding: str = "nearest") -> str:
-    return format_quantity(20 * math.log10(phase / 2), "dB", 3, rounding)
+def _echo(phase: float) -> float:
+    """Level of the echoes of a tone. [dB]"""
+    return 20 * math.log10(phase / 2)
 
 
 # ---------------------------------------------------------------------- powers together
@@ -224,15 +220,12 @@ def islr_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterat
         variance = math.fsum(power for _, power in members)
         limit, by_other = (spread_limit(mission, allocation, owner, model) or 0.0 for model in (gating, other))
         rms = math.sqrt(variance)
-        over = doubt = ""
+        over = doubt = NOTHING
         if rms > limit and members:
             row_id, largest = max(members, key=lambda member: member[1])
-            over = (
-                f"noise spreads {_level(variance)}, {_level(limit**2, 'down')} allowed; largest: {row_id}, "
-                f"{_level(largest)}"
-            )
+            over = phrases.noise_spreads_too_much(_level(rms), _level(limit), row_id, _level(math.sqrt(largest)))
         if rms > by_other * (1 + UTILIZATION_TOLERANCE):
-            doubt = f"the {other} model says fail: {_level(by_other**2, 'down')} allowed"
+            doubt = phrases.other_model_allows(other, _level(by_other), "dB")
         row = judged(
             mission,
             subject=subject(owner, ISLR),

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
+from bisar_budget import phrases
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.model import Mission
@@ -35,6 +36,5 @@ def _required(row: Row, missing: Sequence[tuple[str, str, str]]) -> Row:
     if row.status == "not_declared":
         for owner, kind, key in missing:
             if row.subject.owner == owner and (row.subject.kind == kind or owner == "clock"):
-                reason = f"the file has no {key}, which requirements.declare asks for"
-                return row._replace(status="not_evaluated", reason=reason)
+                return row._replace(status="not_evaluated", reason=phrases.not_declared_as_required(key))
     return row

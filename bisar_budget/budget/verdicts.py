@@ -1,5 +1,6 @@
 """What follows from images for the rows of a check, and which of the images are worth showing."""
 
+from bisar_budget import phrases
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.findings.mission import FileWarning, MissionFindings
@@ -7,7 +8,6 @@ from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import RANK
 from bisar_budget.units import format_limit
 
-_OPTIMISTIC = "optimistic limit"  # how is said that an image refutes a limit
 _SHOWN = 4  # rows of a mission
 
 
@@ -23,16 +23,17 @@ def with_verdicts(findings: MissionFindings, verified: VerifiedMission) -> Missi
     judged = tuple(_with_verdict(row, by_id[row.id]) if row.id in by_id else row for row in findings.rows)
     known = {row.id for row in findings.rows}
     warnings = tuple(
-        FileWarning(line=None, message=f"{verdict.id}: {_OPTIMISTIC}: {_shown(verdict)}")
+        FileWarning(line=None, message=f"{verdict.id}: {phrases.optimistic_limit(_shown(verdict))}")
         for verdict in rows
         if verdict.id not in known and verdict.verdict == "optimistic"
     )
     if verified.doubt:
         warnings = (FileWarning(line=None, message=verified.doubt), *warnings)
+    images = (phrases.images_formed(verified.conditions),) if verified.conditions else ()
     return findings._replace(
         rows=judged,
         warnings=(*findings.warnings, *warnings),
-        notes=(*findings.notes, f"images: {verified.conditions}") if verified.conditions else findings.notes,
+        notes=(*findings.notes, *images),
         verdicts=rows,
         is_unverified=bool(verified.doubt),
     )
@@ -41,20 +42,19 @@ def with_verdicts(findings: MissionFindings, verified: VerifiedMission) -> Missi
 def _with_verdict(row: Row, verdict: Verdict) -> Row:
     refuted = row.refuted
     if verdict.verdict == "optimistic":
-        refuted = (*refuted, f"{_OPTIMISTIC}: {_shown(verdict)}")
+        refuted = (*refuted, phrases.optimistic_limit(_shown(verdict)))
     if verdict.verdict_autofocus == "optimistic":
-        refuted = (*refuted, f"{_OPTIMISTIC} with autofocus: {verdict.reason_autofocus}")
+        refuted = (*refuted, phrases.optimistic_limit_with_autofocus(str(verdict.reason_autofocus)))
         if row.status == "pass_with_autofocus":
-            reason = "passes only with autofocus, and the image at that limit shows that autofocus fails"
-            return row._replace(status="warn", reason=reason, refuted=refuted)
+            return row._replace(status="warn", reason=phrases.autofocus_refuted(), refuted=refuted)
     if row.metric == "location_error" and row.status == "pass" and verdict.verdict == "optimistic":
-        return row._replace(status="warn", reason="the image is not where the gating model puts it", refuted=refuted)
+        return row._replace(status="warn", reason=phrases.location_refuted(), refuted=refuted)
     excess = _excess(verdict)
     if (
         row.status in ("pass", "pass_with_autofocus")
         and (row.utilization or 0.0) * excess > 1 + UTILIZATION_TOLERANCE
     ):
-        reason = f"inside the limit, but {(row.utilization or 0.0) * excess:.3g} times what the image allows"
+        reason = phrases.limit_refuted((row.utilization or 0.0) * excess)
         return row._replace(status="warn", reason=reason, refuted=refuted)
     return row._replace(refuted=refuted)
 

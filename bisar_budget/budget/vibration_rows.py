@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 from typing import NamedTuple
 
+from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.vibration_limits import VibrationLimits, echo_level, slow_limits, vibration_limits
 from bisar_budget.budget.judgement import judged
@@ -19,7 +20,8 @@ from bisar_budget.effects.vibration_lines import Line, counted, lines_of, projec
 from bisar_budget.faults import KeyPath
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.model import Mission, MotionError
-from bisar_budget.units import format_limit, format_quantity
+from bisar_budget.phrases import NOTHING, Note
+from bisar_budget.units import format_quantity
 
 ECHO_CYCLES = 3.0  # per aperture; below, echoes lie beside the mainlobe and the motion is a quadratic phase as well
 
@@ -40,12 +42,12 @@ class VibrationCase(NamedTuple):
     limits: VibrationLimits | None
     path: KeyPath
     equation: str
-    missing: str
-    not_evaluated: str
-    doubt: str
-    over: str
+    missing: Note
+    not_evaluated: Note
+    doubt: Note
+    over: Note
     evidence: str | None
-    notes: tuple[str, ...]
+    notes: tuple[Note, ...]
     qpe: float | None = None
     cubic: float | None = None
     islr_db: float | None = None
@@ -82,11 +84,11 @@ def _slow_row(mission: Mission, allocation: Allocation, name: str, index: int, l
     limits = slow_limits(mission, allocation, name, cycles)
     limit = allocation.qpe_limit(name) * gain
     if limits.binding == CUBIC:
-        allowed = format_limit(mission.requirements.cubic_phase_error or 0.0, "rad")
-        over = f"cubic phase {cubic:.3g} rad in the worst phase, {allowed} allowed; autofocus gain does not apply"
+        over = phrases.slow_cubic_phase_over(cubic, mission.requirements.cubic_phase_error or 0.0)
     else:
-        needed = needed_sentence(allocation.n_pull_needed(qpe, name), caps(mission)) if qpe > limit else ""
-        over = f"QPE {qpe:.3g} rad in the worst phase, {format_limit(limit, 'rad')} allowed; {needed}"
+        over = phrases.slow_quadratic_phase_over(qpe, limit)
+        if qpe > limit:
+            over = over.then(needed_sentence(allocation.n_pull_needed(qpe, name), caps(mission)))
     use = line.amplitude / limits.smallest
     row = judged(
         mission,
@@ -99,15 +101,14 @@ def _slow_row(mission: Mission, allocation: Allocation, name: str, index: int, l
         equation="first principles",
         gain=qpe / (limit / gain) / use if use else 1.0,  # a cubic phase has none
         over=over,
-        info="" if combine == "each" else f"combine is {combine}: the aggregate decides",
+        info=NOTHING if combine == "each" else phrases.aggregate_decides(combine),
         limits=(limits.quadratic, limits.quadratic),
         qpe=qpe,
         qpe_full=qpe,
         evidence=error.source,
         notes=(
             *projected(mission, error.vibration.sinusoidal[index].amplitude, error, line.amplitude),
-            f"{cycles:.2g} cycles per aperture: below one a vibration makes no echoes but, in its worst phase, a "
-            f"quadratic phase of {qpe:.3g} rad or a cubic phase of {cubic:.3g} rad",
+            phrases.slower_than_a_cycle(cycles, qpe, cubic),
         ),
     )
     return row._replace(binding_requirement=limits.binding, cubic_rad=cubic)
@@ -154,7 +155,7 @@ def _case(
     case = _blank(subject(name, "vibration", axis, entry=entry), metric, path, mission.allocation.model)
     if allowed is None and error.source is None:
         return case
-    missing = "" if allowed else case.missing
+    missing = NOTHING if allowed else case.missing
     return case._replace(
         limits=allowed, missing=missing, not_evaluated=missing, evidence=error.source, notes=_margin(allowed)
     )
@@ -163,8 +164,8 @@ def _case(
 @cache
 def _blank(what_it_is: Subject, metric: str, path: KeyPath, model: str) -> VibrationCase:
     """The row of a mission that says nothing of vibration."""
-    what, kind = ("paired echoes", "sinusoidal") if metric == "pslr" else ("power spread", "wideband")
-    missing = f"no requirements.{metric} to hold it to"
+    kind = "sinusoidal" if metric == "pslr" else "wideband"
+    missing = phrases.no_requirement_of(metric)
     rule = f"Section V, {kind}" if model == "published" else "first principles"
     return VibrationCase(
         subject=what_it_is,
@@ -175,8 +176,8 @@ def _blank(what_it_is: Subject, metric: str, path: KeyPath, model: str) -> Vibra
         equation=rule,
         missing=missing,
         not_evaluated=missing,
-        doubt="",
-        over=f"{what} above the platform's share of {metric.upper()} ({rule})",
+        doubt=NOTHING,
+        over=phrases.share_of_power_over(metric, rule),
         evidence=None,
         notes=(),
     )
@@ -203,17 +204,12 @@ def _line(
         return case._replace(notes=(*notes, *both.notes), doubt=case.doubt or both.doubt)
     qpe, cubic = phase * quadratic_part(cycles), phase * cubic_part(cycles)
     limit = allocation.qpe_limit(name) * allocation.autofocus_gain
-    worst = f"in the worst phase a quadratic phase error of {qpe:.3g} rad, {format_limit(limit, 'rad')} allowed"
-    or_cubic = f"or a cubic of {cubic:.3g} rad"
     allowed_cubic = mission.requirements.cubic_phase_error
-    if allowed_cubic is not None:
-        or_cubic += f", {format_limit(allowed_cubic, 'rad')} allowed"
-    notes.append(
-        f"{cycles:.3g} cycles per aperture: below three it also is {worst}, {or_cubic}; "
-        "it is the same motion, so no sum counts it"
-    )
+    notes.append(phrases.slower_than_three_cycles(cycles, qpe, limit, cubic, allowed_cubic))
     breaks_cubic = allowed_cubic is not None and cubic > allowed_cubic * (1 + UTILIZATION_TOLERANCE)
-    doubt = f"also {worst}, {or_cubic}" if breaks_cubic or qpe > limit * (1 + UTILIZATION_TOLERANCE) else ""
+    doubt = NOTHING
+    if breaks_cubic or qpe > limit * (1 + UTILIZATION_TOLERANCE):
+        doubt = phrases.phase_of_vibration_over(qpe, limit, cubic, allowed_cubic)
     return case._replace(notes=(*notes, *both.notes), doubt=case.doubt or doubt or both.doubt, qpe=qpe, cubic=cubic)
 
 
@@ -230,10 +226,7 @@ def _together(
     shown = ", ".join(map(str, numbers[:5])) + (f" and {len(numbers) - 5} more" if len(numbers) > 5 else "")
     case = _case(mission, allowed, "pslr", name, "sinusoidal.sum", index, numbers[0], "frequency")
     declared = worst_phases([line.amplitude for line in members], [line.frequency * T for line in members]).amplitude
-    near = (
-        f"entries {shown}, at {_band(members)}, are at most {NEAR_CYCLES:g} cycles per aperture apart: in the worst "
-        f"phases their echoes together are as high as that of one vibration of {format_quantity(declared, 'm')}"
-    )
+    near = phrases.lines_together(shown, _band(members), NEAR_CYCLES, declared)
     return _with_doubt(case._replace(declared=declared, notes=(near, *case.notes)), mission)
 
 
@@ -261,14 +254,13 @@ def islr_db(variance: float) -> float | None:
     return 10 / math.log(10) * (variance + math.log(-math.expm1(-variance)))  # without exp(σ²), which overflows
 
 
-def _margin(allowed: VibrationLimits | None) -> tuple[str, ...]:
+def _margin(allowed: VibrationLimits | None) -> tuple[Note, ...]:
     """How far the published rule stays inside first principles, said of every limit."""
     if allowed is None:
         return ()
     if abs(allowed.margin_db) < 0.005:
-        return ("the published rule is that of first principles, to 0.01 dB",)
-    side = "inside" if allowed.margin_db >= 0 else "beyond"
-    return (f"the published rule is {abs(allowed.margin_db):.2f} dB {side} first principles",)
+        return (phrases.published_rule_is_exact(),)
+    return (phrases.published_rule_is_off(allowed.margin_db),)
 
 
 def _with_doubt(case: VibrationCase, mission: Mission) -> VibrationCase:
@@ -279,13 +271,12 @@ def _with_doubt(case: VibrationCase, mission: Mission) -> VibrationCase:
     other, limit = ("full", case.limits.full) if is_published else ("published", case.limits.published)
     if case.declared <= limit * (1 + UTILIZATION_TOLERANCE):
         return case
-    text = f"the {other} model says fail: {format_quantity(limit, 'm', 3, 'down')} allowed"
-    return case._replace(doubt=text)
+    return case._replace(doubt=phrases.other_model_allows(other, limit, "m"))
 
 
 class _Together(NamedTuple):
-    notes: tuple[str, ...] = ()
-    doubt: str = ""
+    notes: tuple[Note, ...] = ()
+    doubt: Note = NOTHING
 
 
 def _of_both_platforms(mission: Mission, lines: dict[str, list[Line]]) -> dict[tuple[str, int], _Together]:
@@ -307,10 +298,6 @@ def _of_both_platforms(mission: Mission, lines: dict[str, list[Line]]) -> dict[t
         level = 20 * math.log10(echo_level(min(phase, _LARGEST)))
         for (name, index), _ in members:
             (other,) = (platform for platform in PLATFORMS if platform != name)
-            text = (
-                f"the {other} vibrates at most {NEAR_CYCLES:g} cycles per aperture from this frequency too: in the "
-                f"worst phases echoes of both together are {'above ' if phase > _LARGEST else ''}{level:.1f} dB, "
-                f"{requirement:g} dB required"
-            )
-            found[name, index] = _Together((text,), text if level > requirement + 1e-6 else "")
+            note = phrases.both_platforms_vibrate(other, NEAR_CYCLES, level, phase > _LARGEST, requirement)
+            found[name, index] = _Together((note,), note if level > requirement + 1e-6 else NOTHING)
     return found

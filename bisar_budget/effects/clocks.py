@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from bisar_budget import phrases
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.effects.random_errors import RandomEffect, RandomError
@@ -12,9 +13,7 @@ from bisar_budget.effects.subject import subject
 from bisar_budget.effects.tones import Parts, held
 from bisar_budget.mission.instruments import Oscillator, Synchronization
 from bisar_budget.mission.model import Mission
-from bisar_budget.units import format_quantity
 
-_DIRECT = "the direct path is the receiver's clock: oscillators drop out"
 _MISFIT = 0.2  # of an Allan deviation, from where a power law does not describe it
 
 
@@ -32,12 +31,13 @@ def clock_noise(mission: Mission) -> Iterator[RandomError]:
 def _of_oscillator(mission: Mission, name: str, oscillator: Oscillator, sync: Synchronization | None) -> RandomError:
     T, factor = mission.collection.aperture_time, mission.allocation.coverage_factor
     noise = noise_of(oscillator, mission.radar.center_frequency, T)
-    notes, no_limit, warning = list(filter(None, (noise.extrapolated, *noise.notes))), "no phase noise", ""
+    notes = [note for note in (noise.extrapolated, *noise.notes) if note]
+    no_limit, warning = phrases.no_phase_noise(), ""
     if sync is not None and sync.is_direct_path:
-        found, no_limit, notes = Parts(0.0, 0.0, 0.0), _DIRECT, []
+        found, no_limit, notes = Parts(0.0, 0.0, 0.0), phrases.oscillators_drop_out(), []
     else:
         if sync is not None and sync.interval is not None:
-            notes.append(f"only what synchronisation every {format_quantity(sync.interval, 's')} leaves of it counts")
+            notes.append(phrases.left_by_exchanges(sync.interval))
             found = synchronized_parts(noise.pieces, T, sync.interval)
         else:
             found = parts(noise.pieces, T)
@@ -47,7 +47,7 @@ def _of_oscillator(mission: Mission, name: str, oscillator: Oscillator, sync: Sy
             f"{'.'.join(key)}: no power law fits the Allan deviation; the fit is off by {100 * noise.misfit:.3g} %"
         )
     elif noise.misfit > 0.005:
-        notes.append(f"the power law fits the Allan deviation to {100 * noise.misfit:.2g} %")
+        notes.append(phrases.power_law_fits(noise.misfit))
     quadratic, cubic, spread = map(math.sqrt, found)
     effect = RandomEffect(quadratic * factor, cubic * factor, spread)
     return RandomError(
@@ -70,9 +70,9 @@ def _of_link(mission: Mission, sync: Synchronization) -> RandomError:
     """Each exchange is wrong by an error of its own, and straight lines join them."""
     T, factor = mission.collection.aperture_time, mission.allocation.coverage_factor
     if sync.interval is None:  # from pulse to pulse: all of it spreads
-        found, note = Parts(0.0, 0.0, 1.0), "the error is another one for each pulse: all of it spreads"
+        found, notes = Parts(0.0, 0.0, 1.0), [phrases.another_for_each_pulse()]
     else:
-        found, note = link_parts(T, sync.interval), ""
+        found, notes = link_parts(T, sync.interval), []
     quadratic, cubic, spread = map(math.sqrt, found)
     effect = RandomEffect(quadratic, cubic, spread / factor)
     return RandomError(
@@ -84,7 +84,7 @@ def _of_link(mission: Mission, sync: Synchronization) -> RandomError:
         full=effect,
         equation="synchronisation",
         evidence=sync.source,
-        notes=(note,) if note else (),
+        notes=tuple(notes),
     )
 
 

@@ -6,10 +6,12 @@ full model, is linear in the errors, so the common effect is the sum of the two 
 
 from collections.abc import Iterator, Sequence
 
+from bisar_budget import phrases
 from bisar_budget.constants import ROUNDING
 from bisar_budget.effects.effect import MOTION_UNITS, PLATFORMS, Effect, ErrorSource
 from bisar_budget.effects.subject import subject
 from bisar_budget.mission.model import Mission
+from bisar_budget.phrases import Note
 
 
 def common_sources(mission: Mission, sources: Sequence[ErrorSource]) -> Iterator[ErrorSource]:
@@ -47,7 +49,7 @@ def common_sources(mission: Mission, sources: Sequence[ErrorSource]) -> Iterator
                 equation=f"{legs[0].equation}, both platforms",
                 no_limit=_no_limit(kind, letter),
                 evidence=error.source,
-                notes=("held to the total budget: it belongs to both platforms",),
+                notes=(phrases.held_to_the_total("both platforms"),),
             )
 
 
@@ -60,8 +62,8 @@ def _sum(effects: Sequence[Effect]) -> Effect:
     return Effect._make(total)
 
 
-def _no_limit(kind: str, axis: str) -> str:
+def _no_limit(kind: str, axis: str) -> Note:
     if kind == "position":
-        return "no quadratic term: a position error moves the image (Table I)"
+        return phrases.no_quadratic_term_of_position()
     cause = "velocities" if kind == "velocity" else "lines of sight"
-    return f"no quadratic term: the platforms' {cause} have no component along {axis}, or cancel"
+    return phrases.no_common_component(cause, axis)

@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
+from bisar_budget import phrases
 from bisar_budget.effects.combine import combine_displacements, combine_phases
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource
 from bisar_budget.effects.subject import subject
@@ -15,6 +16,7 @@ from bisar_budget.faults import Place
 from bisar_budget.geometry import FRAME_AXES, GroundVector
 from bisar_budget.mission.model import Mission, MotionError
 from bisar_budget.mission.symmetric import quadratic_form
+from bisar_budget.phrases import Note
 
 
 class Correlated(NamedTuple):
@@ -99,14 +101,11 @@ def combined_displacement(
     return combine_displacements([move for _, move in displacement_parts(moves, rule, groups)], rule)
 
 
-def correlation_notes(rule: str, groups: Sequence[Correlated]) -> tuple[str, ...]:
+def correlation_notes(rule: str, groups: Sequence[Correlated]) -> tuple[Note, ...]:
     """Say what an aggregate makes of covariances."""
     if rule == "rss":
-        return tuple(f"the errors of {group.id} count as one, the root of gᵀCg" for group in groups)
-    return tuple(
-        f"a sum uses no correlations: each error of {group.id} counts with its own sigma, all at their worst"
-        for group in groups
-    )
+        return tuple(phrases.counted_as_one(group.id) for group in groups)
+    return tuple(phrases.correlations_unused(group.id) for group in groups)
 
 
 def unused_correlations(mission: Mission) -> Iterator[tuple[Place | None, str]]:

@@ -7,11 +7,12 @@ counts what the displacement of the image adds (`exact_ranges`).
 import math
 from typing import NamedTuple
 
-from bisar_budget import evaluators
+from bisar_budget import evaluators, phrases
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG
 from bisar_budget.effects.subject import MOTION, Subject
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import BistaticGeometry, GroundVector, Vector, angle_between_lines
+from bisar_budget.phrases import NOTHING, Note
 
 PLATFORMS = ("transmitter", "receiver")
 MOTION_UNITS = dict(zip(MOTION, ("m", "m/s", "m/s^2"), strict=True))
@@ -52,10 +53,10 @@ class ErrorSource(NamedTuple):
     full: Effect
     direction: Vector
     equation: str
-    no_limit: str
+    no_limit: Note
     evidence: str | None = None
     is_independent: bool = True
-    notes: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
 
     @property
     def id(self) -> str:
@@ -92,7 +93,7 @@ class ImagePlane(NamedTuple):
 
     adjugate: tuple[tuple[float, ...], ...]
     determinant: float
-    degeneracy: str
+    degeneracy: Note
 
     @property
     def inverse(self) -> list[list[float]]:
@@ -124,10 +125,7 @@ def image_plane(geometry: BistaticGeometry) -> ImagePlane:
     # (30): the first column holds (-rate_y, rate_x), the second (s_y, -s_x).
     range_gradient, doppler_gradient = (-second[1], first[1]), (second[0], -first[0])
     degrees = math.degrees(angle_between_lines(range_gradient, doppler_gradient))
-    degeneracy = ""
+    degeneracy = NOTHING
     if degrees < MIN_GRADIENT_ANGLE_DEG:
-        degeneracy = (
-            f"(25) has no displacement here: with the range held constant, range and Doppler gradients are "
-            f"{degrees:.2g} deg from parallel"
-        )
+        degeneracy = phrases.no_displacement(degrees)
     return ImagePlane((first, second), determinant, degeneracy)

@@ -22,6 +22,7 @@ from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
 from bisar_budget.effects.effect import CLOCK_UNITS, PLATFORMS, Effect, ErrorSource, ImagePlane
 from bisar_budget.evaluators import LEGENDRE_FITS, direct_motion, full_ground_inverse, full_motion
 from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vector
+from bisar_budget.phrases import NOTHING
 
 # Way of a platform in half an aperture, over its slant range, up to which so many nodes change phases by less than
 # 1e-6 of themselves; beyond the last, 16 nodes are right to 1e-3 at 1.25.
@@ -152,7 +153,7 @@ class ExactRanges:
         (s_x, rate_x, *_), (s_y, rate_y, *_) = self._gradient
         rate_x, rate_y = rate_x / self.half, rate_y / self.half
         first, second, (determinant,) = full_ground_inverse(s_x, s_y, rate_x, rate_y)
-        return ImagePlane((first, second), determinant, "")
+        return ImagePlane((first, second), determinant, NOTHING)
 
     @cached_property
     def phases_per_term(self) -> tuple[tuple[float, float], tuple[float, float]]:

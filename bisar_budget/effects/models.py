@@ -8,11 +8,12 @@ has two signs and a bound covers both, so that phases and allowables are those o
 import math
 from typing import NamedTuple
 
-from bisar_budget import evaluators
+from bisar_budget import evaluators, phrases
 from bisar_budget.effects.effect import PLATFORMS, Effect, ErrorSource, ImagePlane, image_plane
 from bisar_budget.effects.exact_ranges import ExactPhases, ExactRanges
 from bisar_budget.effects.point_path import PointPath, Value
 from bisar_budget.geometry import BistaticGeometry, GroundVector
+from bisar_budget.phrases import Note
 
 QUADRATIC, CUBIC, LOCATION = "quadratic_phase_error", "cubic_phase_error", "location_error"
 
@@ -70,7 +71,7 @@ class PublishedModel:
         """Where it comes from."""
         return source.equation
 
-    def no_limit(self, source: ErrorSource) -> str:
+    def no_limit(self, source: ErrorSource) -> Note:
         """Say why an error has no limit from its quadratic phase."""
         return source.no_limit
 
@@ -127,15 +128,11 @@ class FullModel:
         """Where it comes from."""
         return "full model" if source.is_motion else source.equation
 
-    def no_limit(self, source: ErrorSource) -> str:
+    def no_limit(self, source: ErrorSource) -> Note:
         """Say why an error has no limit from its quadratic phase."""
         if self.is_heard_out(source):
-            return "the direct path is the clock: a timing error has no effect"
-        return (
-            "no error up to a tenth of the slant range reaches the limit"
-            if source.is_motion
-            else "no quadratic phase"
-        )
+            return phrases.clock_is_heard()
+        return phrases.no_size_reaches_the_limit() if source.is_motion else phrases.no_quadratic_phase()
 
     def small(self, source: ErrorSource, requirement: str, limit: float) -> float:
         """Size at which an error would reach a limit, were its effects those of a small one; infinite: never."""

@@ -5,9 +5,10 @@ from collections.abc import Sequence
 from itertools import combinations, pairwise
 from typing import NamedTuple
 
-from bisar_budget import evaluators
+from bisar_budget import evaluators, phrases
 from bisar_budget.effects.spectra import Piece
 from bisar_budget.mission.instruments import Oscillator, PowerLaw
+from bisar_budget.phrases import NOTHING, Note
 
 _EXACT, _DESCRIBES = 1e-6, 0.01  # misfits of an Allan deviation: nothing, and so little that no term is added
 _STEEPEST, _LEAST_STEEP = 4.0, 3.0  # slopes of a mask below its first point
@@ -17,8 +18,8 @@ class Noise(NamedTuple):
     """Phase noise of an oscillator at the radar's centre frequency, and what was assumed to get it."""
 
     pieces: tuple[Piece, ...]
-    notes: tuple[str, ...] = ()
-    extrapolated: str = ""  # how it goes on beyond what is stated
+    notes: tuple[Note, ...] = ()
+    extrapolated: Note = NOTHING  # how it goes on beyond what is stated
     misfit: float = 0.0  # of a power law to an Allan deviation, the worst point's
 
 
@@ -30,17 +31,15 @@ def noise_of(oscillator: Oscillator, center_frequency: float, aperture_time: flo
         return Noise(_of_power_law(oscillator.power_law, center_frequency, oscillator.bandwidth))
     points = oscillator.allan_deviation or ()
     law, misfit = fitted(points, oscillator.bandwidth, aperture_time)
-    notes, beyond, last = [], "", points[-1][0]
+    notes, beyond, last = [], NOTHING, points[-1][0]
     if len(points) == 1:
-        notes.append("one point of an Allan deviation tells no kind of noise: it is the worst for this aperture")
+        notes.append(phrases.one_point_of_allan_deviation())
     if points[0][0] > aperture_time:
-        beyond = (
-            f"the Allan deviation begins at {points[0][0]:g} s; down to the aperture time its power law continues"
-        )
+        beyond = phrases.allan_deviation_begins(points[0][0])
     if last < aperture_time:
-        beyond = f"the Allan deviation ends at {last:g} s; up to the aperture time its power law continues"
+        beyond = phrases.allan_deviation_ends(last)
     if law.flicker_phase:
-        notes.append("an Allan deviation does not tell white from flicker phase noise: flicker is assumed")
+        notes.append(phrases.flicker_is_assumed())
     return Noise(_of_power_law(law, center_frequency, oscillator.bandwidth), tuple(notes), beyond, misfit)
 
 
@@ -56,9 +55,9 @@ def _of_mask(oscillator: Oscillator, center_frequency: float, aperture_time: flo
     slope = min(_STEEPEST, max(_LEAST_STEEP, pieces[0].slope))
     pieces.insert(0, Piece(0.0, min(first, oscillator.bandwidth), density * first**slope, slope))
     # The quadratic phase is made of tones of about a cycle per aperture.
-    below = ""
+    below = NOTHING
     if first * aperture_time > 0.5:
-        below = f"the mask begins at {first:g} Hz; below, it continues as f^-{slope:.3g}"
+        below = phrases.mask_begins(first, slope)
     return Noise(tuple(piece for piece in pieces if piece.low < piece.high), extrapolated=below)
 
 

@@ -13,7 +13,7 @@ from functools import cache
 from operator import mul
 from typing import NamedTuple
 
-from bisar_budget import evaluators
+from bisar_budget import evaluators, phrases
 from bisar_budget.constants import ROUNDING, STANDARD_GRAVITY
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.exact_ranges import ExactRanges
@@ -24,6 +24,7 @@ from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import BistaticGeometry, PlatformState, Vector, dot
 from bisar_budget.mission.instruments import IMU_KINDS, GaussMarkov, Imu
 from bisar_budget.mission.model import Mission, MotionError
+from bisar_budget.phrases import NOTHING, Note
 
 IMU_UNITS = dict(zip(IMU_KINDS, ("m/s^2", "rad", "rad/s", "m/s/sqrt(s)", "rad/sqrt(s)"), strict=True))
 _BY_GRAVITY = ("attitude", "gyro_bias", "angle_random_walk")
@@ -60,9 +61,9 @@ class RandomError(NamedTuple):
     full: RandomEffect
     equation: str
     evidence: str | None
-    no_limit: str = "no quadratic phase, no cubic phase and nothing that spreads"
-    notes: tuple[str, ...] = ()
-    extrapolated: str = ""
+    no_limit: Note = phrases.nothing_spreads()
+    notes: tuple[Note, ...] = ()
+    extrapolated: Note = NOTHING
     warning: str = ""
 
     @property
@@ -139,7 +140,7 @@ def _of_imu(mission: Mission, name: str, state: PlatformState, exact: ExactRange
             full=RandomEffect(quadratic, cubic, heard[2] / factor, covariance),
             equation="inertial sensor",
             evidence=(imu.source if key == kind else None) or error.evidence(kind),
-            no_limit="the line of sight has no part in it: no phase",
+            no_limit=phrases.across_the_line_of_sight(),
         )
 
 
@@ -224,7 +225,7 @@ def _of_position(mission: Mission, name: str, state: PlatformState) -> Iterator[
             full=full,
             equation="Gauss-Markov",
             evidence=process.source or error.evidence("random"),
-            no_limit="the line of sight has no part in it: no phase",
+            no_limit=phrases.across_the_line_of_sight(),
         )
 
 

@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterator
 from functools import cache
 
-from bisar_budget import evaluators
+from bisar_budget import evaluators, phrases
 from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
 from bisar_budget.effects.common import common_sources
 from bisar_budget.effects.effect import (
@@ -24,6 +24,7 @@ from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, PlatformState, Vector
 from bisar_budget.mission.model import Mission, MotionError
+from bisar_budget.phrases import NOTHING, Note
 
 _AXES: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -107,7 +108,7 @@ def _motion(mission: Mission, name: str, state: PlatformState, full_effects: lis
 
 
 @cache
-def _scene_axes(name: str, kind: str) -> tuple[tuple[Subject, KeyPath, str, str], ...]:
+def _scene_axes(name: str, kind: str) -> tuple[tuple[Subject, KeyPath, str, Note], ...]:
     """Subject, path in the file, equation and reason for no limit, along each axis of the scene."""
     return tuple(
         (
@@ -152,12 +153,12 @@ def _equation(kind: str, axis: int | None) -> str:
     return f"Table II rows {first}-{first + 2}" if axis is None else f"Table II row {first + axis}"
 
 
-def _no_limit(kind: str, axis: str) -> str:
+def _no_limit(kind: str, axis: str) -> Note:
     """Say why an error has no QPE limit, for the case that it has none."""
     if kind == "position":
-        return "no quadratic term: a position error moves the image (Table I)"
+        return phrases.no_quadratic_term_of_position()
     cause = "velocity" if kind == "velocity" else "line of sight"
-    return f"no quadratic term: the platform's {cause} has no component along {axis}"
+    return phrases.no_component(cause, axis)
 
 
 def _clock(mission: Mission, full_effects: list[Effect]) -> Iterator[ErrorSource]:
@@ -173,7 +174,7 @@ def _clock(mission: Mission, full_effects: list[Effect]) -> Iterator[ErrorSource
             full=full,
             direction=NOWHERE,
             equation="Table I row 1, step of Table II" if term == "quadratic" else "Table I row 1",
-            no_limit=f"no quadratic term: the clock's {term} term has another order (Table I row 1)",
+            no_limit=phrases.no_quadratic_term_of_clock(term),
         )
 
 
@@ -193,8 +194,8 @@ def _terrain(mission: Mission, sources: list[ErrorSource]) -> Iterator[ErrorSour
         full=Effect._make(map(sum, zip(*(source.full for source in up), strict=True))),
         direction=_AXES[2],
         equation="full model",
-        no_limit="no quadratic term: to the published model a height error moves the image",
-        notes=("held to the total budget: it belongs to no platform",),
+        no_limit=phrases.no_quadratic_term_of_height(),
+        notes=(phrases.held_to_the_total("no platform"),),
     )
 
 
@@ -209,7 +210,7 @@ def _other(mission: Mission) -> Iterator[ErrorSource]:
             full=Effect(constant=0.0, linear=0.0, qpe=1.0, cubic=0.0),
             direction=NOWHERE,
             equation="as declared",
-            no_limit="",
+            no_limit=NOTHING,
             evidence=other.source,
-            notes=("held to the total budget: it belongs to no platform",),
+            notes=(phrases.held_to_the_total("no platform"),),
         )

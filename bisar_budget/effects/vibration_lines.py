@@ -7,9 +7,11 @@ changes of that.
 import math
 from typing import NamedTuple
 
+from bisar_budget import phrases
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.geometry import FRAME_AXES, PlatformState, Vector, dot, without_rounding
 from bisar_budget.mission.model import Mission, MotionError
+from bisar_budget.phrases import Note
 from bisar_budget.units import format_quantity
 
 
@@ -56,18 +58,15 @@ def lines_of(mission: Mission, name: str) -> list[Line]:
     return [Line(counted(mission, name, line.amplitude, "pslr"), line.frequency) for line in lines]
 
 
-def projected(mission: Mission, value: float | Vector, error: MotionError, along: float) -> tuple[str, ...]:
+def projected(mission: Mission, value: float | Vector, error: MotionError, along: float) -> tuple[Note, ...]:
     """Say of a vibration along three axes what is along the line of sight; nothing of one that is.
 
     With a direct path say of either what is left in the range less the direct path.
     """
-    counts = f"{format_quantity(along, 'm')} of it in the range less the direct path"
     if not isinstance(value, tuple):
         stated = f"{format_quantity(value, 'm')} along the line of sight"
-        return (f"{stated}: {counts}",) if mission.has_direct_path else ()
-    if not mission.has_direct_path:
-        counts = f"{format_quantity(along, 'm')} of it along the line of sight"
+        return (phrases.seen_of_vibration(stated, along, True),) if mission.has_direct_path else ()
     axes = ", ".join(
         f"{axis} {format_quantity(part, 'm')}" for axis, part in zip(FRAME_AXES[error.frame], value, strict=True)
     )
-    return (f"{axes}: {counts}",)
+    return (phrases.seen_of_vibration(axes, along, mission.has_direct_path),)

@@ -9,6 +9,7 @@ from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUSES, worst
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Document, Mission
+from bisar_budget.phrases import Note
 
 if TYPE_CHECKING:
     from bisar_budget.analysis.analysis import Analysis
@@ -55,7 +56,7 @@ class MissionFindings(NamedTuple):
     allocation: Allocation
     rows: tuple[Row, ...]
     warnings: tuple[FileWarning, ...]
-    notes: tuple[str, ...]
+    notes: tuple[Note, ...]
     scene: "SceneEdge | None" = None  # of missions with a scene.radius and declared errors
     verdicts: "tuple[Verdict, ...] | None" = None  # of images, if any were formed
     is_unverified: bool = False  # images were asked for, and none gave a verdict

@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+from bisar_budget.phrases import Note
+
 
 class Requirement(NamedTuple):
     """How often one requirement holds.
@@ -44,4 +46,4 @@ class MonteCarlo(NamedTuple):
     probability_low: float | None
     probability_high: float | None
     is_exact: bool
-    notes: tuple[str, ...]
+    notes: tuple[Note, ...]

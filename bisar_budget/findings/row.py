@@ -4,9 +4,11 @@ from collections.abc import Sequence
 from datetime import date
 from typing import NamedTuple
 
+from bisar_budget import phrases
 from bisar_budget.effects.subject import Subject
 from bisar_budget.findings.status import RANK
 from bisar_budget.geometry import GroundVector
+from bisar_budget.phrases import Note
 
 
 class AppliedWaiver(NamedTuple):
@@ -18,9 +20,9 @@ class AppliedWaiver(NamedTuple):
     is_expired: bool
 
     @property
-    def words(self) -> str:
+    def words(self) -> Note:
         """The waiver in a sentence."""
-        return f"{'expired ' if self.is_expired else ''}waiver of line {self.line}, until {self.until}: {self.reason}"
+        return phrases.waived(*self)
 
 
 class Row(NamedTuple):
@@ -49,8 +51,8 @@ class Row(NamedTuple):
     margin: float | None
     status: str
     line: int | None
-    reason: str | None
-    remarks: tuple[str, ...]
+    reason: Note | None
+    remarks: tuple[Note, ...]
     equation: str
     requirement_id: str | None
     evidence: str | None
@@ -62,7 +64,7 @@ class Row(NamedTuple):
     islr_db: float | None = None
     model: str | None = None
     waivers: tuple[AppliedWaiver, ...] = ()
-    refuted: tuple[str, ...] = ()
+    refuted: tuple[Note, ...] = ()
 
     @property
     def id(self) -> str:
@@ -75,13 +77,13 @@ class Row(NamedTuple):
         return self.subject.owner
 
     @property
-    def decisive(self) -> tuple[str, ...]:
+    def decisive(self) -> tuple[Note, ...]:
         """What decides its status: the reason, waivers, and what images say against its limit."""
         reason = (self.reason,) if self.reason else ()
         return (*reason, *(waiver.words for waiver in self.waivers), *self.refuted)
 
     @property
-    def notes(self) -> tuple[str, ...]:
+    def notes(self) -> tuple[Note, ...]:
         """All there is to say besides the reason."""
         if not (self.waivers or self.refuted):
             return self.remarks

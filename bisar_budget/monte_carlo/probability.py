@@ -13,6 +13,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.together import Together
@@ -23,6 +24,7 @@ from bisar_budget.findings.monte_carlo import MonteCarlo, Requirement
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
 from bisar_budget.mission.symmetric import eigensystem
 from bisar_budget.monte_carlo.draws import Judged, Variable, count
+from bisar_budget.phrases import Note
 
 if TYPE_CHECKING:
     from bisar_budget.effects.random_errors import RandomError
@@ -290,21 +292,21 @@ def _doubts(found: Requirement, holds: int, draws: int, predictions: _Prediction
         )
 
 
-def _notes(mission: Mission, declared: Sequence[ErrorSource], is_exact: bool) -> Iterator[str]:
+def _notes(mission: Mission, declared: Sequence[ErrorSource], is_exact: bool) -> Iterator[Note]:
     """Say what is drawn by a rule of ours, and what is not drawn."""
     if is_exact:
-        yield "every draw goes through exact ranges: the declared errors are too large for sums of their effects"
+        yield phrases.drawn_through_exact_ranges()
     if mission.gating_model != "full":
-        yield f"drawn by the full model; the rows are judged by allocation.model, {mission.gating_model}"
+        yield phrases.drawn_by_the_full_model(mission.gating_model)
     if mission.allocation.combine == "each":
-        yield "a draw is the sum of all errors at once; the rows are judged one by one, allocation.combine being each"
+        yield phrases.drawn_all_at_once()
     bounds = [source.id for source in declared if source.owner == "mission" and not source.is_common]
     if bounds:
-        yield f"{', '.join(bounds)}: drawn as plus or minus the declared value, which has no distribution"
+        yield phrases.drawn_as_bounds(bounds)
     vibrations = [getattr(mission.platforms, name).motion_error.vibration for name in PLATFORMS]
     if any(one.sinusoidal or one.wideband for one in vibrations):
-        yield "vibration is not drawn; the phase of a slow vibration is not included"
+        yield phrases.vibration_is_not_drawn()
     if mission.requirements.islr is not None and has_instruments(mission):
-        yield "what sensors and clocks spread is a mean power: ISLR is not drawn"
+        yield phrases.mean_power_is_not_drawn()
     if mission.allocation.coverage_factor != 1:
-        yield "the coverage factor is in sum and rss, not in the draws"
+        yield phrases.drawn_without_coverage()

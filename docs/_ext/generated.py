@@ -26,6 +26,7 @@ from bisar_budget.catalogue import SYMBOLS
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission import readers
 from bisar_budget.mission.model import MISSION
+from bisar_budget.phrases import CODES
 from bisar_budget.report import FORMATS
 from bisar_budget.units import DIMENSIONS
 
@@ -405,6 +406,13 @@ def symbols(directive: Generated) -> str:
     )
 
 
+def note_codes(_: Generated) -> str:
+    """Codes of what findings say, with what each is said of."""
+    return table(
+        ("code", "said"), [(f"`{code}`", said[0].lower() + said[1:]) for code, said in sorted(CODES.items())]
+    )
+
+
 def rooms(_: Generated) -> str:
     """The rooms of the package from the lowest floor up, with the first line of what each says of itself."""
     structure = ast.parse((ROOT / "tests" / "house" / "test_structure.py").read_text(encoding="utf-8"))
@@ -426,6 +434,7 @@ DIRECTIVES = {
     "statuses": statuses,
     "formats": formats,
     "json-keys": json_keys,
+    "note-codes": note_codes,
     "mission-keys": mission_keys,
     "units": units,
     "finding": finding,

@@ -136,10 +136,14 @@ def _mission(mission: MissionFindings) -> dict[str, Any]:
 
 
 def _row(row: Row) -> dict[str, Any]:
-    found = dict(zip(_ROW, row, strict=False))
-    found["id"] = row.id
-    if row.waivers or row.refuted:
-        found["notes"] = row.notes
+    found: dict[str, Any] = dict(zip(_ROW, row, strict=False))
+    notes = row.notes
+    found |= {
+        "id": row.id,
+        "notes": notes,
+        "reason_code": None if row.reason is None else row.reason.code,
+        "note_codes": [note.code for note in notes],
+    }
     return found
 
 

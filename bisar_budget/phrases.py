@@ -1,0 +1,709 @@
+"""Every sentence that a finding may carry, in one place: a note is data, and its words are written here.
+
+A function writes one sentence. Its name is the note's code, its arguments are what the note is made of: numbers in SI
+and radians, ids of rows, names. What ends in a colon or begins with one goes on with what another sentence says.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from datetime import date
+from functools import wraps
+from typing import ParamSpec
+
+from bisar_budget.units import format_limit, format_quantity
+
+P = ParamSpec("P")
+
+
+class Note(str):
+    """A sentence as data: `code` names it, `values` are the numbers, ids and names that it is made of."""
+
+    __slots__ = ("code", "values")
+    code: str
+    values: tuple[object, ...]
+
+    def __new__(cls, text: str, code: str = "", values: tuple[object, ...] = ()) -> "Note":
+        """Attach what a sentence is made of to its words."""
+        note = super().__new__(cls, text)
+        note.code, note.values = code, values
+        return note
+
+    def then(self, *more: str) -> "Note":
+        """Add what else there is to say, after semicolons; nothing of what is empty."""
+        return Note("; ".join(filter(None, (self, *more))), self.code, (*self.values, *filter(None, more)))
+
+
+NOTHING = Note("")
+CODES: dict[str, str] = {}  # of every sentence, with what it is said of
+_NO_GAIN = "autofocus gain does not apply"
+
+
+def _phrase(sentence: Callable[P, str]) -> Callable[P, Note]:
+    code = sentence.__name__.replace("_", "-")
+    CODES[code] = sentence.__doc__ or ""
+
+    @wraps(sentence)
+    def written(*args: P.args, **kwargs: P.kwargs) -> Note:
+        return Note(sentence(*args, **kwargs), code, (*args, *kwargs.values()))
+
+    return written
+
+
+def _size(size: float, unit: str) -> str:
+    """Metres with a prefix, as everywhere; phases in radians, to be compared with π/4."""
+    if not math.isfinite(size):
+        return "without a value (no ground point has this range history)"
+    return format_quantity(size, unit) if unit == "m" else f"{abs(size):.3g} {unit}"
+
+
+def _level(db: float, rounding: str = "nearest") -> str:
+    return format_quantity(db, "dB", 3, rounding)
+
+
+# ---------------------------------------------------------------------- how a row stands
+@_phrase
+def over_the_limit_without_autofocus(times: float) -> str:
+    """Of a row that passes with autofocus."""
+    return f"{times:.3g} times the limit without autofocus"
+
+
+@_phrase
+def near_the_limit_with_autofocus(utilization: float) -> str:
+    """Of a row that passes with autofocus."""
+    return f"uses {100 * utilization:.3g} % of the limit with autofocus"
+
+
+@_phrase
+def above_warn_above(warn_above: float) -> str:
+    """Of a row that passes."""
+    return f"above {100 * warn_above:g} % of the limit"
+
+
+@_phrase
+def aggregate_decides(combine: str) -> str:
+    """Of a single error under a sum."""
+    return f"combine is {combine}: the aggregate decides"
+
+
+@_phrase
+def stated_along_other_axes(axes: Sequence[str]) -> str:
+    """Of rows along the scene's axes."""
+    return f"the file states this error along other axes ({', '.join(axes)}): those rows decide"
+
+
+@_phrase
+def no_requirement() -> str:
+    """Of an aggregate that nothing is asked of."""
+    return "no requirement in the file: computed, not judged"
+
+
+@_phrase
+def no_requirement_of(metric: str) -> str:
+    """Of a vibration, or a tone."""
+    return f"no requirements.{metric} to hold it to"
+
+
+@_phrase
+def not_declared_as_required(key: str) -> str:
+    """Of an error that the file should declare."""
+    return f"the file has no {key}, which requirements.declare asks for"
+
+
+# ---------------------------------------------------------------------- over the limit
+@_phrase
+def quadratic_phase_over(phase: float, limit: float, equation: str = "") -> str:
+    """Of one error. [rad]"""
+    text = f"QPE {_size(phase, 'rad')}, {format_limit(limit, 'rad')} allowed"
+    return f"{text} ({equation})" if equation else text
+
+
+@_phrase
+def cubic_phase_over(phase: float, limit: float, equation: str = "") -> str:
+    """Of one error. [rad]"""
+    text = f"cubic phase {_size(phase, 'rad')}, {format_limit(limit, 'rad')} allowed"
+    return f"{text} ({equation}); {_NO_GAIN}" if equation else f"{text}; {_NO_GAIN}"
+
+
+@_phrase
+def no_gain() -> str:
+    """Of a cubic phase."""
+    return _NO_GAIN
+
+
+@_phrase
+def location_over(moved: float | None, limit: float, equation: str) -> str:
+    """Of one error; None: there is no image of it. [m]"""
+    where = "out of sight" if moved is None else f"by {format_quantity(moved, 'm')}"
+    return f"moves the image {where}, {format_limit(limit, 'm')} allowed ({equation})"
+
+
+@_phrase
+def aggregate_over(
+    what: str, size: float, limit: float, unit: str, row_id: str, largest: float, extrapolated: str = ""
+) -> str:
+    """Of errors together: how large, what is allowed, and which is the largest, with what that rests on."""
+    text = (
+        f"{what} {_size(size, unit)}, {format_limit(limit, unit)} allowed; largest: {row_id}, "
+        f"{_size(abs(largest), unit)}"
+    )
+    return f"{text} ({extrapolated})" if extrapolated else text
+
+
+@_phrase
+def one_total() -> str:
+    """Of a sum beyond the pull-in range."""
+    return "autofocus corrects one total, not each error separately"
+
+
+@_phrase
+def all_together_over(what: str, size: float, limit: float, unit: str) -> str:
+    """Of errors that are judged one by one."""
+    return (
+        f"each error alone is judged. All declared errors together have a root-sum-square {what} of "
+        f"{_size(size, unit)}, {format_limit(limit, unit)} allowed: combine: rss judges that"
+    )
+
+
+@_phrase
+def edge_over() -> str:
+    """Of the scene's edge."""
+    return "quadratic phase at the scene's edge and at its centre differ by more than the total budget"
+
+
+@_phrase
+def passes_from(n_pull: float) -> str:
+    """Of an error that autofocus could correct."""
+    return f"passes with autofocus from n_pull {n_pull:g}"
+
+
+@_phrase
+def beyond_autofocus(n_pull: str, allowed: str) -> str:
+    """Of an error that no autofocus corrects; rounded numbers, what allows so much before its own."""
+    return f"no autofocus corrects this: N_pull would have to be {n_pull}, {allowed}"
+
+
+# ---------------------------------------------------------------------- what the other model says
+@_phrase
+def other_model_fails(model: str, size: float, limit: float, unit: str, what: str = "", equation: str = "") -> str:
+    """Of a row, or an aggregate, that the gating model passes."""
+    text = f"the {model} model says fail: {what}".rstrip()
+    text = f"{text} {_size(size, unit)}, {format_limit(limit, unit)} allowed"
+    return f"{text} ({equation})" if equation else text
+
+
+@_phrase
+def other_model_is_beyond(model: str, phase: float, limit: float) -> str:
+    """Of the pull-in range. [rad]"""
+    return f"the {model} model says beyond it: QPE {_size(phase, 'rad')}, {format_limit(limit, 'rad')} allowed"
+
+
+@_phrase
+def other_model_allows(model: str, limit: float, unit: str) -> str:
+    """Of a vibration, a tone, or a power."""
+    return f"the {model} model says fail: {format_quantity(limit, unit, 3, 'down')} allowed"
+
+
+@_phrase
+def other_model_spreads(model: str, level_db: float) -> str:
+    """Of noise."""
+    return f"the {model} model says fail: it spreads {_level(level_db)}"
+
+
+@_phrase
+def wrong_height_defocuses() -> str:
+    """Why the full model fails the terrain."""
+    return "a bistatic image defocuses on a wrong height"
+
+
+@_phrase
+def position_defocuses() -> str:
+    """Why the full model fails a position."""
+    return "the line of sight turns over a position error, and its displacement defocuses"
+
+
+@_phrase
+def displacement_defocuses() -> str:
+    """Why the full model fails a clock or another phase."""
+    return "the displaced response has a quadratic phase of its own"
+
+
+@_phrase
+def turning_defocuses() -> str:
+    """Why the full model fails a velocity or an acceleration."""
+    return "the line of sight turns, and the displaced response has a quadratic phase of its own"
+
+
+# ---------------------------------------------------------------------- no limit, no value
+@_phrase
+def no_quadratic_term_of_position() -> str:
+    """Of a position, by the published model."""
+    return "no quadratic term: a position error moves the image (Table I)"
+
+
+@_phrase
+def no_component(cause: str, axis: str) -> str:
+    """Of a velocity or an acceleration, by the published model."""
+    return f"no quadratic term: the platform's {cause} has no component along {axis}"
+
+
+@_phrase
+def no_common_component(cause: str, axis: str) -> str:
+    """Of an error that both platforms share, by the published model."""
+    return f"no quadratic term: the platforms' {cause} have no component along {axis}, or cancel"
+
+
+@_phrase
+def no_quadratic_term_of_clock(term: str) -> str:
+    """Of a clock, by the published model."""
+    return f"no quadratic term: the clock's {term} term has another order (Table I row 1)"
+
+
+@_phrase
+def no_quadratic_term_of_height() -> str:
+    """Of the terrain, by the published model."""
+    return "no quadratic term: to the published model a height error moves the image"
+
+
+@_phrase
+def no_size_reaches_the_limit() -> str:
+    """Of a motion error, by the full model."""
+    return "no error up to a tenth of the slant range reaches the limit"
+
+
+@_phrase
+def no_quadratic_phase() -> str:
+    """Of a clock, by the full model."""
+    return "no quadratic phase"
+
+
+@_phrase
+def clock_is_heard() -> str:
+    """Of a clock under a direct path."""
+    return "the direct path is the clock: a timing error has no effect"
+
+
+@_phrase
+def oscillators_drop_out() -> str:
+    """Of an oscillator under a direct path."""
+    return "the direct path is the receiver's clock: oscillators drop out"
+
+
+@_phrase
+def no_phase_noise() -> str:
+    """Of an oscillator without any."""
+    return "no phase noise"
+
+
+@_phrase
+def across_the_line_of_sight() -> str:
+    """Of a sensor."""
+    return "the line of sight has no part in it: no phase"
+
+
+@_phrase
+def nothing_spreads() -> str:
+    """Of a clock's error that does nothing."""
+    return "no quadratic phase, no cubic phase and nothing that spreads"
+
+
+@_phrase
+def no_requirement_limits(effects: Sequence[str]) -> str:
+    """Of a sensor or a clock whose effects are not required."""
+    return f"no requirement limits its {' and '.join(effects)}"
+
+
+@_phrase
+def same_all_over_the_scene() -> str:
+    """Of the scene's edge, by the published model."""
+    return "to the published model an error is the same all over the scene"
+
+
+@_phrase
+def no_ground_point() -> str:
+    """Of an aggregate that has no value."""
+    return "a declared error leaves no ground point with its range history"
+
+
+@_phrase
+def no_image() -> str:
+    """Of the scene's edge."""
+    return "a declared error leaves no ground point with its range history: there is no image"
+
+
+@_phrase
+def no_image_to_place() -> str:
+    """Of the location."""
+    return "with a declared error no ground point has the recorded range history: there is no image"
+
+
+@_phrase
+def no_displacement(degrees: float) -> str:
+    """Of an image plane whose gradients are nearly parallel. [deg]"""
+    return (
+        f"(25) has no displacement here: with the range held constant, range and Doppler gradients are "
+        f"{degrees:.2g} deg from parallel"
+    )
+
+
+@_phrase
+def no_image_at_the_edge(azimuth_deg: float, why: str) -> str:
+    """Of a place of the scene's edge."""
+    return f"no image at the scene's edge, azimuth {azimuth_deg:.0f} deg: {why}"
+
+
+@_phrase
+def platform_at_the_edge(distance: float) -> str:
+    """Of a place of the scene's edge. [m]"""
+    return f"a platform is within {distance:g} m of it"
+
+
+@_phrase
+def gradients_become_parallel() -> str:
+    """Of a place of the scene's edge."""
+    return "on the way there range and Doppler gradients become parallel"
+
+
+# ---------------------------------------------------------------------- the scene
+@_phrase
+def same_at_the_edge() -> str:
+    """Of a scene over which nothing changes."""
+    return "the declared errors have the same quadratic phase at the edge and at the centre"
+
+
+@_phrase
+def largest_at_the_edge(azimuth_deg: float, radius: float) -> str:
+    """Where the scene's edge differs most."""
+    return f"largest between the centre and azimuth {azimuth_deg:.0f} deg, {format_quantity(radius, 'm')} away"
+
+
+@_phrase
+def one_correction_serves(how_far: str, total: float) -> str:
+    """Within which radius one autofocus correction serves. [rad]"""
+    return f"one autofocus correction serves {how_far}, by the total of {format_limit(total, 'rad')}"
+
+
+@_phrase
+def over_at_the_edge(row_id: str, phase: float, limit: float) -> str:
+    """Of an error that is inside its limit at the centre. [rad]"""
+    return f"{row_id} is {phase:.3g} rad at the scene's edge, {format_limit(limit, 'rad')} allowed"
+
+
+# ---------------------------------------------------------------------- what a value rests on
+@_phrase
+def held_to_the_total(owners: str) -> str:
+    """Of an error of both platforms, or of none."""
+    return f"held to the total budget: it belongs to {owners}"
+
+
+@_phrase
+def counted_as_one(group: str) -> str:
+    """Of a covariance in a root-sum-square."""
+    return f"the errors of {group} count as one, the root of gᵀCg"
+
+
+@_phrase
+def correlations_unused(group: str) -> str:
+    """Of a covariance in a sum."""
+    return f"a sum uses no correlations: each error of {group} counts with its own sigma, all at their worst"
+
+
+@_phrase
+def one_point_of_allan_deviation() -> str:
+    """Of an oscillator."""
+    return "one point of an Allan deviation tells no kind of noise: it is the worst for this aperture"
+
+
+@_phrase
+def flicker_is_assumed() -> str:
+    """Of an oscillator."""
+    return "an Allan deviation does not tell white from flicker phase noise: flicker is assumed"
+
+
+@_phrase
+def allan_deviation_begins(time: float) -> str:
+    """Of an oscillator. [s]"""
+    return f"the Allan deviation begins at {time:g} s; down to the aperture time its power law continues"
+
+
+@_phrase
+def allan_deviation_ends(time: float) -> str:
+    """Of an oscillator. [s]"""
+    return f"the Allan deviation ends at {time:g} s; up to the aperture time its power law continues"
+
+
+@_phrase
+def mask_begins(frequency: float, slope: float) -> str:
+    """Of an oscillator. [Hz]"""
+    return f"the mask begins at {frequency:g} Hz; below, it continues as f^-{slope:.3g}"
+
+
+@_phrase
+def power_law_fits(misfit: float) -> str:
+    """Of an oscillator."""
+    return f"the power law fits the Allan deviation to {100 * misfit:.2g} %"
+
+
+@_phrase
+def left_by_exchanges(interval: float) -> str:
+    """Of an oscillator. [s]"""
+    return f"only what synchronisation every {format_quantity(interval, 's')} leaves of it counts"
+
+
+@_phrase
+def another_for_each_pulse() -> str:
+    """Of the error of a link."""
+    return "the error is another one for each pulse: all of it spreads"
+
+
+# ---------------------------------------------------------------------- noise and tones
+@_phrase
+def spreads_too_much(level_db: float, limit_db: float) -> str:
+    """Of noise."""
+    return f"spreads {_level(level_db)}, {_level(limit_db, 'down')} allowed"
+
+
+@_phrase
+def noise_spreads_too_much(level_db: float, limit_db: float, row_id: str, largest_db: float) -> str:
+    """Of all noise together."""
+    return (
+        f"noise spreads {_level(level_db)}, {_level(limit_db, 'down')} allowed; largest: {row_id}, "
+        f"{_level(largest_db)}"
+    )
+
+
+@_phrase
+def echoes_over(level_db: float, limit_db: float) -> str:
+    """Of a tone."""
+    return f"paired echoes of {_level(level_db)}, {_level(limit_db, 'down')} allowed"
+
+
+@_phrase
+def echoes_on_the_mainlobe(cycles: float, least: float) -> str:
+    """Of a slow tone."""
+    return f"{cycles:.3g} cycles per aperture: below {least:g} its echoes lie on the mainlobe"
+
+
+@_phrase
+def tone_lies(frequency: float, cells: float) -> str:
+    """Of a tone. [Hz]"""
+    return f"at {format_quantity(frequency, 'Hz')}, {cells:.3g} cells from the response"
+
+
+# ---------------------------------------------------------------------- vibration
+@_phrase
+def share_of_power_over(metric: str, rule: str) -> str:
+    """Of a vibration."""
+    what = "paired echoes" if metric == "pslr" else "power spread"
+    return f"{what} above the platform's share of {metric.upper()} ({rule})"
+
+
+@_phrase
+def slow_quadratic_phase_over(phase: float, limit: float) -> str:
+    """Of a vibration below a cycle per aperture. [rad]"""
+    return f"QPE {phase:.3g} rad in the worst phase, {format_limit(limit, 'rad')} allowed"
+
+
+@_phrase
+def slow_cubic_phase_over(phase: float, limit: float) -> str:
+    """Of a vibration below a cycle per aperture. [rad]"""
+    return f"cubic phase {phase:.3g} rad in the worst phase, {format_limit(limit, 'rad')} allowed; {_NO_GAIN}"
+
+
+@_phrase
+def slower_than_a_cycle(cycles: float, quadratic: float, cubic: float) -> str:
+    """Of a vibration. [rad]"""
+    return (
+        f"{cycles:.2g} cycles per aperture: below one a vibration makes no echoes but, in its worst phase, a "
+        f"quadratic phase of {quadratic:.3g} rad or a cubic phase of {cubic:.3g} rad"
+    )
+
+
+def _in_the_worst_phase(quadratic: float, limit: float, cubic: float, cubic_limit: float | None) -> str:
+    text = (
+        f"in the worst phase a quadratic phase error of {quadratic:.3g} rad, {format_limit(limit, 'rad')} allowed, "
+        f"or a cubic of {cubic:.3g} rad"
+    )
+    return text if cubic_limit is None else f"{text}, {format_limit(cubic_limit, 'rad')} allowed"
+
+
+@_phrase
+def slower_than_three_cycles(
+    cycles: float, quadratic: float, limit: float, cubic: float, cubic_limit: float | None
+) -> str:
+    """Of a vibration. [rad]"""
+    return (
+        f"{cycles:.3g} cycles per aperture: below three it also is "
+        f"{_in_the_worst_phase(quadratic, limit, cubic, cubic_limit)}; it is the same motion, so no sum counts it"
+    )
+
+
+@_phrase
+def phase_of_vibration_over(quadratic: float, limit: float, cubic: float, cubic_limit: float | None) -> str:
+    """Of a vibration below three cycles per aperture. [rad]"""
+    return f"also {_in_the_worst_phase(quadratic, limit, cubic, cubic_limit)}"
+
+
+@_phrase
+def lines_together(entries: str, band: str, apart: float, amplitude: float) -> str:
+    """Of lines of one platform whose echoes add. [m]"""
+    return (
+        f"entries {entries}, at {band}, are at most {apart:g} cycles per aperture apart: in the worst phases their "
+        f"echoes together are as high as that of one vibration of {format_quantity(amplitude, 'm')}"
+    )
+
+
+@_phrase
+def both_platforms_vibrate(other: str, apart: float, level_db: float, is_more: bool, required_db: float) -> str:
+    """Of lines of both platforms whose echoes add."""
+    return (
+        f"the {other} vibrates at most {apart:g} cycles per aperture from this frequency too: in the worst phases "
+        f"echoes of both together are {'above ' if is_more else ''}{level_db:.1f} dB, {required_db:g} dB required"
+    )
+
+
+@_phrase
+def published_rule_is_exact() -> str:
+    """Of a limit of a vibration."""
+    return "the published rule is that of first principles, to 0.01 dB"
+
+
+@_phrase
+def published_rule_is_off(margin_db: float) -> str:
+    """Of a limit of a vibration."""
+    side = "inside" if margin_db >= 0 else "beyond"
+    return f"the published rule is {abs(margin_db):.2f} dB {side} first principles"
+
+
+@_phrase
+def seen_of_vibration(stated: str, along: float, has_direct_path: bool) -> str:
+    """Of a vibration that the line of sight sees a part of. [m]"""
+    where = "in the range less the direct path" if has_direct_path else "along the line of sight"
+    return f"{stated}: {format_quantity(along, 'm')} of it {where}"
+
+
+# ---------------------------------------------------------------------- images
+@_phrase
+def autofocus_refuted() -> str:
+    """Of a row that passes with autofocus."""
+    return "passes only with autofocus, and the image at that limit shows that autofocus fails"
+
+
+@_phrase
+def location_refuted() -> str:
+    """Of the location."""
+    return "the image is not where the gating model puts it"
+
+
+@_phrase
+def limit_refuted(times: float) -> str:
+    """Of a row that passes."""
+    return f"inside the limit, but {times:.3g} times what the image allows"
+
+
+@_phrase
+def optimistic_limit(shown: str) -> str:
+    """Of a limit that an image refutes."""
+    return f"optimistic limit: {shown}"
+
+
+@_phrase
+def optimistic_limit_with_autofocus(shown: str) -> str:
+    """Of a limit with autofocus that an image refutes."""
+    return f"optimistic limit with autofocus: {shown}"
+
+
+@_phrase
+def images_formed(conditions: str) -> str:
+    """Of a mission with images."""
+    return f"images: {conditions}"
+
+
+# ---------------------------------------------------------------------- the collection
+@_phrase
+def path_curves(platform: str) -> str:
+    """Of a collection."""
+    return f"the {platform}'s path curves: the published model takes it for straight, the full model does not"
+
+
+@_phrase
+def sight_turns(platform: str, half_turn: float) -> str:
+    """Of a collection. [rad]"""
+    return (
+        f"the {platform}'s line of sight turns by ±{half_turn:.2g} rad: the published model takes the phase for a "
+        "quadratic, the full model does not"
+    )
+
+
+@_phrase
+def direct_path_is_the_clock() -> str:
+    """Of a collection."""
+    return (
+        "the direct path is the clock: the full model takes ranges less the distance of the platforms, and "
+        "timing errors have no effect; values of the published model are those without it"
+    )
+
+
+@_phrase
+def range_cells_are_coarse(phase: float, shown_percent: float) -> str:
+    """Of a collection. [rad]"""
+    return (
+        f"points a range cell apart differ by {phase:.3g} rad of quadratic phase: a defocused response spreads "
+        f"over range cells instead. An image shows about {shown_percent:.2g} % of the phase: the limits are "
+        "conservative"
+    )
+
+
+@_phrase
+def keys_not_used(keys: Sequence[str]) -> str:
+    """Of a mission file."""
+    return f"not used by this check: {', '.join(keys)}"
+
+
+# ---------------------------------------------------------------------- draws
+@_phrase
+def drawn_through_exact_ranges() -> str:
+    """Of Monte Carlo."""
+    return "every draw goes through exact ranges: the declared errors are too large for sums of their effects"
+
+
+@_phrase
+def drawn_by_the_full_model(model: str) -> str:
+    """Of Monte Carlo."""
+    return f"drawn by the full model; the rows are judged by allocation.model, {model}"
+
+
+@_phrase
+def drawn_all_at_once() -> str:
+    """Of Monte Carlo."""
+    return "a draw is the sum of all errors at once; the rows are judged one by one, allocation.combine being each"
+
+
+@_phrase
+def drawn_as_bounds(row_ids: Sequence[str]) -> str:
+    """Of Monte Carlo."""
+    return f"{', '.join(row_ids)}: drawn as plus or minus the declared value, which has no distribution"
+
+
+@_phrase
+def vibration_is_not_drawn() -> str:
+    """Of Monte Carlo."""
+    return "vibration is not drawn; the phase of a slow vibration is not included"
+
+
+@_phrase
+def mean_power_is_not_drawn() -> str:
+    """Of Monte Carlo."""
+    return "what sensors and clocks spread is a mean power: ISLR is not drawn"
+
+
+@_phrase
+def drawn_without_coverage() -> str:
+    """Of Monte Carlo."""
+    return "the coverage factor is in sum and rss, not in the draws"
+
+
+# ---------------------------------------------------------------------- waivers
+@_phrase
+def waived(line: int | None, until: date, reason: str, is_expired: bool) -> str:
+    """Of a row that fails."""
+    return f"{'expired ' if is_expired else ''}waiver of line {line}, until {until}: {reason}"
