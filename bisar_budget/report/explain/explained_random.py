@@ -20,11 +20,11 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.report.explain.explained_budget import limit_steps
 from bisar_budget.report.explain.explained_error import as_written, missing, place
 from bisar_budget.report.explain.formulas import (
-    INERTIAL,
     Step,
     Sum,
     WorkedEquation,
     equation,
+    inertial_phases,
     number,
     step,
     with_unit,
@@ -74,8 +74,8 @@ def _declared(mission: Mission, error: RandomError) -> Iterator[Step]:
 def _imu(analysis: Analysis, error: RandomError, model: str) -> Iterator[Step]:
     """The formulas of an inertial sensor with the line of sight at mid-aperture, then over exact ranges."""
     mission, kind = analysis.mission, error.subject.axis
-    formulas = INERTIAL[kind]
     symbol = _SYMBOLS[kind]
+    formulas = inertial_phases(symbol)
     unit = error.published
     wavelength, T = mission.radar.wavelength, mission.collection.aperture_time
     gravity = STANDARD_GRAVITY

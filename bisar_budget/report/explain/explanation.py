@@ -215,10 +215,10 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[S
     yield from step(f"Section V, {kind}, s is the {platform}’s share of power", *lines)
     if is_sinusoid:
         part = amplitude_share(split, platform)
-        shares = {"s_k": share, "s_t": split.transmitter, "s_r": split.receiver}
+        shares = {"s_t": split.transmitter, "s_r": split.receiver}
         yield from step(
             "Both platforms at one frequency: echoes add in amplitude, its part a",
-            *equation("a", formulas.AMPLITUDE_SHARE, shares, part, ""),
+            *equation("a", formulas.amplitude_share(platform), shares, part, ""),
         )
         level = math.sqrt(ratio * (split.transmitter + split.receiver))
         values = {

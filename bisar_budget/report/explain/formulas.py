@@ -1,7 +1,6 @@
-"""The formulas behind a row as text, and the same with the numbers put in.
+"""The formulas behind a row, by what a row asks for, and the same with the numbers put in.
 
-Each text is, letter for letter, the cell that `bisar-budget derive` prints for it (a test compares them);
-SymPy itself stays out of a check.
+Their texts are the derivation's, from the generated catalogue; SymPy itself stays out of a check.
 """
 
 import re
@@ -9,45 +8,19 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 from unicodedata import combining
 
+from bisar_budget.catalogue import TEXTS
+
 AXES = "xyz"
-# Table I: coefficients of the range error; {a} is the axis, {s} the platform's subscript.
-_COEFFICIENTS = {
-    "position": {0: "-p\u0303_{a}{s}*{a}_{s}/R_{s}", 1: "-p\u0303_{a}{s}*v_{a}{s}/R_{s}"},
-    "velocity": {1: "-ṽ_{a}{s}*{a}_{s}/R_{s}", 2: "-v_{a}{s}*ṽ_{a}{s}/R_{s}"},
-    "acceleration": {2: "-ã_{a}{s}*{a}_{s}/(2*R_{s})", 3: "-ã_{a}{s}*v_{a}{s}/(2*R_{s})"},
-}
-# Table II: quadratic phase error at the aperture edge.
-_PHASES = {
-    "velocity": "π*T^2*|v_{a}{s}*ṽ_{a}{s}|/(2*R_{s}*λ)",
-    "acceleration": "π*T^2*|ã_{a}{s}*{a}_{s}|/(4*R_{s}*λ)",
-}
 _LETTERS = {"position": "p\u0303", "velocity": "ṽ", "acceleration": "ã"}
-EDGE_PHASE = "π*T^2*β̃_2/(2*λ)"
-CLOCK_PHASE = "π*T^2*f_0*|t̃_2|/2"
-VIBRATION = {"pslr": "sqrt(PSLR)*λ*sqrt(s)/(2*π)", "islr": "sqrt(ISLR)*λ*sqrt(s)/(2*π)"}
+EDGE_PHASE = TEXTS["edge phase"]
+CLOCK_PHASE = TEXTS["Table II t̃_2 0"]
+VIBRATION = {"pslr": TEXTS["Vibration A 1"], "islr": TEXTS["Vibration σ 1"]}
 # From first principles; of a sinusoid φ is the phase of the echoes that both platforms may make.
-FULL_VIBRATION = {"pslr": "a*λ*φ/(2*π)", "islr": "λ*sqrt(s)*sqrt(log(ISLR + 1))/(2*π)"}
-AMPLITUDE_SHARE = "sqrt(s_k)/(sqrt(s_t) + sqrt(s_r))"
-# Inertial sensors: quadratic phase, cubic phase and what is left, of one unit.
-INERTIAL = {
-    "accelerometer_bias": ("π*T^2*b*u/(4*λ)", "", ""),
-    "attitude": ("π*T^2*g*ψ*u_h/(4*λ)", "", ""),
-    "gyro_bias": ("", "π*T^3*ε*g*u_h/(24*λ)", ""),
-    "velocity_random_walk": (
-        "sqrt(70)*π*N*T^(3/2)*u/(28*λ)",
-        "sqrt(770)*π*N*T^(3/2)*u/(132*λ)",
-        "sqrt(770)*π*N*T^(3/2)*u/(1155*λ)",
-    ),
-    "angle_random_walk": (
-        "sqrt(164010)*π*N_g*T^(5/2)*g*u_h/(7392*λ)",
-        "5*sqrt(3003)*π*N_g*T^(5/2)*g*u_h/(5148*λ)",
-        "sqrt(15015)*π*N_g*T^(5/2)*g*u_h/(45045*λ)",
-    ),
-}
-AUTOFOCUS_GAIN = "π*N_pull/q"
-SMEAR = ("sin(φ̄_r)*cos(θ̄_r) + sin(φ̄_t)*cos(θ̄_t)", "-cos(φ̄_r)*cos(θ̄_r) - cos(φ̄_t)*cos(θ̄_t)")
-LOOK_AZIMUTH = "atan2(sin(φ̄_r)*cos(θ̄_r) + sin(φ̄_t)*cos(θ̄_t), cos(φ̄_r)*cos(θ̄_r) + cos(φ̄_t)*cos(θ̄_t))"
-DETERMINANT = "-(-v_xt/R_t - v_xr/R_r)*(-y_t/R_t - y_r/R_r) + (-v_yt/R_t - v_yr/R_r)*(-x_t/R_t - x_r/R_r)"
+FULL_VIBRATION = {"pslr": TEXTS["echoes"], "islr": TEXTS["noise"]}
+AUTOFOCUS_GAIN = TEXTS["autofocus gain"]
+SMEAR = (TEXTS["smear east"], TEXTS["smear north"])
+LOOK_AZIMUTH = TEXTS["look azimuth"]
+DETERMINANT = TEXTS["determinant"]
 
 
 def motion_symbol(kind: str, axis: str, platform: str) -> str:
@@ -57,18 +30,28 @@ def motion_symbol(kind: str, axis: str, platform: str) -> str:
 
 def motion_coefficients(kind: str, axis: str, platform: str) -> dict[int, str]:
     """Cells of Table I for one motion error, by order in slow time."""
-    return {order: text.format(a=axis, s=platform[0]) for order, text in _COEFFICIENTS[kind].items()}
+    names = {order: f"Table I {motion_symbol(kind, axis, platform)} {order}" for order in range(4)}
+    return {order: TEXTS[name] for order, name in names.items() if name in TEXTS}
 
 
 def motion_phase(kind: str, axis: str, platform: str) -> str | None:
     """Cell of Table II; None for a position error, which has none."""
-    text = _PHASES.get(kind)
-    return None if text is None else text.format(a=axis, s=platform[0])
+    return TEXTS.get(f"Table II {motion_symbol(kind, axis, platform)} 0")
 
 
 def clock_coefficient(order: int) -> str:
     """Cell of the first row of Table I."""
-    return f"c*t̃_{order}"
+    return TEXTS[f"Table I t̃ {order}"]
+
+
+def inertial_phases(symbol: str) -> tuple[str, ...]:
+    """Quadratic phase, cubic phase and what is left of one unit of a figure of an inertial sensor; empty: none."""
+    return tuple(TEXTS.get(f"Inertial sensors {symbol} {part}", "") for part in range(3))
+
+
+def amplitude_share(platform: str) -> str:
+    """Part of a platform in an amplitude that both make."""
+    return TEXTS[f"amplitude share {platform[0]}"]
 
 
 class WorkedEquation(NamedTuple):
