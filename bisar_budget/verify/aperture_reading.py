@@ -104,10 +104,10 @@ def read_aperture(
     tapered = np.stack([(one * _taper(columns)).reshape(-1) for one in images])
     correlated = np.empty((2, slow_time.size), dtype=complex)
     block = max(1, _BLOCK // pixels.shape[0])
+    every = _Pixels(collection, errors, centre, pixels)
     for start in range(0, slow_time.size, block):
         part = slice(start, start + block)
-        contribution = _contributions(collection, errors, centre, slow_time[part], pixels)
-        correlated[:, part] = tapered @ contribution.conj().T
+        correlated[:, part] = tapered @ every.contributions(slow_time[part]).conj().T
     seen, clean = correlated
     product, strength = seen * clean.conj(), np.abs(seen) / np.maximum(np.abs(clean), 1e-30)
     inner = np.abs(place) < _INNER
@@ -130,7 +130,8 @@ def read_aperture(
     # Of a large patch some pixels are enough for a polynomial.
     some = slice(None, None, -(-pixels.shape[0] * slow_time.size // CONTRIBUTIONS))
     seen_there, clean_there = (one.reshape(-1)[some] for one in images)
-    at_rest = _contributions(collection, errors, centre, slow_time, pixels[some]).sum(axis=0)
+    few = _Pixels(collection, errors, centre, pixels[some])
+    at_rest = few.contributions(slow_time).sum(axis=0)
     gain = complex(np.vdot(at_rest, clean_there) / np.vdot(at_rest, at_rest))
     starts = [np.pad(fit, (0, _ORDERS[0][1] + 1 - fit.size))]
     if expected is not None:
@@ -142,7 +143,7 @@ def read_aperture(
             # What is left of the range error takes a pulse to other range cells too.
             phase = np.polynomial.legendre.legval(place, [0.0, *found.fit[1:]])
             left = -collection.wavelength / (2 * math.pi) * phase
-            single = _contributions(collection, errors, centre, slow_time, pixels[some], left)
+            single = few.contributions(slow_time, left)
             found = _refined(found.fit, place, single.astype(np.complex128), seen_there, gain)
         best = min(best, found, key=lambda one: one.misfit)
         if best.misfit < _EXACT:
@@ -211,50 +212,51 @@ def _taper(columns: int) -> Floats:
     return taper
 
 
-def _contributions(
-    collection: PointCollection,
-    errors: Errors,
-    centre: GroundVector,
-    slow_time: Floats,
-    pixels: Floats,
-    left: Floats | None = None,
-) -> NDArray[np.complex64]:
-    """What each pulse adds to the image of a point at a place, (pulses, pixels), at baseband.
+class _Pixels:
+    """Pixels (n, 3) of an image, and what each pulse adds to them of a point at a place."""
 
-    `left` (pulses,) is a range error that displaces its range response, and has no part in the phase. [m]
-    """
-    flown = collection.flown(errors)
-    at_middle = flown.range_sum(pixels) - flown.range_sum(np.asarray(centre, dtype=float))
-    point = np.array([[*centre, 0.0]])
-    paths = collection.paths(errors.smooth(), slow_time)
-    if collection.is_tapered:
-        weights = taylor_window(257)
-        frequency = cell_centres(1.0, 257)
-        kernel = np.cos(2 * math.pi * np.outer(_KERNEL, frequency)) @ weights / 257
-        by_time = _weights(collection, slow_time)[:, None]
-    contribution = np.empty((slow_time.size, pixels.shape[0]), dtype=np.complex64)
-    pulses = max(1, _BLOCK // pixels.shape[0])
-    for start in range(0, slow_time.size, pulses):
-        part = slice(start, start + pulses)
-        farther = np.zeros(contribution[part].shape)
-        for one in paths:
-            farther += _distance(one.measured[part], pixels)
-            farther -= _distance(one.measured[part], point)
-        # Whole cycles are taken off in double precision; of what is left single precision holds 1e-6 rad, in a
-        # quarter of the time.
-        cycles = (farther - at_middle) / collection.wavelength
-        cycles -= np.rint(cycles)
-        turned = (2 * math.pi * cycles).astype(np.float32)
-        if left is not None:
-            farther -= left[part, None]
-        cells = (farther * (collection.radar.bandwidth / SPEED_OF_LIGHT)).astype(np.float32)
+    def __init__(self, collection: PointCollection, errors: Errors, centre: GroundVector, pixels: Floats) -> None:
+        self.collection, self.errors, self.places = collection, errors.smooth(), pixels
+        self.point = np.array([[*centre, 0.0]])
+        flown = collection.flown(errors)
+        self.at_middle = flown.range_sum(pixels) - flown.range_sum(self.point[0, :2])
+        self.squares = _squares(pixels)
         if collection.is_tapered:
-            strength = np.interp(np.abs(cells), _KERNEL, kernel, right=0.0) * by_time[part]
-        else:
-            strength = np.sinc(cells)
-        np.multiply(np.cos(turned), strength, out=contribution[part].real)
-        np.multiply(np.sin(turned), strength, out=contribution[part].imag)
-    return contribution
+            weights, frequency = taylor_window(257), cell_centres(1.0, 257)
+            self.kernel = np.cos(2 * math.pi * np.outer(_KERNEL, frequency)) @ weights / 257
+
+    def contributions(self, slow_time: Floats, left: Floats | None = None) -> NDArray[np.complex64]:
+        """What pulses (m,) add, (m, n), at baseband.
+
+        `left` (m,) is a range error that displaces the range responses, and has no part in the phase. [m]
+        """
+        collection = self.collection
+        paths = collection.paths(self.errors, slow_time)
+        if collection.is_tapered:
+            by_time = _weights(collection, slow_time)[:, None]
+        contribution = np.empty((slow_time.size, self.places.shape[0]), dtype=np.complex64)
+        pulses = max(1, _BLOCK // self.places.shape[0])
+        for start in range(0, slow_time.size, pulses):
+            part = slice(start, start + pulses)
+            farther = np.zeros(contribution[part].shape)
+            for one in paths:
+                farther += _distance(one.measured[part], self.places, self.squares)
+                farther -= _distance(one.measured[part], self.point, _squares(self.point))
+            # Whole cycles are taken off in double precision; of what is left single precision holds 1e-6 rad, in a
+            # quarter of the time.
+            cycles = (farther - self.at_middle) / collection.wavelength
+            cycles -= np.rint(cycles)
+            turned = (2 * math.pi * cycles).astype(np.float32)
+            if left is not None:
+                farther -= left[part, None]
+            cells = (farther * (collection.radar.bandwidth / SPEED_OF_LIGHT)).astype(np.float32)
+            if collection.is_tapered:
+                strength = np.interp(np.abs(cells), _KERNEL, self.kernel, right=0.0) * by_time[part]
+            else:
+                strength = np.sinc(cells)
+            np.multiply(np.cos(turned), strength, out=contribution[part].real)
+            np.multiply(np.sin(turned), strength, out=contribution[part].imag)
+        return contribution
 
 
 def _weights(collection: PointCollection, slow_time: Floats) -> Floats:
@@ -264,9 +266,14 @@ def _weights(collection: PointCollection, slow_time: Floats) -> Floats:
     return weights
 
 
-def _distance(positions: Floats, points: Floats) -> Floats:
-    """From positions (m, 3) to points (n, 3), (m, n): to 1e-8 m from a geostationary orbit. [m]"""
+def _squares(points: Floats) -> Floats:
+    found: Floats = np.einsum("ij,ij->i", points, points)
+    return found
+
+
+def _distance(positions: Floats, points: Floats, squares: Floats) -> Floats:
+    """From positions (m, 3) to points (n, 3), their squares known, (m, n): to 1e-8 m from geostationary orbit. [m]"""
     square: Floats = positions @ (-2 * points.T)
-    square += np.einsum("ij,ij->i", positions, positions)[:, None]
-    square += np.einsum("ij,ij->i", points, points)
+    square += _squares(positions)[:, None]
+    square += squares
     return np.sqrt(square, out=square)

@@ -12,7 +12,7 @@ from bisar_budget.evaluators import LEGENDRE_FITS
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.simulate.collection import Errors, PointCollection, superposed
 from bisar_budget.simulate.phase_history import PathError, cell_centres
-from bisar_budget.verify.aperture_reading import _distance, read_aperture
+from bisar_budget.verify.aperture_reading import _distance, _squares, read_aperture
 from bisar_budget.verify.limits import verify_mission
 from bisar_budget.verify.shift import measured_shift
 from tests.conftest import mission_text
@@ -305,4 +305,4 @@ def test_distances_are_right_to_a_hundredth_of_a_degree_of_phase(slant_range: fl
     positions *= slant_range / np.linalg.norm(positions, axis=1)[:, None]
     points = np.column_stack((random.uniform(-100, 100, (30, 2)), np.zeros(30)))
     exact = np.linalg.norm(positions[:, None] - points, axis=2)
-    assert np.abs(_distance(positions, points) - exact).max() < 2e-8
+    assert np.abs(_distance(positions, points, _squares(points)) - exact).max() < 2e-8
