@@ -335,7 +335,8 @@ class TestPlots:
     @pytest.fixture
     def folder(self, tmp_path) -> Path:
         folder = tmp_path
-        (folder / "m.yaml").write_text(mission_text(name="A $\\frac$ of $x_"))
+        short = {"collection__aperture_time": "1 s", "radar__bandwidth": "20 MHz"}  # an image of few pixels
+        (folder / "m.yaml").write_text(mission_text(name="A $\\frac$ of $x_", **short))
         (folder / "matplotlibrc").write_text("backend: nonsense\nfigure.figsize: 1, 1\nfont.size: 40\n")
         return folder
 

@@ -369,19 +369,19 @@ class TestTargets:
     def test_a_scene_is_refocused_by_one_correction(self, run, tmp_path) -> None:
         """Spatial invariance: the same phase and displacement at each target, and one phase takes it from all."""
         archive = tmp_path / "scene.npz"
-        targets = "0, 0; 20 m, -10 m, -6 dB; -15, 18; clutter -40 dB"
+        targets = "0, 0; 9 m, -5 m, -6 dB; -7, 8; clutter -40 dB"
         result = run("simulate", SECTION_V, "--targets", targets, "-o", archive)
         assert result.exit_code == 0, result.output
         table = [line.split() for line in result.stdout.splitlines()[-3:]]
-        assert [row[:3] for row in table] == [["0", "0", "0"], ["20", "-10", "-6"], ["-15", "18", "0"]]
+        assert [row[:3] for row in table] == [["0", "0", "0"], ["9", "-5", "-6"], ["-7", "8", "0"]]
         for _, _, _, east, north, phase, before, _, after, width in (map(float, row) for row in table):
             assert (east, north) == (0.004, 0.002)
-            assert phase == pytest.approx(-4.626, abs=0.001)  # 25 m from the centre less than 0.1 mrad
+            assert phase == pytest.approx(-4.626, abs=0.001)  # 11 m from the centre less than 0.1 mrad
             assert before == pytest.approx(-5.7, abs=0.3)  # clutter of -40 dB: 0.17 dB for the one of -6 dB
             assert after == pytest.approx(0, abs=0.3)
             assert width == pytest.approx(0.403, abs=0.02)
         with np.load(archive) as saved:
-            assert saved["targets_m"].tolist() == [[0, 0], [20, -10], [-15, 18]]
+            assert saved["targets_m"].tolist() == [[0, 0], [9, -5], [-7, 8]]
             assert saved["rotated_back"].shape == saved["in_scene"].shape
 
     def test_clutter_has_the_power_it_is_given(self) -> None:

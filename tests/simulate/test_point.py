@@ -220,7 +220,7 @@ SATELLITES = {
 }  # fmt: skip
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")  # tests of other modules run between those of a group
 def satellite():
     """Images of two satellites, what progress told on the way, and the peak of memory. [B]"""
     told: list[tuple[int, int]] = []

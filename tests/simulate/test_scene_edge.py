@@ -316,7 +316,8 @@ def test_edge_and_radius_are_those_of_a_circle_of_720_places() -> None:
         # Of large errors at fewer places: each is searched for by exact ranges. 1 % is what lies between two of them.
         places = 90 if edge.large else 0
         of_large = [edge.together(edge.differences(scene.radius, 2 * math.pi * k / 90)) for k in range(places)]
-        has_image = all(place.has_image for place in circle(scene.radius)) and all(map(math.isfinite, of_large))
+        rim = circle(scene.radius)
+        has_image = all(place.has_image for place in rim) and all(map(math.isfinite, of_large))
         assert has_image == (not scene.degeneracy), mission
         seen["image" if has_image else "none"] += 1
         if not has_image:
@@ -324,7 +325,7 @@ def test_edge_and_radius_are_those_of_a_circle_of_720_places() -> None:
         if edge.large:
             assert max(of_large) * (1 - 2e-3) <= scene.difference <= max(of_large) * 1.01
         else:
-            assert scene.difference == pytest.approx(max(p.size for p in circle(scene.radius)), rel=2e-3, abs=1e-9)
+            assert scene.difference == pytest.approx(max(place.size for place in rim), rel=2e-3, abs=1e-9)
         served = scene.autofocus_radius or scene.searched
 
         def is_served(radius: float, edge=edge, places=places) -> bool:

@@ -472,7 +472,7 @@ class TestNothingVerified:
         assert with_verdicts(declared, confirmed).status == declared.status == "pass"
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")  # tests of other modules run between those of a group
 def reports(tmp_path_factory):
     """Section V checked with images once, in every format that is read here."""
     folder = tmp_path_factory.mktemp("verified")
