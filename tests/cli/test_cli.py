@@ -292,7 +292,6 @@ def test_help_fits_the_terminal(run, command) -> None:
     assert max(map(len, result.stdout.splitlines())) <= 80
 
 
-@pytest.mark.xdist_group("derivation")
 class TestDerive:
     @pytest.mark.parametrize("format_name", ["text", "latex", "markdown", "mathml"])
     @pytest.mark.parametrize("table", ["I", "II", "vibration", "equations"])

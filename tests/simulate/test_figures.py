@@ -280,7 +280,6 @@ class TestImageFormers:
             assert 20 * math.log10(images.response.peak / clean) == pytest.approx(-5.7, abs=0.1)
             assert 20 * math.log10(images.focused_response.peak / clean) == pytest.approx(0, abs=0.1)
 
-    @pytest.mark.xdist_group("short_aperture")
     def test_the_matched_filter_is_backprojection(self) -> None:
         images = [of_a_short_aperture(name)[0] for name in ("matched_filter", "backprojection")]
         for name in ("in_scene", "rotated"):
@@ -320,7 +319,6 @@ class TestImageFormers:
         assert result.exit_code == 2
         assert "polar format cannot form this image: no rectangle" in result.stderr
 
-    @pytest.mark.xdist_group("short_aperture")
     @pytest.mark.parametrize("name", IMAGE_FORMERS)
     def test_their_memory_is_estimated_and_the_estimate_holds(self, run, tmp_path, monkeypatch, name: str) -> None:
         _, peak = of_a_short_aperture(name)

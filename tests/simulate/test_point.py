@@ -150,7 +150,6 @@ class TestRefusals:
         ):
             simulate_point(parse_mission(mission_text(**changes)))
 
-    @pytest.mark.xdist_group("satellite")
     def test_memory_is_estimated_and_the_estimate_holds(self, satellite) -> None:
         """Peak of what is allocated, traced, in an image large enough that imports do not count."""
         _, _, peak = satellite
@@ -220,7 +219,7 @@ SATELLITES = {
 }  # fmt: skip
 
 
-@pytest.fixture(scope="session")  # tests of other modules run between those of a group
+@pytest.fixture(scope="module")
 def satellite():
     """Images of two satellites, what progress told on the way, and the peak of memory. [B]"""
     told: list[tuple[int, int]] = []
@@ -234,7 +233,6 @@ def satellite():
     return images, told, peak
 
 
-@pytest.mark.xdist_group("satellite")
 def test_patches_are_no_larger_than_the_response_and_progress_tells_all_of_the_work(satellite) -> None:
     images, told, _ = satellite
     in_range, cross_range = images.spacing

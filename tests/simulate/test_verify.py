@@ -472,7 +472,7 @@ class TestNothingVerified:
         assert with_verdicts(declared, confirmed).status == declared.status == "pass"
 
 
-@pytest.fixture(scope="session")  # tests of other modules run between those of a group
+@pytest.fixture(scope="module")
 def reports(tmp_path_factory):
     """Section V checked with images once, in every format that is read here."""
     folder = tmp_path_factory.mktemp("verified")
@@ -482,7 +482,6 @@ def reports(tmp_path_factory):
     return [name.read_text(encoding="utf-8") for name in names]
 
 
-@pytest.mark.xdist_group("section_v_with_images")
 class TestCheckWithImages:
     def test_json_carries_the_verdicts_and_a_row_says_when_its_limit_is_optimistic(self, reports) -> None:
         (mission,) = json.loads(reports[2])["missions"]

@@ -35,7 +35,6 @@ ALLOWED = (
 )
 
 
-@pytest.mark.xdist_group("derivation")
 @pytest.mark.parametrize("generated", [emit, emit_catalogue], ids=lambda module: module.TARGET.name)
 def test_committed_file_is_current(generated, one_derivation) -> None:
     assert generated.TARGET.read_text(encoding="utf-8") == generated.source()
@@ -55,7 +54,6 @@ def test_brackets_that_sympy_1_13_writes_as_fences_are_operators() -> None:
     assert printer.without_fences(outer).toxml() == row
 
 
-@pytest.mark.xdist_group("derivation")
 def test_emission_does_not_depend_on_the_process() -> None:
     """Another seed of hashes than that of this process, whose emission is held to the same files."""
     code = """from bisar_budget.theory import emit, emit_catalogue
