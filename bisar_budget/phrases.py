@@ -1,7 +1,7 @@
 """Every sentence that a finding may carry, in one place: a note is data, and its words are written here.
 
 A function writes one sentence. Its name is the note's code, its arguments are what the note is made of: numbers in SI
-and radians, ids of rows, names. What ends in a colon or begins with one goes on with what another sentence says.
+and radians, ids of rows, names.
 """
 
 import math
