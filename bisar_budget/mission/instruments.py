@@ -35,14 +35,22 @@ _VELOCITY_WALK = Triple(Quantity(units.VELOCITY_RANDOM_WALK, ge=0, le=1e3), or_s
 _ANGLE_WALK = Triple(Quantity(units.ANGLE_RANDOM_WALK, ge=0, le=1e2), or_scalar=True)
 
 
+# Figures that a mission states, and a part of the catalogue.
+AccelerometerBias = Annotated[Vector | None, Key(_BIAS, "What is left of it in flight.")]
+Attitude = Annotated[Vector | None, Key(_TILT, "Roll and pitch at mid-aperture, about each axis.")]
+GyroBias = Annotated[Vector | None, Key(_DRIFT, "What is left of it in flight.")]
+VelocityRandomWalk = Annotated[Vector | None, Key(_VELOCITY_WALK, "Noise of the accelerometers.")]
+AngleRandomWalk = Annotated[Vector | None, Key(_ANGLE_WALK, "Noise of the gyros.")]
+
+
 class Imu(NamedTuple):
     """Figures of an inertial sensor, 1 sigma. A scalar means each axis; three values follow the error's frame."""
 
-    accelerometer_bias: Annotated[Vector | None, Key(_BIAS, "What is left of it in flight.")] = None
-    attitude: Annotated[Vector | None, Key(_TILT, "Roll and pitch at mid-aperture, about each axis.")] = None
-    gyro_bias: Annotated[Vector | None, Key(_DRIFT, "What is left of it in flight.")] = None
-    velocity_random_walk: Annotated[Vector | None, Key(_VELOCITY_WALK, "Noise of the accelerometers.")] = None
-    angle_random_walk: Annotated[Vector | None, Key(_ANGLE_WALK, "Noise of the gyros.")] = None
+    accelerometer_bias: AccelerometerBias = None
+    attitude: Attitude = None
+    gyro_bias: GyroBias = None
+    velocity_random_walk: VelocityRandomWalk = None
+    angle_random_walk: AngleRandomWalk = None
     source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
 
 
@@ -141,39 +149,43 @@ _STEEPEST = 60.0  # dB a decade; noise of an oscillator falls by 40 at most
 _RISE = 20.0  # dB a decade; a mask that rises by more is a tone, or a slip
 
 
+Frequency = Annotated[float | None, Key(Quantity(units.FREQUENCY, gt=0, ge=1, le=1e15), "At which a mask is stated.")]
+PhaseNoise = Annotated[
+    Points | None,
+    Key(
+        _Curve(
+            Quantity(units.FREQUENCY, gt=0, ge=1e-6, le=1e12),
+            Quantity(units.PHASE_NOISE, ge=-250, le=60),
+            "{1 Hz: -95 dBc/Hz, 10 Hz: -125 dBc/Hz} and the like",
+            2,
+        ),
+        "L(f), single sideband; interpolated over logarithms.",
+    ),
+]
+AllanDeviation = Annotated[
+    Points | None,
+    Key(
+        _Curve(
+            Quantity(units.TIME, gt=0, ge=1e-6, le=1e9),
+            Quantity(units.RATIO, gt=0, ge=1e-20, le=1e-3),
+            "{1 s: 6e-12, 10 s: 2e-11} and the like",
+            1,
+        ),
+        "σ_y(τ); a power law is fitted.",
+    ),
+]
+PowerLawFigures = Annotated[
+    PowerLaw | None, Key(_PowerLawReader(), "h-2 … h2 of the one-sided spectrum of fractional frequency.")
+]
+
+
 class Oscillator(NamedTuple):
     """An oscillator and its noise, in one of three forms or as a part of the catalogue."""
 
-    frequency: Annotated[
-        float | None, Key(Quantity(units.FREQUENCY, gt=0, ge=1, le=1e15), "At which a mask is stated.")
-    ] = None
-    phase_noise: Annotated[
-        Points | None,
-        Key(
-            _Curve(
-                Quantity(units.FREQUENCY, gt=0, ge=1e-6, le=1e12),
-                Quantity(units.PHASE_NOISE, ge=-250, le=60),
-                "{1 Hz: -95 dBc/Hz, 10 Hz: -125 dBc/Hz} and the like",
-                2,
-            ),
-            "L(f), single sideband; interpolated over logarithms.",
-        ),
-    ] = None
-    allan_deviation: Annotated[
-        Points | None,
-        Key(
-            _Curve(
-                Quantity(units.TIME, gt=0, ge=1e-6, le=1e9),
-                Quantity(units.RATIO, gt=0, ge=1e-20, le=1e-3),
-                "{1 s: 6e-12, 10 s: 2e-11} and the like",
-                1,
-            ),
-            "σ_y(τ); a power law is fitted.",
-        ),
-    ] = None
-    power_law: Annotated[
-        PowerLaw | None, Key(_PowerLawReader(), "h-2 … h2 of the one-sided spectrum of fractional frequency.")
-    ] = None
+    frequency: Frequency = None
+    phase_noise: PhaseNoise = None
+    allan_deviation: AllanDeviation = None
+    power_law: PowerLawFigures = None
     bandwidth: Annotated[
         float,
         Key(

@@ -15,9 +15,18 @@ from bisar_budget.geometry import Vector
 from bisar_budget.mission.instruments import (
     FORMS,
     IMU_KINDS,
+    AccelerometerBias,
+    AllanDeviation,
+    AngleRandomWalk,
+    Attitude,
+    Frequency,
     GaussMarkov,
+    GyroBias,
     Imu,
     Oscillator,
+    PhaseNoise,
+    PowerLawFigures,
+    VelocityRandomWalk,
 )
 from bisar_budget.mission.model import COORDINATE, VELOCITY, Mission, MotionError
 from bisar_budget.mission.readers import (
@@ -50,11 +59,11 @@ class ImuPart(NamedTuple):
     kind: Annotated[str, Key(Choice("imu"))]
     name: Annotated[str, Key(_NAME)]
     source: Annotated[str | Mapping[str, str], _SOURCES]
-    accelerometer_bias: Annotated[Vector | None, Imu.__annotations__["accelerometer_bias"].__metadata__[0]] = None
-    attitude: Annotated[Vector | None, Imu.__annotations__["attitude"].__metadata__[0]] = None
-    gyro_bias: Annotated[Vector | None, Imu.__annotations__["gyro_bias"].__metadata__[0]] = None
-    velocity_random_walk: Annotated[Vector | None, Imu.__annotations__["velocity_random_walk"].__metadata__[0]] = None
-    angle_random_walk: Annotated[Vector | None, Imu.__annotations__["angle_random_walk"].__metadata__[0]] = None
+    accelerometer_bias: AccelerometerBias = None
+    attitude: Attitude = None
+    gyro_bias: GyroBias = None
+    velocity_random_walk: VelocityRandomWalk = None
+    angle_random_walk: AngleRandomWalk = None
     says: Annotated[str | None, _SAYS] = None
 
 
@@ -76,10 +85,10 @@ class OscillatorPart(NamedTuple):
     kind: Annotated[str, Key(Choice("oscillator"))]
     name: Annotated[str, Key(_NAME)]
     source: Annotated[str | Mapping[str, str], _SOURCES]
-    frequency: Annotated[float | None, Oscillator.__annotations__["frequency"].__metadata__[0]] = None
-    phase_noise: Annotated[Any, Oscillator.__annotations__["phase_noise"].__metadata__[0]] = None
-    allan_deviation: Annotated[Any, Oscillator.__annotations__["allan_deviation"].__metadata__[0]] = None
-    power_law: Annotated[Any, Oscillator.__annotations__["power_law"].__metadata__[0]] = None
+    frequency: Frequency = None
+    phase_noise: PhaseNoise = None
+    allan_deviation: AllanDeviation = None
+    power_law: PowerLawFigures = None
     says: Annotated[str | None, _SAYS] = None
 
     @staticmethod
