@@ -29,7 +29,9 @@ class Note(str):
         return note
 
     def then(self, *more: str) -> "Note":
-        """Add what else there is to say, after semicolons; nothing of what is empty."""
+        """Add what else there is to say, after semicolons; nothing of what is empty, and nothing to nothing."""
+        if not self:
+            return self
         return Note("; ".join(filter(None, (self, *more))), self.code, (*self.values, *filter(None, more)))
 
 
@@ -192,9 +194,9 @@ def other_model_fails(model: str, size: float, limit: float, unit: str, what: st
 
 
 @_phrase
-def other_model_is_beyond(model: str, phase: float, limit: float) -> str:
-    """Of the pull-in range. [rad]"""
-    return f"the {model} model says beyond it: QPE {_size(phase, 'rad')}, {format_limit(limit, 'rad')} allowed"
+def other_model_is_beyond(model: str, phase: float, limit: float, unit: str) -> str:
+    """Of the pull-in range."""
+    return f"the {model} model says beyond it: QPE {_size(phase, unit)}, {format_limit(limit, unit)} allowed"
 
 
 @_phrase

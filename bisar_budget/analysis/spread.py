@@ -21,7 +21,7 @@ def spread_limit(mission: Mission, allocation: Allocation, owner: str, model: st
 
 
 def spread_powers(analysis: Analysis, allocation: Allocation, owner: str, model: str) -> list[tuple[str, float]]:
-    """Row id and phase variance of what spreads and counts against an owner’s share; all, for the mission. [rad²]"""
+    """Row id and phase variance of what spreads and counts against an owner's share; all, for the mission. [rad²]"""
     mission, found = analysis.mission, []
     for name in PLATFORMS:
         wideband = getattr(mission.platforms, name).motion_error.vibration.wideband

@@ -194,9 +194,7 @@ def _pull_in_row(analysis: Analysis, mine: Together, theirs: Together, pull_in: 
         equation="Section VI",
         never_fails=True,
         over=_exceeded("QPE", total, pull_in, "rad", lambda: phases).then(phrases.one_total()),
-        doubt=phrases.other_model_is_beyond(theirs.model.name, by_other or 0.0, pull_in)
-        if _doubt(theirs.model, by_other, pull_in, "rad")
-        else NOTHING,
+        doubt=_doubt(theirs.model, by_other, pull_in, "rad", phrases.other_model_is_beyond),
     )
 
 
@@ -211,11 +209,17 @@ def _judged(mission: Mission, *, declared: float | None, **of_row: Any) -> Row:
     return row._replace(status="fail", reason=phrases.no_ground_point())
 
 
-def _doubt(other: Model, size: float | None, limit: float | None, unit: str) -> Note:
+def _doubt(
+    other: Model,
+    size: float | None,
+    limit: float | None,
+    unit: str,
+    phrase: Callable[[str, float, float, str], Note] = phrases.other_model_fails,
+) -> Note:
     """Say that the model that does not gate fails an aggregate; else nothing."""
     if size is None or limit is None or size <= limit * (1 + UTILIZATION_TOLERANCE) or other.is_blind:
         return NOTHING
-    return phrases.other_model_fails(other.name, size, limit, unit)
+    return phrase(other.name, size, limit, unit)
 
 
 def _of_all(what: str, size: float, limit: float | None, unit: str) -> Note:

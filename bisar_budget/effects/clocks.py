@@ -98,7 +98,7 @@ class Spur(NamedTuple):
     entry: int
     frequency: float
     phase: float
-    left: float = 1.0
+    left: float
 
 
 def spurs_of(mission: Mission) -> list[Spur]:

@@ -43,6 +43,7 @@ def test_a_note_is_its_words_with_what_they_are_made_of() -> None:
     assert more == f"{note}; passes with autofocus from n_pull 2"
     assert more.code == note.code
     assert more.values[-1].code == "passes-from"
+    assert phrases.NOTHING.then(more) is phrases.NOTHING
     assert not phrases.NOTHING
 
 
