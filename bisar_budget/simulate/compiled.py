@@ -31,6 +31,7 @@ from bisar_budget.simulate.range_profile import (
 Spline = Literal["linear", "cubic"]
 
 _LINE = 32  # pixels of one expansion; two or four vectors of a processor
+_RUN = 64  # pixels anywhere whose ranges are bounded together
 _TILE = 512  # pixels anywhere that are taken together: what they need of a pulse stays in that cache too
 _ROWS = 16  # lines of one tile; what it needs of a pulse stays in a processor's first cache
 _OVERSAMPLING = 2  # of profiles from the FFT
@@ -144,7 +145,9 @@ def backproject(history: PhaseHistory, points: Floats, spline: Spline) -> Comple
         image = np.ascontiguousarray(image if shape == points.shape[:-1] else image.T)
     else:
         axes = np.ascontiguousarray(points.reshape(-1, 3).T)
-        nearest, farthest = _reach(history.transmitter, history.receiver, axes)
+        nearest, farthest = _reach(
+            history.transmitter, history.receiver, *_boxes(points.reshape(-1, *points.shape[-2:]))
+        )
         within = _needed(history, nearest, farthest, image.size)
         if within is None:
             return None
@@ -459,14 +462,70 @@ def _sums(points, transmitter, receiver, reference, sums):
         sums[i] = math.sqrt(x * x + y * y + z * z) + math.sqrt(u * u + v * v + w * w) - reference
 
 
+def _boxes(lines: Floats) -> tuple[Floats, Floats]:
+    """Boxes around runs of points (nx, ny, 3), along the way from the first to the last of each run.
+
+    What a patch reads of a profile follows from them in a few steps where its pixels would take as long as its image.
+
+    Returns
+    -------
+    centres : (3, m) ndarray
+        [m]
+    halves : (m, 3, 3) ndarray
+        Half axes, one a row. [m]
+    """
+    starts = np.arange(0, lines.shape[1], _RUN)
+    ends = np.minimum(starts + _RUN, lines.shape[1]) - 1
+    along = (lines[:, ends, :2] - lines[:, starts, :2]).reshape(-1, 2)
+    length = np.hypot(*along.T)
+    cosine, sine = np.where(length > 0, along.T / np.where(length > 0, length, 1.0), [[1.0], [0.0]])
+    zero, one = np.zeros_like(cosine), np.ones_like(cosine)
+    axes = np.stack((cosine, sine, zero, -sine, cosine, zero, zero, zero, one), axis=-1).reshape(-1, 3, 3)
+    centres, halves = np.zeros((3, axes.shape[0])), np.empty_like(axes)
+    of_run = np.repeat(np.arange(starts.size), ends + 1 - starts)
+    by_line = axes.reshape(lines.shape[0], starts.size, 3, 3)
+    for axis in range(3):
+        place = np.einsum("lni,lni->ln", by_line[:, of_run, axis], lines)
+        least = np.minimum.reduceat(place, starts, axis=1).reshape(-1)
+        most = np.maximum.reduceat(place, starts, axis=1).reshape(-1)
+        centres += (least + most) / 2 * axes[:, axis].T
+        halves[:, axis] = ((most - least) / 2)[:, None] * axes[:, axis]
+    return centres, halves
+
+
+@_compiled
+def _leg(position, box, centres):
+    """From a platform to the middle of a box: distance and direction; no direction without a distance."""
+    x, y, z = centres[0, box] - position[0], centres[1, box] - position[1], centres[2, box] - position[2]
+    distance = math.sqrt(x * x + y * y + z * z)
+    scale = 1.0 / distance if distance > 0.0 else 0.0
+    return distance, x * scale, y * scale, z * scale
+
+
+@_compiled
+def _bend(distance, size):
+    """How far a distance may be above its tangent, so far from where it is touched."""
+    return min(size, size * size / (2.0 * (distance - size))) if distance > size else 2.0 * size
+
+
 @_parallel
-def _reach(transmitter, receiver, points):
-    """Smallest and largest range sum at each pulse of points (3, n)."""
+def _reach(transmitter, receiver, centres, halves):
+    """Bounds of the range sum at each pulse over boxes: it is convex, so above its tangent, and bends by r²/2R."""
     nearest, farthest = np.empty(transmitter.shape[0]), np.empty(transmitter.shape[0])
     for pulse in prange(transmitter.shape[0]):
-        sums = np.empty(points.shape[1])
-        _sums(points, transmitter[pulse], receiver[pulse], 0.0, sums)
-        nearest[pulse], farthest[pulse] = sums.min(), sums.max()
+        low, high = np.inf, -np.inf
+        for box in range(centres.shape[1]):
+            far_t, x, y, z = _leg(transmitter[pulse], box, centres)
+            far_r, u, v, w = _leg(receiver[pulse], box, centres)
+            slope, size = 0.0, 0.0
+            for axis in range(3):
+                a, b, c = halves[box, axis, 0], halves[box, axis, 1], halves[box, axis, 2]
+                slope += abs((x + u) * a + (y + v) * b + (z + w) * c)
+                size += a * a + b * b + c * c
+            size = math.sqrt(size)
+            low = min(low, far_t + far_r - slope)
+            high = max(high, far_t + far_r + slope + _bend(far_t, size) + _bend(far_r, size))
+        nearest[pulse], farthest[pulse] = low, high
     return nearest, farthest
 
 

@@ -1,13 +1,15 @@
 """What a chip says about each part of the aperture: the phase that an error leaves there, read from the image.
 
-Every pulse contributes to every pixel what exact ranges by the measured paths say. Correlated with a pulse's
-contribution, an image gives that pulse's phase: the projection of the spectrum to slow time, with range walk and bent
-lines as they are. The error-free response, formed and read by the same paths, takes out what is common to both. A
-polynomial through these phases then is fitted to the pixels themselves, so that the ends of the patch, where a finite
-image cuts sidelobes off, count as what they are.
+Every pulse contributes to every pixel what exact ranges by the measured paths say. A polynomial of the phase over the
+aperture is fitted to the pixels themselves, so that the ends of the patch, where a finite image cuts sidelobes off,
+count as what they are. The fit starts where exact ranges put the response. What it leaves over of the image says
+whether the polynomial is the image's; if not, the image is correlated with each pulse's contribution. That gives the
+pulse's phase: the projection of the spectrum to slow time, with range walk and bent lines as they are. The error-free
+response, formed and read by the same paths, takes out what is common to both.
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -37,10 +39,9 @@ _ORDERS = ((0.9, 6), (0.6, 3), (-1.0, 2))
 _PRESENT = 0.25  # of the median strength over the aperture; less is smeared out of the patch
 _WALKS = 2  # fits, the range walk being that of the fit before
 _REFINEMENTS, _HALVINGS, _SETTLED_RAD = 20, 6, 1e-5
-_REPRODUCED, _EXACT = (
-    0.05,
-    2e-3,
-)  # of an image's norm: less left over, and the polynomial is the image's; is it for sure
+# Of an image's norm, which is the phase's rms: less left over, and the polynomial is the image's; is it for sure, a
+# quarter of the 0.02 rad that a measured phase may be off.
+_REPRODUCED, _EXACT = 0.05, 5e-3
 _BLOCK = 1 << 18  # contributions formed at once
 _KERNEL = np.linspace(0, 64, 4097)  # range cells, of a tapered range response
 
@@ -85,8 +86,7 @@ def read_aperture(
     walk_cells : float
         Range cells that the response walks, both ways: so many lines are read.
     expected : ExactEffect, optional
-        Where the fit may start too, if what the pulses say does not lead to a polynomial that reproduces the pixels:
-        close to a platform a long smear overlaps itself.
+        Where the fit starts. If no polynomial near it reproduces the pixels, what single pulses say is tried too.
 
     Raises
     ------
@@ -98,118 +98,33 @@ def read_aperture(
     half = min(middle, lines - 1 - middle, round(walk_cells * OVERSAMPLING / 2)) // _STRIDE * _STRIDE
     rows = slice(middle - half, middle + half + 1, _STRIDE)
     slow_time = cell_centres(collection.aperture_time, pulses_for(round(columns / OVERSAMPLING)))
-    place = slow_time / (collection.aperture_time / 2)
     pixels = chip.grid[rows].reshape(-1, 3)
     images = [one.image[rows] for one in (chip, reference)]
-    tapered = np.stack([(one * _taper(columns)).reshape(-1) for one in images])
-    correlated = np.empty((2, slow_time.size), dtype=complex)
-    block = max(1, _BLOCK // pixels.shape[0])
-    every = _Pixels(collection, errors, centre, pixels)
-    for start in range(0, slow_time.size, block):
-        part = slice(start, start + block)
-        correlated[:, part] = tapered @ every.contributions(slow_time[part]).conj().T
-    seen, clean = correlated
-    product, strength = seen * clean.conj(), np.abs(seen) / np.maximum(np.abs(clean), 1e-30)
-    inner = np.abs(place) < _INNER
-    present = strength > _PRESENT * np.median(strength[inner])
-    centre_pulse, count = place.size // 2, place.size
-    if not np.isfinite(strength).all() or (expected is None and not present[centre_pulse]):
-        raise ValueError("the response is not in the image")
-    fit: Floats = np.zeros(4)
-    covered = 0.0
-    if present[centre_pulse]:
-        gaps = np.nonzero(~(present & inner))[0]
-        first = int(gaps[gaps < centre_pulse].max(initial=-1)) + 1
-        last = int(gaps[gaps > centre_pulse].min(initial=count))
-        kept = slice(first, last)
-        covered = float(place[last - 1] - place[first]) / (2 * _INNER)
-        order = next(order for part, order in _ORDERS if covered > part)
-        phase = np.unwrap(np.angle(product[kept]))
-        fit = np.zeros(max(4, order + 1))
-        fit[: order + 1] = np.polynomial.legendre.legfit(place[kept], phase, order, w=np.abs(clean[kept]))
-    # Of a large patch some pixels are enough for a polynomial.
-    some = slice(None, None, -(-pixels.shape[0] * slow_time.size // CONTRIBUTIONS))
-    seen_there, clean_there = (one.reshape(-1)[some] for one in images)
-    few = _Pixels(collection, errors, centre, pixels[some])
-    at_rest = few.contributions(slow_time).sum(axis=0)
-    gain = complex(np.vdot(at_rest, clean_there) / np.vdot(at_rest, at_rest))
-    starts = [np.pad(fit, (0, _ORDERS[0][1] + 1 - fit.size))]
+    fitting = _Fitting(collection, errors, centre, pixels, slow_time, images, bool(walk_cells))
+    best, covered = _Refined(np.zeros(4), math.inf), 1.0
     if expected is not None:
-        starts.append(np.array([0.0, 0.0, -expected.quadratic / 1.5, -expected.cubic / 2.5, 0.0, 0.0, 0.0]))
-    best = _Refined(fit, math.inf)
-    for first_fit in starts:
-        found = _Refined(first_fit, math.inf)
-        for _ in range(_WALKS if walk_cells else 1):
-            # What is left of the range error takes a pulse to other range cells too.
-            phase = np.polynomial.legendre.legval(place, [0.0, *found.fit[1:]])
-            left = -collection.wavelength / (2 * math.pi) * phase
-            single = few.contributions(slow_time, left)
-            found = _refined(found.fit, place, single.astype(np.complex128), seen_there, gain)
-        best = min(best, found, key=lambda one: one.misfit)
-        if best.misfit < _EXACT:
-            break
-    if best.misfit < _REPRODUCED:
-        fit, covered = best.fit, 1.0
-    elif not covered:
-        raise ValueError("the response is not in the image")
+        best = fitting.refined(np.array([0.0, 0.0, -expected.quadratic / 1.5, -expected.cubic / 2.5]))
+    if best.misfit >= _EXACT:
+        by_pulses, covered = _fit_to_pulses(_Pixels(collection, errors, centre, pixels), slow_time, images, columns)
+        if expected is None and not covered:
+            raise ValueError("the response is not in the image")
+        best = min(best, fitting.refined(by_pulses), key=lambda one: one.misfit)
+        if best.misfit < _REPRODUCED:
+            covered = 1.0
+        elif covered:
+            best = _Refined(by_pulses, best.misfit)
+        else:
+            raise ValueError("the response is not in the image")
+    fit = best.fit
     # A pixel along y′ changes the range sum over the aperture by λ / OVERSAMPLING, twice its P₁ part.
     turn = 1 if collection.flown(errors).turns_left(centre) else -1
     across = -turn * OVERSAMPLING / math.pi * float(fit[1])
+    place = 2 * slow_time / collection.aperture_time
     slope = np.polynomial.legendre.legder([0.0, 0.0, *fit[2:]])
     mean = float(np.mean(place * np.polynomial.legendre.legval(place, slope)))
     walked = mean / (2 * math.pi) * collection.relative_bandwidth * OVERSAMPLING
     # The image's phase is −2π/λ times the range error; P₂ = (3t² - 1)/2, P₃ = (5t³ - 3t)/2.
     return ApertureReading(float(-1.5 * fit[2]), float(-2.5 * fit[3]), across, -walked, min(1.0, covered * 1.02))
-
-
-class _Refined(NamedTuple):
-    """Polynomial of the phase, and what of the image it leaves over, of its norm."""
-
-    fit: Floats
-    misfit: float
-
-
-def _refined(fit: Floats, place: Floats, contribution: Complexes, seen: Complexes, gain: complex) -> _Refined:
-    """Fit the phase's polynomial to the pixels, by Gauss and Newton; a step that makes it worse is shortened."""
-    legendre = np.polynomial.legendre.legvander(place, fit.size - 1)
-    norm = float(np.linalg.norm(seen))
-
-    def left_by(coefficients: Floats) -> tuple[Complexes, float, Complexes]:
-        pulses = gain * np.exp(1j * (legendre @ coefficients))
-        model = pulses @ contribution
-        # The constant phase is free: what it takes is known at once.
-        turn = np.angle(np.vdot(model, seen))
-        pulses, model = pulses * np.exp(1j * turn), model * np.exp(1j * turn)
-        amplitude = float(abs(np.vdot(model, seen)) / np.real(np.vdot(model, model)))
-        return seen - amplitude * model, amplitude, pulses
-
-    found = fit.copy()
-    left, amplitude, pulses = left_by(found)
-    for _ in range(_REFINEMENTS):
-        columns = contribution.T @ (1j * amplitude * pulses[:, None] * legendre)
-        both = np.concatenate((columns.real, columns.imag))
-        step = np.linalg.lstsq(both, np.concatenate((left.real, left.imag)), rcond=1e-6)[0]
-        for _ in range(_HALVINGS):
-            ahead = left_by(found + step)
-            if np.linalg.norm(ahead[0]) <= np.linalg.norm(left):
-                break
-            step = step / 2
-        else:
-            break
-        found = found + step
-        left, amplitude, pulses = ahead
-        if np.abs(step[1:]).max() < _SETTLED_RAD:
-            break
-    return _Refined(found, float(np.linalg.norm(left)) / norm)
-
-
-def _taper(columns: int) -> Floats:
-    """Weights along a line: its ends, half the cells of a response without smear, fade."""
-    ramp = round(CELLS * OVERSAMPLING / 2)
-    place = np.arange(columns)
-    inside = np.minimum(place + 0.5, columns - place - 0.5) / ramp
-    taper: Floats = np.sin(math.pi / 2 * np.clip(inside, 0, 1)) ** 2
-    return taper
 
 
 class _Pixels:
@@ -277,3 +192,122 @@ def _distance(positions: Floats, points: Floats, squares: Floats) -> Floats:
     square += _squares(positions)[:, None]
     square += squares
     return np.sqrt(square, out=square)
+
+
+def _fit_to_pulses(
+    every: _Pixels, slow_time: Floats, images: Sequence[Complexes], columns: int
+) -> tuple[Floats, float]:
+    """A polynomial through the phases of single pulses, and its share of the aperture: 0 without its middle.
+
+    `images` are with and without error, of the same pixels.
+    """
+    place = 2 * slow_time / every.collection.aperture_time
+    tapered = np.stack([(one * _taper(columns)).reshape(-1) for one in images])
+    correlated = np.empty((2, slow_time.size), dtype=complex)
+    block = max(1, _BLOCK // every.places.shape[0])
+    for start in range(0, slow_time.size, block):
+        part = slice(start, start + block)
+        correlated[:, part] = tapered @ every.contributions(slow_time[part]).conj().T
+    seen, clean = correlated
+    strength = np.abs(seen) / np.maximum(np.abs(clean), 1e-30)
+    inner = np.abs(place) < _INNER
+    present = strength > _PRESENT * np.median(strength[inner])
+    middle = place.size // 2
+    if not np.isfinite(strength).all():
+        raise ValueError("the response is not in the image")
+    if not present[middle]:
+        return np.zeros(4), 0.0
+    gaps = np.nonzero(~(present & inner))[0]
+    first = int(gaps[gaps < middle].max(initial=-1)) + 1
+    last = int(gaps[gaps > middle].min(initial=place.size))
+    kept = slice(first, last)
+    covered = float(place[last - 1] - place[first]) / (2 * _INNER)
+    order = next(order for part, order in _ORDERS if covered > part)
+    phase = np.unwrap(np.angle((seen * clean.conj())[kept]))
+    fit = np.zeros(max(4, order + 1))
+    fit[: order + 1] = np.polynomial.legendre.legfit(place[kept], phase, order, w=np.abs(clean[kept]))
+    return fit, covered
+
+
+def _taper(columns: int) -> Floats:
+    """Weights along a line: its ends, half the cells of a response without smear, fade."""
+    ramp = round(CELLS * OVERSAMPLING / 2)
+    place = np.arange(columns)
+    inside = np.minimum(place + 0.5, columns - place - 0.5) / ramp
+    taper: Floats = np.sin(math.pi / 2 * np.clip(inside, 0, 1)) ** 2
+    return taper
+
+
+class _Refined(NamedTuple):
+    """Polynomial of the phase, and what of the image it leaves over, of its norm."""
+
+    fit: Floats
+    misfit: float
+
+
+class _Fitting:
+    """Fits of the phase's polynomial to some pixels of an image: of a large one they are enough."""
+
+    def __init__(
+        self,
+        collection: PointCollection,
+        errors: Errors,
+        centre: GroundVector,
+        pixels: Floats,
+        slow_time: Floats,
+        images: Sequence[Complexes],
+        walks: bool,
+    ) -> None:
+        some = slice(None, None, -(-pixels.shape[0] * slow_time.size // CONTRIBUTIONS))
+        self.seen, clean = (one.reshape(-1)[some] for one in images)
+        self.few = _Pixels(collection, errors, centre, pixels[some])
+        self.slow_time, self.fits = slow_time, _WALKS if walks else 1
+        at_rest = self.few.contributions(slow_time).sum(axis=0)
+        self.gain = complex(np.vdot(at_rest, clean) / np.vdot(at_rest, at_rest))
+
+    def refined(self, fit: Floats) -> _Refined:
+        """Refine a polynomial, the range walk being that of the fit before."""
+        collection = self.few.collection
+        place = 2 * self.slow_time / collection.aperture_time
+        found = _Refined(np.pad(fit, (0, _ORDERS[0][1] + 1 - fit.size)), math.inf)
+        for _ in range(self.fits):
+            # What is left of the range error takes a pulse to other range cells too.
+            phase = np.polynomial.legendre.legval(place, [0.0, *found.fit[1:]])
+            left = -collection.wavelength / (2 * math.pi) * phase
+            single = self.few.contributions(self.slow_time, left)
+            found = _refined(found.fit, place, single.astype(np.complex128), self.seen, self.gain)
+        return found
+
+
+def _refined(fit: Floats, place: Floats, contribution: Complexes, seen: Complexes, gain: complex) -> _Refined:
+    """Fit the phase's polynomial to the pixels, by Gauss and Newton; a step that makes it worse is shortened."""
+    legendre = np.polynomial.legendre.legvander(place, fit.size - 1)
+    norm = float(np.linalg.norm(seen))
+
+    def left_by(coefficients: Floats) -> tuple[Complexes, float, Complexes]:
+        pulses = gain * np.exp(1j * (legendre @ coefficients))
+        model = pulses @ contribution
+        # The constant phase is free: what it takes is known at once.
+        turn = np.angle(np.vdot(model, seen))
+        pulses, model = pulses * np.exp(1j * turn), model * np.exp(1j * turn)
+        amplitude = float(abs(np.vdot(model, seen)) / np.real(np.vdot(model, model)))
+        return seen - amplitude * model, amplitude, pulses
+
+    found = fit.copy()
+    left, amplitude, pulses = left_by(found)
+    for _ in range(_REFINEMENTS):
+        columns = contribution.T @ (1j * amplitude * pulses[:, None] * legendre)
+        both = np.concatenate((columns.real, columns.imag))
+        step = np.linalg.lstsq(both, np.concatenate((left.real, left.imag)), rcond=1e-6)[0]
+        for _ in range(_HALVINGS):
+            ahead = left_by(found + step)
+            if np.linalg.norm(ahead[0]) <= np.linalg.norm(left):
+                break
+            step = step / 2
+        else:
+            break
+        found = found + step
+        left, amplitude, pulses = ahead
+        if np.abs(step[1:]).max() < _SETTLED_RAD:
+            break
+    return _Refined(found, float(np.linalg.norm(left)) / norm)
