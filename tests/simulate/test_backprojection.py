@@ -139,6 +139,34 @@ def test_compiled_and_numpy_form_the_same_image(at, turn, spacing, shape, squint
 
 
 @needs_numba
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    shape=st.tuples(st.integers(1, 4), st.integers(1, 200)),
+    length=st.floats(0, 3e3),
+    bend=st.floats(-0.5, 0.5),
+    is_on_a_pixel=st.booleans(),
+)
+@settings(max_examples=50, deadline=None)
+def test_no_pixel_is_outside_the_bounds_of_its_ranges(seed, shape, length, bend, is_on_a_pixel) -> None:
+    """Profiles are refined between them. Bent lines, their pixels moved at random, some of them at a platform."""
+    from bisar_budget.simulate.compiled import _boxes, _reach
+
+    rng = np.random.default_rng(seed)
+    place, line = np.linspace(-0.5, 0.5, shape[1]), np.arange(shape[0])[:, None]
+    lines = np.stack(np.broadcast_arrays(length * place, line + bend * length * place**2, 0 * place), axis=-1)
+    lines = lines + rng.normal(size=lines.shape) * 10.0 ** rng.uniform(-6, 2)
+    platforms = rng.normal(size=(2, 6, 3)) * 10.0 ** rng.uniform(0, 5)
+    if is_on_a_pixel:
+        platforms[0, 2] = lines[-1, shape[1] // 2]
+    nearest, farthest = _reach(*platforms, *_boxes(lines))
+    legs = [np.linalg.norm(lines.reshape(-1, 1, 3) - platform, axis=-1) for platform in platforms]
+    sums = legs[0] + legs[1]
+    rounding = 1e-12 * (1 + sums.max())
+    assert (nearest <= sums.min(axis=0) + rounding).all()
+    assert (farthest >= sums.max(axis=0) - rounding).all()
+
+
+@needs_numba
 def test_a_pixel_on_a_platform_is_its_own_range() -> None:
     """No expansion holds there; the exact range is 0 on one leg."""
     c = collection(pulses=16)
