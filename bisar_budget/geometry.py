@@ -7,6 +7,7 @@ Vectors are plain tuples, so that a check needs no array library.
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import zip_longest
 
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT, ROUNDING
 
@@ -14,16 +15,21 @@ Vector = tuple[float, float, float]
 GroundVector = tuple[float, float]
 
 STRAIGHT: Vector = (0.0, 0.0, 0.0)  # acceleration of a platform whose path does not curve
+Axes = tuple[Vector, Vector, Vector]
 
 FRAME_AXES = {
     "scene": ("x", "y", "z"),
     "track": ("along", "cross", "up"),
     "look": ("line_of_sight", "cross", "up"),
+    "ric": ("radial", "in_track", "cross_track"),
 }
 
 
 class UndefinedFrameError(ValueError):
-    """A frame that this platform does not have: a still one has no track, one overhead no cross direction."""
+    """A frame that this platform does not have: a still one has no track, one overhead no cross direction.
+
+    Without the scene's latitude and longitude nothing is known of the Earth's centre, and no platform has `ric`.
+    """
 
 
 def dot(a: Vector, b: Vector) -> float:
@@ -60,20 +66,34 @@ def _minus(a: Vector, b: Vector) -> Vector:
 
 @dataclass(frozen=True, kw_only=True)
 class PlatformState:
-    """Position [m] and velocity [m/s] of one platform at the aperture midpoint, and its acceleration [m/s²]."""
+    """The path of one platform over the aperture, a polynomial of slow time.
+
+    Position [m] and velocity [m/s] at the midpoint, acceleration [m/s²], and in `bends` the coefficients of τ³, τ⁴, …
+    [m/s³], [m/s⁴], …. `radial` are the axes of its `ric` frame, where the Earth's centre is known.
+    """
 
     position: Vector
     velocity: Vector
     acceleration: Vector = STRAIGHT
+    bends: tuple[Vector, ...] = ()
+    radial: Axes | None = None
+
+    @property
+    def is_straight(self) -> bool:
+        """Whether the velocity is constant."""
+        return self.acceleration == STRAIGHT and not self.bends
 
     def at(self, tau: float) -> tuple[Vector, Vector]:
         """Position and velocity at a slow time from the midpoint. [m], [m/s]"""
         p, v, a = self.position, self.velocity, self.acceleration
         half = tau * tau / 2
-        return (
-            (p[0] + v[0] * tau + a[0] * half, p[1] + v[1] * tau + a[1] * half, p[2] + v[2] * tau + a[2] * half),
-            (v[0] + a[0] * tau, v[1] + a[1] * tau, v[2] + a[2] * tau),
-        )
+        x, y, z = p[0] + v[0] * tau + a[0] * half, p[1] + v[1] * tau + a[1] * half, p[2] + v[2] * tau + a[2] * half
+        u, v_y, w = v[0] + a[0] * tau, v[1] + a[1] * tau, v[2] + a[2] * tau
+        for power, (a_x, a_y, a_z) in enumerate(self.bends, 3):
+            moved, faster = tau**power, power * tau ** (power - 1)
+            x, y, z = x + a_x * moved, y + a_y * moved, z + a_z * moved
+            u, v_y, w = u + a_x * faster, v_y + a_y * faster, w + a_z * faster
+        return (x, y, z), (u, v_y, w)
 
     @cached_property
     def slant_range(self) -> float:
@@ -98,7 +118,8 @@ class PlatformState:
 
     def travelled(self, duration_s: float) -> float:
         """Bound of the way it makes from the midpoint in a time. [m]"""
-        return norm(self.velocity) * duration_s + norm(self.acceleration) * duration_s**2 / 2
+        way = norm(self.velocity) * duration_s + norm(self.acceleration) * duration_s**2 / 2
+        return way + sum(norm(bend) * duration_s**power for power, bend in enumerate(self.bends, 3))
 
     @property
     def azimuth(self) -> float:
@@ -119,18 +140,23 @@ class PlatformState:
         sine = -dot(self.look, self.velocity) / speed
         return math.asin(max(-1.0, min(1.0, sine))) if abs(sine) > ROUNDING else 0.0
 
-    def frame(self, name: str) -> tuple[Vector, Vector, Vector]:
+    def frame(self, name: str) -> Axes:
         """Axes of a frame as unit vectors of the scene, right-handed, in the order of `FRAME_AXES`.
 
         `track`: along the velocity; cross is horizontal, to the left; up completes it (vertical in level
         flight). `look`: line of sight from the scene centre to the platform; cross is horizontal; up
-        completes it.
+        completes it. `ric`: away from the Earth's centre; in-track and cross-track are those of the orbit, whose
+        plane holds the velocity against the stars; cross-track is its normal.
 
         Raises
         ------
         UndefinedFrameError
-            Track frame of a still platform, or a first axis that is vertical.
+            Track frame of a still platform, a first axis that is vertical, or no Earth's centre.
         """
+        if name == "ric":
+            if self.radial is None:
+                raise UndefinedFrameError("the ric frame needs the scene's latitude, longitude and height")
+            return self.radial
         if name == "scene":
             return ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
         first = self.velocity if name == "track" else self.position
@@ -179,7 +205,10 @@ class BistaticGeometry:
         (p, v, a), (q, w, b) = (
             (state.position, state.velocity, state.acceleration) for state in (self.transmitter, self.receiver)
         )
-        return PlatformState(position=_minus(p, q), velocity=_minus(v, w), acceleration=_minus(a, b))
+        bends = tuple(
+            _minus(*both) for both in zip_longest(self.transmitter.bends, self.receiver.bends, fillvalue=STRAIGHT)
+        )
+        return PlatformState(position=_minus(p, q), velocity=_minus(v, w), acceleration=_minus(a, b), bends=bends)
 
     def sights(self, *, has_direct_path: bool) -> tuple[Vector, Vector]:
         """What a metre of the transmitter's motion, and of the receiver's, takes from the range at mid-aperture. [-]

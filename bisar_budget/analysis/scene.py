@@ -12,6 +12,7 @@ and with a correction that has its own bound, an edge whose phase itself exceeds
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cached_property, partial
 from operator import add, mul
 from typing import NamedTuple
@@ -110,12 +111,7 @@ class ScenePhases:
         """Both platforms as a point of the ground has them."""
         states = (self.geometry.transmitter, self.geometry.receiver)
         transmitter, receiver = (
-            PlatformState(
-                position=(s.position[0] - point[0], s.position[1] - point[1], s.position[2]),
-                velocity=s.velocity,
-                acceleration=s.acceleration,
-            )
-            for s in states
+            replace(s, position=(s.position[0] - point[0], s.position[1] - point[1], s.position[2])) for s in states
         )
         return BistaticGeometry(transmitter=transmitter, receiver=receiver)
 

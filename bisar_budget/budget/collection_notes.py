@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.geometry import STRAIGHT, norm
+from bisar_budget.geometry import norm
 from bisar_budget.phrases import Note
 
 _TURNING_RAD = 0.1  # half the turn of a line of sight; the quartic term is 1 % of the quadratic there
@@ -17,7 +17,7 @@ def collection_notes(analysis: Analysis) -> Iterator[Note]:
     """Say where the published model leaves the collection, and where an image shows less than the full one."""
     mission = analysis.mission
     for name, state in (("transmitter", analysis.geometry.transmitter), ("receiver", analysis.geometry.receiver)):
-        if state.acceleration != STRAIGHT:
+        if not state.is_straight:
             yield phrases.path_curves(name)
         turn = norm(state.look_rate) * mission.collection.aperture_time / 2
         if turn > _TURNING_RAD:

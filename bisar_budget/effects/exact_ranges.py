@@ -525,6 +525,8 @@ class ExactRanges:
 def _track(state: PlatformState, times: Samples, east: float, north: float) -> Track:
     (x, y, z), (u, v, w), (a, b, c) = state.position, state.velocity, state.acceleration
     x, y = x - east, y - north
+    if state.bends:
+        return [(p - east, q - north, r) for (p, q, r), _ in map(state.at, times)]
     return [(x + tau * (u + tau * a / 2), y + tau * (v + tau * b / 2), z + tau * (w + tau * c / 2)) for tau in times]
 
 

@@ -123,7 +123,7 @@ def path(
     rng: np.random.Generator | None = None,
     way: Floats | None = None,
 ) -> Path:
-    """Fly one platform through its midpoint state, at its acceleration, and measure it with an error.
+    """Fly one platform along its path, and measure it with an error.
 
     Parameters
     ----------
@@ -146,6 +146,8 @@ def path(
     tau = slow_time[:, None]
     actual = np.asarray(state.position) + np.asarray(state.velocity) * tau
     actual = actual + np.asarray(state.acceleration) * tau**2 / 2
+    for power, bend in enumerate(state.bends, 3):
+        actual = actual + np.asarray(bend) * tau**power
     if error is None:
         return Path(actual=actual, measured=actual)
     # (22): p̃ + ṽτ + ãτ²/2

@@ -112,7 +112,7 @@ def _named(geometry: BistaticGeometry) -> tuple[tuple[str, PlatformState], tuple
 
 def _flown(state: PlatformState, aperture_time: float) -> tuple[Vector, ...]:
     """Places along the aperture; both ends say all of a straight path."""
-    steps = _PATH_STEPS if norm(state.acceleration) else 1
+    steps = 1 if state.is_straight else _PATH_STEPS
     times = (aperture_time * (index / steps - 0.5) for index in range(steps + 1))
     return tuple(state.at(time)[0] for time in times)
 

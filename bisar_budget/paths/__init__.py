@@ -1,0 +1,1 @@
+"""Paths of platforms from orbits, logs of flights and geodetic places, in the scene's axes."""

@@ -1,0 +1,128 @@
+"""The Earth as WGS-84 has it: geodetic places, and the axes of a scene on it. No array library.
+
+Earth-fixed axes: x through Greenwich on the equator, z through the north pole. [m]
+"""
+
+import math
+from typing import NamedTuple
+
+from bisar_budget.geometry import Axes, Vector, cross, dot, unit
+
+# NGA.STND.0036, table 3.1
+EQUATORIAL_RADIUS = 6378137.0  # m
+FLATTENING = 1 / 298.257223563
+ROTATION_RATE = 7.292115e-5  # rad/s
+_ECCENTRICITY_SQUARED = FLATTENING * (2 - FLATTENING)
+_POLAR_RADIUS = EQUATORIAL_RADIUS * (1 - FLATTENING)
+_SETTLED = 1e-15  # rad; a metre on the ground is 1.6e-7
+
+
+class Place(NamedTuple):
+    """Geodetic latitude and longitude [rad], height above the ellipsoid [m]."""
+
+    latitude: float
+    longitude: float
+    height: float
+
+
+class SceneAxes(NamedTuple):
+    """East, north and up at a place, and the place itself, in Earth-fixed axes."""
+
+    origin: Vector
+    axes: Axes
+
+    def place(self, earth_fixed: Vector) -> Vector:
+        """A place in the scene's axes. [m]"""
+        return self.turned(_minus(earth_fixed, self.origin))
+
+    def turned(self, earth_fixed: Vector) -> Vector:
+        """A direction or velocity in the scene's axes."""
+        east, north, up = self.axes
+        return (dot(east, earth_fixed), dot(north, earth_fixed), dot(up, earth_fixed))
+
+    def earth_fixed(self, place: Vector) -> Vector:
+        """A place of the scene in Earth-fixed axes. [m]"""
+        x, y, z = self.turned_back(place)
+        return (x + self.origin[0], y + self.origin[1], z + self.origin[2])
+
+    def turned_back(self, vector: Vector) -> Vector:
+        """A direction or velocity of the scene in Earth-fixed axes."""
+        (a, b, c), (u, v, w), (p, q, r) = self.axes
+        e, n, h = vector
+        return (a * e + u * n + p * h, b * e + v * n + q * h, c * e + w * n + r * h)
+
+    def radial(self, place: Vector, velocity: Vector) -> Axes:
+        """Axes of the `ric` frame of a platform, in the scene's axes.
+
+        Radial: away from the Earth's centre. Cross-track: normal of the plane that holds the velocity against the
+        stars, v + ω×r. In-track completes them, and is not quite the velocity on an eccentric orbit (CCSDS 502.0-B,
+        RTN).
+        """
+        r = self.earth_fixed(place)
+        x, y, z = self.turned_back(velocity)
+        against_stars = (x - ROTATION_RATE * r[1], y + ROTATION_RATE * r[0], z)
+        radial = unit(r)
+        across = unit(cross(r, against_stars))
+        return self.turned(radial), self.turned(cross(across, radial)), self.turned(across)
+
+
+def earth_fixed(place: Place) -> Vector:
+    """Earth-fixed coordinates of a geodetic place. [m]"""
+    sine, cosine = math.sin(place.latitude), math.cos(place.latitude)
+    normal = _prime_vertical(sine)
+    level = (normal + place.height) * cosine
+    return (
+        level * math.cos(place.longitude),
+        level * math.sin(place.longitude),
+        (normal * (1 - _ECCENTRICITY_SQUARED) + place.height) * sine,
+    )
+
+
+def geodetic(point: Vector) -> Place:
+    """Geodetic place of Earth-fixed coordinates, more than a few kilometres from the Earth's centre.
+
+    Bowring's iteration, on the reduced latitude.
+    """
+    x, y, z = point
+    level = math.hypot(x, y)
+    if not level:
+        return Place(math.copysign(math.pi / 2, z), 0.0, abs(z) - _POLAR_RADIUS)
+    tangent = z / (level * (1 - FLATTENING))
+    latitude = math.atan2(z, level)
+    for _ in range(10):
+        reduced = math.atan(tangent)
+        up = z + _ECCENTRICITY_SQUARED / (1 - FLATTENING) * EQUATORIAL_RADIUS * math.sin(reduced) ** 3
+        out = level - _ECCENTRICITY_SQUARED * EQUATORIAL_RADIUS * math.cos(reduced) ** 3
+        before, latitude = latitude, math.atan2(up, out)
+        if abs(latitude - before) < _SETTLED:
+            break
+        tangent = (1 - FLATTENING) * math.tan(latitude)
+    sine, cosine = math.sin(latitude), math.cos(latitude)
+    height = level * cosine + z * sine - EQUATORIAL_RADIUS * math.sqrt(1 - _ECCENTRICITY_SQUARED * sine * sine)
+    return Place(latitude, math.atan2(y, x), height)
+
+
+def axes_at(place: Place) -> SceneAxes:
+    """East, north and up at a place."""
+    sine, cosine = math.sin(place.latitude), math.cos(place.latitude)
+    sine_l, cosine_l = math.sin(place.longitude), math.cos(place.longitude)
+    east = (-sine_l, cosine_l, 0.0)
+    north = (-sine * cosine_l, -sine * sine_l, cosine)
+    up = (cosine * cosine_l, cosine * sine_l, sine)
+    return SceneAxes(earth_fixed(place), (east, north, up))
+
+
+def radius_along(place: Place, heading: float) -> float:
+    """Radius of curvature of the way of constant height over a place, by its compass heading: Euler's formula. [m]"""
+    sine = math.sin(place.latitude)
+    across = _prime_vertical(sine)
+    along = across * (1 - _ECCENTRICITY_SQUARED) / (1 - _ECCENTRICITY_SQUARED * sine * sine)
+    return 1 / (math.cos(heading) ** 2 / along + math.sin(heading) ** 2 / across) + place.height
+
+
+def _prime_vertical(sine: float) -> float:
+    return EQUATORIAL_RADIUS / math.sqrt(1 - _ECCENTRICITY_SQUARED * sine * sine)
+
+
+def _minus(a: Vector, b: Vector) -> Vector:
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])

@@ -1,0 +1,180 @@
+"""What a file knows of a platform's path, and the polynomial of slow time that a budget flies.
+
+Exact ranges, images and every other command take a path as a polynomial over the aperture. An orbit gives a place at
+any time: its polynomial interpolates. A log gives measured places: its polynomial smooths them by least squares. Both
+say how far the polynomial is from what the file has.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from functools import cache
+from typing import TYPE_CHECKING, NamedTuple
+
+from bisar_budget.geometry import PlatformState, Vector
+from bisar_budget.paths.instant import Instant
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+_NODES = 15  # Chebyshev points of an interpolation, so many coefficients
+_LEAST_WINDOW = 10.0  # s; in a shorter one rounding of an Earth-fixed place, 1e-9 m, is an acceleration
+_UNSEEN_M = 1e-7  # a coefficient that moves the path by less is rounding
+_HIGHEST = 8  # order of a smoothed path
+_BETTER = 0.9  # of the residual; an order that leaves more smooths nothing
+
+
+class PathFileError(Exception):
+    """A file that gives no path. The message names the file, and its line, byte or record."""
+
+
+class Orbit(NamedTuple):
+    """A path that is known at any instant of a span.
+
+    `place` takes an instant and gives Earth-fixed coordinates [m]. `words` says what it is, for reports; `epoch` is
+    that of the elements. `doubts` are warnings about it at an instant.
+    """
+
+    place: Callable[[Instant], Vector]
+    words: str
+    span: tuple[Instant, Instant] | None = None
+    epoch: Instant | None = None
+    doubts: Callable[[Instant], Sequence[str]] = lambda _: ()
+
+
+class Log(NamedTuple):
+    """Measured places (n, 3) [m] at rising times (n,) [s], Earth-fixed or in the scene's axes.
+
+    Times count from `start`; without one they are those of the log itself. `words` says what it is, for reports.
+    """
+
+    times: "NDArray[np.float64]"
+    places: "NDArray[np.float64]"
+    is_earth_fixed: bool
+    words: str
+    start: Instant | None = None
+
+
+class Fitted(NamedTuple):
+    """A path as a polynomial, its order, and how far it is from the file's places, at most and root mean square [m].
+
+    `samples` is how many of a log's places the polynomial smooths; none of an orbit, which is interpolated.
+    """
+
+    state: PlatformState
+    order: int
+    farthest: float
+    rms: float
+    samples: int = 0
+
+
+def interpolated(place: Callable[[float], Vector], aperture_time_s: float, widest_s: float = math.inf) -> Fitted:
+    """Path through places of the scene at Chebyshev points around the aperture.
+
+    Parameters
+    ----------
+    place : callable
+        From slow time [s] to a place in the scene's axes [m].
+    aperture_time_s : float
+        What the path is needed for.
+    widest_s : float
+        Longest time around the middle in which there are places.
+    """
+    half = min(max(aperture_time_s, _LEAST_WINDOW), widest_s) / 2
+    nodes = [math.cos(math.pi * (n + 0.5) / _NODES) for n in range(_NODES)]
+    places = [place(half * node) for node in nodes]
+    monomials = _monomials(_NODES)
+    coefficients = []
+    for axis in range(3):
+        chebyshev = [
+            (2 if order else 1)
+            / _NODES
+            * math.fsum(places[n][axis] * math.cos(math.pi * order * (n + 0.5) / _NODES) for n in range(_NODES))
+            for order in range(_NODES)
+        ]
+        # What is below rounding would be divided by high powers of the window.
+        kept = [one if abs(one) > _UNSEEN_M else 0.0 for one in chebyshev]
+        coefficients.append(
+            [
+                math.fsum(kept[order] * monomials[order][power] for order in range(power, _NODES)) / half**power
+                for power in range(_NODES)
+            ]
+        )
+    state = _state([tuple(axis[power] for axis in coefficients) for power in range(_NODES)])  # type: ignore[misc]
+    apart = []
+    for n in range(_NODES + 1):
+        tau = aperture_time_s / 2 * math.cos(math.pi * n / _NODES)
+        apart.append(math.dist(state.at(tau)[0], place(tau)))
+    rms = math.sqrt(math.fsum(one * one for one in apart) / len(apart))
+    return Fitted(state, len(state.bends) + 2, max(apart), rms)
+
+
+def smoothed(times: "NDArray[np.float64]", places: "NDArray[np.float64]", aperture_time_s: float) -> Fitted:
+    """Path that fits the places of a log within the aperture by least squares.
+
+    The order rises as long as it leaves clearly less, to 8 at most and to a fifth of the samples: what a platform does
+    faster is in the log's noise, or is vibration.
+
+    Parameters
+    ----------
+    times : (n,) ndarray
+        Slow time; what is outside the aperture is not used. [s]
+    places : (n, 3) ndarray
+        In the scene's axes. [m]
+    aperture_time_s : float
+        Length of the aperture.
+
+    Raises
+    ------
+    PathFileError
+        Fewer than five places within the aperture.
+    """
+    import numpy as np
+
+    half = aperture_time_s / 2
+    inside = np.abs(times) <= half * (1 + 1e-9)
+    count = int(inside.sum())
+    if count < 5:
+        raise PathFileError(
+            f"has {count} places in the aperture of {aperture_time_s:g} s, at least 5 are needed; sample faster"
+        )
+    at, wanted = times[inside] / half, places[inside]
+    best = None
+    for order in range(2, max(2, min(_HIGHEST, count // 5)) + 1):
+        legendre = np.polynomial.legendre.legvander(at, order)
+        found = np.linalg.lstsq(legendre, wanted, rcond=None)[0]
+        left = wanted - legendre @ found
+        spare = max(count - order - 1, 1)
+        rms = math.sqrt(float((left**2).sum()) / spare)
+        if best is None or rms < _BETTER * best[0]:
+            best = (rms, found, float(np.linalg.norm(left, axis=1).max()))
+    assert best is not None
+    rms, found, farthest = best
+    powers = np.stack([_padded(np.polynomial.legendre.leg2poly(found[:, axis]), len(found)) for axis in range(3)])
+    state = _state([tuple(float(p) for p in powers[:, n] / half**n) for n in range(len(found))])  # type: ignore[misc]
+    return Fitted(state, len(found) - 1, farthest, rms, count)
+
+
+def _padded(values: "NDArray[np.float64]", count: int) -> "NDArray[np.float64]":
+    import numpy as np
+
+    return np.pad(values, (0, count - values.size))
+
+
+def _state(powers: Sequence[Vector]) -> PlatformState:
+    """A path from its coefficients of τ⁰, τ¹, …; the highest that are zero are left out."""
+    position, velocity, (x, y, z), *bends = powers
+    while bends and bends[-1] == (0.0, 0.0, 0.0):
+        bends.pop()
+    return PlatformState(position=position, velocity=velocity, acceleration=(2 * x, 2 * y, 2 * z), bends=tuple(bends))
+
+
+@cache
+def _monomials(count: int) -> tuple[tuple[float, ...], ...]:
+    """Coefficients of powers in Chebyshev's polynomials T₀ …, row by row."""
+    rows = [[1.0], [0.0, 1.0]]
+    while len(rows) < count:
+        last, before = rows[-1], rows[-2]
+        doubled = [0.0, *(2 * one for one in last)]
+        rows.append([a - b for a, b in zip(doubled, [*before, 0.0, 0.0], strict=True)])
+    return tuple(tuple(row + [0.0] * (count - len(row))) for row in rows[:count])
