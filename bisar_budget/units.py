@@ -78,6 +78,8 @@ ACCELERATION = Dimension(
     "m/s^2",
     {f"{unit}/s^2": factor for unit, factor in _LENGTHS.items()} | {"g": _G, "mg": 1e-3 * _G, "ug": 1e-6 * _G},
 )
+JERK = Dimension("a jerk", "m/s^3", {f"{unit}/s^3": factor for unit, factor in _LENGTHS.items()})
+SNAP = Dimension("a snap", "m/s^4", {f"{unit}/s^4": factor for unit, factor in _LENGTHS.items()})
 # Readers think in degrees, formulas in radians: 45 without its unit is one in one file and the other in the next.
 ANGLE = Dimension(
     "an angle", "rad", _scaled("rad", "mun") | {"deg": math.pi / 180, "°": math.pi / 180}, usual=("deg", "rad")
@@ -134,6 +136,8 @@ DIMENSIONS = (
     LENGTH,
     SPEED,
     ACCELERATION,
+    JERK,
+    SNAP,
     ANGLE,
     RATIO,
     RATE,

@@ -25,7 +25,7 @@ from bisar_budget.effects.combine import combine_phases
 from bisar_budget.effects.correlation import phase_parts
 from bisar_budget.effects.exact_ranges import ExactRanges, nodes_for
 from bisar_budget.effects.point_path import PointPath
-from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState
+from bisar_budget.geometry import BistaticGeometry, GroundVector
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.units import format_quantity
 

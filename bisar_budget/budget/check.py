@@ -19,11 +19,12 @@ from bisar_budget.budget.vibration_rows import vibration_rows
 from bisar_budget.budget.waivers import apply_waivers
 from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
 from bisar_budget.effects.correlation import unused_correlations
+from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.subject import subject
 from bisar_budget.findings.mission import FileWarning, MissionFindings, Resolution
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import RANK
-from bisar_budget.mission.model import Mission
+from bisar_budget.mission.model import FlownPath, Mission
 from bisar_budget.phrases import NOTHING, Note
 
 if TYPE_CHECKING:
@@ -80,10 +81,12 @@ def check_mission(mission: Mission, today: date, *, is_brief: bool = False) -> M
             *warnings,
             *_unused_correlations(mission),
             *straight_orbits(mission),
+            *_doubtful_paths(mission),
             *_of_instruments(analysis),
             *pull_in_caps(mission, resolution),
             *_nothing_declared(rows),
         ),
+        paths=tuple((name, path) for name, path in _paths(mission) if path.source),
         scene=checked.scene,
         notes=(*collection_notes(analysis), *_unused_keys(mission)),
         document=mission.document,
@@ -220,6 +223,20 @@ def _nothing_declared(rows: Sequence[Row]) -> Iterator[FileWarning]:
 
 def _unused_correlations(mission: Mission) -> Iterator[FileWarning]:
     return (FileWarning(line, message) for line, message in unused_correlations(mission))
+
+
+def _paths(mission: Mission) -> Iterator[tuple[str, FlownPath]]:
+    for name in PLATFORMS:
+        path = getattr(mission.platforms, name).path
+        if path is not None:
+            yield name, path
+
+
+def _doubtful_paths(mission: Mission) -> Iterator[FileWarning]:
+    for name, path in _paths(mission):
+        for doubt in path.doubts:
+            place = mission.line(("platforms", name, getattr(mission.platforms, name).way))
+            yield FileWarning(line=place, message=f"platforms.{name}: {doubt}", is_doubt=True)
 
 
 def _unused_keys(mission: Mission) -> Iterator[Note]:

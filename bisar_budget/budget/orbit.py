@@ -42,7 +42,7 @@ def straight_orbits(mission: Mission) -> Iterator[FileWarning]:
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
         speed = norm(platform.state.velocity)
-        if speed <= FASTEST_FLIGHT or platform.acceleration is not None:
+        if speed <= FASTEST_FLIGHT or platform.acceleration is not None or platform.is_of_the_earth:
             continue
         key: KeyPath = ("speed",) if platform.velocity is None else ("velocity",)
         parts = [f"{part + 0.0:.3f} m/s^2" for part in orbital_acceleration(platform.state.position)]

@@ -88,8 +88,8 @@ def diff(
     """
     from bisar_budget.budget.check import check_mission
     from bisar_budget.faults import MissionError
-    from bisar_budget.mission.load import load_mission, parse_mission
-    from bisar_budget.mission.revision import RevisionError, file_at
+    from bisar_budget.mission.load import load_mission
+    from bisar_budget.mission.revision import RevisionError, mission_at
     from bisar_budget.report.change import difference
     from bisar_budget.report.change.comparison import compare
 
@@ -102,7 +102,7 @@ def diff(
     changes = []
     for before, after in pairs:
         try:
-            old = load_mission(before) if base is None else parse_mission(file_at(before, base), f"{base}:{before}")
+            old = load_mission(before) if base is None else mission_at(before, base)
             new = load_mission(after)
         except RevisionError as error:
             fail(str(error))

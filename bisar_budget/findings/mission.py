@@ -8,7 +8,7 @@ from bisar_budget.faults import Fault
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUSES, worst
 from bisar_budget.geometry import BistaticGeometry
-from bisar_budget.mission.model import Document, Mission
+from bisar_budget.mission.model import Document, FlownPath, Mission
 from bisar_budget.phrases import Note
 
 if TYPE_CHECKING:
@@ -57,6 +57,7 @@ class MissionFindings(NamedTuple):
     rows: tuple[Row, ...]
     warnings: tuple[FileWarning, ...]
     notes: tuple[Note, ...]
+    paths: tuple[tuple[str, FlownPath], ...] = ()  # of platforms whose path the file does not state itself
     scene: "SceneEdge | None" = None  # of missions with a scene.radius and declared errors
     verdicts: "tuple[Verdict, ...] | None" = None  # of images, if any were formed
     is_unverified: bool = False  # images were asked for, and none gave a verdict

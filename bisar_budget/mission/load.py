@@ -5,11 +5,12 @@ A text gives a `Mission` or a `MissionError`, nothing else.
 
 import os
 import sys
+from collections.abc import Callable
 from contextlib import suppress
 from typing import BinaryIO, cast
 
 from bisar_budget.faults import MissionError
-from bisar_budget.mission.model import MISSION, Mission, names_parts
+from bisar_budget.mission.model import MISSION, Mission, flies_on_earth, names_parts
 from bisar_budget.mission.readers import INVALID
 from bisar_budget.mission.tree import MAX_BYTES, UnusableError, file_fault, read_tree
 
@@ -48,7 +49,12 @@ def _bounded(file: BinaryIO) -> bytes:
     return data + file.read(MAX_BYTES + 1 - len(data)) if len(data) == 1 << 14 else data
 
 
-def parse_mission(data: bytes | str, file: str = "-", model: str | None = None) -> Mission:
+def parse_mission(
+    data: bytes | str,
+    file: str = "-",
+    model: str | None = None,
+    beside: Callable[[str], bytes] | None = None,
+) -> Mission:
     """Turn the content of a mission file into a `Mission`.
 
     Parameters
@@ -59,6 +65,8 @@ def parse_mission(data: bytes | str, file: str = "-", model: str | None = None) 
         Name to say in messages.
     model : str, optional
         Gating model in place of `allocation.model`.
+    beside : callable, optional
+        Gives the content of a file that the mission names, and raises `PathFileError`; omitted: files beside it.
 
     Raises
     ------
@@ -71,10 +79,15 @@ def parse_mission(data: bytes | str, file: str = "-", model: str | None = None) 
     mission = INVALID
     with suppress(UnusableError):
         mission = MISSION.read(tree.root, (), tree.report)
+        folder = os.path.dirname(file) if file != "-" else ""
+        if mission is not INVALID and flies_on_earth(mission):
+            from bisar_budget.paths.resolve import reader_of, with_paths
+
+            mission = with_paths(mission, beside or reader_of(folder), tree.report)
         if mission is not INVALID and names_parts(mission):
             from bisar_budget.mission.parts import with_parts
 
-            mission = with_parts(mission, os.path.dirname(file) if file != "-" else "", tree.report)
+            mission = with_parts(mission, folder, tree.report)
     if tree.faults:
         ordered = sorted(dict.fromkeys(tree.faults), key=lambda fault: (fault.line or 0, fault.column or 0))
         raise MissionError(file, tuple(ordered))

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from datetime import date
 from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
@@ -42,6 +43,8 @@ from bisar_budget.mission.readers import (
 if TYPE_CHECKING:
     from bisar_budget.mission.covariance import Covariance
     from bisar_budget.mission.instruments import GaussMarkov, Imu, Oscillator, Synchronization
+    from bisar_budget.mission.routes import Orbit, Trajectory
+    from bisar_budget.paths.instant import Instant
 
 STILL = 1e-6  # m/s; slower than this no platform flies an aperture
 _LEAST_BASELINE = 1.0  # m, between platforms of which one hears the other
@@ -56,7 +59,11 @@ SIZE = Quantity(units.LENGTH, ge=0, le=1e9)
 VELOCITY = Quantity(units.SPEED, ge=-1e6, le=1e6)
 SPEED = Quantity(units.SPEED, ge=0, le=1e6)
 ACCELERATION = Quantity(units.ACCELERATION, ge=-1e6, le=1e6)
+JERK = Quantity(units.JERK, ge=-1e6, le=1e6)
+SNAP = Quantity(units.SNAP, ge=-1e6, le=1e6)
 DIRECTION = Quantity(units.ANGLE, ge=-2 * math.pi, le=2 * math.pi)
+LATITUDE = Quantity(units.ANGLE, ge=-math.pi / 2, le=math.pi / 2)
+HEIGHT = Quantity(units.LENGTH, ge=-1e4, le=1e9)
 ELEVATION = Quantity(units.ANGLE, ge=0, le=math.pi / 2)
 PHASE = Quantity(units.ANGLE, ge=-1e6, le=1e6)
 # With a turn at the aperture edge a response has no mainlobe; 45 without a unit would be seven.
@@ -103,17 +110,38 @@ class Collection(NamedTuple):
     pulses: Annotated[int | None, Key(Whole(2, 10_000_000), "For the simulator; omitted: what the patch needs.")] = (
         None
     )
+    center_time: Annotated[
+        "Instant | None", Key(Late(lambda: _routes("INSTANT")), "UTC of the middle of the aperture.")
+    ] = None
 
 
 class Scene(NamedTuple):
     """The imaged ground."""
+
+    latitude: Annotated[float | None, Key(LATITUDE, "Of its centre, geodetic, WGS-84; all three or none.")] = None
+    longitude: Annotated[float | None, Key(DIRECTION, "Of its centre, positive to the east.")] = None
+    height: Annotated[float | None, Key(HEIGHT, "Of its centre above the ellipsoid.")] = None
 
     radius: Annotated[float | None, Key(RANGE, "Radius of the scene about its centre.")] = None
     height_error: Annotated[
         float | None, Key(COORDINATE, "How much higher the scene is than the processor takes it for.")
     ] = None
 
+    @staticmethod
+    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+        """Hold its place to all three coordinates."""
+        if values.keys() >= set(PLACE_KEYS):
+            missing = [key for key in PLACE_KEYS if values[key] is None]
+            if 0 < len(missing) < len(PLACE_KEYS):
+                yield Problem(f"lacks {', '.join(missing)}", "accepted: latitude, longitude and height, or none")
 
+    @property
+    def is_on_earth(self) -> bool:
+        """Whether the file says where on the Earth it is."""
+        return self.latitude is not None
+
+
+PLACE_KEYS = ("latitude", "longitude", "height")
 SIZES = Triple(SIZE)
 ALONG_SIGHT_OR_AXES = OneOf(lambda value: SIZES if isinstance(value, list) else SIZE, (SIZE, SIZES))
 
@@ -158,6 +186,14 @@ def _instruments(name: str) -> Reader:
     return reader
 
 
+def _routes(name: str) -> Reader:
+    """A reader of `routes`, which few files need."""
+    from bisar_budget.mission import routes
+
+    reader: Reader = getattr(routes, name)
+    return reader
+
+
 PART = Text()
 PARTS = OneOf(lambda value: TextList() if isinstance(value, list) else PART, (PART, TextList()))
 
@@ -171,8 +207,9 @@ class MotionError(NamedTuple):
     frame: Annotated[
         str,
         Key(
-            Choice("scene", "track", "look"),
-            "scene: east, north, up; track: along, cross, up; look: line of sight, cross, up.",
+            Choice("scene", "track", "look", "ric"),
+            "scene: east, north, up; track: along, cross, up; look: line of sight, cross, up; ric: radial, in-track, "
+            "cross-track.",
         ),
     ] = "scene"
     position: Annotated[Vector | None, Key(Triple(COORDINATE, or_scalar=True), "At the midpoint.")] = None
@@ -244,7 +281,9 @@ class CommonMotionError(NamedTuple):
         Key(
             Choice(
                 "scene",
-                refused=dict.fromkeys(("track", "look"), "each platform has its own, an error of both has none"),
+                refused=dict.fromkeys(
+                    ("track", "look", "ric"), "each platform has its own, an error of both has none"
+                ),
             ),
             "east, north, up.",
         ),
@@ -256,23 +295,80 @@ class CommonMotionError(NamedTuple):
     source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
 
 
-CARTESIAN_KEYS = ("position", "velocity")
-POLAR_KEYS = ("slant_range", "azimuth", "elevation", "speed", "motion_azimuth", "climb")
-GEOMETRY_KEYS = frozenset((*CARTESIAN_KEYS, *POLAR_KEYS))
+class Way(NamedTuple):
+    """A way to state the path of a platform: keys that it needs, others that it may have, and those of it alone.
+
+    `direction` is the key that a platform which does not move has no use for.
+    """
+
+    keys: tuple[str, ...]
+    optional: tuple[str, ...]
+    own: tuple[str, ...]
+    direction: str = ""
+
+
+_CURVES = ("acceleration", "jerk", "snap")
 WAYS = (
-    "accepted: position and velocity, or slant_range, azimuth, elevation, speed, motion_azimuth (and climb); "
-    "a fixed platform has speed 0 and no motion_azimuth"
+    Way(("position", "velocity"), _CURVES, ("position", "velocity")),
+    Way(("orbit",), (), ("orbit",)),
+    Way(("trajectory",), (), ("trajectory",)),
+    Way(
+        ("latitude", "longitude", "altitude", "speed", "heading"),
+        ("climb",),
+        ("latitude", "longitude", "altitude", "heading"),
+        "heading",
+    ),
+    Way(
+        ("slant_range", "azimuth", "elevation", "speed", "motion_azimuth"),
+        ("climb", *_CURVES),
+        ("slant_range", "azimuth", "elevation", "motion_azimuth"),
+        "motion_azimuth",
+    ),
+)
+_PATH_KEYS = tuple(dict.fromkeys(key for way in WAYS for key in (*way.keys, *way.optional)))
+ACCEPTED_WAYS = (
+    "accepted: position and velocity; slant_range, azimuth, elevation, speed, motion_azimuth (and climb); latitude, "
+    "longitude, altitude, speed, heading (and climb); orbit; or trajectory. A fixed platform has speed 0 and no "
+    "direction"
 )
 
 
+class FlownPath(NamedTuple):
+    """The path of a platform that the scene's place on the Earth, an orbit or a log of a flight decide.
+
+    `source` says where it comes from, empty where the file states it; `file` and `sha256` are those of the file it
+    was read from, `age` that of its elements [s]. Of a fit the order, the residual at most and root mean square [m],
+    and the number of places of a log. `doubts` are warnings, for reports.
+    """
+
+    state: PlatformState
+    source: str = ""
+    file: str | None = None
+    sha256: str | None = None
+    age: float | None = None
+    order: int | None = None
+    farthest: float | None = None
+    rms: float | None = None
+    samples: int | None = None
+    doubts: tuple[str, ...] = ()
+
+
 class Platform(NamedTuple):
-    """Position and velocity at the aperture midpoint, in one of two ways, and the motion error."""
+    """Its path over the aperture, in one of five ways, and the motion error."""
 
     position: Annotated[Vector | None, Key(Triple(COORDINATE), "East, north, up of the scene centre.")] = None
     velocity: Annotated[Vector | None, Key(Triple(VELOCITY), "East, north, up.")] = None
     acceleration: Annotated[
-        Vector | None, Key(Triple(ACCELERATION), "East, north, up; constant over the aperture: a curved path.")
+        Vector | None, Key(Triple(ACCELERATION), "East, north, up, at the midpoint: a curved path.")
     ] = None
+    jerk: Annotated[Vector | None, Key(Triple(JERK), "Rate of the acceleration, at the midpoint.")] = None
+    snap: Annotated[Vector | None, Key(Triple(SNAP), "Rate of the jerk.")] = None
+    orbit: Annotated["Orbit | None", Key(Late(lambda: _routes("ORBIT")), "A satellite, by its orbit.")] = None
+    trajectory: Annotated["Trajectory | None", Key(Late(lambda: _routes("TRAJECTORY")), "A log of a flight.")] = None
+    latitude: Annotated[float | None, Key(LATITUDE, "Geodetic, WGS-84.")] = None
+    longitude: Annotated[float | None, Key(DIRECTION, "Positive to the east.")] = None
+    altitude: Annotated[float | None, Key(HEIGHT, "Above the ellipsoid; level flight follows it.")] = None
+    heading: Annotated[float | None, Key(DIRECTION, "Of the way over ground, from north, clockwise.")] = None
     slant_range: Annotated[float | None, Key(RANGE, "Distance to the scene centre.")] = None
     azimuth: Annotated[float | None, Key(DIRECTION, "From east, counter-clockwise.")] = None
     elevation: Annotated[float | None, Key(ELEVATION, "Above the ground, seen from the scene centre.")] = None
@@ -285,59 +381,88 @@ class Platform(NamedTuple):
     oscillator: Annotated[
         "Oscillator | None", Key(Late(lambda: _instruments("OSCILLATOR")), "The oscillator and its noise.")
     ] = None
+    path: FlownPath | None = None
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
         """Hold it to one complete geometry, above the ground, off the scene centre."""
-        if not values.keys() >= GEOMETRY_KEYS:
+        if not values.keys() >= set(_PATH_KEYS):
             return  # one of them is wrong by itself
-        acceleration = values.get("acceleration")
-        platform = Platform(acceleration=acceleration, **{key: values[key] for key in GEOMETRY_KEYS})
+        platform = Platform(**{key: values[key] for key in _PATH_KEYS})
         unclear = platform._unclear_geometry()
         if unclear is not None:
             yield unclear
         if platform.position is not None and platform.position[2] < 0:
             yield Problem("puts the platform below the ground, z < 0", at=("position", 2))
-        if unclear is not None:
-            return
-        state = platform.state
+        if unclear is None and not platform.is_of_the_earth:
+            yield from platform.without_image(values.get("motion_error"))
+
+    def without_image(self, error: MotionError | None) -> Iterator[Problem]:
+        """Say what keeps its path from forming an image, and its errors from their frame."""
+        state = self.state
         if state.slant_range < 1:
-            where = "position" if platform.position else "slant_range"
-            yield Problem("puts the platform within 1 m of the scene centre", at=(where,))
-        elif "motion_error" in values:
+            where: KeyPath = ("slant_range",) if self.slant_range is not None else (self.way,)
+            yield Problem("puts the platform within 1 m of the scene centre", at=where)
+        elif error is not None and (error.frame != "ric" or self.path is not None):
             try:
-                state.frame(values["motion_error"].frame)
-            except UndefinedFrameError as error:
-                yield Problem(str(error), "accepted: scene", at=("motion_error", "frame"))
+                state.frame(error.frame)
+            except UndefinedFrameError as undefined:
+                yield Problem(str(undefined), "accepted: scene", at=("motion_error", "frame"))
 
     def _unclear_geometry(self) -> Problem | None:
-        cartesian = [key for key in CARTESIAN_KEYS if getattr(self, key) is not None]
-        polar = [key for key in POLAR_KEYS if getattr(self, key) is not None]
-        if cartesian and polar:
-            return Problem(f"mixes {cartesian[0]} with {polar[0]}", WAYS, at=(polar[0],))
-        if cartesian:
-            missing = [key for key in CARTESIAN_KEYS if key not in cartesian]
-        else:
-            is_fixed = self.speed == 0
-            if is_fixed and self.motion_azimuth is not None:
-                return Problem("a platform with speed 0 has none", WAYS, at=("motion_azimuth",))
-            optional = ("climb", "motion_azimuth") if is_fixed else ("climb",)
-            missing = [key for key in POLAR_KEYS if key not in polar and key not in optional]
-        return Problem(f"lacks {', '.join(missing)}", WAYS) if missing else None
+        given = [key for key in _PATH_KEYS if getattr(self, key) is not None]
+        ways = [way for way in WAYS if any(key in way.own for key in given)] or WAYS[-1:]
+        known = (*ways[0].keys, *ways[0].optional)
+        strange = [key for key in given if key not in known]
+        if strange:
+            own = next(key for key in given if key in ways[0].own)
+            other = next((key for key in strange if any(key in way.own for way in ways[1:])), strange[0])
+            return Problem(f"mixes {own} with {other}", ACCEPTED_WAYS, at=(other,))
+        is_fixed, direction = self.speed == 0, ways[0].direction
+        if is_fixed and direction in given:
+            return Problem("a platform with speed 0 has none", ACCEPTED_WAYS, at=(direction,))
+        missing = [key for key in ways[0].keys if key not in given and not (is_fixed and key == direction)]
+        return Problem(f"lacks {', '.join(missing)}", ACCEPTED_WAYS) if missing else None
+
+    @property
+    def way(self) -> str:
+        """First key of the way in which its path is stated."""
+        keys = ("position", "orbit", "trajectory", "latitude")
+        return next((key for key in keys if getattr(self, key) is not None), "slant_range")
+
+    @property
+    def is_of_the_earth(self) -> bool:
+        """Whether its path needs to be found: by a file, or where the scene is on the Earth."""
+        return self.way in ("orbit", "trajectory", "latitude")
 
     @property
     def state(self) -> PlatformState:
-        """Position and velocity in the frame of the scene."""
+        """Its path in the frame of the scene; of a way that needs to be found once it is, see `is_of_the_earth`."""
+        if self.path is not None:
+            return self.path.state
+        curves = (self.acceleration, self.jerk, self.snap)
         if self.position is not None and self.velocity is not None:
-            return _state_from_vectors(self.position, self.velocity, self.acceleration)
+            return _state_from_vectors(self.position, self.velocity, *curves)
         polar = (self.slant_range, self.azimuth, self.elevation, self.speed, self.motion_azimuth, self.climb)
-        return _state_from_angles(*polar, self.acceleration)
+        return _state_from_angles(*polar, *curves)
+
+
+def _bends(jerk: Vector | None, snap: Vector | None) -> tuple[Vector, ...]:
+    """Coefficients of τ³ and τ⁴."""
+    if jerk is None and snap is None:
+        return ()
+    (a, b, c), (x, y, z) = jerk or STRAIGHT, snap or STRAIGHT
+    return ((a / 6, b / 6, c / 6), (x / 24, y / 24, z / 24))
 
 
 # Asked for while a platform is read, while its mission is, and when that is checked.
 @lru_cache(maxsize=8)
-def _state_from_vectors(position: Vector, velocity: Vector, acceleration: Vector | None) -> PlatformState:
-    return PlatformState(position=position, velocity=velocity, acceleration=acceleration or STRAIGHT)
+def _state_from_vectors(
+    position: Vector, velocity: Vector, acceleration: Vector | None, jerk: Vector | None, snap: Vector | None
+) -> PlatformState:
+    return PlatformState(
+        position=position, velocity=velocity, acceleration=acceleration or STRAIGHT, bends=_bends(jerk, snap)
+    )
 
 
 @lru_cache(maxsize=8)
@@ -349,8 +474,10 @@ def _state_from_angles(
     motion_azimuth: float | None,
     climb: float | None,
     acceleration: Vector | None,
+    jerk: Vector | None,
+    snap: Vector | None,
 ) -> PlatformState:
-    return state_from_angles(
+    state = state_from_angles(
         slant_range=slant_range or 0.0,
         azimuth=azimuth or 0.0,
         elevation=elevation or 0.0,
@@ -359,6 +486,7 @@ def _state_from_angles(
         climb=climb or 0.0,
         acceleration=acceleration or STRAIGHT,
     )
+    return replace(state, bends=_bends(jerk, snap)) if jerk or snap else state
 
 
 class Platforms(NamedTuple):
@@ -547,13 +675,8 @@ class Mission(NamedTuple):
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
         """Hold it to a collection that forms an image, and to names that can be told apart."""
         platforms: Platforms | None = values.get("platforms")
-        collection: Collection | None = values.get("collection")
-        if platforms is not None:
-            yield from _no_image(_geometry(platforms))
-        if platforms is not None and collection is not None:
-            yield from _dives(platforms, collection.aperture_time)
-            if values.get("synchronization") is not None and values["synchronization"].is_direct_path:
-                yield from _no_baseline(_geometry(platforms).apart, collection.aperture_time / 2)
+        if platforms is not None and not any(platform.is_of_the_earth for platform in platforms):
+            yield from without_image(platforms, values.get("collection"), values.get("synchronization"))
         seen: set[str] = set()
         for index, other in enumerate(values.get("other_errors", ())):
             if other.name in seen:
@@ -593,6 +716,17 @@ def _geometry(platforms: Platforms) -> BistaticGeometry:
     return BistaticGeometry(transmitter=platforms.transmitter.state, receiver=platforms.receiver.state)
 
 
+def without_image(
+    platforms: Platforms, collection: Collection | None, synchronization: "Synchronization | None"
+) -> Iterator[Problem]:
+    """Say what keeps paths from forming an image."""
+    yield from _no_image(_geometry(platforms))
+    if collection is not None:
+        yield from _dives(platforms, collection.aperture_time)
+        if synchronization is not None and synchronization.is_direct_path:
+            yield from _no_baseline(_geometry(platforms).apart, collection.aperture_time / 2)
+
+
 def _no_image(geometry: BistaticGeometry) -> Iterator[Problem]:
     if all(norm(platform.velocity) < STILL for platform in (geometry.transmitter, geometry.receiver)):
         yield Problem("both platforms are still: no aperture", at=("platforms",))
@@ -608,6 +742,8 @@ def _dives(platforms: Platforms, aperture_time: float) -> Iterator[Problem]:
             key: KeyPath = ("climb",) if platform.velocity is None else ("velocity", 2)
             if platform.acceleration is not None:
                 key = ("acceleration", 2)
+            if platform.is_of_the_earth:
+                key = (platform.way,)
             yield Problem(
                 f"takes the platform below the ground within the aperture, to z = {lowest:.4g} m",
                 at=("platforms", name, *key),
@@ -628,9 +764,14 @@ def _no_baseline(apart: PlatformState, half: float) -> Iterator[Problem]:
 
 
 def _turning_points(state: PlatformState, half: float) -> Iterator[float]:
-    """Slow times within the aperture where a platform can be lowest: its ends, and where it stops sinking."""
+    """Slow times within the aperture where a platform can be lowest: its ends, and where it stops sinking.
+
+    Of a path that bends more than once, places a 64th of the aperture apart.
+    """
     yield from (-half, half)
-    if state.acceleration[2] > 0:
+    if state.bends:
+        yield from (half * part / 32 for part in range(-31, 32))
+    elif state.acceleration[2] > 0:
         yield max(-half, min(half, -state.velocity[2] / state.acceleration[2]))
 
 
@@ -639,6 +780,13 @@ def has_instruments(mission: Mission) -> bool:
     return mission.synchronization is not None or any(
         platform.oscillator is not None or platform.motion_error.imu is not None or platform.motion_error.random
         for platform in mission.platforms
+    )
+
+
+def flies_on_earth(mission: Mission) -> bool:
+    """Whether paths of a mission depend on where on the Earth its scene is, or stand in files."""
+    return mission.scene.is_on_earth or any(
+        platform.is_of_the_earth or platform.motion_error.frame == "ric" for platform in mission.platforms
     )
 
 

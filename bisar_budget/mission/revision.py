@@ -4,6 +4,9 @@ import os
 from subprocess import DEVNULL, PIPE, run
 
 from bisar_budget.faults import printable
+from bisar_budget.mission.load import parse_mission
+from bisar_budget.mission.model import Mission
+from bisar_budget.paths.flight import PathFileError
 
 
 class RevisionError(Exception):
@@ -35,6 +38,26 @@ def file_at(path: str, revision: str) -> bytes:
     if not is_there:
         raise RevisionError(f"{path} is not in revision {printable(revision)}")
     return content
+
+
+def mission_at(path: str, revision: str) -> Mission:
+    """Read a mission file as committed in `revision`, and the orbits and logs that it names as committed there.
+
+    Raises
+    ------
+    RevisionError
+        As `file_at`.
+    MissionError
+        Not a usable mission then.
+    """
+
+    def beside(name: str) -> bytes:
+        try:
+            return file_at(os.path.join(os.path.dirname(path), name), revision)
+        except RevisionError as error:
+            raise PathFileError(str(error)) from None
+
+    return parse_mission(file_at(path, revision), f"{revision}:{path}", beside=beside)
 
 
 def _git(folder: str, *arguments: str) -> tuple[bool, bytes]:

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, NamedTuple
 
 from bisar_budget import units
-from bisar_budget.faults import Problem
+from bisar_budget.faults import InvalidValueError, Problem
 from bisar_budget.mission.readers import INVALID, Choice, Key, OneOf, Quantity, Reader, Report, Section, Text, Whole
 
 _FILE = Text()
@@ -49,6 +49,23 @@ class Orbit(NamedTuple):
             yield Problem(said, f"accepted: one of {', '.join(_ORBIT_WAYS)}")
 
 
+class _Instant(Reader):
+    """An instant of UTC."""
+
+    def leaf(self, value: Any) -> Any:
+        """Read 2026-06-01T05:20:31.250Z."""
+        from bisar_budget.paths.instant import parse_instant
+
+        found = parse_instant(value) if isinstance(value, str) else None
+        if found is None:
+            raise InvalidValueError("must be an instant of UTC", "accepted: 2026-06-01T05:20:31.250Z and the like")
+        return found
+
+    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+        """Date and time."""
+        return {"type": "string", "format": "date-time"}
+
+
 FORMATS = ("csv", "sbet")
 
 
@@ -70,4 +87,4 @@ class Trajectory(NamedTuple):
     ] = None
 
 
-ORBIT, TRAJECTORY = Section(Orbit), Section(Trajectory)
+ORBIT, TRAJECTORY, INSTANT = Section(Orbit), Section(Trajectory), _Instant()

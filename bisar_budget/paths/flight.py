@@ -112,8 +112,8 @@ def interpolated(place: Callable[[float], Vector], aperture_time_s: float, wides
 def smoothed(times: "NDArray[np.float64]", places: "NDArray[np.float64]", aperture_time_s: float) -> Fitted:
     """Path that fits the places of a log within the aperture by least squares.
 
-    The order rises as long as it leaves clearly less, to 8 at most and to a fifth of the samples: what a platform does
-    faster is in the log's noise, or is vibration.
+    The order rises as long as it leaves clearly less, to 8 at most and to a fifth of the samples: what a platform
+    does faster is in the log's noise, or is vibration.
 
     Parameters
     ----------

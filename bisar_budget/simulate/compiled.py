@@ -145,8 +145,8 @@ def backproject(history: PhaseHistory, points: Floats, spline: Spline) -> Comple
         image = np.ascontiguousarray(image if shape == points.shape[:-1] else image.T)
     else:
         axes = np.ascontiguousarray(points.reshape(-1, 3).T)
-        lines = points.reshape(-1, *np.atleast_2d(points).shape[-2:])
-        nearest, farthest = _reach(history.transmitter, history.receiver, *_boxes(lines))
+        by_line = points.reshape(-1, *np.atleast_2d(points).shape[-2:])
+        nearest, farthest = _reach(history.transmitter, history.receiver, *_boxes(by_line))
         within = _needed(history, nearest, farthest, image.size)
         if within is None:
             return None

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from bisar_budget.constants import UTILIZATION_TOLERANCE
+from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.faults import KeyPath
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import Row
@@ -115,6 +116,11 @@ def _inputs(before: Mission | None, after: Mission | None) -> Iterator[Moved]:
         if path in old and path in new and meant[0] is not None and meant[0] == meant[1]:
             continue
         yield Moved(_dotted(path), "", old.get(path), new.get(path))
+    for name in PLATFORMS:
+        files = [getattr(mission.platforms, name).path for mission in (before, after)]
+        if None not in files and files[0].file == files[1].file and files[0].sha256 != files[1].sha256:
+            contents = [file.sha256 and file.sha256[:12] for file in files]
+            yield Moved(f"platforms.{name}: content of {files[1].file}", "", *contents)
 
 
 def _written(mission: Mission) -> dict[KeyPath, str]:

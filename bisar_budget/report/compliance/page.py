@@ -53,7 +53,7 @@ from bisar_budget.report.drawing.evidence_drawings import (
 from bisar_budget.report.explain.explanation import chain, collection_chain
 from bisar_budget.report.formats import verification
 from bisar_budget.report.words.escapes import source_path
-from bisar_budget.report.words.missions import head, multiple_of_pi, narrow_gradients
+from bisar_budget.report.words.missions import head, multiple_of_pi, narrow_gradients, path_words
 from bisar_budget.report.words.sentences import matters, measure, percent
 from bisar_budget.units import format_quantity
 
@@ -528,6 +528,10 @@ def _validity(mission: Mission, found: MissionFindings) -> Iterator[tuple[str, s
             "platforms, and timing errors have no effect. The published model does not know that: its values are "
             "those without, and a row that it fails is no warning",
         )
+    for name, path in found.paths:
+        yield f"Path of the {name}", path_words(path)
+        if path.sha256 is not None:
+            yield f"File of the {name}’s path", f"{path.file or 'in the mission file'}, SHA-256 {path.sha256}"
     yield "Combination", _RULES[found.combine]
     yield "Phases", f"at the centre frequency, c = {SPEED_OF_LIGHT / 1e3:.3f} km/s; at the aperture edge, ±T/2"
     factor = f"{found.coverage_factor:g} times the file’s value" if found.coverage_factor != 1 else "the file’s value"

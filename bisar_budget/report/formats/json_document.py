@@ -103,8 +103,8 @@ def _mission(mission: MissionFindings) -> dict[str, Any]:
             "gradient_angle_rad": mission.geometry.gradient_angle,
             "range_resolution_m": mission.resolution.range,
             "cross_range_resolution_m": mission.resolution.cross_range,
-            "transmitter": _platform(mission.geometry.transmitter),
-            "receiver": _platform(mission.geometry.receiver),
+            "transmitter": _platform(mission, "transmitter"),
+            "receiver": _platform(mission, "receiver"),
         },
         "budget": {
             "qpe_rad": {
@@ -151,12 +151,26 @@ def _monte_carlo(drawn: "MonteCarlo") -> dict[str, Any]:
     return {**drawn._asdict(), "requirements": [requirement._asdict() for requirement in drawn.requirements]}
 
 
-def _platform(state: PlatformState) -> dict[str, float | None]:
+def _platform(mission: MissionFindings, name: str) -> dict[str, Any]:
+    state: PlatformState = getattr(mission.geometry, name)
+    path = dict(mission.paths).get(name)
     return {
         "slant_range_m": state.slant_range,
         "azimuth_rad": state.azimuth,
         "elevation_rad": state.elevation,
         "squint_rad": state.squint,
+        "path": None
+        if path is None
+        else {
+            "source": path.source,
+            "file": path.file,
+            "sha256": path.sha256,
+            "age_s": path.age,
+            "order": path.order,
+            "residual_max_m": path.farthest,
+            "residual_rms_m": path.rms,
+            "samples": path.samples,
+        },
     }
 
 

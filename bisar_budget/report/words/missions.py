@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.geometry import BistaticGeometry, PlatformState
-from bisar_budget.mission.model import Document
+from bisar_budget.mission.model import Document, FlownPath
 from bisar_budget.units import format_quantity
 
 _MODELS = {
@@ -40,6 +40,8 @@ def head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
     for name, state in (("Transmitter", geometry.transmitter), ("Receiver", geometry.receiver)):
         yield name, _platform(state, is_first)
         is_first = is_first and state.squint is None
+    for name, path in mission.paths:
+        yield "Path", f"{name}: {path_words(path)}"
     yield (
         "Geometry",
         f"bistatic angle {_degrees(geometry.bistatic_angle)}, look azimuth {_degrees(geometry.look_azimuth)}, "
@@ -71,6 +73,21 @@ def head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
         )
     if mission.coverage_factor != 1:
         yield "Coverage", f"navigation and clock: declared is {mission.coverage_factor:g} times the file's value"
+
+
+def path_words(path: FlownPath) -> str:
+    """Say where a path comes from, and how far the polynomial that stands for it is from what the file has."""
+    said = path.source if path.file is None else f"{path.file}: {path.source}"
+    if path.age is not None:
+        when = "old" if path.age >= 0 else "ahead"
+        said += f", {format_quantity(abs(path.age) / 86400, '')} days {when}"
+    if path.order is None or path.farthest is None or path.rms is None:
+        return said
+    said += f"; flown as a polynomial of order {path.order}"
+    if path.samples:
+        rms, farthest = (format_quantity(one, "m") for one in (path.rms, path.farthest))
+        return f"{said} through {path.samples} places, {rms} rms and at most {farthest} from them"
+    return f"{said}, at most {format_quantity(path.farthest, 'm')} from it"
 
 
 def multiple_of_pi(factor: float) -> str:

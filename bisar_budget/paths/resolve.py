@@ -1,0 +1,255 @@
+"""Put the path of each platform into a mission: from its orbit, the log of its flight or its geodetic place."""
+
+import hashlib
+import math
+import os
+import stat
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from bisar_budget.faults import Problem
+from bisar_budget.geometry import PlatformState, Vector
+from bisar_budget.mission import routes
+from bisar_budget.mission.model import FlownPath, Mission, MotionError, Platform, without_image
+from bisar_budget.mission.readers import INVALID, Report
+from bisar_budget.paths import earth
+from bisar_budget.paths.flight import Fitted, Log, Orbit, PathFileError, interpolated, smoothed
+
+Beside = Callable[[str], bytes]  # content of a file that a mission names
+
+_MOST_BYTES = 500_000_000
+_PLACE = "accepted: scene.latitude, scene.longitude and scene.height"
+
+
+class _UnusablePathError(Exception):
+    """A path that cannot be found: below which key of the platform, and why."""
+
+    def __init__(self, key: tuple[str, ...], problem: Problem) -> None:
+        super().__init__(problem)
+        self.key, self.problem = key, problem
+
+
+def reader_of(folder: str) -> Beside:
+    """What reads files beside a mission file in a folder.
+
+    It raises `PathFileError` where a file cannot be read, is no regular file, or is larger than 500 MB.
+    """
+
+    def read(name: str) -> bytes:
+        file = os.path.join(folder, name)
+        try:
+            if not stat.S_ISREG(os.stat(file).st_mode):  # a pipe would wait for ever
+                raise PathFileError(f"{name} is no regular file")
+            with open(file, "rb") as stream:
+                data = stream.read(_MOST_BYTES + 1)
+        except OSError as error:
+            raise PathFileError(f"{name} cannot be read: {error.strerror}") from None
+        except ValueError:  # a NUL in the name
+            raise PathFileError("is no name of a file") from None
+        if len(data) > _MOST_BYTES:
+            raise PathFileError(f"{name} is larger than {_MOST_BYTES // 10**6} MB")
+        return data
+
+    return read
+
+
+def with_paths(mission: Mission, read: Beside, report: Report) -> Any:
+    """Put in the paths; `INVALID` after a report.
+
+    Parameters
+    ----------
+    mission : Mission
+        As read.
+    read : callable
+        Content of a file that the mission names; raises `PathFileError`.
+    report : callable
+        Takes what is wrong, and where.
+    """
+    scene, axes = mission.scene, None
+    if scene.is_on_earth:
+        axes = earth.axes_at(earth.Place(scene.latitude or 0.0, scene.longitude or 0.0, scene.height or 0.0))
+    platforms, is_valid = mission.platforms, True
+    for name in platforms._fields:
+        platform: Platform = getattr(platforms, name)
+        try:
+            found = _with_path(mission, platform, axes, read)
+        except _UnusablePathError as unusable:
+            report(("platforms", name, *unusable.key), unusable.problem)
+            is_valid = False
+            continue
+        for problem in found.without_image(found.motion_error):
+            report(("platforms", name), problem)
+            is_valid = False
+        platforms = platforms._replace(**{name: found})
+    if not is_valid:
+        return INVALID
+    for problem in without_image(platforms, mission.collection, mission.synchronization):
+        report((), problem)
+        is_valid = False
+    return mission._replace(platforms=platforms) if is_valid else INVALID
+
+
+def _with_path(mission: Mission, platform: Platform, axes: earth.SceneAxes | None, read: Beside) -> Platform:
+    if platform.orbit is not None:
+        path = _of_orbit(mission, platform.orbit, _known(axes, "orbit"), read)
+    elif platform.trajectory is not None:
+        path = _of_log(mission, platform.trajectory, axes, read)
+    elif platform.latitude is not None:
+        path = _of_place(platform, _known(axes, "latitude"))
+    else:
+        path = FlownPath(platform.state)
+    if path.state.position[2] < 0:
+        height = f"{path.state.position[2]:.6g} m"
+        raise _UnusablePathError(
+            (platform.way,), Problem(f"puts the platform below the scene's horizon, to z = {height}")
+        )
+    if axes is not None:
+        path = path._replace(state=_with_radial(path.state, axes))
+    found = platform._replace(path=path)
+    trajectory = platform.trajectory
+    if trajectory is not None and trajectory.accuracy is not None:
+        found = found._replace(motion_error=_by_accuracy(mission, trajectory, platform.motion_error, read))
+    return found
+
+
+def _known(axes: earth.SceneAxes | None, key: str) -> earth.SceneAxes:
+    if axes is None:
+        raise _UnusablePathError((key,), Problem("needs the scene's place on the Earth", _PLACE))
+    return axes
+
+
+def _with_radial(state: PlatformState, axes: earth.SceneAxes) -> PlatformState:
+    try:
+        return replace(state, radial=axes.radial(state.position, state.velocity))
+    except ZeroDivisionError:  # at rest against the stars, on the Earth's axis: no plane
+        return state
+
+
+def _of_orbit(mission: Mission, route: routes.Orbit, axes: earth.SceneAxes, read: Beside) -> FlownPath:
+    center = mission.collection.center_time
+    if center is None:
+        raise _UnusablePathError(("orbit",), Problem("needs an instant", "accepted: collection.center_time"))
+    form = next(form for form in ("tle", "omm", "oem") if getattr(route, form) is not None)
+    named = getattr(route, form)
+    file = named if isinstance(named, str) else None
+    from bisar_budget.paths import orbits
+
+    try:
+        if file is None:
+            data = "\n".join(named).encode()
+            orbit: Orbit = orbits.read_tle("\n".join(named), "the element set", route.object, center)
+        else:
+            data = read(file)
+            reader = {"tle": orbits.read_tle_file, "omm": orbits.read_omm, "oem": orbits.read_oem}[form]
+            orbit = reader(data, file, route.object, center)
+        widest = math.inf
+        if orbit.span is not None:
+            before, after = center.since(orbit.span[0]), orbit.span[1].since(center)
+            if min(before, after) < mission.collection.aperture_time / 2:
+                raise PathFileError(
+                    f"{file}: covers {orbit.span[0].as_text()} to {orbit.span[1].as_text()}, the aperture is "
+                    f"{mission.collection.aperture_time:g} s around {center.as_text()}"
+                )
+            widest = 2 * min(before, after)
+        fitted = interpolated(
+            lambda tau: axes.place(orbit.place(center.after(tau))), mission.collection.aperture_time, widest
+        )
+        doubts = tuple(orbit.doubts(center))
+    except PathFileError as error:
+        raise _UnusablePathError(("orbit", form), Problem(str(error))) from None
+    age = None if orbit.epoch is None else center.since(orbit.epoch)
+    return _flown(fitted, orbit.words, file, data)._replace(age=age, doubts=doubts)
+
+
+def _of_log(mission: Mission, route: routes.Trajectory, axes: earth.SceneAxes | None, read: Beside) -> FlownPath:
+    from bisar_budget.paths import flight_log
+
+    aperture_time = mission.collection.aperture_time
+    try:
+        data = read(route.file)
+        log = _log(route, data)
+        if log.is_earth_fixed:
+            log = _in_scene(log, _known(axes, "trajectory"))
+        times = flight_log.slow_times(log, mission.collection.center_time, route.center, aperture_time, route.file)
+        fitted = smoothed(times, log.places, aperture_time)
+    except PathFileError as error:
+        raise _UnusablePathError(("trajectory", "file"), Problem(str(error))) from None
+    return _flown(fitted, log.words, route.file, data)
+
+
+def _log(route: routes.Trajectory, data: bytes) -> Log:
+    """Read a log; its format is stated, or that of its name."""
+    is_sbet = route.format == "sbet" or (route.format is None and route.file.lower().endswith((".out", ".sbet")))
+    if is_sbet:
+        from bisar_budget.paths import sbet
+
+        return sbet.read_sbet(data, route.file, route.week)
+    from bisar_budget.paths import flight_log
+
+    return flight_log.read_csv(data, route.file)
+
+
+def _in_scene(log: Log, axes: earth.SceneAxes) -> Log:
+    import numpy as np
+
+    return log._replace(places=(log.places - np.array(axes.origin)) @ np.array(axes.axes).T, is_earth_fixed=False)
+
+
+def _by_accuracy(mission: Mission, route: routes.Trajectory, error: MotionError, read: Beside) -> MotionError:
+    """Errors that the accuracy file of a log states, where the mission file states none."""
+    from bisar_budget.paths import sbet
+
+    file = route.accuracy or ""
+    key = ("trajectory", "accuracy")
+    if error.frame != "scene":
+        raise _UnusablePathError(key, Problem("is stated east, north, up", "accepted: motion_error.frame: scene"))
+    try:
+        stated = sbet.read_accuracy(
+            read(file),
+            file,
+            route.week,
+            mission.collection.center_time,
+            route.center,
+            mission.collection.aperture_time,
+        )
+    except PathFileError as unusable:
+        raise _UnusablePathError(key, Problem(str(unusable))) from None
+    figures = {"position": stated.position, "velocity": stated.velocity}
+    taken = (
+        {}
+        if error.covariance is not None
+        else {figure: sigmas for figure, sigmas in figures.items() if getattr(error, figure) is None}
+    )
+    sources = dict(error.of_parts) | dict.fromkeys(taken, f"accuracy file {file}")
+    return error._replace(**taken, of_parts=tuple(sources.items()))
+
+
+def _of_place(platform: Platform, axes: earth.SceneAxes) -> FlownPath:
+    """Flight along the geodesic at the height that climb leaves; level flight follows the ellipsoid's curvature."""
+    place = earth.Place(platform.latitude or 0.0, platform.longitude or 0.0, platform.altitude or 0.0)
+    speed, heading = platform.speed or 0.0, platform.heading or 0.0
+    local = earth.axes_at(place)
+
+    def in_scene(vector: Vector) -> Vector:
+        return axes.turned(local.turned_back(vector))
+
+    state = PlatformState(
+        position=axes.place(local.origin),
+        velocity=in_scene((speed * math.sin(heading), speed * math.cos(heading), platform.climb or 0.0)),
+        acceleration=in_scene((0.0, 0.0, -(speed**2) / earth.radius_along(place, heading))),
+    )
+    return FlownPath(state, "geodetic place, flight along the geodesic" if speed else "geodetic place")
+
+
+def _flown(fitted: Fitted, words: str, file: str | None, data: bytes) -> FlownPath:
+    return FlownPath(
+        fitted.state,
+        source=words,
+        file=file,
+        sha256=hashlib.sha256(data).hexdigest(),
+        order=fitted.order,
+        farthest=fitted.farthest,
+        rms=fitted.rms,
+        samples=fitted.samples or None,
+    )
