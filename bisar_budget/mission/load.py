@@ -81,7 +81,7 @@ def parse_mission(
         mission = MISSION.read(tree.root, (), tree.report)
         folder = os.path.dirname(file) if file != "-" else ""
         if mission is not INVALID and flies_on_earth(mission):
-            from bisar_budget.paths.resolve import reader_of, with_paths
+            from bisar_budget.mission.paths import reader_of, with_paths
 
             mission = with_paths(mission, beside or reader_of(folder), tree.report)
         if mission is not INVALID and names_parts(mission):

@@ -15,6 +15,7 @@ FLOORS = [
     {"", "constants", "faults", "phrases", "units", "resources", "settings", "workers"},
     {"geometry"},
     {"theory", "evaluators", "catalogue"},
+    {"paths"},
     {"mission"},
     {"effects"},
     {"analysis"},

@@ -153,15 +153,15 @@ def _monte_carlo(drawn: "MonteCarlo") -> dict[str, Any]:
 
 def _platform(mission: MissionFindings, name: str) -> dict[str, Any]:
     state: PlatformState = getattr(mission.geometry, name)
-    path = dict(mission.paths).get(name)
-    return {
+    found: dict[str, Any] = {
         "slant_range_m": state.slant_range,
         "azimuth_rad": state.azimuth,
         "elevation_rad": state.elevation,
         "squint_rad": state.squint,
-        "path": None
-        if path is None
-        else {
+    }
+    path = dict(mission.paths).get(name)
+    if path is not None:
+        found["path"] = {
             "source": path.source,
             "file": path.file,
             "sha256": path.sha256,
@@ -170,8 +170,8 @@ def _platform(mission: MissionFindings, name: str) -> dict[str, Any]:
             "residual_max_m": path.farthest,
             "residual_rms_m": path.rms,
             "samples": path.samples,
-        },
-    }
+        }
+    return found
 
 
 def _shares(split: Split) -> dict[str, float]:

@@ -100,10 +100,8 @@ def _with_path(mission: Mission, platform: Platform, axes: earth.SceneAxes | Non
     else:
         path = FlownPath(platform.state)
     if path.state.position[2] < 0:
-        height = f"{path.state.position[2]:.6g} m"
-        raise _UnusablePathError(
-            (platform.way,), Problem(f"puts the platform below the scene's horizon, to z = {height}")
-        )
+        words = f"puts the platform below the scene's horizon, to z = {path.state.position[2]:.6g} m"
+        raise _UnusablePathError((platform.way,), Problem(words))
     if axes is not None:
         path = path._replace(state=_with_radial(path.state, axes))
     found = platform._replace(path=path)
