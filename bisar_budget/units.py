@@ -262,7 +262,7 @@ def _steps(unit: str) -> tuple[tuple[float, float, float, str], ...]:
     if unit in _SHEETS:
         scale, suffix = _SHEETS[unit]
         return ((scale, 0.0, math.inf, suffix),)
-    pretty = unit.replace("^2", "²").replace("^3", "³")
+    pretty = unit.replace("^2", "²").replace("^3", "³").replace("^4", "⁴")
     if pretty.startswith("1/"):
         return ((1.0, 0.0, math.inf, pretty[1:]),)
     steps = ((scale, scale * 0.9995, scale * 1e6, f" {prefix}{pretty}") for scale, prefix in _STEPS.get(unit, ()))
@@ -301,7 +301,7 @@ def _finite(number: float, dimension: Dimension) -> float:
 
 
 def _normal(unit: str) -> str:
-    unit = unit.strip().replace("µ", "u").replace("μ", "u").replace("²", "^2").replace("³", "^3")
+    unit = unit.strip().replace("µ", "u").replace("μ", "u").replace("²", "^2").replace("³", "^3").replace("⁴", "^4")
     unit = re.sub(r"\s*([/^])\s*", r"\1", unit.replace("**", "^"))
     unit = re.sub(r"√\(?(s|h|Hz)\)?", r"sqrt(\1)", unit)
     return unit.replace("s2", "s^2").replace("s3", "s^3")

@@ -161,6 +161,9 @@ class Lanes:
         powers = np.array([np.ones_like(tau), tau, tau**2 / 2])  # (3, n)
         motion = np.array([(s.position, s.velocity, s.acceleration) for s in _states(mission)])  # (2, 3, 3)
         self.true = np.einsum("kof,on->knf", motion, powers)[None]  # (1, 2, n, 3)
+        for platform, state in enumerate(_states(mission)):
+            for power, bend in enumerate(state.bends, 3):
+                self.true[0, platform] += np.outer(tau**power, bend)
         if points is not None:
             ground = np.concatenate([points, np.zeros((len(points), 1))], axis=1)
             self.true = self.true - ground[:, None, None, :]  # (L, 2, n, 3)

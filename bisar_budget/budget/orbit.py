@@ -3,14 +3,16 @@
 Over an aperture T the missing acceleration a moves the true path by aT²/8 against the straight one: 25 m in 5 s.
 """
 
+import math
 from collections.abc import Iterator
 
 from bisar_budget.constants import EARTH_GRAVITATIONAL_PARAMETER, EARTH_RADIUS
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.faults import KeyPath
 from bisar_budget.findings.mission import FileWarning
-from bisar_budget.geometry import Vector, norm
+from bisar_budget.geometry import PlatformState, Vector, norm
 from bisar_budget.mission.model import Mission, Platform
+from bisar_budget.paths.earth import ROTATION_RATE, Place, axes_at
 
 FASTEST_FLIGHT = 3e3  # m/s; no aircraft is as fast, and no satellite in a low orbit as slow
 
@@ -34,6 +36,26 @@ def orbital_acceleration(position: Vector) -> Vector:
     return (factor * x, factor * y, factor * from_centre[2])
 
 
+def free_fall(mission: Mission, state: PlatformState) -> Vector:
+    """Acceleration of a satellite in the axes of a scene on the Earth: −μr/r³ − 2ω×v − ω×(ω×r). [m/s²]
+
+    Derived here: r against the stars, written in axes that turn at ω.
+    """
+    scene = mission.scene
+    axes = axes_at(Place(scene.latitude or 0.0, scene.longitude or 0.0, scene.height or 0.0))
+    x, y, z = axes.earth_fixed(state.position)
+    u, v, _ = axes.turned_back(state.velocity)
+    factor = -EARTH_GRAVITATIONAL_PARAMETER / math.hypot(x, y, z) ** 3
+    turning = ROTATION_RATE**2
+    return axes.turned(
+        (
+            factor * x + 2 * ROTATION_RATE * v + turning * x,
+            factor * y - 2 * ROTATION_RATE * u + turning * y,
+            factor * z,
+        )
+    )
+
+
 def straight_orbits(mission: Mission) -> Iterator[FileWarning]:
     """Doubt each platform that is as fast as a satellite and has no `acceleration`; say what its orbit would have.
 
@@ -45,14 +67,21 @@ def straight_orbits(mission: Mission) -> Iterator[FileWarning]:
         if speed <= FASTEST_FLIGHT or platform.acceleration is not None or platform.is_of_the_earth:
             continue
         key: KeyPath = ("speed",) if platform.velocity is None else ("velocity",)
-        parts = [f"{part + 0.0:.3f} m/s^2" for part in orbital_acceleration(platform.state.position)]
+        if mission.scene.is_on_earth:
+            acceleration = free_fall(mission, platform.state)
+            how = "(gravity of a point mass, less what the Earth's rotation adds)"
+        else:
+            acceleration = orbital_acceleration(platform.state.position)
+            how = (
+                "(towards the Earth's centre; the Earth's rotation changes it by up to 1.1 m/s^2, which needs the "
+                "latitude)"
+            )
+        parts = ", ".join(f"{part + 0.0:.3f} m/s^2" for part in acceleration)
         yield FileWarning(
             line=mission.line(("platforms", name, *key)),
             message=(
                 f"platforms.{name}: {speed / 1e3:.3g} km/s is the speed of a satellite, and the path is straight. "
-                f"A circular orbit has acceleration: [{', '.join(parts)}] "
-                "(towards the Earth's centre; the Earth's rotation changes it by up to 1.1 m/s^2, which needs the "
-                "latitude)"
+                f"A circular orbit has acceleration: [{parts}] {how}"
             ),
             is_doubt=True,
         )

@@ -220,6 +220,8 @@ def _fit_to_pulses(
     gaps = np.nonzero(~(present & inner))[0]
     first = int(gaps[gaps < middle].max(initial=-1)) + 1
     last = int(gaps[gaps > middle].min(initial=place.size))
+    if last - first <= _ORDERS[0][1]:  # too few pulses for a polynomial
+        return np.zeros(4), 0.0
     kept = slice(first, last)
     covered = float(place[last - 1] - place[first]) / (2 * _INNER)
     order = next(order for part, order in _ORDERS if covered > part)
