@@ -12,7 +12,6 @@ from bisar_budget.faults import KeyPath
 from bisar_budget.findings.mission import FileWarning
 from bisar_budget.geometry import PlatformState, Vector, norm
 from bisar_budget.mission.model import Mission, Platform
-from bisar_budget.paths.earth import ROTATION_RATE, Place, axes_at
 
 FASTEST_FLIGHT = 3e3  # m/s; no aircraft is as fast, and no satellite in a low orbit as slow
 
@@ -41,6 +40,8 @@ def free_fall(mission: Mission, state: PlatformState) -> Vector:
 
     Derived here: r against the stars, written in axes that turn at ω.
     """
+    from bisar_budget.paths.earth import ROTATION_RATE, Place, axes_at
+
     scene = mission.scene
     axes = axes_at(Place(scene.latitude or 0.0, scene.longitude or 0.0, scene.height or 0.0))
     x, y, z = axes.earth_fixed(state.position)

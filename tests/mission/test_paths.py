@@ -136,8 +136,8 @@ class TestRadialAxes:
         with pytest.raises(MissionError) as error:
             parse_mission(text, "m.yaml")
         assert error.value.lines() == [
-            "m.yaml:28:14: platforms.receiver.motion_error.frame: the ric frame needs the scene's latitude, longitude "
-            "and height (got ric); accepted: scene"
+            "m.yaml:28:14: platforms.receiver.motion_error.frame: the ric frame needs the scene's latitude, "
+            "longitude and height (got ric); accepted: scene"
         ]
 
 
