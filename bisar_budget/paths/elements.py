@@ -1,10 +1,10 @@
 """Orbits from mean elements: two-line element sets and orbit mean-elements messages, propagated by SGP4.
 
 SGP4 places a satellite about 1 km off at the epoch of its elements, and 1 to 3 km more with each day from it
-(documentation of the package sgp4; Vallado and others, Revisiting Spacetrack Report #3, AIAA 2006-6753). Constants are
-those of WGS-72, which the elements are made with. Places in the true equator and mean equinox of date turn to the Earth
-by the mean sidereal time of 1982, with UT1 = UTC: for a low orbit and UT1 - UTC of 56 ms this is 23 m from where
-Skyfield has the satellite, and polar motion, which Skyfield too leaves out unless it is given, is up to 20 m.
+(documentation of the package sgp4; Vallado and others, Revisiting Spacetrack Report #3, AIAA 2006-6753). Constants
+are those of WGS-72, which the elements are made with. Places in the true equator and mean equinox of date turn to the
+Earth by the mean sidereal time of 1982, with UT1 = UTC: for a low orbit and UT1 - UTC of 56 ms this is 23 m from
+where Skyfield has the satellite. Polar motion, which Skyfield too leaves out unless it is given, is up to 20 m.
 """
 
 import csv
@@ -23,8 +23,10 @@ from bisar_budget.paths.markup import parse_markup
 from bisar_budget.paths.turning import INSTALL, from_teme
 
 LARGEST_BYTES = 32_000_000  # the whole catalogue has 25 MB as XML
+EARLIEST, LATEST = 36112, 124593  # modified Julian days of 1957-10-01 and 2200-01-01, for which there are orbits
 _DAY_OF_1950 = 33281  # modified Julian day of 1949-12-31, from which SGP4 counts days
 _FRESH_DAYS = 7.0
+_FARTHEST_DAYS = 36525.0  # SGP4 steps through the time to a resonant orbit
 _AT_EPOCH_KM, _PER_DAY_KM = 1, (1, 3)
 _LISTED = 10  # objects that an error names
 _COLUMNS = 69
@@ -91,8 +93,8 @@ def read_tle(text: str, name: str, wanted: str | None, center: Instant) -> Orbit
 def read_omm(data: bytes, name: str, wanted: str | None, center: Instant) -> Orbit:
     """Orbit from orbit mean-elements messages (CCSDS 502.0-B) as XML, JSON or CSV; arguments as of `read_tle`.
 
-    JSON and CSV have the message's keywords. CelesTrak leaves those out there that can have one value only, and Space-
-    Track writes all of them.
+    JSON and CSV have the message's keywords. CelesTrak leaves those out there that can have one value only;
+    Space-Track writes all of them.
     """
     _hold_to_size(len(data), name)
     if data.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"<":
@@ -139,8 +141,14 @@ def teme(elements: Elements) -> Callable[[Instant], Vector]:
         raise PathFileError(f"{elements.where}: SGP4 refuses {elements.object}: {_failure(satellite.error)}")
 
     def place(instant: Instant) -> Vector:
+        elapsed = instant.since(elements.epoch)
+        if abs(elapsed) > _FARTHEST_DAYS * DAY:
+            raise PathFileError(
+                f"{elements.where}: the elements of {elements.object} are of {elements.epoch.as_text()}, too far from"
+                f" {instant.as_text()}"
+            )
         # A Julian date of two numbers would be as exact, but its epoch passes through a calendar.
-        error, position, _ = satellite.sgp4_tsince(instant.since(elements.epoch) / 60)
+        error, position, _ = satellite.sgp4_tsince(elapsed / 60)
         if error or not all(math.isfinite(one) for one in position):
             raise PathFileError(
                 f"{elements.where}: SGP4 has no place of {elements.object} at {instant.as_text()}: {_failure(error)}"
@@ -213,7 +221,9 @@ def _failure(error: int) -> str:
 
 def _hold_to_size(size: int, name: str) -> None:
     if size > LARGEST_BYTES:
-        raise PathFileError(f"{name}: is larger than {LARGEST_BYTES // 1_000_000} MB; keep the objects that are needed")
+        raise PathFileError(
+            f"{name}: is larger than {LARGEST_BYTES // 1_000_000} MB; keep the objects that are needed"
+        )
 
 
 def _chosen(found: Sequence[Elements], name: str, wanted: str | None, center: Instant) -> Elements:
@@ -274,7 +284,9 @@ def _sets(text: str, name: str) -> Iterator[Elements]:
     if first is not None:
         raise PathFileError(f"{name}:{first[0]}: line 1 of an element set has no line 2 after it")
     if above is not None:
-        raise PathFileError(f"{name}:{above[0]}: must be line 1 of an element set, or a name above one{_got(above[1])}")
+        raise PathFileError(
+            f"{name}:{above[0]}: must be line 1 of an element set, or a name above one{_got(above[1])}"
+        )
 
 
 def _got(line: str) -> str:
@@ -356,7 +368,7 @@ def _days_of_year(year: int) -> int:
 
 
 def _drag(line: str, where: str) -> float:
-    """B*: its five digits follow a decimal point that is not written, and the last two characters are the exponent."""
+    """B*: five digits behind a decimal point that is not written, and an exponent of a sign and a digit."""
     text = line[53:61].strip()
     match = re.fullmatch(r"([+-]?)\.?(\d{1,5})\s?([+-]\d)", text, re.ASCII)
     if match is None:
@@ -394,7 +406,7 @@ def _from_markup(data: bytes, name: str) -> _Records:
                 leaves.update({one.name: one.text.strip() for one in found.children})
         where = f"{name}:{message.line}"
         for key in _MANDATORY:
-            _ = _value(leaves, key, where)
+            _value(leaves, key, where)
         yield where, leaves
 
 
@@ -411,7 +423,8 @@ def _from_json(text: str, name: str) -> _Records:
         where = f"{name}: record {count}"
         if not isinstance(record, dict):
             raise PathFileError(f"{where}: must have keywords and values")
-        yield where, record
+        # A list or a mapping is no value of any keyword.
+        yield where, {key: value for key, value in record.items() if isinstance(value, str | int | float)}
 
 
 def _from_csv(text: str, name: str) -> _Records:
@@ -445,7 +458,7 @@ def _from_message(record: Mapping[str, Any], where: str) -> Elements:
         if value not in (None, "") and str(value).strip().upper() not in accepted:
             raise PathFileError(f"{where}: {key} must be {accepted[0]} (got {shown(str(value))})")
     kind = str(record.get("EPHEMERIS_TYPE", "")).strip()
-    if kind not in (*_PLAIN_TYPES, "None", "SGP4", "SGP"):
+    if kind not in (*_PLAIN_TYPES, "SGP4"):
         raise PathFileError(f"{where}: the elements are of type {shown(kind)}, which SGP4 does not propagate")
 
     def number(key: str) -> float:
@@ -463,8 +476,10 @@ def _from_message(record: Mapping[str, Any], where: str) -> Elements:
         raise PathFileError(f"{where}: NORAD_CAT_ID must be a whole number of up to nine digits (got {catalogue:g})")
     written = str(_value(record, "EPOCH", where))
     epoch = epoch_in(written)
-    if epoch is None:
-        raise PathFileError(f"{where}: EPOCH must be an instant such as 2026-05-31T10:12:13.123 (got {shown(written)})")
+    if epoch is None or not EARLIEST <= epoch.day < LATEST:
+        raise PathFileError(
+            f"{where}: EPOCH must be an instant such as 2026-05-31T10:12:13.123 (got {shown(written)})"
+        )
     eccentricity = number("ECCENTRICITY")
     if not 0 <= eccentricity < 1:
         raise PathFileError(f"{where}: ECCENTRICITY must be from 0 to less than 1 (got {eccentricity:g})")

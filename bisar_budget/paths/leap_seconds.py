@@ -1,7 +1,7 @@
 """Instants of other time systems, by the leap seconds of UTC.
 
-TAI - UTC: table of the Earth orientation centre of the IERS, Bulletin C 52 (2016-07-06) and before. No leap second came
-after that of 2016-12-31; one that is announced later needs a line here.
+TAI - UTC: table of the Earth orientation centre of the IERS, Bulletin C 52 (2016-07-06) and before. No leap second
+came after that of 2016-12-31; one that is announced later needs a line here.
 """
 
 from bisect import bisect_right

@@ -1,8 +1,8 @@
 """From the axes of orbits to those of the Earth, with UT1 = UTC and without polar motion.
 
-Both that is left out comes from tables which the IERS issues every week. UT1 - UTC is kept below 0.9 s: 1 ms turns the
-Earth by 0.51 m at the distance of a low orbit. Polar motion is up to 0.6", which is 20 m there. The turn is the same
-throughout an aperture: it moves the whole path, and bends nothing.
+Both that is left out comes from tables which the IERS issues every week. UT1 - UTC is kept below 0.9 s: 1 ms turns
+the Earth by 0.51 m at the distance of a low orbit. Polar motion is up to 0.6", which is 20 m there. The turn is the
+same throughout an aperture: it moves the whole path, and bends nothing.
 """
 
 import math
@@ -48,8 +48,8 @@ def celestial_turn(is_j2000: bool) -> Turn:
     """From the axes of the GCRF, or the mean equator and equinox of J2000, to Earth-fixed ones.
 
     Precession and nutation are those of the IAU, 2006 and 2000A (IERS Conventions 2010, chapter 5). The axes of J2000
-    are 0.023" from the GCRF's, 0.8 m at the distance of a low orbit; a file that calls the GCRF `EME2000` is that much
-    off.
+    are 0.023" from the GCRF's, 0.8 m at the distance of a low orbit; a file that calls the GCRF `EME2000` is that
+    much off.
 
     Raises
     ------
