@@ -6,7 +6,6 @@ other years differ by, centimetres, is not seen. Those of the stars are turned w
 
 import math
 import re
-from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
@@ -15,6 +14,7 @@ from bisar_budget.geometry import Vector
 from bisar_budget.paths.elements import LARGEST_BYTES, LATEST, decoded, epoch_in, number_in
 from bisar_budget.paths.flight import Orbit, PathFileError
 from bisar_budget.paths.instant import Instant
+from bisar_budget.paths.interpolation import Sample, interpolate
 from bisar_budget.paths.leap_seconds import FIRST_DAY, TAI_LESS, has_leap_second, tai, utc
 from bisar_budget.paths.markup import Element, parse_markup
 from bisar_budget.paths.turning import Turn, celestial_turn, from_teme, unknown_rotation
@@ -34,14 +34,6 @@ _VECTOR = ("X", "Y", "Z", "X_DOT", "Y_DOT", "Z_DOT")
 _GAUSS = ((0.5 - math.sqrt(0.15), 5 / 18), (0.5, 8 / 18), (0.5 + math.sqrt(0.15), 5 / 18))
 
 
-class _Sample(NamedTuple):
-    """A time, counted in the message's system without steps, and position and velocity. [m], [m/s]"""
-
-    time: Instant
-    place: Vector
-    velocity: Vector
-
-
 class _Block(NamedTuple):
     """Metadata of a segment: keyword to line and value; and its ephemeris: line, epoch and numbers of each sample."""
 
@@ -56,7 +48,7 @@ class _Segment(NamedTuple):
     object: str
     ids: tuple[str, ...]
     frame: str
-    samples: Sequence[_Sample]
+    samples: Sequence[Sample]
     first: Instant
     last: Instant
     is_hermite: bool
@@ -143,44 +135,6 @@ def _turn(frame: str, where: str) -> Turn | None:
         return celestial_turn(_CELESTIAL[frame])
     except PathFileError as error:
         raise PathFileError(f"{where}: REF_FRAME {frame} {error}") from None
-
-
-def interpolate(samples: Sequence[_Sample], time: Instant, count: int, is_hermite: bool) -> Vector:
-    """Place at a time, from the samples around it. [m]
-
-    The samples are the same throughout an interval between two of them. Neighbouring intervals, where the count is
-    even or not, share the sample between them: the path has no jumps.
-    """
-    after = bisect_right(samples, time, key=lambda one: one.time)
-    first = min(max(after - (count + 1) // 2, 0), len(samples) - count)
-    near = samples[first : first + count]
-    return _through(near, [one.time.since(time) for one in near], is_hermite)
-
-
-def _through(near: Sequence[_Sample], times: Sequence[float], is_hermite: bool) -> Vector:
-    """Value at time 0 of the polynomial of Lagrange through places, or that of Hermite through velocities too.
-
-    Sources: Abramowitz & Stegun, equations 25.2.1 and 25.2.2; Burden & Faires, Numerical Analysis, theorem 3.9.
-    """
-    terms: list[list[float]] = [[], [], []]
-    for j, sample in enumerate(near):
-        others = [times[j] - one for n, one in enumerate(times) if n != j]
-        basis = math.prod(-one / (times[j] - one) for n, one in enumerate(times) if n != j)
-        if is_hermite:
-            square = basis * basis
-            slope = math.fsum(1 / one for one in others)
-            of_place, of_velocity = (1 + 2 * times[j] * slope) * square, -times[j] * square
-        else:
-            of_place, of_velocity = basis, 0.0
-        for axis in range(3):
-            terms[axis].append(of_place * sample.place[axis])
-            if of_velocity:
-                terms[axis].append(of_velocity * sample.velocity[axis])
-    try:
-        x, y, z = (math.fsum(axis) for axis in terms)
-    except (OverflowError, ValueError):  # samples that are much nearer to each other than others
-        return (math.nan, math.nan, math.nan)
-    return (x, y, z)
 
 
 def _holds(segment: _Segment, time: Instant) -> bool:
@@ -296,7 +250,7 @@ _LIMITS = ("START_TIME", "STOP_TIME", "USEABLE_START_TIME", "USEABLE_STOP_TIME")
 
 
 def _interpolation(
-    metadata: Mapping[str, tuple[int, str]], samples: Sequence[_Sample], name: str, line: int
+    metadata: Mapping[str, tuple[int, str]], samples: Sequence[Sample], name: str, line: int
 ) -> tuple[bool, int]:
     """Whether it is Hermite's, and its degree."""
     said_at, said = metadata.get("INTERPOLATION", (line, ""))
@@ -331,7 +285,7 @@ def _interpolation(
     return is_hermite, degree
 
 
-def _velocity_off(samples: Sequence[_Sample]) -> float:
+def _velocity_off(samples: Sequence[Sample]) -> float:
     """How far velocities are from what the places do between the two samples in the middle, over the speed.
 
     The velocities, interpolated, are integrated by Gauss and Legendre. Derived here.
@@ -343,7 +297,7 @@ def _velocity_off(samples: Sequence[_Sample]) -> float:
     a, b = samples[middle - 1 : middle + 1]
     step = b.time.since(a.time)
     means = [0.0, 0.0, 0.0]
-    of_velocity = [_Sample(one.time, one.velocity, one.velocity) for one in near]
+    of_velocity = [Sample(one.time, one.velocity, one.velocity) for one in near]
     for share, weight in _GAUSS:
         velocity = interpolate(of_velocity, a.time.after(share * step), len(near), False)
         means = [mean + weight * one for mean, one in zip(means, velocity, strict=True)]
@@ -352,7 +306,7 @@ def _velocity_off(samples: Sequence[_Sample]) -> float:
     return math.dist(means, moved) / max(math.hypot(*moved), _STILL)
 
 
-def _sample(line: int, epoch: str, values: Sequence[str], system: str, name: str) -> _Sample:
+def _sample(line: int, epoch: str, values: Sequence[str], system: str, name: str) -> Sample:
     numbers = []
     for value in values:
         one = number_in(value)
@@ -360,7 +314,7 @@ def _sample(line: int, epoch: str, values: Sequence[str], system: str, name: str
             raise PathFileError(f"{name}:{line}: must be a number of km or km/s (got {shown(value)})")
         numbers.append(1000 * one)
     x, y, z, u, v, w = numbers[:6]
-    return _Sample(_time(line, epoch, system, name), (x, y, z), (u, v, w))
+    return Sample(_time(line, epoch, system, name), (x, y, z), (u, v, w))
 
 
 def _time(line: int, text: str, system: str, name: str) -> Instant:
