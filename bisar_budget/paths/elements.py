@@ -167,7 +167,8 @@ def smooth(place: Callable[[Instant], Vector]) -> Callable[[Instant], Vector]:
 
     SGP4 counts minutes and angles from the epoch: a week from it a place is rounded to 2e-6 m, which is the curvature
     of a path within a second, and 100 days from it to 4e-5 m. Lagrange's polynomial through eight places 30 s apart
-    leaves 1e-8 m in a low orbit, by its remainder.
+    leaves 1e-8 m in a low orbit, by its remainder. It also rounds off the millimetres by which SGP4 jumps every half
+    day in resonant orbits.
     """
 
     @lru_cache(maxsize=64)
@@ -177,7 +178,10 @@ def smooth(place: Callable[[Instant], Vector]) -> Callable[[Instant], Vector]:
 
     def between(instant: Instant) -> Vector:
         count = math.floor(instant.seconds / _STEP_S)
-        near = [node(instant.day, count + n) for n in range(1 - _NODES // 2, 1 + _NODES // 2)]
+        try:
+            near = [node(instant.day, count + n) for n in range(1 - _NODES // 2, 1 + _NODES // 2)]
+        except PathFileError:  # within minutes of the end of an orbit
+            return place(instant)
         return interpolate(near, instant, _NODES, False)
 
     return between
