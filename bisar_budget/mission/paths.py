@@ -15,6 +15,7 @@ from bisar_budget.mission.model import FlownPath, Mission, MotionError, Platform
 from bisar_budget.mission.readers import INVALID, Report
 from bisar_budget.paths import earth
 from bisar_budget.paths.flight import Fitted, Log, Orbit, PathFileError, interpolated, smoothed
+from bisar_budget.paths.instant import Instant
 
 Beside = Callable[[str], bytes]  # content of a file that a mission names
 
@@ -131,16 +132,9 @@ def _of_orbit(mission: Mission, route: routes.Orbit, axes: earth.SceneAxes, read
     form = next(form for form in ("tle", "omm", "oem") if getattr(route, form) is not None)
     named = getattr(route, form)
     file = named if isinstance(named, str) else None
-    from bisar_budget.paths import orbits
-
     try:
-        if file is None:
-            data = "\n".join(named).encode()
-            orbit: Orbit = orbits.read_tle("\n".join(named), "the element set", route.object, center)
-        else:
-            data = read(file)
-            reader = {"tle": orbits.read_tle_file, "omm": orbits.read_omm, "oem": orbits.read_oem}[form]
-            orbit = reader(data, file, route.object, center)
+        data = read(file) if file is not None else "\n".join(named).encode()
+        orbit = _read_orbit(form, data, file or "the element set", route.object, center)
         widest = math.inf
         if orbit.span is not None:
             before, after = center.since(orbit.span[0]), orbit.span[1].since(center)
@@ -158,6 +152,18 @@ def _of_orbit(mission: Mission, route: routes.Orbit, axes: earth.SceneAxes, read
         raise _UnusablePathError(("orbit", form), Problem(str(error))) from None
     age = None if orbit.epoch is None else center.since(orbit.epoch)
     return _flown(fitted, orbit.words, file, data)._replace(age=age, doubts=doubts)
+
+
+def _read_orbit(form: str, data: bytes, name: str, wanted: str | None, center: Instant) -> Orbit:
+    if form == "oem":
+        from bisar_budget.paths import ephemeris
+
+        return ephemeris.read_oem(data, name, wanted, center)
+    from bisar_budget.paths import elements
+
+    if form == "omm":
+        return elements.read_omm(data, name, wanted, center)
+    return elements.read_tle(elements.decoded(data, name), name, wanted, center)
 
 
 def _of_log(mission: Mission, route: routes.Trajectory, axes: earth.SceneAxes | None, read: Beside) -> FlownPath:

@@ -1,4 +1,4 @@
 """Paths of platforms from orbits and logs of flights, and the Earth they are flown over."""
 
 # What other rooms may use.
-__all__ = ["earth", "flight", "flight_log", "instant", "orbits", "sbet"]
+__all__ = ["earth", "elements", "ephemeris", "flight", "flight_log", "instant", "sbet"]

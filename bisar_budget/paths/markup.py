@@ -1,0 +1,83 @@
+"""XML of others as a tree whose elements know their lines. It follows no reference and expands no entity."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from xml.parsers import expat
+
+from bisar_budget.faults import shown
+from bisar_budget.paths.flight import PathFileError
+
+_MOST = 2_000_000  # elements; a day of an OEM at 10 Hz has three times as many
+_DEEPEST = 32
+_LONGEST = 10_000  # characters of an element's own text
+
+
+@dataclass(eq=False)
+class Element:
+    """An element: its name without namespace, its attributes, text, children, and the line where it begins."""
+
+    name: str
+    line: int
+    attributes: dict[str, str]
+    text: str = ""
+    children: list["Element"] = field(default_factory=list)
+
+    def all(self, name: str) -> Iterator["Element"]:
+        """Elements of a name anywhere below, in the order of the file."""
+        for child in self.children:
+            if child.name == name:
+                yield child
+            else:
+                yield from child.all(name)
+
+
+def parse_markup(data: bytes, name: str) -> Element:
+    """Read XML.
+
+    Raises
+    ------
+    PathFileError
+        The text is not XML, declares a document type, or has too many elements.
+    """
+    parser = expat.ParserCreate()
+    parser.buffer_text = True
+    top = Element("", 1, {})
+    open_ones = [top]
+    count = 0
+
+    def here(problem: str) -> PathFileError:
+        return PathFileError(f"{name}:{parser.CurrentLineNumber}: {problem}")
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal count
+        count += 1
+        if count > _MOST or len(open_ones) > _DEEPEST:
+            raise here(f"has more than {_MOST} elements, or {_DEEPEST} in each other")
+        one = Element(tag.rpartition(":")[2], parser.CurrentLineNumber, attributes)
+        open_ones[-1].children.append(one)
+        open_ones.append(one)
+
+    def end(_: str) -> None:
+        open_ones.pop()
+
+    def text(found: str) -> None:
+        one = open_ones[-1]
+        if found.strip():
+            one.text += found
+            if len(one.text) > _LONGEST:
+                raise here(f"has a text of more than {_LONGEST} characters")
+
+    def doctype(*_: object) -> None:
+        raise here("declares a document type (DOCTYPE), which is not read; take it out")
+
+    parser.StartElementHandler = start
+    parser.EndElementHandler = end
+    parser.CharacterDataHandler = text
+    parser.StartDoctypeDeclHandler = doctype
+    try:
+        parser.Parse(data, True)
+    except expat.ExpatError as error:
+        raise PathFileError(f"{name}:{error.lineno}: is not XML: {expat.ErrorString(error.code)}") from None
+    except (LookupError, ValueError) as error:  # an encoding that nobody has
+        raise PathFileError(f"{name}:1: is not XML: {shown(str(error))}") from None
+    return top
