@@ -501,7 +501,10 @@ def _from_message(record: Mapping[str, Any], where: str) -> Elements:
 
     catalogue = number("NORAD_CAT_ID")
     if not 0 <= catalogue <= 999_999_999 or catalogue != int(catalogue):
-        raise PathFileError(f"{where}: NORAD_CAT_ID must be a whole number of up to nine digits (got {catalogue:g})")
+        raise PathFileError(
+            f"{where}: NORAD_CAT_ID must be a whole number of up to nine digits"
+            f" (got {shown(str(record['NORAD_CAT_ID']))})"
+        )
     written = str(_value(record, "EPOCH", where))
     epoch = epoch_in(written)
     if epoch is None or not EARLIEST <= epoch.day < LATEST:

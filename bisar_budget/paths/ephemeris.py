@@ -26,8 +26,8 @@ _SYSTEMS = ("UTC", *TAI_LESS)
 _DEGREE = 7  # where the message says none
 _HIGHEST_DEGREE = 31
 _EDGE = 1e-9  # s; a time at the end of a span is inside
-_OWN_VELOCITY = 0.01  # of the speed; one against the stars is 7 % off in a low orbit
-_STILL = 1.0  # m/s
+_OWN_VELOCITY = 0.001  # of the speed; one against the stars is up to 7 % off in a low orbit
+_SLOW = 100.0  # m/s; slower ones over the ground are held to a tenth of a metre a second
 _BESIDE = 4  # samples on each side that velocities are compared with places by
 _VECTOR = ("X", "Y", "Z", "X_DOT", "Y_DOT", "Z_DOT")
 # Nodes and weights of Gauss and Legendre on (0, 1), of three points: Abramowitz & Stegun, table 25.4.
@@ -271,7 +271,7 @@ def _interpolation(
     if said.upper() == "HERMITE" and not off <= _OWN_VELOCITY:
         raise PathFileError(
             f"{name}:{said_at}: INTERPOLATION HERMITE needs the velocities of the places; those of the segment are"
-            f" {100 * off:.0f} % off what the places do"
+            f" {100 * off:.2g} % off what the places do"
         )
     is_hermite = said.upper() == "HERMITE" or (not said and off <= _OWN_VELOCITY)
     if is_hermite:
@@ -279,31 +279,35 @@ def _interpolation(
     needed = (degree + 1) // 2 if is_hermite else degree + 1
     if len(samples) < needed:
         raise PathFileError(
-            f"{name}:{line}: the segment has {len(samples)} places;"
+            f"{name}:{line}: the segment has {len(samples)} place{'s' * (len(samples) != 1)};"
             f" {'Hermite' if is_hermite else 'Lagrange'} of degree {degree} needs {needed}"
         )
     return is_hermite, degree
 
 
 def _velocity_off(samples: Sequence[Sample]) -> float:
-    """How far velocities are from what the places do between the two samples in the middle, over the speed.
+    """How far velocities are from what the places do between two samples, over the speed; NaN where nobody knows.
 
-    The velocities, interpolated, are integrated by Gauss and Legendre. Derived here.
+    Sixteen pairs of neighbours are tried: near a pole the Earth's rotation hardly moves a place.
     """
-    if len(samples) < _BESIDE:
+    last = len(samples) - _BESIDE
+    if last < _BESIDE:
         return 0.0
-    middle = len(samples) // 2
-    near = samples[max(middle - _BESIDE, 0) : middle + _BESIDE]
+    found = [_off_at(samples, middle) for middle in range(_BESIDE, last + 1, max((last - _BESIDE) // 16, 1))]
+    return max(found) if all(math.isfinite(one) for one in found) else math.nan
+
+
+def _off_at(samples: Sequence[Sample], middle: int) -> float:
+    """The same before one sample: the velocities, interpolated, are integrated by Gauss and Legendre. Derived here."""
+    near = [Sample(one.time, one.velocity, one.velocity) for one in samples[middle - _BESIDE : middle + _BESIDE]]
     a, b = samples[middle - 1 : middle + 1]
     step = b.time.since(a.time)
     means = [0.0, 0.0, 0.0]
-    of_velocity = [Sample(one.time, one.velocity, one.velocity) for one in near]
     for share, weight in _GAUSS:
-        velocity = interpolate(of_velocity, a.time.after(share * step), len(near), False)
+        velocity = interpolate(near, a.time.after(share * step), len(near), False)
         means = [mean + weight * one for mean, one in zip(means, velocity, strict=True)]
     moved = [(end - start) / step for start, end in zip(a.place, b.place, strict=True)]
-    # One that stands still over the ground has no share of its speed to be off by.
-    return math.dist(means, moved) / max(math.hypot(*moved), _STILL)
+    return math.dist(means, moved) / max(math.hypot(*moved), _SLOW)
 
 
 def _sample(line: int, epoch: str, values: Sequence[str], system: str, name: str) -> Sample:

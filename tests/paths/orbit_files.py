@@ -163,10 +163,10 @@ def oem_xml(text: str) -> bytes:
                 for key, one in zip(keys, numbers, strict=True)
             )
             rows.append(f"<stateVector><EPOCH>{epoch}</EPOCH>{values}</stateVector>")
-    head = '<?xml version="1.0" encoding="UTF-8"?>\n<oem id="CCSDS_OEM_VERS" version="2.0">\n<header/>\n<body><segment>\n'
+    head = '<?xml version="1.0" encoding="UTF-8"?>\n<oem id="CCSDS_OEM_VERS" version="2.0">\n<header/>\n'
     return (
         head
-        + "<metadata>\n"
+        + "<body><segment>\n<metadata>\n"
         + "\n".join(metadata)
         + "\n</metadata>\n<data>\n"
         + "\n".join(rows)
