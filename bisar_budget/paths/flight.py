@@ -112,9 +112,9 @@ def interpolated(place: Callable[[float], Vector], aperture_time_s: float, wides
 def smoothed(times: "NDArray[np.float64]", places: "NDArray[np.float64]", aperture_time_s: float) -> Fitted:
     """Path that fits the places of a log within the aperture by least squares.
 
-    The order is that of the least Bayesian information criterion (Schwarz 1978), to 8 at most and to a fifth of the
-    samples: what a platform does faster is in the log's noise, or is vibration. Samples whose residuals keep their
-    sign count as one. A slow error of the log, which looks like motion, is then not fitted as if it were known well.
+    The order is that of the least Bayesian information criterion (Schwarz 1978), to 8 at most and to half the
+    samples: what a platform does faster is in the log's noise, or is vibration. Samples whose residuals are correlated
+    count as fewer. A slow error of the log, which looks like motion, is then not fitted as if it were white noise.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ def smoothed(times: "NDArray[np.float64]", places: "NDArray[np.float64]", apertu
         )
     at, wanted = times[inside] / half, places[inside]
     fits = []
-    for order in range(2, max(2, min(_HIGHEST, count // 5)) + 1):
+    for order in range(2, min(_HIGHEST, (count - 1) // 2) + 1):
         legendre = np.polynomial.legendre.legvander(at, order)
         found = np.linalg.lstsq(legendre, wanted, rcond=None)[0]
         fits.append((found, wanted - legendre @ found))
@@ -149,8 +149,10 @@ def smoothed(times: "NDArray[np.float64]", places: "NDArray[np.float64]", apertu
 
     def information(left: "NDArray[np.float64]", order: int) -> float:
         squares = (left**2).mean(axis=0) + _UNSEEN_M**2
-        # Each axis has its own noise; an order adds a coefficient to each of the three.
-        return float(independent * np.log(squares).sum()) + 3 * (order + 1) * math.log(independent)
+        # Each axis has its own noise, and a coefficient of each order. The last factor is that of AICc (Hurvich & Tsai
+        # 1989): a few samples are fitted too well by chance.
+        coefficients = 3 * (order + 1) * math.log(independent) * count / (count - order - 2)
+        return float(independent * np.log(squares).sum()) + coefficients
 
     found, left = min(fits, key=lambda fit: information(fit[1], len(fit[0]) - 1))
     rms = math.sqrt(float((left**2).sum()) / max(count - len(found), 1))
@@ -225,14 +227,18 @@ def slow_times(
 
 
 def _independent(left: "NDArray[np.float64]") -> float:
-    """How many independent samples residuals (n, 3) are worth.
+    """How many independent samples residuals (n, 3) are worth: n over the sum of their correlation to its first zero.
 
-    White noise changes its sign between every other sample. What keeps its sign for longer is correlated.
+    White noise is worth all its samples. Each axis counts alike.
     """
     import numpy as np
 
-    changes = (np.diff(np.signbit(left), axis=0)).mean()
-    return max(2.0, min(1.0, 2 * float(changes)) * len(left))
+    count = len(left)
+    spectrum = np.abs(np.fft.rfft(left, 2 * count, axis=0)) ** 2
+    correlation = np.fft.irfft(spectrum, axis=0)[:count]
+    correlation = (correlation / np.maximum(correlation[0], _UNSEEN_M**2)).mean(axis=1)
+    ends = int(np.argmax(correlation <= 0)) or count
+    return max(2.0, count / float(1 + 2 * correlation[1:ends].sum()))
 
 
 def _padded(values: "NDArray[np.float64]", count: int) -> "NDArray[np.float64]":
