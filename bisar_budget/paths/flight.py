@@ -113,7 +113,7 @@ def smoothed(times: "NDArray[np.float64]", places: "NDArray[np.float64]", apertu
     """Path that fits the places of a log within the aperture by least squares.
 
     The order is that of the least Bayesian information criterion (Schwarz 1978), to 8 at most and to half the
-    samples: what a platform does faster is in the log's noise, or is vibration. Samples whose residuals are correlated
+    samples: what a platform does faster is in the log's noise, or is vibration. Samples with correlated residuals
     count as fewer. A slow error of the log, which looks like motion, is then not fitted as if it were white noise.
 
     Parameters
@@ -149,8 +149,8 @@ def smoothed(times: "NDArray[np.float64]", places: "NDArray[np.float64]", apertu
 
     def information(left: "NDArray[np.float64]", order: int) -> float:
         squares = (left**2).mean(axis=0) + _UNSEEN_M**2
-        # Each axis has its own noise, and a coefficient of each order. The last factor is that of AICc (Hurvich & Tsai
-        # 1989): a few samples are fitted too well by chance.
+        # Each axis has its own noise, and a coefficient of each order. The last factor is that of AICc (Hurvich &
+        # Tsai 1989): a few samples are fitted too well by chance.
         coefficients = 3 * (order + 1) * math.log(independent) * count / (count - order - 2)
         return float(independent * np.log(squares).sum()) + coefficients
 
@@ -188,8 +188,8 @@ def slow_times(
     Raises
     ------
     PathFileError
-        The log does not cover the aperture, give or take one sample, or has a gap in it of more than five median
-        intervals. Or the middle is said on a clock that the log does not have.
+        The log does not cover the aperture, give or take one sample, or has a gap in it of more than five usual
+        intervals: medians, in the aperture or of the log. Or the middle is on a clock that the log does not have.
     """
     import numpy as np
 
@@ -211,7 +211,8 @@ def slow_times(
     first = max(int(np.searchsorted(slow, -half, "right")) - 1, 0)
     inside = slow[first : int(np.searchsorted(slow, half, "left")) + 1]
     steps = np.diff(inside)
-    usual = float(np.median(steps)) if steps.size else 0.0
+    # A gap as long as the aperture is the only step in it.
+    usual = min(float(np.median(steps)), float(np.median(np.diff(slow)))) if steps.size else 0.0
     if slow[0] > -half + usual or slow[-1] < half - usual:
         raise PathFileError(
             f"{name}: covers {said(float(slow[0]))} to {said(float(slow[-1]))}, "

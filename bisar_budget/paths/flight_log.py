@@ -204,10 +204,10 @@ def _header(lines: Sequence[str], name: str) -> _Header:
     def refuse(says: str) -> NoReturn:
         raise PathFileError(f"{name}:{at + 1}: {says}")
 
-    delimiter = max("\t;,", key=lines[at].count)
+    delimiter = max(",;\t", key=lines[at].count)
     cells = _cells(lines[at], delimiter)
-    if cells is None:
-        refuse("has a quote that does not end on its line")
+    if isinstance(cells, str):
+        refuse(cells)
     found: dict[str, tuple[int, str | None]] = {}
     others = []
     for index, cell in enumerate(cells):
@@ -265,8 +265,8 @@ def _measured(name: str, index: int, unit: str | None, refuse: Callable[[str], N
     try:
         return _Column(name, index, shown(unit), units.parse_quantity(f"1 {unit}", dimension))
     except InvalidValueError as error:
-        hint = f" {error.problem.hint}" if error.problem.hint else ""
-        refuse(f"{name} {error.problem.problem}; write '{example}'.{hint}")
+        hint = f". {error.problem.hint}" if error.problem.hint else ""
+        refuse(f"{name} {error.problem.problem}; write '{example}'{hint}")
 
 
 def _all_rows(lines: list[str], header: _Header, name: str) -> _Rows:
@@ -371,19 +371,19 @@ def _alike_times(texts: list[str]) -> tuple[_Numbers, _Numbers] | None:
     return np.repeat(days * DAY + seconds, repeats), whole / 10.0**decimals
 
 
-def _cells(text: str, delimiter: str) -> list[str] | None:
-    """Cells of a line; None where a quote goes on behind it, or a cell is longer than any."""
+def _cells(text: str, delimiter: str) -> list[str] | str:
+    """Cells of a line, or why it has none."""
     try:
         rows = list(csv.reader([text, ""], delimiter=delimiter, skipinitialspace=True))
     except csv.Error:
-        return None
-    return rows[0] if len(rows) == 2 else None
+        return f"has a cell of more than {csv.field_size_limit()} letters"
+    return rows[0] if len(rows) == 2 else "has a quote that does not end on its line"
 
 
 def _row_fault(text: str, header: _Header) -> str | None:
     cells = _cells(text, header.delimiter)
-    if cells is None:
-        return "has a quote that does not end on its line"
+    if isinstance(cells, str):
+        return cells
     if len(cells) != header.width:
         return f"has {_counted(len(cells), 'cell')}, the header has {header.width}"
     if header.is_utc and parse_instant(cells[header.time.place]) is None:
