@@ -14,7 +14,7 @@ from bisar_budget.mission import routes
 from bisar_budget.mission.model import FlownPath, Mission, MotionError, Platform, without_image
 from bisar_budget.mission.readers import INVALID, Report
 from bisar_budget.paths import earth
-from bisar_budget.paths.flight import Fitted, Log, Orbit, PathFileError, interpolated, smoothed
+from bisar_budget.paths.flight import Fitted, Log, Orbit, PathFileError, interpolated, slow_times, smoothed
 from bisar_budget.paths.instant import Instant
 
 Beside = Callable[[str], bytes]  # content of a file that a mission names
@@ -167,15 +167,13 @@ def _read_orbit(form: str, data: bytes, name: str, wanted: str | None, center: I
 
 
 def _of_log(mission: Mission, route: routes.Trajectory, axes: earth.SceneAxes | None, read: Beside) -> FlownPath:
-    from bisar_budget.paths import flight_log
-
     aperture_time = mission.collection.aperture_time
     try:
         data = read(route.file)
         log = _log(route, data)
         if log.is_earth_fixed:
             log = _in_scene(log, _known(axes, "trajectory"))
-        times = flight_log.slow_times(log, mission.collection.center_time, route.center, aperture_time, route.file)
+        times = slow_times(log, mission.collection.center_time, route.center, aperture_time, route.file)
         fitted = smoothed(times, log.places, aperture_time)
     except PathFileError as error:
         raise _UnusablePathError(("trajectory", "file"), Problem(str(error))) from None
@@ -219,14 +217,13 @@ def _by_accuracy(mission: Mission, route: routes.Trajectory, error: MotionError,
         )
     except PathFileError as unusable:
         raise _UnusablePathError(key, Problem(str(unusable))) from None
-    figures = {"position": stated.position, "velocity": stated.velocity}
-    taken = (
-        {}
-        if error.covariance is not None
-        else {figure: sigmas for figure, sigmas in figures.items() if getattr(error, figure) is None}
-    )
-    sources = dict(error.of_parts) | dict.fromkeys(taken, f"accuracy file {file}")
-    return error._replace(**taken, of_parts=tuple(sources.items()))
+    if error.covariance is None:
+        source = f"accuracy file {file}"
+        if error.position is None:
+            error = error._replace(position=stated.position, of_parts=(*error.of_parts, ("position", source)))
+        if error.velocity is None:
+            error = error._replace(velocity=stated.velocity, of_parts=(*error.of_parts, ("velocity", source)))
+    return error
 
 
 def _of_place(platform: Platform, axes: earth.SceneAxes) -> FlownPath:

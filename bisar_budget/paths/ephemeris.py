@@ -298,7 +298,7 @@ def _velocity_off(samples: Sequence[Sample]) -> float:
 
 
 def _off_at(samples: Sequence[Sample], middle: int) -> float:
-    """The same before one sample: the velocities, interpolated, are integrated by Gauss and Legendre. Derived here."""
+    """The same before one sample: the velocities, interpolated, are integrated by Gauss and Legendre."""
     near = [Sample(one.time, one.velocity, one.velocity) for one in samples[middle - _BESIDE : middle + _BESIDE]]
     a, b = samples[middle - 1 : middle + 1]
     step = b.time.since(a.time)

@@ -21,7 +21,7 @@ _NODES = 15  # Chebyshev points of an interpolation, so many coefficients
 _LEAST_WINDOW = 10.0  # s; in a shorter one rounding of an Earth-fixed place, 1e-9 m, is an acceleration
 _UNSEEN_M = 1e-7  # a coefficient that moves the path by less is rounding
 _HIGHEST = 8  # order of a smoothed path
-_BETTER = 0.9  # of the residual; an order that leaves more smooths nothing
+_WIDEST_GAP = 5  # median intervals between samples
 
 
 class PathFileError(Exception):
@@ -112,8 +112,9 @@ def interpolated(place: Callable[[float], Vector], aperture_time_s: float, wides
 def smoothed(times: "NDArray[np.float64]", places: "NDArray[np.float64]", aperture_time_s: float) -> Fitted:
     """Path that fits the places of a log within the aperture by least squares.
 
-    The order rises as long as it leaves clearly less, to 8 at most and to a fifth of the samples: what a platform
-    does faster is in the log's noise, or is vibration.
+    The order is that of the least Bayesian information criterion (Schwarz 1978), to 8 at most and to half the
+    samples: what a platform does faster is in the log's noise, or is vibration. Samples with correlated residuals
+    count as fewer. A slow error of the log, which looks like motion, is then not fitted as if it were white noise.
 
     Parameters
     ----------
@@ -139,20 +140,106 @@ def smoothed(times: "NDArray[np.float64]", places: "NDArray[np.float64]", apertu
             f"has {count} places in the aperture of {aperture_time_s:g} s, at least 5 are needed; sample faster"
         )
     at, wanted = times[inside] / half, places[inside]
-    best = None
-    for order in range(2, max(2, min(_HIGHEST, count // 5)) + 1):
+    fits = []
+    for order in range(2, min(_HIGHEST, (count - 1) // 2) + 1):
         legendre = np.polynomial.legendre.legvander(at, order)
         found = np.linalg.lstsq(legendre, wanted, rcond=None)[0]
-        left = wanted - legendre @ found
-        spare = max(count - order - 1, 1)
-        rms = math.sqrt(float((left**2).sum()) / spare)
-        if best is None or rms < _BETTER * best[0]:
-            best = (rms, found, float(np.linalg.norm(left, axis=1).max()))
-    assert best is not None
-    rms, found, farthest = best
+        fits.append((found, wanted - legendre @ found))
+    independent = _independent(fits[-1][1])
+
+    def information(left: "NDArray[np.float64]", order: int) -> float:
+        squares = (left**2).mean(axis=0) + _UNSEEN_M**2
+        # Each axis has its own noise, and a coefficient of each order. The last factor is that of AICc (Hurvich &
+        # Tsai 1989): a few samples are fitted too well by chance.
+        coefficients = 3 * (order + 1) * math.log(independent) * count / (count - order - 2)
+        return float(independent * np.log(squares).sum()) + coefficients
+
+    found, left = min(fits, key=lambda fit: information(fit[1], len(fit[0]) - 1))
+    rms = math.sqrt(float((left**2).sum()) / max(count - len(found), 1))
+    farthest = float(np.linalg.norm(left, axis=1).max())
     powers = np.stack([_padded(np.polynomial.legendre.leg2poly(found[:, axis]), len(found)) for axis in range(3)])
     state = _state([tuple(float(p) for p in powers[:, n] / half**n) for n in range(len(found))])  # type: ignore[misc]
     return Fitted(state, len(found) - 1, farthest, rms, count)
+
+
+def slow_times(
+    log: Log, center: Instant | None, center_seconds: float | None, aperture_time_s: float, name: str
+) -> "NDArray[np.float64]":
+    """Slow time of each sample of a log that has what the aperture needs.
+
+    Parameters
+    ----------
+    log : Log
+        Any samples before and behind the aperture are kept.
+    center : Instant or None
+        Middle of the aperture, for a log in UTC; not looked at for another.
+    center_seconds : float or None
+        Middle of the aperture on the clock of a log that is not in UTC; None is 0 s. [s]
+    aperture_time_s : float
+        Length of the aperture. [s]
+    name : str
+        What messages call the file.
+
+    Returns
+    -------
+    (n,) ndarray
+        0 is the middle of the aperture. [s]
+
+    Raises
+    ------
+    PathFileError
+        The log does not cover the aperture, give or take one sample, or has a gap in it of more than five usual
+        intervals: medians, in the aperture or of the log. Or the middle is on a clock that the log does not have.
+    """
+    import numpy as np
+
+    times, start = log.times, log.start
+    if start is not None:
+        if center_seconds is not None:
+            raise PathFileError(
+                f"{name}: is in UTC, and has no time {center_seconds:.12g} s; give the middle of the aperture in UTC"
+            )
+        if center is None:
+            raise PathFileError(f"{name}: is in UTC; give the middle of the aperture in UTC")
+    middle = center.since(start) if center is not None and start is not None else center_seconds or 0.0
+
+    def said(slow: float) -> str:
+        return start.after(slow + middle).as_text() if start is not None else f"{slow + middle:.12g} s"
+
+    slow, half = times - middle, aperture_time_s / 2
+    # The interval before the aperture and the one behind it lead into it.
+    first = max(int(np.searchsorted(slow, -half, "right")) - 1, 0)
+    inside = slow[first : int(np.searchsorted(slow, half, "left")) + 1]
+    steps = np.diff(inside)
+    # A gap as long as the aperture is the only step in it.
+    usual = min(float(np.median(steps)), float(np.median(np.diff(slow)))) if steps.size else 0.0
+    if slow[0] > -half + usual or slow[-1] < half - usual:
+        raise PathFileError(
+            f"{name}: covers {said(float(slow[0]))} to {said(float(slow[-1]))}, "
+            f"the aperture needs {said(-half)} to {said(half)}"
+        )
+    if steps.size and steps.max() > _WIDEST_GAP * usual:
+        at = int(steps.argmax())
+        raise PathFileError(
+            f"{name}: has a gap of {steps[at]:.4g} s after {said(float(inside[at]))}, in the aperture; "
+            f"{usual:.4g} s is usual, at most {_WIDEST_GAP * usual:.4g} s are bridged"
+        )
+    return slow
+
+
+def _independent(left: "NDArray[np.float64]") -> float:
+    """How many independent samples residuals (n, 3) are worth: n over the sum of their correlation to its first zero.
+
+    White noise is worth all its samples. Each axis counts alike.
+    """
+    import numpy as np
+
+    count = len(left)
+    spectrum = np.abs(np.fft.rfft(left, 2 * count, axis=0)) ** 2
+    correlation = np.fft.irfft(spectrum, axis=0)[:count]
+    correlation = (correlation / np.maximum(correlation[0], _UNSEEN_M**2)).mean(axis=1)
+    ends = int(np.argmax(correlation <= 0)) or count
+    return max(2.0, count / float(1 + 2 * correlation[1:ends].sum()))
 
 
 def _padded(values: "NDArray[np.float64]", count: int) -> "NDArray[np.float64]":

@@ -1,0 +1,350 @@
+"""CSV logs of flights."""
+
+import importlib.util
+import math
+import re
+from itertools import pairwise
+from types import ModuleType
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from bisar_budget.paths import flight_log
+from bisar_budget.paths.earth import Place, earth_fixed
+from bisar_budget.paths.flight import PathFileError, slow_times, smoothed
+from bisar_budget.paths.flight_log import earth_fixed_places, read_csv
+from bisar_budget.paths.instant import parse_instant
+from tests.conftest import ROOT
+from tests.paths.flown import earth_fixed_csv, flight, geodetic_csv, stamp
+
+GOOD = "time [s],latitude [deg],longitude [deg],height [m]\n0,48,11,3000\n1,48.001,11,3000\n2,48.002,11,3000\n"
+HEADER = GOOD.split("\n")[0]
+
+
+def read(text: str) -> flight_log.Log:
+    return read_csv(text.encode(), "flight.csv")
+
+
+@given(st.floats(-math.pi / 2, math.pi / 2), st.floats(-math.pi, 2 * math.pi), st.floats(-1e4, 1e6))
+def test_arrays_of_places_are_those_of_the_earth(latitude: float, longitude: float, height: float) -> None:
+    found = earth_fixed_places(*(np.array([one]) for one in (latitude, longitude, height)))
+    assert found[0] == pytest.approx(earth_fixed(Place(latitude, longitude, height)), abs=4e-9)  # 4 ulp of 7e6 m
+
+
+def test_a_level_flight_is_where_it_was() -> None:
+    """0.1 nm of a cell is less than rounding of an Earth-fixed place, 1e-9 m; a degree has 15 decimals."""
+    flown = flight()
+    by_degrees, by_metres = read_csv(geodetic_csv(flown), "a.csv"), read_csv(earth_fixed_csv(flown), "b.csv")
+    for log in (by_degrees, by_metres):
+        assert log.is_earth_fixed
+        assert log.times == pytest.approx(flown.times, abs=1e-12)
+        assert np.abs(log.places - flown.places).max() < 5e-9
+    assert by_degrees.start == parse_instant(stamp(0))
+    assert by_metres.start is None
+    assert by_degrees.words == "CSV of latitude, longitude, height, 501 places over 10 s"
+    assert by_metres.words == "CSV of x, y, z, 501 places over 10 s"
+
+
+def test_places_of_the_scene() -> None:
+    log = read("up [ft];east [m];north [m];TIME [min]\n".replace("[ft]", "[m]") + "100;1;2;0\n100;3;4;0.5\n")
+    assert not log.is_earth_fixed
+    assert log.places.tolist() == [[1, 2, 100], [3, 4, 100]]
+    assert log.times.tolist() == [0, 30]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        GOOD,
+        GOOD.replace(",", ";"),
+        GOOD.replace(",", "\t"),
+        GOOD.replace(",", ",\t"),
+        GOOD.replace(",", " , "),
+        GOOD.replace("\n", "\r\n"),
+        GOOD.replace("\n", "\r"),
+        GOOD.rstrip("\n"),
+        "\ufeff" + GOOD,
+        "# a comment, with a comma\n\n" + GOOD.replace("\n", "\n # 1,2\n\n"),
+        GOOD.replace("[deg]", "[ deg ]").replace("latitude [", "Latitude["),
+        GOOD.replace("[deg]", "[°]"),
+        GOOD.replace(",3000", ',"3000"').replace("time [s]", '"time [s]"'),
+        GOOD.replace("0,48", "+0.0,48").replace("3000", "3.e3"),
+        re.sub(r"(?m),(\w+)", r",\1", GOOD)
+        .replace("time [s]", "time [s]")
+        .replace("height [m]", "height [km]")
+        .replace("3000", "3"),
+        re.sub(r"(?m)^(.)", r'"a, b",\1', GOOD).replace('"a, b",time', "note,time"),
+        re.sub(r"(?m)^([0-2]),", r"2026-06-01T05:59:5\g<1>Z,", GOOD.replace("time [s]", "time [UTC]")),
+        re.sub(r"(?m)^([0-2]),", r"2026-06-01 05:59:5\g<1>.000+00:00,", GOOD.replace("time [s]", "utc [UTC]")),
+        re.sub(r"(?m)^([0-2]),", r" 2026-06-01T23:59:5\g<1>.000Z ,", GOOD.replace("time [s]", "UTC")),
+        # As `isoformat` leaves out a fraction of zero.
+        re.sub(r"(?m)^([0-2]),", r"2026-06-01T23:59:5\g<1>.00Z,", GOOD.replace("time [s]", "utc")).replace(
+            "0.00Z", "0Z"
+        ),
+    ],
+)
+def test_ways_to_write_the_same(text: str) -> None:
+    log, plain = read(text), read(GOOD)
+    assert log.times.tolist() == [0, 1, 2]
+    assert np.abs(log.places - plain.places).max() < 2e-9
+    assert (log.start is not None) == ("utc" in text.lower())
+
+
+@settings(max_examples=50)
+@given(
+    st.lists(st.integers(0, 10**7), min_size=1, max_size=20, unique=True).map(sorted),
+    st.integers(0, 3),
+    st.sampled_from(["2026-06-01T23:5", "2024-02-28T23:5", "2025-12-31T23:5"]),
+)
+def test_stamps_are_instants(ticks: list[int], spare: int, begins: str) -> None:
+    """Arrays of stamps are read as one stamp is, across midnight too. The ticks are of 10 µs."""
+    first = parse_instant(f"{begins}0:00Z")
+    assert first is not None
+    stamps = []
+    for tick in ticks:
+        at = first.after((tick // 100_000) * 1.0)
+        stamps.append(f"{at.as_text()[:19]}.{tick % 100_000:05d}{'0' * spare}Z")
+    log = read("utc,x [m],y [m],z [m]\n" + "".join(f"{one},7000000,0,{n}\n" for n, one in enumerate(stamps)))
+    instants = [parse_instant(one) for one in stamps]
+    assert log.start is not None
+    for time, instant in zip(log.times, instants, strict=True):
+        assert instant is not None
+        assert time == pytest.approx(instant.since(log.start), abs=1e-10)
+    assert log.start.since(instants[0]) == pytest.approx(0, abs=1e-10)  # type: ignore[arg-type]
+
+
+def test_chunks_of_lines_are_one_log(monkeypatch: pytest.MonkeyPatch) -> None:
+    data = geodetic_csv(flight())
+    whole = read_csv(data, "a.csv")
+    monkeypatch.setattr(flight_log, "_CHUNK", 7)
+    parts = read_csv(data, "a.csv")
+    assert (parts.times == whole.times).all()
+    assert (parts.places == whole.places).all()
+
+
+STAMPED = "utc,x [m],y [m],z [m]\n2026-06-01T05:20:31Z,7e6,0,0\n"
+LATE = "time 1 s is not after 2 s of line 3; times must rise"
+PLACES = "places are latitude, longitude, height, or x, y, z, or east, north, up"
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "1: is empty; its first line names columns, like 'time [s], x [m], y [m], z [m]'"),
+        ("\n# a comment\n", "1: is empty; its first line names columns, like 'time [s], x [m], y [m], z [m]'"),
+        (HEADER, "1: has a header and no places"),
+        ("#\n" + HEADER + "\n# none\n", "2: has a header and no places"),
+        (
+            "0,48,11,3000\n1,48,11,3000",
+            "1: names no place; the first line names columns, like 'latitude [deg]', 'x [m]' or 'east [m]'",
+        ),
+        (GOOD.replace("height", "x"), f"1: mixes latitude with x; {PLACES}"),
+        (GOOD.replace("height [m]", "height [m],up [m]"), f"1: mixes latitude with up; {PLACES}"),
+        (GOOD.replace("latitude", "lat"), "1: has no column latitude"),
+        (
+            GOOD.replace("height", "altitude"),
+            "1: has no column height; a height counts from the ellipsoid of WGS-84, an altitude often from the sea",
+        ),
+        (GOOD.replace("time [s]", "t [s]"), "1: has no column of time; write 'time [s]' or 'utc'"),
+        (GOOD.replace("height [m]", "height [m],utc"), "1: has both time and utc; keep one"),
+        (GOOD.replace("longitude", "latitude"), "1: has two columns latitude"),
+        (GOOD.replace("latitude [deg]", "latitude"), "1: latitude has no unit; write 'latitude [deg]'"),
+        (GOOD.replace("latitude [deg]", "latitude (deg)"), "1: latitude has no unit; write 'latitude [deg]'"),
+        (GOOD.replace("height [m]", "height []"), "1: height has no unit; write 'height [m]'"),
+        (GOOD.replace("time [s]", "time"), "1: time has no unit; write 'time [s]' or 'time [UTC]'"),
+        (
+            GOOD.replace("time [s]", "time [gps]"),
+            "1: time has the unknown unit 'gps'; write 'time [s]' or 'time [UTC]'. Did you mean 'ps'?",
+        ),
+        (
+            GOOD.replace("latitude [deg]", "latitude [degrees]"),
+            "1: latitude has the unknown unit 'degrees'; write 'latitude [deg]'. Did you mean 'deg'?",
+        ),
+        (
+            GOOD.replace("height [m]", "height [deg]"),
+            "1: height must be a length, but 'deg' makes it an angle; write 'height [m]'",
+        ),
+        (GOOD.replace("longitude [deg]", "longitude [rad]"), "1: mixes units: latitude [deg] and longitude [rad]"),
+        ("time [s],x [m],y [m],z [km]\n0,0,0,7000\n", "1: mixes units: x [m] and z [km]"),
+        (
+            GOOD.replace("time [s]", "utc [s]"),
+            "1: utc has the unit 's'; stamps like 2026-06-01T05:20:31.250Z need none",
+        ),
+        ('time [s],"x [m]\n', "1: has a quote that does not end on its line"),
+        (GOOD.replace("1,48.001,11,3000", "1,48.001,11"), "3: has 3 cells, the header has 4"),
+        (GOOD.replace("1,48.001,11,3000", "1"), "3: has 1 cell, the header has 4"),
+        (GOOD.replace("1,48.001,11,3000", "1,48.001,11,3000,"), "3: has 5 cells, the header has 4"),
+        (GOOD.replace("1,48.001,11,3000", "1,48.001,11,"), "3: height is empty"),
+        (GOOD.replace("48.001", "48 001"), "3: latitude must be a number (got '48 001')"),
+        (GOOD.replace("48.001", "48_001"), "3: latitude must be a number (got '48_001')"),
+        (GOOD.replace("48.001", "４８"), "3: latitude must be a number (got '４８')"),
+        (GOOD.replace("48.001", "0x30"), "3: latitude must be a number (got '0x30')"),
+        (GOOD.replace("48.001", "\x1b[2J"), "3: latitude must be a number (got '\\\\x1b[2J')"),
+        (GOOD.replace("48.001", "NaN"), "3: latitude must be a finite number (got 'NaN')"),
+        (GOOD.replace("3000\n2", "-inf\n2"), "3: height must be a finite number (got '-inf')"),
+        (GOOD.replace("3000\n2", "1e999\n2"), "3: height must be a finite number (got '1e999')"),
+        (
+            GOOD.replace(",", ";").replace("48.001", "48,001"),
+            "3: latitude must be a number (got '48,001'); write a decimal point",
+        ),
+        (GOOD.replace("48.001", '"48.001'), "3: has a quote that does not end on its line"),
+        (GOOD.replace("48.001", "x" * 200_000), "3: has a cell of more than 131072 letters"),
+        (GOOD.replace("48.001", "x" * 100_000), f"3: latitude must be a number (got '{'x' * 57}...')"),
+        (GOOD.replace("48.001", f'"{"x" * 200_000}"'), "3: has a cell of more than 131072 letters"),
+        (GOOD.replace("48.001", "90.001"), "3: latitude 90.001 deg is beyond 90 deg"),
+        (GOOD.replace(",11,", ",361,"), "2: longitude 361 deg is beyond 360 deg"),
+        (GOOD.replace("3000\n2", "1e308\n2"), "3: height 1e+308 m is beyond 1e+09 m"),
+        (GOOD.replace("[m]", "[km]").replace("3000\n2", "1e308\n2"), "3: height 1e+308 km is beyond 1e+09 m"),
+        (GOOD.replace("2,48", "1e12,48"), "4: time 1e+12 s is beyond 1e+11 s"),
+        (GOOD.replace("2,48", "1,48"), "4: time 1 s is not after 1 s of line 3; times must rise"),
+        (GOOD.replace("\n2,", "\n0.5,"), "4: time 0.5 s is not after 1 s of line 3; times must rise"),
+        (
+            "time [s],x [m],y [m],z [m]\n0,100,200,300\n",
+            "2: x, y, z are 0.3742 km from the Earth's centre; Earth-fixed coordinates are wanted, "
+            "places of the scene are named east, north, up",
+        ),
+        (
+            STAMPED + "2026-06-01T05:20:32.5,7e6,0,0\n",
+            "3: utc must be an instant of UTC like 2026-06-01T05:20:31.250Z (got '2026-06-01T05:20:32.5')",
+        ),
+        (
+            STAMPED.replace("-06-", "-13-"),
+            "2: utc must be an instant of UTC like 2026-06-01T05:20:31.250Z (got '2026-13-01T05:20:31Z')",
+        ),
+        (
+            STAMPED + "2026-06-01T05:20:31.000Z,7e6,0,0\n",
+            "3: time 2026-06-01T05:20:31.000Z is not after 2026-06-01T05:20:31.000Z of line 2; times must rise",
+        ),
+        (GOOD + "\0", "5: has a zero byte; CSV is text in UTF-8, not in UTF-16"),
+    ],
+)
+def test_faults_have_lines(text: str, says: str) -> None:
+    with pytest.raises(PathFileError) as error:
+        read(text)
+    assert str(error.value) == f"flight.csv:{says}"
+
+
+@pytest.mark.parametrize(
+    ("data", "says"),
+    [
+        (GOOD.encode("utf-16"), "1: is in UTF-16; save it in UTF-8"),
+        (GOOD.encode("utf-16-le"), "1: has a zero byte; CSV is text in UTF-8, not in UTF-16"),
+        (
+            GOOD.replace("\n", "\r\n").replace("[deg]", "[°]").encode("latin-1"),
+            "1: has the byte 0xb0, which is not UTF-8; save it in UTF-8",
+        ),
+        (b"\xef\xbb\xbf" + GOOD.encode() + b"# \xfc", "5: has the byte 0xfc, which is not UTF-8; save it in UTF-8"),
+    ],
+)
+def test_other_encodings_are_refused(data: bytes, says: str) -> None:
+    with pytest.raises(PathFileError) as error:
+        read_csv(data, "flight.csv")
+    assert str(error.value) == f"flight.csv:{says}"
+
+
+def test_a_file_too_large_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(flight_log, "LARGEST", 50)
+    with pytest.raises(PathFileError, match=r"^flight.csv: has 0 MB, at most 0 MB are read$"):
+        read(GOOD)
+
+
+def held_to_its_word(data: bytes) -> None:
+    """A log, or an error of one line that names the file."""
+    try:
+        log = read_csv(data, "flight.csv")
+    except PathFileError as error:
+        said = str(error)
+        assert re.match(r"flight\.csv(:\d+)?: ", said)
+        assert said.isprintable()
+        assert len(said) < 400
+    else:
+        assert log.places.shape == (len(log.times), 3)
+        assert np.isfinite(log.places).all()
+        assert np.isfinite(log.times).all()
+        assert (np.diff(log.times) > 0).all()
+
+
+@given(st.binary(max_size=200))
+@example(b"\xef\xbb\xbf")
+@example(b"\xef\xbb\xbf\xff")
+@example(b'"')
+@example(b"\r")
+def test_any_bytes(data: bytes) -> None:
+    held_to_its_word(data)
+
+
+@settings(max_examples=300)
+@given(
+    st.sampled_from(
+        [GOOD, STAMPED + "2026-06-01T05:20:32Z,7e6,0,0\n", GOOD.replace(",", ";"), GOOD.replace("1", '"1"')]
+    ),
+    st.lists(
+        st.tuples(
+            st.integers(0, 200),
+            st.integers(0, 6),
+            st.binary(max_size=6)
+            | st.sampled_from(
+                [
+                    b",",
+                    b";",
+                    b"\t",
+                    b'"',
+                    b"\n",
+                    b"\r",
+                    b"#",
+                    b"nan",
+                    b"1e400",
+                    b"-",
+                    b"[",
+                    b"]",
+                    b"\xc2\xa0",
+                    b"\x1c",
+                    b"\xe2\x80\xa8",
+                ]
+            ),
+        ),
+        min_size=1,
+        max_size=4,
+    ),
+)
+def test_damaged_files(text: str, changes: list[tuple[int, int, bytes]]) -> None:
+    data = text.encode()
+    for at, length, new in changes:
+        data = data[:at] + new + data[at + length :]
+    held_to_its_word(data)
+
+
+@given(st.lists(st.lists(st.text(max_size=8) | st.floats().map(str), min_size=4, max_size=4), max_size=4))
+def test_any_cells(rows: list[list[str]]) -> None:
+    held_to_its_word("\n".join([HEADER, *(",".join(row) for row in rows)]).encode(errors="surrogatepass"))
+
+
+def make_flight() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("make_flight", ROOT / "docs" / "make_flight.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_flight_of_the_examples_can_be_flown() -> None:
+    """Smoothed over two seconds, what is left is its noise."""
+    maker = make_flight()
+    lines = list(maker.lines())
+    data = "\n".join(lines).encode()
+    assert lines == list(maker.lines())
+    assert len(data) < 250_000
+    assert lines[0].startswith("# Made up, not flown")
+    log = read_csv(data, "flight.csv")
+    middle = parse_instant(maker.MIDDLE)
+    fitted = smoothed(slow_times(log, middle, None, 2.0, "flight.csv"), log.places, 2.0)
+    assert fitted.samples == 101
+    assert fitted.rms == pytest.approx(math.sqrt(3) * maker.NOISE, rel=0.15)  # 6 % one sigma of 3 x 101
+    speeds = np.linalg.norm(np.diff(log.places[::50], axis=0), axis=1)
+    assert speeds == pytest.approx(np.full(60, maker.SPEED), abs=2)
+    heights = [float(line.split(",")[3]) for line in lines if line.startswith("2026")]
+    assert np.std(heights) == pytest.approx(maker.GUSTS[2], rel=0.4)
+    assert max(abs(b - a) for a, b in pairwise(heights)) < 0.1

@@ -1,0 +1,216 @@
+"""Slow times of a log, and the polynomial that smooths it."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bisar_budget.geometry import PlatformState
+from bisar_budget.paths.flight import Log, PathFileError, slow_times, smoothed
+from bisar_budget.paths.instant import Instant
+
+START = Instant(61192, 19201.25)  # 2026-06-01T05:20:01.250Z
+NOISE = 0.02  # m
+
+
+def log(times: Any, start: Instant | None = START) -> Log:
+    at = np.asarray(times, dtype=float)
+    return Log(at, np.zeros((at.size, 3)), False, "", start)
+
+
+TIMES = np.arange(0, 3001) / 50
+
+
+def test_slow_time_is_zero_in_the_middle() -> None:
+    in_utc = slow_times(log(TIMES), START.after(30), None, 10.0, "a.csv")
+    assert in_utc == pytest.approx(TIMES - 30, abs=1e-9)
+    assert slow_times(log(100 + TIMES, None), None, 130.0, 10.0, "a.csv") == pytest.approx(TIMES - 30, abs=1e-9)
+    assert slow_times(log(TIMES - 30, None), None, None, 10.0, "a.csv") == pytest.approx(TIMES - 30, abs=1e-9)
+    # A mission that has an instant for an orbit's sake: this log has another clock.
+    assert slow_times(log(TIMES, None), START, 30.0, 10.0, "a.csv") == pytest.approx(TIMES - 30, abs=1e-9)
+
+
+@pytest.mark.parametrize("lacking", [0, 1])
+def test_an_end_may_lack_one_sample(lacking: int) -> None:
+    """At the limit of what is bridged, and beyond it."""
+    start, end = lacking, 501 - lacking
+    assert slow_times(log(TIMES[start:501]), START.after(5), None, 10.0, "a.csv").size == 501 - start
+    assert slow_times(log(TIMES[:end]), START.after(5), None, 10.0, "a.csv").size == end
+    for times in (TIMES[2:501], TIMES[:499]):
+        with pytest.raises(PathFileError, match="the aperture needs"):
+            slow_times(log(times), START.after(5), None, 10.0, "a.csv")
+
+
+def test_gaps_up_to_five_intervals_are_bridged() -> None:
+    slow_times(log(np.delete(TIMES, range(1400, 1404))), START.after(30), None, 10.0, "a.csv")
+    with pytest.raises(PathFileError, match=r"has a gap of 0\.12 s after 2026-06-01T05:20:29\.230Z"):
+        slow_times(log(np.delete(TIMES, range(1400, 1405))), START.after(30), None, 10.0, "a.csv")
+    # Outside the aperture nobody minds.
+    slow_times(log(np.delete(TIMES, range(100, 1000))), START.after(30), None, 10.0, "a.csv")
+
+
+@pytest.mark.parametrize(
+    ("times", "start", "center", "seconds", "says"),
+    [
+        (TIMES, START, None, None, "is in UTC; give the middle of the aperture in UTC"),
+        (TIMES, START, START, 30.0, "is in UTC, and has no time 30 s; give the middle of the aperture in UTC"),
+        (
+            TIMES,
+            START,
+            START.after(57),
+            None,
+            "covers 2026-06-01T05:20:01.250Z to 2026-06-01T05:21:01.250Z, "
+            "the aperture needs 2026-06-01T05:20:53.250Z to 2026-06-01T05:21:03.250Z",
+        ),
+        (
+            TIMES,
+            START,
+            Instant(59000, 0.0),
+            None,
+            "covers 2026-06-01T05:20:01.250Z to 2026-06-01T05:21:01.250Z, "
+            "the aperture needs 2020-05-30T23:59:55.000Z to 2020-05-31T00:00:05.000Z",
+        ),
+        (193831 + TIMES, None, None, None, "covers 193831 s to 193891 s, the aperture needs -5 s to 5 s"),
+        ([0.0], None, None, None, "covers 0 s to 0 s, the aperture needs -5 s to 5 s"),
+        (
+            [*(TIMES - 10)[:100], *(TIMES + 9)[:100]],
+            None,
+            None,
+            None,
+            "has a gap of 17.02 s after -8.02 s, in the aperture; 0.02 s is usual, at most 0.1 s are bridged",
+        ),
+        (
+            np.delete(TIMES - 30, range(1500, 1600)),
+            None,
+            None,
+            0.0,
+            "has a gap of 2.02 s after -0.02 s, in the aperture; 0.02 s is usual, at most 0.1 s are bridged",
+        ),
+    ],
+)
+def test_logs_without_the_aperture(
+    times: Any, start: Instant | None, center: Instant | None, seconds: float | None, says: str
+) -> None:
+    with pytest.raises(PathFileError) as error:
+        slow_times(log(times, start), center, seconds, 10.0, "a.csv")
+    assert str(error.value) == f"a.csv: {says}"
+
+
+def derivatives(state: PlatformState) -> list[Any]:
+    return [np.array(one) for one in (state.position, state.velocity, state.acceleration)]
+
+
+def sigmas(at: Any, order: int) -> list[float]:
+    """One sigma of position, velocity and acceleration at 0, by the covariance of least squares: σ² (AᵀA)⁻¹."""
+    design = np.vander(at, order + 1, increasing=True)
+    scaled = np.abs(at).max() ** np.arange(order + 1)
+    variance = NOISE**2 * np.linalg.inv((design / scaled).T @ (design / scaled)).diagonal() / scaled**2
+    return [math.sqrt(variance[n]) * factor for n, factor in enumerate((1, 1, 2))]
+
+
+@settings(max_examples=60)
+@given(
+    st.integers(1, 7),
+    st.sampled_from([2.0, 10.0, 30.0]),
+    st.sampled_from([20, 50, 200]),
+    st.integers(0, 2**32 - 1),
+    st.floats(-3, 1),
+)
+def test_a_polynomial_with_noise_is_found(order: int, aperture: float, rate: int, seed: int, size: float) -> None:
+    """Errors at the middle are a few of the standard deviations that the true order has.
+
+    An order that is left out is one that the noise hides: its size is below some standard deviations too.
+    """
+    random = np.random.default_rng(seed)
+    times = np.arange(round(aperture * rate) + 1) / rate - aperture / 2
+    powers = random.normal(0, 1, (order + 1, 3)) * (10.0**size / (aperture / 2) ** np.arange(order + 1))[:, None]
+    powers[0] += 4000, -3000, 3000
+    powers[min(1, order)] += 60, 5, 0
+    true = np.vander(times, order + 1, increasing=True) @ powers
+    found = smoothed(times, true + random.normal(0, NOISE, true.shape), aperture)
+    assert found.samples == len(times)
+    assert found.rms == pytest.approx(math.sqrt(3) * NOISE, rel=6 / math.sqrt(6 * len(times)))
+    padded = np.vstack([powers, np.zeros((3, 3))])
+    expected = [padded[0], padded[1], 2 * padded[2]]
+    allowed = sigmas(times, max(order, found.order))
+    for one, other, sigma in zip(derivatives(found.state), expected, allowed, strict=True):
+        assert np.abs(one - other).max() < 8 * sigma
+
+
+@pytest.mark.parametrize("aperture", [2.0, 10.0, 30.0])
+@pytest.mark.parametrize("rate", [1, 5, 50])
+def test_a_straight_flight_stays_straight(aperture: float, rate: int) -> None:
+    """What noise looks like in a higher order is not motion."""
+    count = round(aperture * rate) + 1
+    if count < 5:
+        pytest.skip("too few samples")
+    times = np.arange(count) / rate - aperture / 2
+    orders = []
+    for seed in range(40):
+        noise = np.random.default_rng(seed).normal(0, NOISE, (count, 3))
+        orders.append(smoothed(times, times[:, None] * [60, 0, 0] + noise, aperture).order)
+    assert orders.count(2) >= 38
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-3, NOISE])
+def test_a_turn_is_found(noise: float) -> None:
+    """A coordinated turn, 60 m/s and 0.1 rad/s: 6 m/s² at the middle."""
+    times = np.arange(501) / 50 - 5
+    angle = 0.1 * times
+    turn = 600 * np.stack([np.sin(angle), 1 - np.cos(angle), np.zeros(501)], axis=1)
+    found = smoothed(times, turn + np.random.default_rng(5).normal(0, noise, turn.shape), 10.0)
+    position, velocity, acceleration = derivatives(found.state)
+    truncated = 600 * 0.5**9 / math.factorial(9)  # of the series, behind order 8 [m]
+    position_sigma, velocity_sigma, acceleration_sigma = np.array(sigmas(times, 8)) * noise / NOISE
+    assert np.abs(position).max() < 5 * position_sigma + truncated
+    assert np.abs(velocity - [60, 0, 0]).max() < 5 * velocity_sigma + 1e-4
+    assert np.abs(acceleration - [0, 6, 0]).max() < 5 * acceleration_sigma + 1e-4
+    assert found.rms == pytest.approx(math.sqrt(3) * noise, rel=0.1, abs=truncated)
+
+
+def test_turbulence_that_is_too_fast_is_left() -> None:
+    """A wave of 2 s over an aperture of 10 s is no polynomial: the residual says so."""
+    times = np.arange(501) / 50 - 5
+    wave = 0.3 * np.sin(math.pi * times)[:, None] * [0, 0, 1]
+    found = smoothed(times, times[:, None] * [60, 0, 0] + wave, 10.0)
+    assert 0.1 < found.rms < 0.3
+    assert 0.3 < found.farthest < 0.7
+    assert np.abs(np.array(found.state.at(1.0)[0]) - [60, 0, 0]).max() < 0.5
+
+
+def test_slow_noise_is_less_sure_than_white() -> None:
+    """Noise that is correlated over 0.2 s: most of its wander is not taken for motion."""
+    times = np.arange(501) / 50 - 5
+    kept = math.exp(-0.02 / 0.2)
+    orders = []
+    for seed in range(20):
+        drive = np.random.default_rng(seed).normal(0, NOISE * math.sqrt(1 - kept**2), (501, 3))
+        noise = np.zeros((501, 3))
+        for n in range(1, 501):
+            noise[n] = kept * noise[n - 1] + drive[n]
+        orders.append(smoothed(times, times[:, None] * [60, 0, 0] + noise, 10.0).order)
+    assert np.median(orders) == 2
+    assert np.mean(orders) < 3.5
+
+
+@pytest.mark.parametrize("count", [0, 1, 4])
+def test_too_few_samples(count: int) -> None:
+    times = np.linspace(-1, 1, count)
+    with pytest.raises(PathFileError) as error:
+        smoothed(times, np.zeros((count, 3)), 2.0)
+    said = f"has {count} places in the aperture of 2 s, at least 5 are needed; sample faster"
+    assert str(error.value) == said
+
+
+@pytest.mark.parametrize("count", [5, 6, 7, 9, 30])
+def test_few_samples_are_smoothed(count: int) -> None:
+    times = np.linspace(-1, 1, count)
+    found = smoothed(times, np.stack([times, 3 * times**2, 0 * times], axis=1), 2.0)
+    assert found.order == 2
+    position, velocity, acceleration = derivatives(found.state)
+    assert position == pytest.approx(np.zeros(3), abs=1e-12)
+    assert velocity == pytest.approx(np.array([1, 0, 0]), abs=1e-12)
+    assert acceleration == pytest.approx(np.array([0, 6, 0]), abs=1e-11)
