@@ -13,8 +13,8 @@ from random import Random
 from bisar_budget.paths.earth import EQUATORIAL_RADIUS, FLATTENING
 from bisar_budget.paths.instant import parse_instant
 
-SEED = 20260601
-MIDDLE = "2026-06-01T05:20:31.250Z"
+SEED = 20260710
+MIDDLE = "2026-07-10T05:26:46Z"
 DURATION, RATE = 60, 50  # s, Hz
 SPEED, HEIGHT = 60.0, 3000.0  # m/s to the east, m above the ellipsoid
 LATITUDE, LONGITUDE = math.radians(48.0866), math.radians(11.2797)  # Oberpfaffenhofen
