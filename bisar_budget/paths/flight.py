@@ -21,7 +21,8 @@ _NODES = 15  # Chebyshev points of an interpolation, so many coefficients
 _LEAST_WINDOW = 10.0  # s; in a shorter one rounding of an Earth-fixed place, 1e-9 m, is an acceleration
 _UNSEEN_M = 1e-7  # a coefficient that moves the path by less is rounding
 _HIGHEST = 8  # order of a smoothed path
-_WIDEST_GAP = 5  # median intervals between samples
+_WIDEST_GAP = 5  # usual intervals between samples
+_ROUNDED = 1 + 1e-6  # of an interval whose ends are rounded
 
 
 class PathFileError(Exception):
@@ -213,12 +214,13 @@ def slow_times(
     steps = np.diff(inside)
     # A gap as long as the aperture is the only step in it.
     usual = min(float(np.median(steps)), float(np.median(np.diff(slow)))) if steps.size else 0.0
-    if slow[0] > -half + usual or slow[-1] < half - usual:
+    spare = usual * _ROUNDED
+    if slow[0] > -half + spare or slow[-1] < half - spare:
         raise PathFileError(
             f"{name}: covers {said(float(slow[0]))} to {said(float(slow[-1]))}, "
             f"the aperture needs {said(-half)} to {said(half)}"
         )
-    if steps.size and steps.max() > _WIDEST_GAP * usual:
+    if steps.size and steps.max() > _WIDEST_GAP * spare:
         at = int(steps.argmax())
         raise PathFileError(
             f"{name}: has a gap of {steps[at]:.4g} s after {said(float(inside[at]))}, in the aperture; "

@@ -25,8 +25,11 @@ class Instant(NamedTuple):
         return (self.day - other.day) * DAY + (self.seconds - other.seconds)
 
     def as_text(self) -> str:
-        """2026-06-01T05:20:31.250Z, to a millisecond."""
-        moment = datetime(1858, 11, 17, tzinfo=UTC) + timedelta(days=self.day, seconds=round(self.seconds, 3))
+        """2026-06-01T05:20:31.250Z, to a millisecond; a modified Julian day outside the years 1 to 9999."""
+        try:
+            moment = datetime(1858, 11, 17, tzinfo=UTC) + timedelta(days=self.day, seconds=round(self.seconds, 3))
+        except OverflowError:
+            return f"MJD {self.day + self.seconds / DAY:.5f}"
         return moment.strftime("%Y-%m-%dT%H:%M:%S.") + f"{moment.microsecond // 1000:03d}Z"
 
 

@@ -248,7 +248,8 @@ def _hold_to_velocities(times: _Numbers, records: _Numbers, name: str) -> None:
         )
     refuse(
         f"has velocities {apart:.3g} m/s off the motion of its positions, at the same speed; "
-        "they are not along x, y, z of the wander frame, x north, y west, z up at a wander angle of 0"
+        "they are not along x, y, z of the wander frame, x north, y west, z up at a wander angle of 0. "
+        "A log in CSV needs no velocities"
     )
 
 

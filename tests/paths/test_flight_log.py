@@ -217,6 +217,10 @@ PLACES = "places are latitude, longitude, height, or x, y, z, or east, north, up
             STAMPED + "2026-06-01T05:20:31.000Z,7e6,0,0\n",
             "3: time 2026-06-01T05:20:31.000Z is not after 2026-06-01T05:20:31.000Z of line 2; times must rise",
         ),
+        (
+            STAMPED.replace("2026-06-01T05:20:31Z", "9999-12-31T23:59:59.9999Z") + "2026-06-01T05:20:31Z,7e6,0,0\n",
+            "3: time 2026-06-01T05:20:31.000Z is not after MJD 2973484.00000 of line 2; times must rise",
+        ),
         (GOOD + "\0", "5: has a zero byte; CSV is text in UTF-8, not in UTF-16"),
     ],
 )

@@ -194,13 +194,15 @@ NOT_SO = "which it cannot be; are these records of 17 doubles?"
             # East for west, of which it has 38.4 m/s.
             sbet(FLOWN._replace(velocities=FLOWN.velocities * [-1, 1, 1])),
             "has velocities 76.8 m/s off the motion of its positions, at the same speed; "
-            "they are not along x, y, z of the wander frame, x north, y west, z up at a wander angle of 0",
+            "they are not along x, y, z of the wander frame, x north, y west, z up at a wander angle of 0. "
+            "A log in CSV needs no velocities",
         ),
         (
             # The wander angle's other sign: 2 sin(0.3) of the speed.
             sbet(FLOWN, 0.3, wander=-0.3),
             "has velocities 34.8 m/s off the motion of its positions, at the same speed; "
-            "they are not along x, y, z of the wander frame, x north, y west, z up at a wander angle of 0",
+            "they are not along x, y, z of the wander frame, x north, y west, z up at a wander angle of 0. "
+            "A log in CSV needs no velocities",
         ),
     ],
 )

@@ -73,6 +73,14 @@ def test_gaps_up_to_five_intervals_are_bridged() -> None:
             "covers 2026-06-01T05:20:01.250Z to 2026-06-01T05:21:01.250Z, "
             "the aperture needs 2020-05-30T23:59:55.000Z to 2020-05-31T00:00:05.000Z",
         ),
+        (
+            TIMES,
+            START,
+            Instant(2973483, 86399.0),  # 9999-12-31T23:59:59Z
+            None,
+            "covers 2026-06-01T05:20:01.250Z to 2026-06-01T05:21:01.250Z, "
+            "the aperture needs 9999-12-31T23:59:54.000Z to MJD 2973484.00005",
+        ),
         (193831 + TIMES, None, None, None, "covers 193831 s to 193891 s, the aperture needs -5 s to 5 s"),
         ([0.0], None, None, None, "covers 0 s to 0 s, the aperture needs -5 s to 5 s"),
         (
@@ -140,13 +148,12 @@ def test_a_polynomial_with_noise_is_found(order: int, aperture: float, rate: int
         assert np.abs(one - other).max() < 8 * sigma
 
 
-@pytest.mark.parametrize("aperture", [2.0, 10.0, 30.0])
-@pytest.mark.parametrize("rate", [1, 5, 50])
+@pytest.mark.parametrize(
+    ("aperture", "rate"), [(2.0, 5), (2.0, 50), (10.0, 1), (10.0, 5), (10.0, 50), (30.0, 1), (30.0, 50)]
+)
 def test_a_straight_flight_stays_straight(aperture: float, rate: int) -> None:
     """What noise looks like in a higher order is not motion."""
     count = round(aperture * rate) + 1
-    if count < 5:
-        pytest.skip("too few samples")
     times = np.arange(count) / rate - aperture / 2
     orders = []
     for seed in range(40):
