@@ -78,7 +78,7 @@ class Trajectory(NamedTuple):
     center: Annotated[
         float | None,
         Key(
-            Quantity(units.TIME, ge=-1e9, le=1e9),
+            Quantity(units.TIME, ge=-1e11, le=1e11),
             "Time of the log that is the middle of the aperture; omitted: collection.center_time, or 0 s.",
         ),
     ] = None

@@ -1,0 +1,309 @@
+"""Orbits and logs that missions name: read beside the mission, hashed, doubted, and refused in one line."""
+
+import hashlib
+import html
+import json
+import math
+import struct
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bisar_budget.mission.load import load_mission
+from bisar_budget.paths import earth, elements
+from bisar_budget.paths.instant import Instant
+from tests.conftest import mission_text
+from tests.paths.flown import flight, geodetic_csv, sbet, smrmsg
+from tests.paths.orbit_files import CENTER, EPOCH, LINE_1, LINE_2, TLE, oem, omm_json
+from tests.report.test_report_diff import git
+
+BELOW_FLIGHT = {"latitude": "48.1 deg", "longitude": "11.3 deg", "height": "600 m"}  # beside `flown.flight`
+FLIGHT = {"latitude": "48.2 deg", "longitude": "11.1 deg", "altitude": "3 km", "heading": "60 deg", "speed": "120 kn"}
+
+
+def overpass(center: Instant) -> earth.Place:
+    """A place some 300 km beside the satellite of `TLE`."""
+    below = earth.geodetic(elements.read_tle(TLE, "x", None, center).place(center))
+    return earth.Place(below.latitude, below.longitude + 0.05 / math.cos(below.latitude), 500.0)
+
+
+def satellite(center: Instant = CENTER, **changes: Any) -> str:
+    """A mission whose transmitter is the satellite of an orbit, its receiver an aircraft near the scene."""
+    at = overpass(center)
+    scene = {"latitude": f"{at.latitude} rad", "longitude": f"{at.longitude} rad", "height": "500 m"}
+    receiver = {**FLIGHT, "latitude": f"{at.latitude + 0.001} rad", "longitude": f"{at.longitude + 0.001} rad"}
+    return _text({"orbit": {"tle": "a.tle"}}, receiver, scene, center.as_text(), **changes)
+
+
+def aircraft(**changes: Any) -> str:
+    """A mission whose receiver is a log."""
+    transmitter = {**FLIGHT, "latitude": "47.6 deg", "altitude": "9 km", "speed": "150 m/s"}
+    trajectory = {"trajectory": {"file": "flight.csv"}}
+    scene = {**BELOW_FLIGHT, "height": changes.pop("height", "600 m")}
+    return _text(transmitter, trajectory, scene, "2026-06-01T05:20:06.250Z", **changes)
+
+
+def _text(transmitter: Any, receiver: Any, scene: Any, center: str, **changes: Any) -> str:
+    tree = {
+        "scene": scene,
+        "platforms__transmitter": transmitter,
+        "platforms__receiver": receiver,
+        "collection__aperture_time": "2 s",
+        "collection__center_time": center,
+        "allocation__model": "full",
+    }
+    return mission_text(**{**tree, **changes})
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """One that has a good file of each kind."""
+    (tmp_path / "a.tle").write_text(TLE)
+    (tmp_path / "a.json").write_bytes(omm_json())
+    (tmp_path / "flight.csv").write_bytes(geodetic_csv(flight()))
+    (tmp_path / "sbet.out").write_bytes(sbet(flight()))
+    (tmp_path / "smrmsg.out").write_bytes(smrmsg(flight().times))
+    return tmp_path
+
+
+class TestEveryKindOfPath:
+    def test_elements_put_the_satellite_above_the_scene(self, folder: Path) -> None:
+        """Its inclination and height say where it can be: a circle of 7.07 Mm, at most 8.2° from the pole."""
+        (folder / "m.yaml").write_text(satellite())
+        state = load_mission(str(folder / "m.yaml")).platforms.transmitter.state
+        axes = earth.axes_at(overpass(CENTER))
+        assert math.hypot(*axes.earth_fixed(state.position)) == pytest.approx(7.07e6, abs=2e4)
+        assert math.hypot(*state.velocity) == pytest.approx(7.5e3, abs=150)
+        # In Earth-fixed axes: gravity less what the rotation adds, up to 1.1 m/s².
+        assert math.hypot(*state.acceleration) == pytest.approx(3.986e14 / 7.07e6**2, abs=1.2)
+
+    def test_two_lines_a_file_and_a_message_are_one_path(self, folder: Path) -> None:
+        ways: list[dict[str, Any]] = [
+            {"tle": [LINE_1, LINE_2]},
+            {"tle": "a.tle", "object": "39634"},
+            {"omm": "a.json"},
+        ]
+        states = []
+        for orbit in ways:
+            (folder / "m.yaml").write_text(satellite(platforms__transmitter={"orbit": orbit}))
+            states.append(load_mission(str(folder / "m.yaml")).platforms.transmitter.state)
+        # The message has two digits less of the mean motion: 5e-9 turns a day over 0.8 days are 0.2 m.
+        for state in states[1:]:
+            assert np.allclose(state.position, states[0].position, rtol=0, atol=0.3)
+
+    def test_a_log_and_a_trajectory_are_where_the_flight_was(self, folder: Path) -> None:
+        flown = flight()
+        middle = flown.places[250]
+        axes = earth.axes_at(earth.Place(math.radians(48.1), math.radians(11.3), 600.0))
+        for route in (
+            {"file": "flight.csv"},
+            {"file": "sbet.out", "week": 2421},
+            {"file": "sbet.out", "center": 1e5},
+        ):
+            if "center" in route:
+                route["center"] = "105624.25 s"
+            (folder / "m.yaml").write_text(aircraft(platforms__receiver={"trajectory": route}))
+            path = load_mission(str(folder / "m.yaml")).platforms.receiver.path
+            assert path.state.position == pytest.approx(axes.place(tuple(middle)), abs=1e-3)
+            assert path.samples == 101
+            assert path.farthest < 1e-6
+
+    def test_an_accuracy_file_fills_what_the_mission_leaves_open(self, folder: Path) -> None:
+        route = {"file": "sbet.out", "week": 2421, "accuracy": "smrmsg.out"}
+        stated = {"trajectory": route, "motion_error": {"velocity": "1 cm/s"}}
+        (folder / "m.yaml").write_text(aircraft(platforms__receiver=stated))
+        error = load_mission(str(folder / "m.yaml")).platforms.receiver.motion_error
+        assert error.position == pytest.approx((0.03, 0.02, 0.05))  # east, north, up
+        assert error.velocity == pytest.approx((0.01,) * 3)
+        assert error.evidence("position") == "accuracy file smrmsg.out"
+
+
+class TestWhatIsSaid:
+    def test_source_age_and_residual(self, run: Callable[..., Any], folder: Path) -> None:
+        (folder / "m.yaml").write_text(satellite())
+        report = run("check", folder / "m.yaml", "--format", "json")
+        path = json.loads(report.stdout)["missions"][0]["geometry"]["transmitter"]["path"]
+        assert path["file"] == "a.tle"
+        assert path["sha256"] == hashlib.sha256(TLE.encode()).hexdigest()
+        assert path["age_s"] == pytest.approx(
+            68898.127568, abs=1e-3
+        )  # 05:20:31.250 less 10:12:13.122432 the day before
+        assert path["residual_max_m"] < 1e-6
+        assert "SENTINEL-1A (39634), epoch 2026-05-31T10:12:13.122Z" in path["source"]
+        page = run("check", folder / "m.yaml", "--format", "html").stdout
+        assert hashlib.sha256(TLE.encode()).hexdigest() in page
+        assert "0.797 days old" in html.unescape(page)
+
+    def test_old_elements_are_a_doubt(self, run: Callable[..., Any], folder: Path) -> None:
+        (folder / "m.yaml").write_text(satellite(EPOCH.after(6.9 * 86400)))
+        assert "days" not in str(
+            json.loads(run("check", folder / "m.yaml", "--format", "json").stdout)["missions"][0]["warnings"]
+        )
+        (folder / "m.yaml").write_text(
+            satellite(EPOCH.after(7.1 * 86400), platforms__receiver__motion_error={"position": "1 mm"})
+        )
+        found = json.loads(run("check", folder / "m.yaml", "--format", "json").stdout)["missions"][0]
+        (doubt,) = [one["message"] for one in found["warnings"] if "days" in one["message"]]
+        assert "7.1 days" in doubt
+        assert found["status"] == "warn"
+
+    def test_diff_reads_files_as_they_were_committed(self, run: Callable[..., Any], folder: Path) -> None:
+        (folder / "m.yaml").write_text(satellite())
+        git(folder, "init", "-q")
+        git(folder, "add", ".")
+        git(folder, "-c", "user.name=t", "-c", "user.email=t@example.org", "commit", "-q", "-m", "x")
+        (folder / "a.tle").write_text(oem())  # no element set any more
+        (folder / "b.tle").write_text(TLE.replace("SENTINEL-1A", "SENTINEL"))
+        (folder / "m.yaml").write_text(satellite(platforms__transmitter={"orbit": {"tle": "b.tle"}}))
+        same = run("diff", folder / "m.yaml", "--base", "HEAD")
+        assert same.exit_code == 0, same.stderr
+        (folder / "a.tle").write_text(TLE.replace("SENTINEL-1A", "SENTINEL"))
+        (folder / "m.yaml").write_text(satellite())
+        changed = run("diff", folder / "m.yaml", "--base", "HEAD")
+        assert "content of a.tle" in changed.stdout
+
+
+def rows(keep: Callable[[list[bytes]], list[bytes]]) -> bytes:
+    """The log of the flight with some of its rows."""
+    header, *rest = geodetic_csv(flight()).split(b"\n")
+    return b"\n".join([header, *keep(rest)])
+
+
+BROKEN: dict[str, tuple[Callable[[], str], dict[str, bytes | str], str]] = {
+    "no such file": (satellite, {"a.tle": ""}, "a.tle: has no element set"),
+    "a missing file": (
+        lambda: satellite(platforms__transmitter={"orbit": {"tle": "none.tle"}}),
+        {},
+        "none.tle cannot be read: No such",
+    ),
+    "a folder": (lambda: satellite(platforms__transmitter={"orbit": {"tle": "."}}), {}, ". is no regular file"),
+    "a wrong checksum": (satellite, {"a.tle": TLE[:-2] + "7\n"}, "a.tle:3: the checksum is 7, its digits give"),
+    "one line": (satellite, {"a.tle": LINE_1}, "a.tle:1: "),
+    "another object": (
+        lambda: satellite(platforms__transmitter={"orbit": {"tle": "a.tle", "object": "ENVISAT"}}),
+        {},
+        "ENVISAT",
+    ),
+    "no text": (satellite, {"a.tle": b"\xff\xfe1\0"}, "a.tle:1: is not a text in UTF-8"),
+    "an ephemeris without its frame": (
+        lambda: satellite(platforms__transmitter={"orbit": {"oem": "a.oem"}}),
+        {"a.oem": "\n".join(line for line in oem().splitlines() if "REF_FRAME" not in line)},
+        "a.oem:",
+    ),
+    "an ephemeris of another time": (
+        lambda: satellite(
+            platforms__transmitter={"orbit": {"oem": "a.oem"}}, collection__center_time="2026-06-01T09:00:00Z"
+        ),
+        {"a.oem": oem()},
+        "2026-06-01T05:20:00.000Z",
+    ),
+    "an ephemeris that ends within the aperture": (
+        lambda: satellite(
+            platforms__transmitter={"orbit": {"oem": "a.oem"}}, collection__center_time="2026-06-01T05:19:59.500Z"
+        ),
+        {"a.oem": oem()},
+        "2026-06-01T05:20:00.000Z",
+    ),
+    "hostile XML": (
+        lambda: satellite(platforms__transmitter={"orbit": {"omm": "a.xml"}}),
+        {"a.xml": '<!DOCTYPE a [<!ENTITY x SYSTEM "file:///etc/passwd">]><omm>&x;</omm>'},
+        "a.xml:1: ",
+    ),
+    "a log that misses the aperture": (
+        lambda: aircraft(collection__center_time="2026-06-01T05:30:00Z"),
+        {},
+        "flight.csv: covers 2026-06-01T05:20:01.250Z",
+    ),
+    "a log with a gap": (
+        aircraft,
+        {"flight.csv": rows(lambda rest: rest[:240] + rest[270:])},
+        "flight.csv: has a gap of",
+    ),
+    "a log of three places": (
+        aircraft,
+        {"flight.csv": rows(lambda rest: rest[::100])},
+        "flight.csv",
+    ),
+    "a log out of order": (
+        aircraft,
+        {"flight.csv": rows(lambda rest: rest[::-1])},
+        "flight.csv:",
+    ),
+    "a log without units": (
+        aircraft,
+        {"flight.csv": geodetic_csv(flight()).replace(b" [deg]", b"", 1)},
+        "flight.csv:1: ",
+    ),
+    "a log in seconds of which nobody knows the middle": (
+        lambda: aircraft(platforms__receiver={"trajectory": {"file": "sbet.out"}}),
+        {},
+        "sbet.out: covers",
+    ),
+    "a trajectory cut off": (
+        lambda: aircraft(platforms__receiver={"trajectory": {"file": "sbet.out", "week": 2421}}),
+        {"sbet.out": sbet(flight())[:1000]},
+        "sbet.out",
+    ),
+    "a trajectory in degrees": (
+        lambda: aircraft(platforms__receiver={"trajectory": {"file": "sbet.out", "week": 2421}}),
+        {"sbet.out": sbet(flight(), latitude=48.0)},
+        "sbet.out",
+    ),
+    "an accuracy file that is a trajectory": (
+        lambda: aircraft(
+            platforms__receiver={"trajectory": {"file": "sbet.out", "week": 2421, "accuracy": "sbet.out"}}
+        ),
+        {},
+        "sbet.out",
+    ),
+    "an accuracy in another frame": (
+        lambda: aircraft(
+            platforms__receiver={
+                "trajectory": {"file": "sbet.out", "week": 2421, "accuracy": "smrmsg.out"},
+                "motion_error": {"frame": "track"},
+            }
+        ),
+        {},
+        "is stated east, north, up",
+    ),
+    "a path below the ground": (lambda: aircraft(height="3500 m"), {}, "below the scene's horizon"),
+    "a name with a control character": (
+        lambda: satellite(platforms__transmitter={"orbit": {"tle": "a\u001b[31m.tle"}}),
+        {},
+        "printable",
+    ),
+    "NaN in a trajectory": (
+        lambda: aircraft(platforms__receiver={"trajectory": {"file": "sbet.out", "week": 2421}}),
+        {"sbet.out": struct.pack("<17d", *[math.nan] * 17) * 10},
+        "sbet.out",
+    ),
+}
+
+
+@pytest.mark.parametrize(("text", "files", "said"), BROKEN.values(), ids=BROKEN)
+def test_a_path_that_cannot_be_read_is_one_line_and_no_report(
+    run: Callable[..., Any], folder: Path, text: Callable[[], str], files: dict[str, bytes | str], said: str
+) -> None:
+    for name, content in files.items():
+        (folder / name).write_bytes(content if isinstance(content, bytes) else content.encode())
+    (folder / "m.yaml").write_text(text())
+    result = run("check", folder / "m.yaml", "--report", folder / "report.html")
+    assert result.exit_code == 2
+    faults = [line for line in result.stderr.splitlines() if "m.yaml:" in line]
+    assert len(faults) == 1, result.stderr
+    assert said in faults[0]
+    assert "Traceback" not in result.stderr
+    assert all(one.isprintable() for one in result.stderr.splitlines())
+
+
+def test_a_missing_package_is_named(run: Callable[..., Any], folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (folder / "m.yaml").write_text(satellite())
+    monkeypatch.setitem(sys.modules, "sgp4", None)
+    monkeypatch.setitem(sys.modules, "sgp4.api", None)
+    result = run("check", folder / "m.yaml")
+    assert result.exit_code == 2
+    assert "pip install 'bisar-budget[orbits]'" in result.stderr
