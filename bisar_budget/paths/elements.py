@@ -33,6 +33,7 @@ _FARTHEST_DAYS = 36525.0  # SGP4 steps through the time to a resonant orbit
 _AT_EPOCH_KM, _PER_DAY_KM = 1, (1, 3)
 _LISTED = 10  # objects that an error names
 _COLUMNS = 69
+_NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?\s*", re.ASCII)
 _PLAIN_TYPES = ("", "0", "2")  # CCSDS 502.0-B-3, EPHEMERIS_TYPE; 0 is SGP4 in all that is distributed, 4 is SGP4-XP
 # The error codes of Satrec.sgp4; 5 is no longer in use.
 _FAILURES = {
@@ -212,10 +213,12 @@ def number_in(text: object) -> float | None:
     """A finite number from a text or a number; None otherwise."""
     if isinstance(text, bool) or not isinstance(text, str | int | float):
         return None
-    if isinstance(text, str) and not re.fullmatch(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?\s*", text, re.ASCII):
-        return None
+    if isinstance(text, str):
+        if not _NUMBER.fullmatch(text):
+            return None
+        text = text.replace("D", "e").replace("d", "e")  # as Fortran writes exponents
     try:
-        value = float(text.translate({68: 69, 100: 101}) if isinstance(text, str) else text)
+        value = float(text)
     except OverflowError:
         return None
     return value if math.isfinite(value) else None

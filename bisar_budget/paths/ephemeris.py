@@ -7,21 +7,23 @@ other years differ by, centimetres, is not seen. Those of the stars are turned w
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 from bisar_budget.faults import shown
 from bisar_budget.geometry import Vector
 from bisar_budget.paths.elements import LARGEST_BYTES, LATEST, decoded, epoch_in, number_in
 from bisar_budget.paths.flight import Orbit, PathFileError
-from bisar_budget.paths.instant import Instant
+from bisar_budget.paths.instant import DAY, Instant
 from bisar_budget.paths.interpolation import Sample, interpolate
-from bisar_budget.paths.leap_seconds import FIRST_DAY, TAI_LESS, has_leap_second, tai, utc
+from bisar_budget.paths.leap_seconds import FIRST_DAY, TAI_LESS, has_leap_second, tai, tai_less_utc, utc
 from bisar_budget.paths.markup import Element, parse_markup
 from bisar_budget.paths.turning import Turn, celestial_turn, from_teme, unknown_rotation
 
 _EARTH_FIXED = re.compile(r"ITRF[- ]?(\d\d|\d{4})?|WGS[- ]?84")
 _CELESTIAL = {"GCRF": False, "ICRF": False, "EME2000": True, "J2000": True}
 _EQUINOX_OF_DATE = ("TEME", "TEMEOFDATE")
+_SECONDS = re.compile(r"\d\d(\.\d{1,12})?Z?", re.ASCII)
 _SYSTEMS = ("UTC", *TAI_LESS)
 _DEGREE = 7  # where the message says none
 _HIGHEST_DEGREE = 31
@@ -298,7 +300,7 @@ def _velocity_off(samples: Sequence[Sample]) -> float:
 
 
 def _off_at(samples: Sequence[Sample], middle: int) -> float:
-    """The same before one sample: the velocities, interpolated, are integrated by Gauss and Legendre. Derived here."""
+    """The same before one sample: the velocities, interpolated, are integrated after Gauss. Derived here."""
     near = [Sample(one.time, one.velocity, one.velocity) for one in samples[middle - _BESIDE : middle + _BESIDE]]
     a, b = samples[middle - 1 : middle + 1]
     step = b.time.since(a.time)
@@ -323,17 +325,25 @@ def _sample(line: int, epoch: str, values: Sequence[str], system: str, name: str
 
 def _time(line: int, text: str, system: str, name: str) -> Instant:
     """A time of the message, as TAI."""
-    # The second that some minutes of UTC have more.
-    is_leap = re.search(r"T23:59:60(\.\d*)?Z?$", text.strip()) is not None
-    found = epoch_in(text.replace(":60", ":59") if is_leap else text)
-    if found is None or (is_leap and not (system == "UTC" and has_leap_second(found.day))):
+    head, _, seconds = text.rpartition(":")
+    minute = _minute(head)
+    # The second that some days of UTC have more is part of their last minute.
+    longest = 60 + (minute is not None and system == "UTC" and _has_leap_second(minute))
+    if minute is None or not _SECONDS.fullmatch(seconds) or (past := float(seconds.rstrip("Z"))) >= longest:
         raise PathFileError(f"{name}:{line}: must be a time such as 2026-05-31T10:12:13.123 (got {shown(text)})")
-    if not FIRST_DAY < found.day < LATEST:
+    if not FIRST_DAY < minute.day < LATEST:
         raise PathFileError(f"{name}:{line}: times must be after 1972-01-01 and before 2200 (got {shown(text)})")
-    if system != "UTC":
-        return found.after(TAI_LESS[system])
-    of_tai = tai(found)
-    return of_tai.after(1.0) if is_leap else of_tai
+    # Seconds are added once: adding twice would round twice.
+    return minute.after(past + (tai_less_utc(minute.day) if system == "UTC" else TAI_LESS[system]))
+
+
+@lru_cache(maxsize=4096)
+def _minute(text: str) -> Instant | None:
+    return epoch_in(f"{text}:00")
+
+
+def _has_leap_second(minute: Instant) -> bool:
+    return minute.seconds == DAY - 60 and has_leap_second(minute.day)
 
 
 def _from_keywords(text: str, name: str) -> Iterator[_Block]:

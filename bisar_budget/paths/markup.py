@@ -12,7 +12,7 @@ _DEEPEST = 32
 _LONGEST = 10_000  # characters of an element's own text
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, slots=True)
 class Element:
     """An element: its name without namespace, its attributes, text, children, and the line where it begins."""
 

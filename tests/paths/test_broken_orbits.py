@@ -271,15 +271,15 @@ def test_what_is_too_large_is_not_read(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(module, "LARGEST_BYTES", 1_000_000)
     text = "#" * 1_000_001
     for read in (lambda: read_tle(text, "x", None, CENTER), lambda: read_omm(text.encode(), "x", None, CENTER)):
-        with pytest.raises(PathFileError, match="^x: is larger than 1 MB; keep the objects that are needed$"):
+        with pytest.raises(PathFileError, match=r"^x: is larger than 1 MB; keep the objects that are needed$"):
             read()
-    with pytest.raises(PathFileError, match="^x: is larger than 1 MB; keep the time that is needed$"):
+    with pytest.raises(PathFileError, match=r"^x: is larger than 1 MB; keep the time that is needed$"):
         read_oem(text.encode(), "x", None, INSIDE)
     monkeypatch.setattr(markup, "_MOST", 1000)
     for data in (b"<omm>" * 100, b"<omm>" + b"<a/>" * 2000 + b"</omm>"):
-        with pytest.raises(PathFileError, match="^x:1: has more than 1000 elements, or 32 in each other$"):
+        with pytest.raises(PathFileError, match=r"^x:1: has more than 1000 elements, or 32 in each other$"):
             read_omm(data, "x", None, CENTER)
-    with pytest.raises(PathFileError, match="^x:1: has a text of more than 10000 characters$"):
+    with pytest.raises(PathFileError, match=r"^x:1: has a text of more than 10000 characters$"):
         read_omm(b"<omm>" + b"a" * 20_000 + b"</omm>", "x", None, CENTER)
 
 

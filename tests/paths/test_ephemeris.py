@@ -103,8 +103,8 @@ def test_without_interpolation_it_is_hermite_where_velocities_are_those_of_the_p
     with pytest.raises(PathFileError) as error:
         read(oem(path=against_stars, interpolation=interpolation("HERMITE", 7)))
     assert str(error.value) == (
-        "c.oem:12: INTERPOLATION HERMITE needs the velocities of the places; those of the segment are 6 % off what the"
-        " places do"
+        "c.oem:12: INTERPOLATION HERMITE needs the velocities of the places; those of the segment are 6 % off"
+        " what the places do"
     )
     # A step of a twelfth of the orbit is long, and its velocities are still known for what they are.
     assert read(oem(step=490.0)).words.endswith("Hermite degree 7")
@@ -163,8 +163,8 @@ def test_axes_of_the_stars_turn_as_skyfield_has_them(frame: str) -> None:
     assert np.linalg.norm(theirs - turned_by_ut1(orbit.place(at), time.dut1)) < 2e-3
     turned = np.hypot(*orbit.place(at)[:2]) * 7.292115e-6
     assert orbit.doubts(at) == (
-        f"c.oem:4: {frame} is turned to the Earth with UT1 = UTC and without polar motion: {turned:.0f} m off for each"
-        " 0.1 s of UT1 - UTC, and up to 21 m; an ephemeris in ITRF has neither",
+        f"c.oem:4: {frame} is turned to the Earth with UT1 = UTC and without polar motion: {turned:.0f} m off"
+        " for each 0.1 s of UT1 - UTC, and up to 21 m; an ephemeris in ITRF has neither",
     )
 
 
