@@ -148,8 +148,8 @@ def teme(elements: Elements) -> Callable[[Instant], Vector]:
         elapsed = instant.since(elements.epoch)
         if abs(elapsed) > _FARTHEST_DAYS * DAY:
             raise PathFileError(
-                f"{elements.where}: the elements of {elements.object} are of {elements.epoch.as_text()}, too far from"
-                f" {instant.as_text()}"
+                f"{elements.where}: the elements of {elements.object} are of {elements.epoch.as_text()}, more than a"
+                " century from the aperture"
             )
         # A Julian date of two numbers would be as exact, but its epoch passes through a calendar.
         error, position, _ = satellite.sgp4_tsince(elapsed / 60)
@@ -334,7 +334,7 @@ def _from_lines(first: tuple[int, str], second: tuple[int, str], object_name: st
         where = f"{name}:{at}"
         if len(line) != _COLUMNS:
             raise PathFileError(f"{where}: has {len(line)} columns, a line of an element set has {_COLUMNS}")
-        digits = sum(int(one) if one.isdigit() else one == "-" for one in line[:-1]) % 10
+        digits = (sum(n * line.count(str(n), 0, -1) for n in range(1, 10)) + line.count("-", 0, -1)) % 10
         if line[-1] != str(digits):
             raise PathFileError(f"{where}: the checksum is {line[-1]}, its digits give {digits}")
         lines[line[0]] = (where, line)

@@ -27,6 +27,7 @@ _SECONDS = re.compile(r"\d\d(\.\d{1,12})?Z?", re.ASCII)
 _SYSTEMS = ("UTC", *TAI_LESS)
 _DEGREE = 7  # where the message says none
 _HIGHEST_DEGREE = 31
+_APART = 0.9e-3  # s; nearer samples are one, and differences of times of two centuries are rounded to 1e-6 s
 _EDGE = 1e-9  # s; a time at the end of a span is inside
 _OWN_VELOCITY = 0.001  # of the speed; one against the stars is up to 7 % off in a low orbit
 _SLOW = 100.0  # m/s; slower ones over the ground are held to a tenth of a metre a second
@@ -211,8 +212,9 @@ def _segment(block: _Block, name: str) -> _Segment:
 
     samples = [_sample(*row, system, name) for row in block.rows]
     for (line, epoch, _), before, one in zip(block.rows[1:], samples, samples[1:], strict=False):
-        if one.time.since(before.time) <= _EDGE:
-            said = "is there twice" if one.time.since(before.time) > -_EDGE else "is earlier than the one before it"
+        step = one.time.since(before.time)
+        if step < _APART:
+            said = "is there twice" if abs(step) < _APART else "is earlier than the one before it"
             raise PathFileError(f"{name}:{line}: the time {shown(epoch)} {said}; times must rise")
     if not samples:
         raise PathFileError(f"{name}:{block.line}: the segment has no ephemeris")
@@ -413,6 +415,6 @@ def _state(state: Element, name: str) -> tuple[int, str, Sequence[str]]:
         if key not in parts:
             raise PathFileError(f"{where}: the state vector has no {key}")
         unit = "km/s" if key.endswith("_DOT") else "km"
-        if key != "EPOCH" and parts[key].attributes.get("units", unit) != unit:
-            raise PathFileError(f"{where}: {key} must be in {unit} (got {shown(parts[key].attributes['units'])})")
+        if key != "EPOCH" and parts[key].units not in ("", unit):
+            raise PathFileError(f"{where}: {key} must be in {unit} (got {shown(parts[key].units)})")
     return state.line, parts["EPOCH"].text.strip(), [parts[key].text.strip() for key in _VECTOR]

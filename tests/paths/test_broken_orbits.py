@@ -20,6 +20,7 @@ from tests.paths.orbit_files import (
     START,
     TLE,
     checked,
+    instant,
     oem,
     oem_xml,
     omm_csv,
@@ -264,6 +265,30 @@ def test_ephemeris_messages(data: str | bytes, said: str) -> None:
     with pytest.raises(PathFileError) as error:
         read_oem(data.encode() if isinstance(data, str) else data, "x", None, INSIDE)
     assert str(error.value) == said
+
+
+@pytest.mark.parametrize("center", ["0001-01-01T00:00:00Z", "9999-12-31T23:59:59.9Z"])
+def test_apertures_of_any_year_are_refused(center: str) -> None:
+    at = instant(center)
+    with pytest.raises(PathFileError, match="more than a century from the aperture$"):
+        read_tle(TLE, "x", None, at).place(at)
+    with pytest.raises(PathFileError, match="^x: has no place at "):
+        read_oem(OEM.encode(), "x", None, at)
+
+
+@pytest.mark.parametrize("kind", ["LAGRANGE", "HERMITE"])
+def test_samples_of_another_century_give_no_traceback(kind: str) -> None:
+    """Differences of times that are rounded, and polynomials that leave every range."""
+    rows = OEM.splitlines()
+    first = next(n for n, row in enumerate(rows) if row.startswith("2026"))
+    rows[first:first] = [f"1972-02-01T00:00:00.{2 * n:03d} {' '.join(rows[first + n].split()[1:])}" for n in range(4)]
+    text = "\n".join(rows).replace("START_TIME = 2026", "START_TIME = 1972")
+    text = text.replace("META_STOP", "\n".join([*interpolation(kind, 31), "META_STOP"]))
+    try:
+        orbit = read_oem(text.encode(), "x", None, INSIDE)
+        assert all(math.isfinite(one) for one in orbit.place(INSIDE))
+    except PathFileError as error:
+        assert str(error).startswith("x:")
 
 
 def test_what_is_too_large_is_not_read(monkeypatch: pytest.MonkeyPatch) -> None:

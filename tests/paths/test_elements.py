@@ -222,7 +222,7 @@ def test_a_satellite_that_comes_down_has_no_place_afterwards() -> None:
     assert math.hypot(*orbit.place(orbit.epoch.after(600))) > 6.4e6
     with pytest.raises(PathFileError, match=r"^down\.tle:1: SGP4 has no place of 28872 at .*: it has decayed$"):
         orbit.place(orbit.epoch.after(86400))
-    with pytest.raises(PathFileError, match=r"2005-11-29T00:28:58\.939Z, too far from 2126-06-01T00:00:00\.000Z"):
+    with pytest.raises(PathFileError, match=r"2005-11-29T00:28:58\.939Z, more than a century from"):
         orbit.place(instant("2126-06-01T00:00:00Z"))
 
 

@@ -4,6 +4,7 @@ import math
 import subprocess
 import sys
 
+import erfa
 import numpy as np
 import pytest
 from skyfield.framelib import ICRS_to_J2000, itrs
@@ -15,7 +16,7 @@ from bisar_budget.paths.earth import Place, axes_at
 from bisar_budget.paths.ephemeris import read_oem
 from bisar_budget.paths.flight import Orbit, PathFileError, interpolated
 from bisar_budget.paths.instant import Instant
-from bisar_budget.paths.leap_seconds import tai, tai_less_utc, utc
+from bisar_budget.paths.leap_seconds import has_leap_second, tai, tai_less_utc, utc
 from tests.conftest import ROOT
 from tests.paths.orbit_files import CENTER, RADIUS, START, TLE, TURN_RATE, instant, oem, oem_xml, on_circle
 from tests.paths.test_elements import skyfield_time, turned_by_ut1
@@ -145,6 +146,16 @@ def test_a_leap_second_is_a_second() -> None:
     for seconds in (86399.5, 86400.5):
         moment = Instant(midnight.day - 1, seconds)
         assert utc(tai(moment)) == pytest.approx(moment, abs=1e-9)
+
+
+def test_leap_seconds_are_those_of_erfa() -> None:
+    """Its table is compiled from the same bulletins by others."""
+    for year, month, ahead in erfa.leap_seconds.get().tolist():
+        if year >= 1972:
+            day = instant(f"{year}-{month:02d}-01T00:00:00Z").day
+            assert tai_less_utc(day) == ahead
+            assert has_leap_second(day - 1) == (year > 1972 or month > 1)
+            assert not has_leap_second(day)
 
 
 def geocentric(place: Vector, time: object) -> np.ndarray:
