@@ -28,6 +28,7 @@ _SYSTEMS = ("UTC", *TAI_LESS)
 _DEGREE = 7  # where the message says none
 _HIGHEST_DEGREE = 31
 _APART = 0.9e-3  # s; nearer samples are one, and differences of times of two centuries are rounded to 1e-6 s
+_SEEN_M, _LOST_M = 1.0, 100_000.0  # errors of an interpolation that are said, and that are refused: gaps
 _EDGE = 1e-9  # s; a time at the end of a span is inside
 _OWN_VELOCITY = 0.001  # of the speed; one against the stars is up to 7 % off in a low orbit
 _SLOW = 100.0  # m/s; slower ones over the ground are held to a tenth of a metre a second
@@ -66,7 +67,8 @@ def read_oem(data: bytes, name: str, wanted: str | None, center: Instant) -> Orb
     Of several segments the one that has `center` in its useable time is taken, for all instants: between segments
     there may be a manoeuvre, over which no polynomial goes. A message that names no interpolation is interpolated
     after Hermite, degree 7, where its velocities are those of its places, and otherwise after Lagrange, degree 7.
-    An interpolation of degree n goes through n + 1 places of Lagrange, or half as many of Hermite.
+    An interpolation of degree n goes through n + 1 places of Lagrange, or half as many of Hermite. Its error is
+    estimated by one of two more degrees, and doubted from 1 m on.
 
     Parameters
     ----------
@@ -93,10 +95,10 @@ def read_oem(data: bytes, name: str, wanted: str | None, center: Instant) -> Orb
         raise PathFileError(f"{name}: has no segment of an orbit ephemeris message")
     segments = _of_one_object([_segment(block, name) for block in blocks], name, wanted)
     segment = _at(segments, name, center)
-    return _orbit(segment, f"{name}:{segment.line}")
+    return _orbit(segment, f"{name}:{segment.line}", center)
 
 
-def _orbit(segment: _Segment, where: str) -> Orbit:
+def _orbit(segment: _Segment, where: str, center: Instant) -> Orbit:
     turn = _turn(segment.frame, where)
     nodes = (segment.degree + 1) // 2 if segment.is_hermite else segment.degree + 1
     span = (utc(segment.first), utc(segment.last))
@@ -117,7 +119,25 @@ def _orbit(segment: _Segment, where: str) -> Orbit:
         found = inside(instant)
         return turn(found, instant) if turn else found
 
+    def off(instant: Instant) -> float:
+        """How far the interpolation is from one of two more degrees: about its error. [m]"""
+        more = min(nodes + (1 if segment.is_hermite else 2), len(segment.samples))
+        better = interpolate(segment.samples, tai(instant), more, segment.is_hermite)
+        return math.dist(inside(instant), better)
+
+    if not off(center) < _LOST_M:
+        raise PathFileError(f"{where}: the ephemeris is too sparse around {center.as_text()} to interpolate")
+
     def doubts(instant: Instant) -> Sequence[str]:
+        said = []
+        error = off(instant)
+        if not error < _SEEN_M:
+            said.append(
+                f"{where}: the interpolation of the ephemeris is about {error:.2g} m off; write it more often"
+            )
+        return (*said, *rotation(instant))
+
+    def rotation(instant: Instant) -> Sequence[str]:
         if turn is None:
             return ()
         turned, moved = unknown_rotation(inside(instant))

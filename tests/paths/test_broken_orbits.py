@@ -270,9 +270,9 @@ def test_ephemeris_messages(data: str | bytes, said: str) -> None:
 @pytest.mark.parametrize("center", ["0001-01-01T00:00:00Z", "9999-12-31T23:59:59.9Z"])
 def test_apertures_of_any_year_are_refused(center: str) -> None:
     at = instant(center)
-    with pytest.raises(PathFileError, match="more than a century from the aperture$"):
+    with pytest.raises(PathFileError, match=r"more than a century from the aperture$"):
         read_tle(TLE, "x", None, at).place(at)
-    with pytest.raises(PathFileError, match="^x: has no place at "):
+    with pytest.raises(PathFileError, match=r"^x: has no place at "):
         read_oem(OEM.encode(), "x", None, at)
 
 

@@ -1,6 +1,7 @@
 """Orbit ephemeris messages: interpolation of a known circle, time systems, axes against Skyfield."""
 
 import math
+import re
 import subprocess
 import sys
 
@@ -59,11 +60,17 @@ def test_interpolation_errs_by_its_remainder(kind: str, degree: int, offsets: li
     orbit = read_oem(data, "c.oem", None, START.after(1200))
     assert orbit.words == f"OEM of CIRCLE, ITRF2014, {kind.capitalize()} degree {degree}"
     assert orbit.span == (START, START.after(2400))
-    assert orbit.doubts(START.after(1200)) == ()
+    error = remainder(offsets, 120.0)
+    doubts = orbit.doubts(START.after(1260))
+    assert len(doubts) == (error > 1)
+    for doubt in doubts:
+        said = re.fullmatch(r"c\.oem:\d: the interpolation of the ephemeris is about (\d+\.?\d*) m off; .*", doubt)
+        assert said is not None
+        assert float(said[1]) == pytest.approx(error, rel=0.1)
     for n in range(5, 15):
         time = 120 * (n + 0.5)
         off = math.dist(orbit.place(START.after(time)), on_circle(time)[0])
-        assert off == pytest.approx(remainder(offsets, 120.0), rel=0.05, abs=2e-6)
+        assert off == pytest.approx(error, rel=0.05, abs=2e-6)
         # At a sample nothing is left but the 1e-9 m of what is written.
         assert math.dist(orbit.place(START.after(120.0 * n)), on_circle(120.0 * n)[0]) < 1e-7
 
@@ -191,6 +198,19 @@ def test_teme_turns_as_that_of_elements() -> None:
     theirs = elements.read_tle(TLE, "s.tle", None, CENTER).place(CENTER.after(7.0))
     # Velocities are differences of places rounded to 1e-7 m.
     assert math.dist(read(text, CENTER).place(CENTER.after(7.0)), theirs) < 1e-4
+
+
+def test_a_gap_is_not_interpolated() -> None:
+    """Three hours are two turns of the orbit: the polynomial over them is nobody's path."""
+
+    def clock(time: float) -> Instant:
+        return START.after(time if time < 600 else time + 3 * 3600)
+
+    text = oem(times=clock, interpolation=interpolation("LAGRANGE", 7))
+    with pytest.raises(PathFileError) as error:
+        read(text, START.after(6000))
+    assert str(error.value) == "c.oem:4: the ephemeris is too sparse around 2026-06-01T06:40:00.000Z to interpolate"
+    assert math.dist(read(text, START.after(300)).place(START.after(300)), on_circle(300)[0]) < 1e-6
 
 
 @pytest.mark.parametrize("frame", ["ITRF", "ITRF-97", "ITRF2000", "ITRF2020", "itrf93", "WGS84", "WGS-84"])
