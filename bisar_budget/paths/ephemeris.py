@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from bisar_budget.faults import shown
 from bisar_budget.geometry import Vector
-from bisar_budget.paths.elements import LARGEST_BYTES, LATEST, decoded, epoch_in, number_in
+from bisar_budget.paths.fields import LATEST, decoded, epoch_in, hold_to_size, number_in
 from bisar_budget.paths.flight import Orbit, PathFileError
 from bisar_budget.paths.instant import DAY, Instant
 from bisar_budget.paths.interpolation import Sample, interpolate
@@ -87,8 +87,7 @@ def read_oem(data: bytes, name: str, wanted: str | None, center: Instant) -> Orb
         The message is not what the standard asks for, has axes, a time system or an interpolation that is not known
         here, does not say which object, or has no place at `center`. `Orbit.place` raises it outside the span.
     """
-    if len(data) > LARGEST_BYTES:
-        raise PathFileError(f"{name}: is larger than {LARGEST_BYTES // 1_000_000} MB; keep the time that is needed")
+    hold_to_size(len(data), name, "time")
     is_markup = data.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"<"
     blocks = list(_from_markup(data, name) if is_markup else _from_keywords(decoded(data, name), name))
     if not blocks:

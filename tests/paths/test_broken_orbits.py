@@ -7,10 +7,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from bisar_budget.paths import elements, ephemeris, markup
-from bisar_budget.paths.elements import read_omm, read_tle
+from bisar_budget.paths import fields, markup
 from bisar_budget.paths.ephemeris import read_oem
 from bisar_budget.paths.flight import PathFileError
+from bisar_budget.paths.mean_elements import read_omm
+from bisar_budget.paths.two_lines import read_tle
 from tests.paths.orbit_files import (
     CENTER,
     CONSTANTS,
@@ -292,13 +293,12 @@ def test_samples_of_another_century_give_no_traceback(kind: str) -> None:
 
 
 def test_what_is_too_large_is_not_read(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (elements, ephemeris):
-        monkeypatch.setattr(module, "LARGEST_BYTES", 1_000_000)
+    monkeypatch.setattr(fields, "LARGEST_BYTES", 1_000_000)
     text = "#" * 1_000_001
     for read in (lambda: read_tle(text, "x", None, CENTER), lambda: read_omm(text.encode(), "x", None, CENTER)):
-        with pytest.raises(PathFileError, match=r"^x: is larger than 1 MB; keep the objects that are needed$"):
+        with pytest.raises(PathFileError, match=r"^x: is larger than 1 MB; keep the objects needed$"):
             read()
-    with pytest.raises(PathFileError, match=r"^x: is larger than 1 MB; keep the time that is needed$"):
+    with pytest.raises(PathFileError, match=r"^x: is larger than 1 MB; keep the time needed$"):
         read_oem(text.encode(), "x", None, INSIDE)
     monkeypatch.setattr(markup, "_MOST", 1000)
     for data in (b"<omm>" * 100, b"<omm>" + b"<a/>" * 2000 + b"</omm>"):
