@@ -159,11 +159,13 @@ def _read_orbit(form: str, data: bytes, name: str, wanted: str | None, center: I
         from bisar_budget.paths import ephemeris
 
         return ephemeris.read_oem(data, name, wanted, center)
-    from bisar_budget.paths import elements
-
     if form == "omm":
-        return elements.read_omm(data, name, wanted, center)
-    return elements.read_tle(elements.decoded(data, name), name, wanted, center)
+        from bisar_budget.paths import mean_elements
+
+        return mean_elements.read_omm(data, name, wanted, center)
+    from bisar_budget.paths import fields, two_lines
+
+    return two_lines.read_tle(fields.decoded(data, name), name, wanted, center)
 
 
 def _of_log(mission: Mission, route: routes.Trajectory, axes: earth.SceneAxes | None, read: Beside) -> FlownPath:

@@ -1,4 +1,14 @@
 """Paths of platforms from orbits and logs of flights, and the Earth they are flown over."""
 
 # What other rooms may use.
-__all__ = ["earth", "elements", "ephemeris", "flight", "flight_log", "instant", "sbet"]
+__all__ = [
+    "earth",
+    "ephemeris",
+    "fields",
+    "flight",
+    "flight_log",
+    "instant",
+    "mean_elements",
+    "sbet",
+    "two_lines",
+]

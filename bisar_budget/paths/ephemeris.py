@@ -7,24 +7,28 @@ other years differ by, centimetres, is not seen. Those of the stars are turned w
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 from bisar_budget.faults import shown
 from bisar_budget.geometry import Vector
-from bisar_budget.paths.elements import LARGEST_BYTES, LATEST, decoded, epoch_in, number_in
+from bisar_budget.paths.fields import LATEST, decoded, epoch_in, hold_to_size, number_in
 from bisar_budget.paths.flight import Orbit, PathFileError
-from bisar_budget.paths.instant import Instant
+from bisar_budget.paths.instant import DAY, Instant
 from bisar_budget.paths.interpolation import Sample, interpolate
-from bisar_budget.paths.leap_seconds import FIRST_DAY, TAI_LESS, has_leap_second, tai, utc
+from bisar_budget.paths.leap_seconds import FIRST_DAY, TAI_LESS, has_leap_second, tai, tai_less_utc, utc
 from bisar_budget.paths.markup import Element, parse_markup
 from bisar_budget.paths.turning import Turn, celestial_turn, from_teme, unknown_rotation
 
 _EARTH_FIXED = re.compile(r"ITRF[- ]?(\d\d|\d{4})?|WGS[- ]?84")
 _CELESTIAL = {"GCRF": False, "ICRF": False, "EME2000": True, "J2000": True}
 _EQUINOX_OF_DATE = ("TEME", "TEMEOFDATE")
+_SECONDS = re.compile(r"\d\d(\.\d{1,12})?Z?", re.ASCII)
 _SYSTEMS = ("UTC", *TAI_LESS)
 _DEGREE = 7  # where the message says none
 _HIGHEST_DEGREE = 31
+_APART = 0.9e-3  # s; nearer samples are one, and differences of times of two centuries are rounded to 1e-6 s
+_SEEN_M, _LOST_M = 1.0, 100_000.0  # errors of an interpolation that are said, and that are refused: gaps
 _EDGE = 1e-9  # s; a time at the end of a span is inside
 _OWN_VELOCITY = 0.001  # of the speed; one against the stars is up to 7 % off in a low orbit
 _SLOW = 100.0  # m/s; slower ones over the ground are held to a tenth of a metre a second
@@ -63,7 +67,8 @@ def read_oem(data: bytes, name: str, wanted: str | None, center: Instant) -> Orb
     Of several segments the one that has `center` in its useable time is taken, for all instants: between segments
     there may be a manoeuvre, over which no polynomial goes. A message that names no interpolation is interpolated
     after Hermite, degree 7, where its velocities are those of its places, and otherwise after Lagrange, degree 7.
-    An interpolation of degree n goes through n + 1 places of Lagrange, or half as many of Hermite.
+    An interpolation of degree n goes through n + 1 places of Lagrange, or half as many of Hermite. Its error is
+    estimated by one of two more degrees, and doubted from 1 m on.
 
     Parameters
     ----------
@@ -82,18 +87,17 @@ def read_oem(data: bytes, name: str, wanted: str | None, center: Instant) -> Orb
         The message is not what the standard asks for, has axes, a time system or an interpolation that is not known
         here, does not say which object, or has no place at `center`. `Orbit.place` raises it outside the span.
     """
-    if len(data) > LARGEST_BYTES:
-        raise PathFileError(f"{name}: is larger than {LARGEST_BYTES // 1_000_000} MB; keep the time that is needed")
+    hold_to_size(len(data), name, "time")
     is_markup = data.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"<"
     blocks = list(_from_markup(data, name) if is_markup else _from_keywords(decoded(data, name), name))
     if not blocks:
         raise PathFileError(f"{name}: has no segment of an orbit ephemeris message")
     segments = _of_one_object([_segment(block, name) for block in blocks], name, wanted)
     segment = _at(segments, name, center)
-    return _orbit(segment, f"{name}:{segment.line}")
+    return _orbit(segment, f"{name}:{segment.line}", center)
 
 
-def _orbit(segment: _Segment, where: str) -> Orbit:
+def _orbit(segment: _Segment, where: str, center: Instant) -> Orbit:
     turn = _turn(segment.frame, where)
     nodes = (segment.degree + 1) // 2 if segment.is_hermite else segment.degree + 1
     span = (utc(segment.first), utc(segment.last))
@@ -114,7 +118,25 @@ def _orbit(segment: _Segment, where: str) -> Orbit:
         found = inside(instant)
         return turn(found, instant) if turn else found
 
+    def off(instant: Instant) -> float:
+        """How far the interpolation is from one of two more degrees: about its error. [m]"""
+        more = min(nodes + (1 if segment.is_hermite else 2), len(segment.samples))
+        better = interpolate(segment.samples, tai(instant), more, segment.is_hermite)
+        return math.dist(inside(instant), better)
+
+    if not off(center) < _LOST_M:
+        raise PathFileError(f"{where}: the ephemeris is too sparse around {center.as_text()} to interpolate")
+
     def doubts(instant: Instant) -> Sequence[str]:
+        said = []
+        error = off(instant)
+        if not error < _SEEN_M:
+            said.append(
+                f"{where}: the interpolation of the ephemeris is about {error:.2g} m off; write it more often"
+            )
+        return (*said, *rotation(instant))
+
+    def rotation(instant: Instant) -> Sequence[str]:
         if turn is None:
             return ()
         turned, moved = unknown_rotation(inside(instant))
@@ -209,8 +231,9 @@ def _segment(block: _Block, name: str) -> _Segment:
 
     samples = [_sample(*row, system, name) for row in block.rows]
     for (line, epoch, _), before, one in zip(block.rows[1:], samples, samples[1:], strict=False):
-        if one.time.since(before.time) <= _EDGE:
-            said = "is there twice" if one.time.since(before.time) > -_EDGE else "is earlier than the one before it"
+        step = one.time.since(before.time)
+        if step < _APART:
+            said = "is there twice" if abs(step) < _APART else "is earlier than the one before it"
             raise PathFileError(f"{name}:{line}: the time {shown(epoch)} {said}; times must rise")
     if not samples:
         raise PathFileError(f"{name}:{block.line}: the segment has no ephemeris")
@@ -298,7 +321,7 @@ def _velocity_off(samples: Sequence[Sample]) -> float:
 
 
 def _off_at(samples: Sequence[Sample], middle: int) -> float:
-    """The same before one sample: the velocities, interpolated, are integrated by Gauss and Legendre."""
+    """The same before one sample: the velocities, interpolated, are integrated after Gauss. Derived here."""
     near = [Sample(one.time, one.velocity, one.velocity) for one in samples[middle - _BESIDE : middle + _BESIDE]]
     a, b = samples[middle - 1 : middle + 1]
     step = b.time.since(a.time)
@@ -323,17 +346,25 @@ def _sample(line: int, epoch: str, values: Sequence[str], system: str, name: str
 
 def _time(line: int, text: str, system: str, name: str) -> Instant:
     """A time of the message, as TAI."""
-    # The second that some minutes of UTC have more.
-    is_leap = re.search(r"T23:59:60(\.\d*)?Z?$", text.strip()) is not None
-    found = epoch_in(text.replace(":60", ":59") if is_leap else text)
-    if found is None or (is_leap and not (system == "UTC" and has_leap_second(found.day))):
+    head, _, seconds = text.rpartition(":")
+    minute = _minute(head)
+    # The second that some days of UTC have more is part of their last minute.
+    longest = 60 + (minute is not None and system == "UTC" and _has_leap_second(minute))
+    if minute is None or not _SECONDS.fullmatch(seconds) or (past := float(seconds.rstrip("Z"))) >= longest:
         raise PathFileError(f"{name}:{line}: must be a time such as 2026-05-31T10:12:13.123 (got {shown(text)})")
-    if not FIRST_DAY < found.day < LATEST:
+    if not FIRST_DAY < minute.day < LATEST:
         raise PathFileError(f"{name}:{line}: times must be after 1972-01-01 and before 2200 (got {shown(text)})")
-    if system != "UTC":
-        return found.after(TAI_LESS[system])
-    of_tai = tai(found)
-    return of_tai.after(1.0) if is_leap else of_tai
+    # Seconds are added once: adding twice would round twice.
+    return minute.after(past + (tai_less_utc(minute.day) if system == "UTC" else TAI_LESS[system]))
+
+
+@lru_cache(maxsize=4096)
+def _minute(text: str) -> Instant | None:
+    return epoch_in(f"{text}:00")
+
+
+def _has_leap_second(minute: Instant) -> bool:
+    return minute.seconds == DAY - 60 and has_leap_second(minute.day)
 
 
 def _from_keywords(text: str, name: str) -> Iterator[_Block]:
@@ -403,6 +434,6 @@ def _state(state: Element, name: str) -> tuple[int, str, Sequence[str]]:
         if key not in parts:
             raise PathFileError(f"{where}: the state vector has no {key}")
         unit = "km/s" if key.endswith("_DOT") else "km"
-        if key != "EPOCH" and parts[key].attributes.get("units", unit) != unit:
-            raise PathFileError(f"{where}: {key} must be in {unit} (got {shown(parts[key].attributes['units'])})")
+        if key != "EPOCH" and parts[key].units not in ("", unit):
+            raise PathFileError(f"{where}: {key} must be in {unit} (got {shown(parts[key].units)})")
     return state.line, parts["EPOCH"].text.strip(), [parts[key].text.strip() for key in _VECTOR]

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from sys import intern
 from xml.parsers import expat
 
 from bisar_budget.faults import shown
@@ -12,13 +13,13 @@ _DEEPEST = 32
 _LONGEST = 10_000  # characters of an element's own text
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, slots=True)
 class Element:
-    """An element: its name without namespace, its attributes, text, children, and the line where it begins."""
+    """An element: its name without namespace, the line where it begins, its units, text and children."""
 
     name: str
     line: int
-    attributes: dict[str, str]
+    units: str = ""
     text: str = ""
     children: list["Element"] = field(default_factory=list)
 
@@ -41,7 +42,7 @@ def parse_markup(data: bytes, name: str) -> Element:
     """
     parser = expat.ParserCreate()
     parser.buffer_text = True
-    top = Element("", 1, {})
+    top = Element("", 1)
     open_ones = [top]
     count = 0
 
@@ -53,7 +54,7 @@ def parse_markup(data: bytes, name: str) -> Element:
         count += 1
         if count > _MOST or len(open_ones) > _DEEPEST:
             raise here(f"has more than {_MOST} elements, or {_DEEPEST} in each other")
-        one = Element(tag.rpartition(":")[2], parser.CurrentLineNumber, attributes)
+        one = Element(intern(tag.rpartition(":")[2]), parser.CurrentLineNumber, intern(attributes.get("units", "")))
         open_ones[-1].children.append(one)
         open_ones.append(one)
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from bisar_budget.mission.load import load_mission
-from bisar_budget.paths import earth, elements
+from bisar_budget.paths import earth, two_lines
 from bisar_budget.paths.instant import Instant
 from tests.conftest import mission_text
 from tests.paths.flown import flight, geodetic_csv, sbet, smrmsg
@@ -27,7 +27,7 @@ FLIGHT = {"latitude": "48.2 deg", "longitude": "11.1 deg", "altitude": "3 km", "
 
 def overpass(center: Instant) -> earth.Place:
     """A place some 300 km beside the satellite of `TLE`."""
-    below = earth.geodetic(elements.read_tle(TLE, "x", None, center).place(center))
+    below = earth.geodetic(two_lines.read_tle(TLE, "x", None, center).place(center))
     return earth.Place(below.latitude, below.longitude + 0.05 / math.cos(below.latitude), 500.0)
 
 

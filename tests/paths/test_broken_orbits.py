@@ -7,10 +7,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from bisar_budget.paths import elements, ephemeris, markup
-from bisar_budget.paths.elements import read_omm, read_tle
+from bisar_budget.paths import fields, markup
 from bisar_budget.paths.ephemeris import read_oem
 from bisar_budget.paths.flight import PathFileError
+from bisar_budget.paths.mean_elements import read_omm
+from bisar_budget.paths.two_lines import read_tle
 from tests.paths.orbit_files import (
     CENTER,
     CONSTANTS,
@@ -20,6 +21,7 @@ from tests.paths.orbit_files import (
     START,
     TLE,
     checked,
+    instant,
     oem,
     oem_xml,
     omm_csv,
@@ -266,20 +268,43 @@ def test_ephemeris_messages(data: str | bytes, said: str) -> None:
     assert str(error.value) == said
 
 
+@pytest.mark.parametrize("center", ["0001-01-01T00:00:00Z", "9999-12-31T23:59:59.9Z"])
+def test_apertures_of_any_year_are_refused(center: str) -> None:
+    at = instant(center)
+    with pytest.raises(PathFileError, match=r"more than a century from the aperture$"):
+        read_tle(TLE, "x", None, at).place(at)
+    with pytest.raises(PathFileError, match=r"^x: has no place at "):
+        read_oem(OEM.encode(), "x", None, at)
+
+
+@pytest.mark.parametrize("kind", ["LAGRANGE", "HERMITE"])
+def test_samples_of_another_century_give_no_traceback(kind: str) -> None:
+    """Differences of times that are rounded, and polynomials that leave every range."""
+    rows = OEM.splitlines()
+    first = next(n for n, row in enumerate(rows) if row.startswith("2026"))
+    rows[first:first] = [f"1972-02-01T00:00:00.{2 * n:03d} {' '.join(rows[first + n].split()[1:])}" for n in range(4)]
+    text = "\n".join(rows).replace("START_TIME = 2026", "START_TIME = 1972")
+    text = text.replace("META_STOP", "\n".join([*interpolation(kind, 31), "META_STOP"]))
+    try:
+        orbit = read_oem(text.encode(), "x", None, INSIDE)
+        assert all(math.isfinite(one) for one in orbit.place(INSIDE))
+    except PathFileError as error:
+        assert str(error).startswith("x:")
+
+
 def test_what_is_too_large_is_not_read(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (elements, ephemeris):
-        monkeypatch.setattr(module, "LARGEST_BYTES", 1_000_000)
+    monkeypatch.setattr(fields, "LARGEST_BYTES", 1_000_000)
     text = "#" * 1_000_001
     for read in (lambda: read_tle(text, "x", None, CENTER), lambda: read_omm(text.encode(), "x", None, CENTER)):
-        with pytest.raises(PathFileError, match="^x: is larger than 1 MB; keep the objects that are needed$"):
+        with pytest.raises(PathFileError, match=r"^x: is larger than 1 MB; keep the objects needed$"):
             read()
-    with pytest.raises(PathFileError, match="^x: is larger than 1 MB; keep the time that is needed$"):
+    with pytest.raises(PathFileError, match=r"^x: is larger than 1 MB; keep the time needed$"):
         read_oem(text.encode(), "x", None, INSIDE)
     monkeypatch.setattr(markup, "_MOST", 1000)
     for data in (b"<omm>" * 100, b"<omm>" + b"<a/>" * 2000 + b"</omm>"):
-        with pytest.raises(PathFileError, match="^x:1: has more than 1000 elements, or 32 in each other$"):
+        with pytest.raises(PathFileError, match=r"^x:1: has more than 1000 elements, or 32 in each other$"):
             read_omm(data, "x", None, CENTER)
-    with pytest.raises(PathFileError, match="^x:1: has a text of more than 10000 characters$"):
+    with pytest.raises(PathFileError, match=r"^x:1: has a text of more than 10000 characters$"):
         read_omm(b"<omm>" + b"a" * 20_000 + b"</omm>", "x", None, CENTER)
 
 

@@ -1,21 +1,23 @@
 """Orbit ephemeris messages: interpolation of a known circle, time systems, axes against Skyfield."""
 
 import math
+import re
 import subprocess
 import sys
 
+import erfa
 import numpy as np
 import pytest
 from skyfield.framelib import ICRS_to_J2000, itrs
 from skyfield.positionlib import Geocentric
 
 from bisar_budget.geometry import Vector
-from bisar_budget.paths import elements
+from bisar_budget.paths import elements, two_lines
 from bisar_budget.paths.earth import Place, axes_at
 from bisar_budget.paths.ephemeris import read_oem
 from bisar_budget.paths.flight import Orbit, PathFileError, interpolated
 from bisar_budget.paths.instant import Instant
-from bisar_budget.paths.leap_seconds import tai, tai_less_utc, utc
+from bisar_budget.paths.leap_seconds import has_leap_second, tai, tai_less_utc, utc
 from tests.conftest import ROOT
 from tests.paths.orbit_files import CENTER, RADIUS, START, TLE, TURN_RATE, instant, oem, oem_xml, on_circle
 from tests.paths.test_elements import skyfield_time, turned_by_ut1
@@ -58,11 +60,17 @@ def test_interpolation_errs_by_its_remainder(kind: str, degree: int, offsets: li
     orbit = read_oem(data, "c.oem", None, START.after(1200))
     assert orbit.words == f"OEM of CIRCLE, ITRF2014, {kind.capitalize()} degree {degree}"
     assert orbit.span == (START, START.after(2400))
-    assert orbit.doubts(START.after(1200)) == ()
+    error = remainder(offsets, 120.0)
+    doubts = orbit.doubts(START.after(1260))
+    assert len(doubts) == (error > 1)
+    for doubt in doubts:
+        said = re.fullmatch(r"c\.oem:\d: the interpolation of the ephemeris is about (\d+\.?\d*) m off; .*", doubt)
+        assert said is not None
+        assert float(said[1]) == pytest.approx(error, rel=0.1)
     for n in range(5, 15):
         time = 120 * (n + 0.5)
         off = math.dist(orbit.place(START.after(time)), on_circle(time)[0])
-        assert off == pytest.approx(remainder(offsets, 120.0), rel=0.05, abs=2e-6)
+        assert off == pytest.approx(error, rel=0.05, abs=2e-6)
         # At a sample nothing is left but the 1e-9 m of what is written.
         assert math.dist(orbit.place(START.after(120.0 * n)), on_circle(120.0 * n)[0]) < 1e-7
 
@@ -103,8 +111,8 @@ def test_without_interpolation_it_is_hermite_where_velocities_are_those_of_the_p
     with pytest.raises(PathFileError) as error:
         read(oem(path=against_stars, interpolation=interpolation("HERMITE", 7)))
     assert str(error.value) == (
-        "c.oem:12: INTERPOLATION HERMITE needs the velocities of the places; those of the segment are 6 % off what the"
-        " places do"
+        "c.oem:12: INTERPOLATION HERMITE needs the velocities of the places; those of the segment are 6 % off"
+        " what the places do"
     )
     # A step of a twelfth of the orbit is long, and its velocities are still known for what they are.
     assert read(oem(step=490.0)).words.endswith("Hermite degree 7")
@@ -147,6 +155,16 @@ def test_a_leap_second_is_a_second() -> None:
         assert utc(tai(moment)) == pytest.approx(moment, abs=1e-9)
 
 
+def test_leap_seconds_are_those_of_erfa() -> None:
+    """Its table is compiled from the same bulletins by others."""
+    for year, month, ahead in erfa.leap_seconds.get().tolist():
+        if year >= 1972:
+            day = instant(f"{year}-{month:02d}-01T00:00:00Z").day
+            assert tai_less_utc(day) == ahead
+            assert has_leap_second(day - 1) == (year > 1972 or month > 1)
+            assert not has_leap_second(day)
+
+
 def geocentric(place: Vector, time: object) -> np.ndarray:
     """Earth-fixed coordinates by Skyfield of a place in the axes of the GCRF. [m]"""
     return Geocentric(np.array(place) / AU, t=time).frame_xyz(itrs).m
@@ -163,13 +181,13 @@ def test_axes_of_the_stars_turn_as_skyfield_has_them(frame: str) -> None:
     assert np.linalg.norm(theirs - turned_by_ut1(orbit.place(at), time.dut1)) < 2e-3
     turned = np.hypot(*orbit.place(at)[:2]) * 7.292115e-6
     assert orbit.doubts(at) == (
-        f"c.oem:4: {frame} is turned to the Earth with UT1 = UTC and without polar motion: {turned:.0f} m off for each"
-        " 0.1 s of UT1 - UTC, and up to 21 m; an ephemeris in ITRF has neither",
+        f"c.oem:4: {frame} is turned to the Earth with UT1 = UTC and without polar motion: {turned:.0f} m off"
+        " for each 0.1 s of UT1 - UTC, and up to 21 m; an ephemeris in ITRF has neither",
     )
 
 
 def test_teme_turns_as_that_of_elements() -> None:
-    exact = elements.smooth(elements.teme(next(elements._sets(TLE, "s.tle"))))
+    exact = elements.smooth(elements.teme(next(two_lines.element_sets(TLE, "s.tle"))))
 
     def path(time: float) -> tuple[Vector, Vector]:
         place, before, after = (exact(CENTER.after(time - 300 + off)) for off in (0.0, -0.05, 0.05))
@@ -177,9 +195,22 @@ def test_teme_turns_as_that_of_elements() -> None:
         return place, velocity  # type: ignore[return-value]
 
     text = oem(frame="TEME", path=path, step=30.0, times=lambda time: CENTER.after(time - 300))
-    theirs = elements.read_tle(TLE, "s.tle", None, CENTER).place(CENTER.after(7.0))
+    theirs = two_lines.read_tle(TLE, "s.tle", None, CENTER).place(CENTER.after(7.0))
     # Velocities are differences of places rounded to 1e-7 m.
     assert math.dist(read(text, CENTER).place(CENTER.after(7.0)), theirs) < 1e-4
+
+
+def test_a_gap_is_not_interpolated() -> None:
+    """Three hours are two turns of the orbit: the polynomial over them is nobody's path."""
+
+    def clock(time: float) -> Instant:
+        return START.after(time if time < 600 else time + 3 * 3600)
+
+    text = oem(times=clock, interpolation=interpolation("LAGRANGE", 7))
+    with pytest.raises(PathFileError) as error:
+        read(text, START.after(6000))
+    assert str(error.value) == "c.oem:4: the ephemeris is too sparse around 2026-06-01T06:40:00.000Z to interpolate"
+    assert math.dist(read(text, START.after(300)).place(START.after(300)), on_circle(300)[0]) < 1e-6
 
 
 @pytest.mark.parametrize("frame", ["ITRF", "ITRF-97", "ITRF2000", "ITRF2020", "itrf93", "WGS84", "WGS-84"])
