@@ -114,10 +114,10 @@ def teme(elements: Elements) -> Callable[[Instant], Vector]:
 def smooth(place: Callable[[Instant], Vector]) -> Callable[[Instant], Vector]:
     """The same places without the steps of their rounding, which grow with the age of the elements.
 
-    SGP4 counts minutes and angles from the epoch: a week from it a place is rounded to 2e-6 m, which is the curvature
-    of a path within a second, and 100 days from it to 4e-5 m. Lagrange's polynomial through eight places 30 s apart
-    leaves 1e-8 m in a low orbit, by its remainder. It also rounds off the millimetres by which SGP4 jumps every half
-    day in resonant orbits.
+    SGP4 counts minutes and angles from the epoch: a week from it a place is rounded to 2e-6 m, and 100 days from it
+    to 4e-5 m, which a polynomial of slow time takes for bends of the path. Lagrange's polynomial through eight places
+    30 s apart leaves 1e-8 m in a low orbit, by its remainder. It also rounds off the millimetres by which SGP4 jumps
+    every half day in resonant orbits.
     """
 
     @lru_cache(maxsize=64)

@@ -8,7 +8,7 @@ from xml.parsers import expat
 from bisar_budget.faults import shown
 from bisar_budget.paths.flight import PathFileError
 
-_MOST = 2_000_000  # elements; a day of an OEM at 10 Hz has three times as many
+_MOST = 2_000_000  # elements; a day of an ephemeris at 1 Hz has 0.7 million
 _DEEPEST = 32
 _LONGEST = 10_000  # characters of an element's own text
 
