@@ -14,6 +14,8 @@ _ORBIT_WAYS = ("tle", "omm", "oem")
 class _Lines(Reader):
     """The two lines of an element set."""
 
+    what = "[line 1, line 2]"
+
     def read(self, value: Any, path: tuple[Any, ...], report: Report) -> Any:
         """Read both."""
         if not isinstance(value, list) or len(value) != 2 or not all(isinstance(line, str) for line in value):
@@ -52,13 +54,15 @@ class Orbit(NamedTuple):
 class _Instant(Reader):
     """An instant of UTC."""
 
+    what = "2026-06-01T05:20:31.250Z and the like"
+
     def leaf(self, value: Any) -> Any:
         """Read 2026-06-01T05:20:31.250Z."""
         from bisar_budget.paths.instant import parse_instant
 
         found = parse_instant(value) if isinstance(value, str) else None
         if found is None:
-            raise InvalidValueError("must be an instant of UTC", "accepted: 2026-06-01T05:20:31.250Z and the like")
+            raise InvalidValueError("must be an instant of UTC", f"accepted: {self.what}")
         return found
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
