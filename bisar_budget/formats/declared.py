@@ -81,7 +81,7 @@ def declared(
     name = frame.text()
     if name not in FRAMES:
         raise frame.fault(f"must be one of {', '.join(FRAMES)} (got {name!r})")
-    target = state.frame(FRAMES[name]) if name != "ECF" else state.frame("scene")
+    target = state.frame("scene") if name == "ECF" else axes.radial(state.position, state.velocity)
     source = _axes_of(name, state, axes)
     turn = np.array(target) @ np.array(source).T  # from the file's frame into that of the mission
     both = np.kron(np.eye(2), turn)

@@ -151,7 +151,7 @@ def _fields(xml: Element, vectors: "NDArray[Any]", block: str, *names: str) -> l
         values = vectors[name]
         if values.dtype.names == ("Int", "Frac"):
             values = values["Int"] + values["Frac"]
-        if values.dtype.kind not in "iuf" or values.shape[1:] not in ((), (3,)):
+        if values.dtype.kind not in "iuf" or values.shape[1:] != ((3,) if name.endswith(("Pos", "Vel")) else ()):
             raise xml.fault("has another form than the standard's", f"{block}/{name}")
         found.append(np.asarray(values, dtype=float))
     return found
