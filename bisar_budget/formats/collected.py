@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 FEWEST = 5  # pulses in an aperture that a path is fitted to
 _HIGHEST = 4  # order of a path that a mission states: up to the snap
 _UNSEEN = 1e-3  # of a wavelength: 0.4° of phase, a hundredth of the usual budget of 45°
+_ROUNDING_M = 1e-7  # a term that moves the path by less at the end of the aperture is rounding
 _BETTER = 0.9  # of the residual; an order that leaves more fits noise
 
 
@@ -152,7 +153,9 @@ def fitted(times: "Floats", places: "Floats", aperture_time_s: float, wavelength
     for axis in range(3):
         powers[: order + 1, axis] = _padded(np.polynomial.legendre.leg2poly(coefficients[:, axis]), order + 1)
     powers /= half ** np.arange(_HIGHEST + 1)[:, None]
+    powers[1:][np.abs(powers[1:]) * half ** np.arange(1, _HIGHEST + 1)[:, None] < _ROUNDING_M] = 0.0
     powers[0] += middle
+    powers[0][np.abs(powers[0]) < _ROUNDING_M] = 0.0
     return Track(_state(powers[: order + 1]), order, farthest, rms, count)
 
 

@@ -1,6 +1,6 @@
 """Files of phase histories and images: header, XML and the parameters of every pulse. The signal is never read.
 
-CPHD 1.1.0 (NGA.STND.0068-1, section 3) and CRSD 1.0 (NGA.STND.0080-2) begin with a header of text lines, which says
+CPHD 1.1.0 (NGA.STND.0068-1) and CRSD 1.0 (NGA.STND.0080-2) begin with a header of text lines, which says
 at which byte each block begins. SICD (NGA.STND.0024) has its XML in a segment of a NITF file.
 """
 

@@ -1,9 +1,9 @@
 """Errors that a file declares, along the frames that a mission has.
 
-CPHD 1.1.0, section 9.3 and SICD, volume 1, ErrorStatistics: sigmas of position and velocity, P1 to V3, with their
-correlations. CRSD 1.0 and the bistatic part of SICD: covariances, 6 x 6. Frames are those of SICD, volume 3: ECF;
-RIC_ECF, radial, in-track and cross-track by the velocity over the turning Earth; RIC_ECI by that against the stars,
-which is `ric` of a mission.
+`ErrorParameters` of CPHD 1.1.0 and `ErrorStatistics` of SICD, volume 1: sigmas of position and velocity, P1 to V3,
+with their correlations. CRSD 1.0 and the bistatic part of SICD: covariances, 6 x 6. Frames are those of SICD, volume
+3: ECF; RIC_ECF, radial, in-track and cross-track by the velocity over the turning Earth; RIC_ECI by that against the
+stars, which is `ric` of a mission.
 """
 
 import math
@@ -87,7 +87,7 @@ def declared(
     both = np.kron(np.eye(2), turn)
     turned = both @ covariance @ both.T
     remarks = []
-    if name != "RIC_ECI":
+    if name != "RIC_ECI" and covariance.any():
         into = "east, north, up" if name == "ECF" else "ric, whose in-track holds the velocity against the stars"
         remarks.append(f"Errors of the {whose} are stated in {name}; they are turned into {into}.")
     sigmas = np.sqrt(np.clip(np.diag(turned), 0, None))
@@ -169,32 +169,39 @@ def _common(whole: Declared, remarks: list[str]) -> Errors:
 def _of_two(both: Element, seen: Seen) -> Errors:
     found: dict[str, Declared | None] = {"transmitter": None, "receiver": None}
     remarks: list[str] = []
-    clocks: list[float | None] = []
+    clocks: list[float] = []
+    delays: list[float] = []
     for whose, name in (("transmitter", "TxPlatform"), ("receiver", "RcvPlatform")):
         platform = both.maybe(name)
         if platform is None:
             remarks.append(f"The file declares no errors of the {whose}.")
-            clocks.append(None)
             continue
         error = platform.one("PosVelErr")
-        state = getattr(seen, whose)
-        found[whose], said = declared(sigmas_and_correlations(error), error.one("Frame"), state, seen.axes, whose)
+        found[whose], said = declared(
+            sigmas_and_correlations(error), error.one("Frame"), getattr(seen, whose), seen.axes, whose
+        )
         remarks += [*said, *_decorrelation(error, f"position of the {whose}")]
         sensor = platform.maybe("RadarSensor")
-        has_clock = sensor is not None and sensor.maybe("ClockFreqSF") is not None
-        clocks.append(sensor.number("ClockFreqSF") if sensor is not None and has_clock else None)
         if sensor is not None:
             remarks += _rest_of_sensor(sensor, ("CollectionStartTime",), f"{name}/RadarSensor")
+            clocks += [sensor.number("ClockFreqSF")] if sensor.maybe("ClockFreqSF") is not None else []
+            delays += [sensor.number("DelayBias")] if sensor.maybe("DelayBias") is not None else []
     found, said = _with_added(both, found)
-    linear = None
-    given = [clock for clock in clocks if clock is not None]
-    if given:
-        linear = math.hypot(*given)
+    if clocks:
         remarks.append(
             "timing_error.linear is the root sum square of ClockFreqSF of both platforms: a receiver whose clock is "
             "off by a factor counts a delay that grows with slow time."
         )
-    return Errors(found["transmitter"], found["receiver"], None, None, linear, both.path, tuple(remarks + said))
+    if delays:
+        remarks.append("timing_error.constant is the root sum square of DelayBias of both platforms.")
+    return Errors(
+        transmitter=found["transmitter"],
+        receiver=found["receiver"],
+        timing_constant=math.hypot(*delays) if delays else None,
+        timing_linear=math.hypot(*clocks) if clocks else None,
+        at=both.path,
+        remarks=tuple(remarks + said),
+    )
 
 
 def _with_added(both: Element, found: dict[str, Declared | None]) -> tuple[dict[str, Declared | None], list[str]]:
@@ -288,7 +295,7 @@ def _rest_of_sensor(sensor: Element, names: tuple[str, ...], where: str) -> list
     return [
         f"{where}/{name} = {sensor.number(name):.6g} has no key in a mission."
         for name in names
-        if sensor.maybe(name) is not None
+        if sensor.maybe(name) is not None and sensor.number(name) != 0
     ]
 
 

@@ -122,8 +122,8 @@ def _cphd(container: Container, channel: str | None) -> Imported:
     remarks += _off_reference_point(xml, point)
     seen = Seen(tracks[0].state, tracks[1].state, axes)
     errors = of_sigmas(xml.maybe("ErrorParameters"), seen, is_monostatic=is_monostatic)
-    names = [xml.maybe(f"CollectionID/{name}") for name in ("CollectorName", "IlluminatorName", "CoreName")]
-    name = ", ".join(one.text() for one in names if one is not None and one.text())
+    name, collectors = _names(xml, "CollectionID")
+    remarks = [*collectors, *remarks]
     return _imported(
         container, channel, name, point, (center, bandwidth), aperture, start, tracks, is_monostatic, reference,
         errors, remarks,
@@ -210,7 +210,7 @@ def _at(polynomial: "Floats", x: float, y: float) -> float:
 
 
 def _image_coordinates(scene: Element, point: Vector) -> tuple[float, float]:
-    """IAX and IAY of a point, sections 4.3.1 (planar surface) and 4.3.2 (constant height) of CPHD 1.1.0. [m]"""
+    """IAX and IAY of a point: image area coordinates of CPHD, on a plane or on a surface of constant height. [m]"""
     import numpy as np
 
     planar = scene.maybe("ReferenceSurface/Planar")
@@ -367,11 +367,8 @@ def _sicd(container: Container, channel: str | None) -> Imported:
         else of_sigmas(statistics, seen, is_monostatic=is_monostatic)
     )
     reference = reference_of(transmitter.state, receiver.state, 0.0)
-    name = ", ".join(
-        one.text()
-        for key in ("CollectorName", "IlluminatorName", "CoreName")
-        if (one := xml.maybe(f"CollectionInfo/{key}")) is not None
-    )
+    name, collectors = _names(xml, "CollectionInfo")
+    remarks = [*collectors, *remarks]
     return _imported(
         container, "", name, point, ((low + high) / 2, high - low), aperture, xml.one("Timeline/CollectStart"),
         tracks, is_monostatic, reference, errors, remarks,
@@ -428,7 +425,7 @@ def _aperture_of_sicd(
     near = pulses_at(np.array([middle - step, middle + step]))
     origin = np.array(axes.origin)
     t, r = near.transmitter - origin, near.receiver - origin
-    sights = t / np.linalg.norm(t, axis=1, keepdims=True) + r / np.linalg.norm(r, axis=1, keepdims=True)
+    sights: Floats = t / np.linalg.norm(t, axis=1, keepdims=True) + r / np.linalg.norm(r, axis=1, keepdims=True)
     rate = (
         abs(float((sights[1] - sights[0]) @ xml.vector("Grid/Col/UVectECF"))) / (2 * step) * center / SPEED_OF_LIGHT
     )
@@ -487,6 +484,15 @@ def _coverage(pulses: _Pulses, axes: SceneAxes, aperture: _Aperture) -> list[str
         f"Pulses cover the aperture from {inside.min():.6g} s to {inside.max():.6g} s of slow time; its ends are "
         "the polynomials' own."
     ]
+
+
+def _names(xml: Element, path: str) -> tuple[str, list[str]]:
+    """Name of the collection, and who collected it."""
+    found = {key: xml.maybe(f"{path}/{key}") for key in ("CoreName", "CollectorName", "IlluminatorName")}
+    core, collector, illuminator = (one.text() if one is not None else "" for one in found.values())
+    by = f"Collected by {shown(collector)}" if collector else ""
+    lit = f"{'lit' if by else 'Lit'} by {shown(illuminator)}" if illuminator else ""
+    return core, [f"{', '.join(part for part in (by, lit) if part)}."] if by or lit else []
 
 
 def _at_reference(
