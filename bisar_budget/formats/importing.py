@@ -379,7 +379,7 @@ def _over(polynomial: "Floats", times: "Floats") -> "Floats":
     """Places (n, 3) of a path polynomial at times (n,)."""
     import numpy as np
 
-    places: Floats = np.polynomial.polynomial.polyval(times, polynomial).T
+    places: Floats = np.asarray(np.polynomial.polynomial.polyval(times, polynomial).T, dtype=float)
     return places
 
 

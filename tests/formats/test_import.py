@@ -118,6 +118,76 @@ class TestBistaticSample:
         assert all(start + length <= signal for start, length in asked)
 
 
+def test_one_platform_agrees_with_the_reference_geometry_of_sarkit(tmp_path) -> None:
+    """Its aperture reference point is in the middle of both paths; a satellite moves 30 m while a pulse is away."""
+    import sarkit.cphd as skcphd
+
+    tree = sample(BISTATIC)
+    tree.find("{*}CollectionID/{*}CollectType").text = "MONOSTATIC"
+    point = values(tree, "ReferenceGeometry/SRP/ECF")
+    at = "ReferenceGeometry/Bistatic/TxPlatform"
+    fly = flown.orbit(values(tree, f"{at}/Pos"), values(tree, f"{at}/Vel"), float(flown.text(tree, f"{at}/Time")))
+    pvps = flown.pulses_of_sample(tree)
+    times = float(flown.text(tree, "ReferenceGeometry/ReferenceTime")) + np.linspace(-0.46, 0.46, len(pvps))
+    pvps["RcvTime"], pvps["RcvPos"], pvps["RcvVel"] = flown.light_time(fly, times, point, 1)
+    path = written(tmp_path / "mono.cphd", tree, pvps)
+    with path.open("rb") as file, skcphd.Reader(file) as reader:
+        theirs = skcphd.compute_reference_geometry(reader.metadata.xmltree, reader.read_pvps("1")).find(
+            "{*}Monostatic"
+        )
+    found = import_collection(str(path))
+    assert found.is_monostatic
+    both = [track.state.at(found.reference.slow_time) for track in (found.transmitter, found.receiver)]
+    x, y, z = np.mean([place for place, _ in both], axis=0)
+    velocity = np.mean([speed for _, speed in both], axis=0)
+    slant = math.hypot(x, y, z)
+    assert math.dist(both[0][0], both[1][0]) > 30
+    expected = {
+        "SlantRange": slant,
+        "GrazeAngle": math.degrees(math.asin(z / slant)),
+        "AzimuthAngle": math.degrees(math.atan2(x, y)) % 360,
+        "DopplerConeAngle": math.degrees(math.acos(-np.dot((x, y, z), velocity) / slant / np.linalg.norm(velocity))),
+    }
+    for key, value in expected.items():
+        assert value == pytest.approx(float(theirs.findtext(f"{{*}}{key}")), rel=1e-6), key
+
+
+def test_another_channel_and_vectors_without_a_pulse(tmp_path) -> None:
+    """The second channel has a band and pulses of its own; a vector that was not sent has no place."""
+    import sarkit.cphd as skcphd
+
+    tree = sample(BISTATIC)
+    pvps = flown.pulses_of_sample(tree)
+    for parent, child in (("Data", "Channel"), ("Channel", "Parameters")):
+        one = tree.find(f"{{*}}{parent}/{{*}}{child}")
+        other = copy.deepcopy(one)
+        other.find("{*}Identifier").text = "2"
+        one.addnext(other)
+    tree.findall("{*}Channel/{*}Parameters/{*}FxC")[1].text = "9e9"
+    for node in tree.iter("{*}NumVectors"):
+        node.text = str(len(pvps))
+    for node in tree.iter("{*}NumSamples"):
+        node.text = "4"
+    for node in tree.iter("{*}RefVectorIndex"):
+        node.text = "100"
+    second = tree.findall("{*}Data/{*}Channel")[1]
+    second.find("{*}SignalArrayByteOffset").text = str(len(pvps) * 4 * 8)
+    second.find("{*}PVPArrayByteOffset").text = str(pvps.nbytes)
+    shorter = pvps.copy()
+    shorter["TxTime"][::7] = math.nan
+    shorter["TxPos"][::7] = math.nan
+    path = tmp_path / "two.cphd"
+    with path.open("wb") as file, skcphd.Writer(file, skcphd.Metadata(xmltree=tree)) as writer:
+        for name, vectors in (("1", pvps), ("2", shorter)):
+            writer.write_signal(name, np.zeros((len(pvps), 4), dtype=np.complex64))
+            writer.write_pvp(name, vectors)
+    first, other = import_collection(str(path)), import_collection(str(path), "2")
+    assert (first.center_frequency, other.center_frequency) == (8e9, 9e9)
+    assert (other.transmitter.samples, first.transmitter.samples) == (120, 140)
+    for tau in (-0.3, 0.0, 0.3):
+        assert math.dist(first.transmitter.state.at(tau)[0], other.transmitter.state.at(tau)[0]) < 30e-6
+
+
 def test_a_moving_reference_surface_of_constant_height(tmp_path) -> None:
     """The dwell of a point away from the image's reference point, by both kinds of surface."""
     tree = sample(BISTATIC)
