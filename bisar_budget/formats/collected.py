@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 FEWEST = 5  # pulses in an aperture that a path is fitted to
+LONGEST = 1e6  # s, of an aperture, and to its middle
+FARTHEST = 1e9  # m, of a platform; a mission takes no more
 _HIGHEST = 4  # order of a path that a mission states: up to the snap
 _UNSEEN = 1e-3  # of a wavelength: 0.4° of phase, a hundredth of the usual budget of 45°
 _ROUNDING_M = 1e-7  # a term that moves the path by less at the end of the aperture is rounding
@@ -123,10 +125,12 @@ def fitted(times: "Floats", places: "Floats", aperture_time_s: float, wavelength
     Raises
     ------
     NoPathError
-        Fewer than five places within the aperture.
+        Fewer than five places within the aperture, or places or an aperture beyond what a mission takes.
     """
     import numpy as np
 
+    if not 0 < aperture_time_s <= LONGEST:
+        raise NoPathError(f"an aperture of {aperture_time_s:g} s is none; accepted: up to {LONGEST:g} s")
     half = aperture_time_s / 2
     inside = np.abs(times) <= half * (1 + 1e-9)
     count = int(inside.sum())
@@ -134,6 +138,8 @@ def fitted(times: "Floats", places: "Floats", aperture_time_s: float, wavelength
         raise NoPathError(
             f"{count} pulses are in the aperture of {aperture_time_s:g} s, at least {FEWEST} are needed"
         )
+    if not float(np.abs(places[inside]).max()) <= FARTHEST:
+        raise NoPathError(f"a platform is farther than {FARTHEST:g} m from the scene point, or nowhere")
     at, wanted = times[inside] / half, places[inside]
     middle = wanted.mean(axis=0)  # what is large is taken away, so that rounding is that of what is small
     found = []

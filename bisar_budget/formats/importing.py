@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.faults import printable, shown
 from bisar_budget.formats.collected import (
+    LONGEST,
     Imported,
     NoPathError,
     Reference,
@@ -136,7 +137,7 @@ def _dtype(xml: Element, block: str) -> "np.dtype[Any]":
     reads = module.get_ppp_dtype if block == "PPP" else module.get_pvp_dtype
     try:
         dtype: np.dtype[Any] = reads(xml.node.getroottree())
-    except (AttributeError, KeyError, TypeError, ValueError) as error:
+    except (AttributeError, IndexError, KeyError, SyntaxError, TypeError, ValueError) as error:
         raise xml.fault(f"describes no parameters ({shown(str(error))})", block) from None
     return dtype
 
@@ -520,6 +521,14 @@ def _imported(
     errors: Errors,
     remarks: list[str],
 ) -> Imported:
+    if not (0 < aperture.length <= LONGEST and abs(aperture.middle) <= LONGEST):
+        raise FormatError(
+            container.file, f"{container.xml.path}: an aperture of {aperture.length:g} s at {aperture.middle:g} s"
+        )
+    if not 0 < band[1] < 2 * band[0]:
+        raise FormatError(
+            container.file, f"{container.xml.path}: a band of {band[1]:g} Hz about {band[0]:g} Hz, which is none"
+        )
     place: Place = geodetic(point)
     axes = axes_at(place)
     transmitter, receiver = (
