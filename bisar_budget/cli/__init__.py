@@ -7,6 +7,7 @@ import sys
 import warnings
 from importlib import import_module
 from io import StringIO
+from keyword import iskeyword
 from typing import Any, NoReturn
 
 import click
@@ -22,12 +23,20 @@ _MODULES = {
     "check": "check",
     "derive": "derive",
     "diff": "diff",
+    "import": "import_file",
     "init": "mission_files",
     "schema": "mission_files",
     "sensors": "sensors",
     "simulate": "simulate",
     "verify": "verify",
 }
+
+
+def _command(name: str) -> click.Command:
+    """A command; where its name is a word of Python, that of its module."""
+    module = import_module(f"bisar_budget.cli.{_MODULES[name]}")
+    command: click.Command = getattr(module, _MODULES[name] if iskeyword(name) else name)
+    return command
 
 
 class _Commands(click.Group):
@@ -39,7 +48,7 @@ class _Commands(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in _MODULES:
             return None
-        command: click.Command = getattr(import_module(f"bisar_budget.cli.{_MODULES[cmd_name]}"), cmd_name)
+        command = _command(cmd_name)
         command.help = command.help or docstring(command.callback)  # without one under -OO
         return command
 

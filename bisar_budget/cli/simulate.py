@@ -1,12 +1,17 @@
 """`bisar-budget simulate`: the image of a point with the declared errors."""
 
 import os
+from typing import TYPE_CHECKING
 
 import click
 
-from bisar_budget.cli.streams import FILE, deliver, fail, load_all, spare, write_file
+from bisar_budget.cli.streams import FILE, complain, deliver, fail, load_all, spare, write_file
 from bisar_budget.cli.verify import announce, faster, progress_bar
 from bisar_budget.faults import printable
+
+if TYPE_CHECKING:
+    from bisar_budget.mission.model import Mission
+    from bisar_budget.simulate.targets import Targets
 
 
 @click.command()
@@ -15,7 +20,11 @@ from bisar_budget.faults import printable
     "--plot", type=FILE, metavar="FILE", help="Draw Figures 3 to 7 of the paper for this mission: .png, .svg or .pdf."
 )
 @click.option(
-    "-o", "--output", type=FILE, metavar="FILE.npz", help="Save the images and what explains them for NumPy."
+    "-o",
+    "--output",
+    type=FILE,
+    metavar="FILE",
+    help="Save the images and what explains them for NumPy: .npz. Or write the phase history alone: .cphd.",
 )
 @click.option(
     "--image-former",
@@ -27,7 +36,8 @@ from bisar_budget.faults import printable
 @click.option(
     "--targets",
     metavar="LIST",
-    help="What stands in the scene, instead of one point at its centre: EAST, NORTH[, LEVEL]; ...; clutter LEVEL.",
+    help="What stands in the scene, instead of one point at its centre: EAST, NORTH[, LEVEL]; ...; "
+    "grid:NXxNY:SPACING; FILE.csv; clutter LEVEL.",
 )
 def simulate(mission: str, plot: str | None, output: str | None, image_former: str, targets: str | None) -> None:
     """Form the image of a point, or of a scene, with the declared errors.
@@ -36,11 +46,18 @@ def simulate(mission: str, plot: str | None, output: str | None, image_former: s
     of `check`. The data come from exact ranges; the image is formed where the errors move the point, in the scene's
     axes and rotated so that the smear lies in cross range, before and after autofocus, and rotated back.
     With --targets "0, 0; 40 m, -30 m, -6 dB; clutter -25 dB" there are two points in clutter, and one correction for
-    both; levels are those of a pixel over a point of 0 dB.
+    both; levels are those of a pixel over a point of 0 dB. grid:5x5:40 is a grid about the scene centre, and a CSV
+    file has the columns east [m], north [m], amplitude.
+
+    FILE.cphd is the phase history for an image former of your own, as CPHD 1.1.0: the signal has the true ranges, its
+    vectors have the measured places. No image is formed then. It needs the extra `formats`.
     """
-    for name, suffixes in ((plot, (".png", ".svg", ".pdf")), (output, (".npz",))):
+    for name, suffixes in ((plot, (".png", ".svg", ".pdf")), (output, (".npz", ".cphd"))):
         if name is not None and os.path.splitext(name)[1].lower() not in suffixes:
             raise click.UsageError(f"{name}: the suffix must be one of {', '.join(suffixes)}")
+    is_phase_history = output is not None and output.lower().endswith(".cphd")
+    if is_phase_history and plot is not None:
+        raise click.UsageError("--plot draws images, and none is formed for a .cphd file.")
     spare([mission], [plot, output])
     from bisar_budget.simulate.targets import Targets, parse_targets
 
@@ -49,6 +66,9 @@ def simulate(mission: str, plot: str | None, output: str | None, image_former: s
     except ValueError as error:
         raise click.UsageError(f"--targets: {printable(str(error))}.") from None
     (loaded,) = load_all([mission])
+    if is_phase_history:
+        _export(mission, loaded, str(output), standing)
+        return
     from bisar_budget.report.drawing import point_plot
     from bisar_budget.simulate.point import SimulationError, simulate_point
 
@@ -75,3 +95,24 @@ def simulate(mission: str, plot: str | None, output: str | None, image_former: s
     if plot is not None:
         write_file(plot, point_plot.drawn(images, loaded.name, os.path.splitext(plot)[1][1:].lower()))
     deliver(point_plot.summary(images, loaded))
+
+
+def _export(mission: str, loaded: "Mission", output: str, standing: "Targets") -> None:
+    """Write the phase history, and say what is in it."""
+    from bisar_budget.formats.document import MissingExtraError
+    from bisar_budget.formats.exporting import export_phase_history
+    from bisar_budget.simulate.point import SimulationError
+
+    try:
+        written = export_phase_history(loaded, standing)
+    except (SimulationError, MissingExtraError, ValueError) as error:
+        fail(f"{mission}: {error}")
+    for remark in written.remarks:
+        complain(f"{mission}: {remark}")
+    write_file(output, written.data)
+    scatterers = f"{written.scatterers} scatterer{'' if written.scatterers == 1 else 's'}"
+    deliver(
+        f"{printable(output)}: CPHD 1.1.0, {written.vectors} vectors of {written.samples} samples, {scatterers}, "
+        f"image area {2 * written.half:g} m x {2 * written.half:g} m\n"
+        "signal by the paths as flown, vectors by the paths as measured\n"
+    )

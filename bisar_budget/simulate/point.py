@@ -353,6 +353,35 @@ def simulate_point(
     )
 
 
+class Flight(NamedTuple):
+    """Both platforms at some slow times, as flown and as measured, and the clock error. [s]"""
+
+    transmitter: Path
+    receiver: Path
+    clock: Floats
+
+
+def flight(mission: Mission, slow_time: Floats, *, vibrating: bool) -> Flight:
+    """Fly a mission once with its declared errors, as `simulate_point` does: what a receiver records.
+
+    Without vibration it is what is smooth of that, by which a response is displaced.
+
+    Parameters
+    ----------
+    mission : Mission
+        As loaded.
+    slow_time : (pulses,) ndarray
+        [s]
+    vibrating : bool
+        With vibration and what else is fast.
+    """
+    drawn = flown_errors(Analysis(mission))
+    drawn = drawn if vibrating else drawn.smooth()
+    rng = np.random.default_rng(mission.simulation.seed if mission.simulation else 1)
+    paths = _paths(mission, mission.geometry, slow_time, vibrating=vibrating, rng=rng, drawn=drawn)
+    return Flight(*paths, _clock(mission, slow_time, paths, drawn))
+
+
 def _formers(mission: Mission, image_former: str, flown: Flown, smooth: tuple[Path, Path]) -> tuple[Former, Former]:
     """Of the rotated images, and of the one along (x, y)."""
     radar = mission.radar
@@ -405,7 +434,7 @@ def _plan(
     )  # fmt: skip
     reach += max(seen, default=0.0)
     cells = [2 * math.ceil(extra + _MARGIN_CELLS) for extra in (walk + apart[0], reach + apart[1])]
-    pulses = _pulses(mission, cells[1])
+    pulses = pulses_for(mission, cells[1])
     rotated = Patch(
         (_SAMPLES_PER_CELL * cells[0], _SAMPLES_PER_CELL * cells[1]),
         (cell[0] / _SAMPLES_PER_CELL, cell[1] / _SAMPLES_PER_CELL),
@@ -430,7 +459,7 @@ def _plan(
     return Plan(rotated, in_scene, pulses, frequencies, own, outside, held)
 
 
-def _pulses(mission: Mission, cells: int) -> int:
+def pulses_for(mission: Mission, cells: int) -> int:
     """Pulses that sample the patch and every declared vibration twice over."""
     given = mission.collection.pulses
     lines = [line for name in PLATFORMS for line in lines_of(mission, name) if line.amplitude]

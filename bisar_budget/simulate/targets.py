@@ -1,5 +1,9 @@
 """What stands in a simulated scene: point targets and clutter, as the command line gives them."""
 
+import csv
+import math
+import re
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from bisar_budget import units
@@ -9,7 +13,13 @@ from bisar_budget.units import parse_quantity
 _MOST_POINTS = 100
 _FARTHEST = 1e5  # m
 _LEVELS = (-200.0, 200.0)  # dB
-_FORM = "EAST, NORTH or EAST, NORTH, LEVEL or clutter LEVEL, separated by semicolons"
+_FORM = (
+    "EAST, NORTH or EAST, NORTH, LEVEL or grid:NXxNY:SPACING or clutter LEVEL, separated by semicolons; or the name "
+    "of a .csv file"
+)
+_GRID = re.compile(r"grid:\s*(\d{1,3})\s*x\s*(\d{1,3})\s*:(.+)", re.ASCII)
+_COLUMNS = ("east [m]", "north [m]", "amplitude")
+_MOST_BYTES = 1 << 20  # of a list
 
 
 class Target(NamedTuple):
@@ -28,12 +38,13 @@ class Targets(NamedTuple):
 
 
 def parse_targets(text: str) -> Targets:
-    """Read `0, 0; 30 m, -20 m, -6 dB; clutter -25 dB`.
+    """Read `0, 0; 30 m, -20 m, -6 dB; clutter -25 dB`, or `grid:3x3:50 m`, or the name of a list.
 
     Parameters
     ----------
     text : str
-        Points and at most one clutter, in the units of a mission file; bare numbers are metres and decibels.
+        Points, grids about the scene centre, and at most one clutter, in the units of a mission file; bare numbers
+        are metres and decibels. What ends in .csv is a file with the columns east [m], north [m], amplitude.
 
     Returns
     -------
@@ -54,6 +65,12 @@ def parse_targets(text: str) -> Targets:
                 raise ValueError("clutter is given twice; one level holds for the scene")
             clutter = _number(entry, entry.removeprefix("clutter").strip(), units.POWER_RATIO)
             continue
+        if entry.lower().endswith(".csv"):
+            points += read_list(entry)
+            continue
+        if entry.startswith("grid"):
+            points += _grid(entry)
+            continue
         parts = [part.strip() for part in entry.split(",")]
         if len(parts) not in (2, 3):
             raise ValueError(f"{entry!r} has {len(parts)} parts; accepted: {_FORM}")
@@ -64,6 +81,55 @@ def parse_targets(text: str) -> Targets:
     if len(points) > _MOST_POINTS:
         raise ValueError(f"there are {len(points)} points, at most {_MOST_POINTS} are simulated")
     return Targets(tuple(points), clutter)
+
+
+def _grid(entry: str) -> Iterator[Target]:
+    """Points of equal level, `grid:NXxNY:SPACING`, about the scene centre."""
+    match = _GRID.fullmatch(entry)
+    if match is None:
+        raise ValueError(f"{entry!r} is no grid; accepted: {_FORM}")
+    columns, rows = int(match[1]), int(match[2])
+    if not 0 < columns * rows <= _MOST_POINTS:
+        raise ValueError(f"{entry!r} has {columns * rows} points, 1 to {_MOST_POINTS} are simulated")
+    spacing = _number(entry, match[3].strip(), units.LENGTH)
+    for row in range(rows):
+        for column in range(columns):
+            yield Target(spacing * (column - (columns - 1) / 2), spacing * (row - (rows - 1) / 2))
+
+
+def read_list(file: str) -> list[Target]:
+    """Read points from a CSV file with the columns east [m], north [m], amplitude.
+
+    Raises
+    ------
+    ValueError
+        The file and line of what is no list of points.
+    """
+    try:
+        with open(file, encoding="utf-8", newline="") as stream:
+            text = stream.read(_MOST_BYTES + 1)
+    except (OSError, UnicodeDecodeError) as error:
+        raise ValueError(f"{file} cannot be read: {getattr(error, 'strerror', None) or 'it is no text'}") from None
+    if len(text) > _MOST_BYTES:
+        raise ValueError(f"{file} is longer than {_MOST_BYTES} characters")
+    rows = csv.reader(text.splitlines())
+    head = [name.strip() for name in next(rows, [])]
+    if tuple(head) != _COLUMNS:
+        raise ValueError(f"{file}:1: the columns must be {', '.join(_COLUMNS)} (got {', '.join(head)[:60]})")
+    return [_listed(f"{file}:{line}", row) for line, row in enumerate(rows, 2) if row]
+
+
+def _listed(place: str, row: list[str]) -> Target:
+    try:
+        east, north, amplitude = (float(part) for part in row)
+    except ValueError:
+        raise ValueError(f"{place}: {', '.join(row)[:60]!r} is not three numbers") from None
+    if not (abs(east) <= _FARTHEST and abs(north) <= _FARTHEST):
+        raise ValueError(f"{place}: a point is beyond {_FARTHEST:g} m from the scene centre, or nowhere")
+    level = 20 * math.log10(amplitude) if 0 < amplitude < math.inf else -math.inf
+    if not _LEVELS[0] <= level <= _LEVELS[1]:
+        raise ValueError(f"{place}: the amplitude must be from 1e-10 to 1e10 (got {amplitude:g})")
+    return Target(east, north, level)
 
 
 def _number(entry: str, part: str, dimension: units.Dimension) -> float:

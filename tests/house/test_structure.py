@@ -24,6 +24,7 @@ FLOORS = [
     {"budget"},
     {"simulate"},
     {"verify"},
+    {"formats"},
     {"report"},
     {"cli"},
     {"__main__"},
@@ -105,7 +106,7 @@ def test_only_the_command_prints(path: Path) -> None:
         assert not (isinstance(node, ast.Call) and getattr(node.func, "id", "") == "print")
 
 
-HEAVY = ("sympy", "numpy", "numba", "matplotlib", "jinja2", "mpmath")
+HEAVY = ("sympy", "numpy", "numba", "matplotlib", "jinja2", "mpmath", "sarkit", "lxml")
 
 
 def loaded_after(code: str) -> set[str]:

@@ -1,0 +1,570 @@
+"""A collection out of a file: CPHD and CRSD by the parameters of their pulses, SICD by its polynomials."""
+
+import hashlib
+import math
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.faults import printable, shown
+from bisar_budget.formats.collected import (
+    LONGEST,
+    Imported,
+    NoPathError,
+    Reference,
+    Track,
+    fitted,
+    in_scene,
+    reference_of,
+)
+from bisar_budget.formats.containers import Container, open_container
+from bisar_budget.formats.declared import Errors, Seen, of_matrices, of_sigmas
+from bisar_budget.formats.document import Element, FormatError, MissingExtraError
+from bisar_budget.geometry import PlatformState, Vector
+from bisar_budget.paths.earth import Place, SceneAxes, axes_at, geodetic
+from bisar_budget.paths.instant import parse_instant
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+_SAMPLES = 201  # moments at which a polynomial of the file is taken; enough for one of any order there
+_SETTLING = 5  # rounds of a light time; each leaves v/c of what the one before left
+_COVERED = 0.02  # of the aperture, that pulses may lack at its ends
+
+
+class _Pulses(NamedTuple):
+    """Vectors of a channel: times of transmission and of reception [s], places then, Earth-fixed [m]."""
+
+    sent: "Floats"
+    transmitter: "Floats"
+    received: "Floats"
+    receiver: "Floats"
+    reference: int  # index of the reference vector among them
+
+
+class _Aperture(NamedTuple):
+    """Middle and length of the dwell on the scene point, counted from the file's start. [s]"""
+
+    middle: float
+    length: float
+
+
+def import_collection(file: str, channel: str | None = None) -> Imported:
+    """Read the collection of a CPHD, CRSD or SICD file, or of XML of one.
+
+    Parameters
+    ----------
+    file : str
+        Its name. Header, XML and parameters of the pulses are read, the signal is not.
+    channel : str, optional
+        Identifier of a channel of CPHD or CRSD; the reference channel.
+
+    Returns
+    -------
+    Imported
+
+    Raises
+    ------
+    FormatError
+        The file cannot be used; the message names it, and its byte or XML path.
+    MissingExtraError
+        The extra `formats` is not installed.
+    """
+    try:
+        import_module("lxml.etree")
+        import_module("sarkit")
+    except ImportError:
+        raise MissingExtraError from None
+    container = open_container(file)
+    read: Callable[[Container, str | None], Imported] = _READERS[container.format.split()[0]]
+    return read(container, channel)
+
+
+# ---------------------------------------------------------------------- CPHD
+def _cphd(container: Container, channel: str | None) -> Imported:
+    """CPHD 1.0.1 and 1.1.0 (NGA.STND.0068-1)."""
+    xml = container.xml
+    channel, parameters = _chosen(xml, channel, "Channel/Parameters", "Identifier")
+    center, bandwidth = parameters.number("FxC"), parameters.number("FxBW")
+    is_monostatic = xml.text("CollectionID/CollectType") == "MONOSTATIC"
+    start = xml.one("Global/Timeline/CollectionStart")
+    remarks = []
+    if container.has_vectors:
+        data = xml.with_child("Data/Channel", "Identifier", channel)
+        if data is None:
+            raise xml.fault(f"has no channel {shown(channel)!r}", "Data")
+        vectors = container.vectors(
+            "PVP", data.whole("PVPArrayByteOffset"), data.whole("NumVectors"), _dtype(xml, "PVP")
+        )
+        pulses, point = _pulses_of_cphd(container, vectors, parameters)
+        aperture = _dwell(xml, xml.maybe("Dwell"), parameters.one("DwellTimes"), point)
+        axes = axes_at(geodetic(point))
+        tracks = _tracks(container, pulses, axes, aperture, center)
+        remarks += _coverage(pulses, axes, aperture)
+        reference = _at_reference(pulses, axes, aperture, tracks)
+    else:
+        point = xml.vector("ReferenceGeometry/SRP/ECF")
+        dwell = xml.number("ReferenceGeometry/SRPDwellTime")
+        axes = axes_at(geodetic(point))
+        aperture = _Aperture(xml.number("ReferenceGeometry/ReferenceTime"), dwell)
+        tracks = _stated(xml, axes, is_monostatic)
+        reference = reference_of(tracks[0].state, tracks[1].state, 0.0)
+        remarks.append(
+            "The file is XML without parameters of pulses: both platforms are taken from its ReferenceGeometry, and "
+            "fly straight on. Slow time counts from its ReferenceTime, not from the centre of the dwell "
+            f"({xml.number('ReferenceGeometry/SRPCODTime') - aperture.middle:+.6g} s)."
+        )
+    remarks += _off_reference_point(xml, point)
+    seen = Seen(tracks[0].state, tracks[1].state, axes)
+    errors = of_sigmas(xml.maybe("ErrorParameters"), seen, is_monostatic=is_monostatic)
+    name, collectors = _names(xml, "CollectionID")
+    remarks = [*collectors, *remarks]
+    return _imported(
+        container, channel, name, point, (center, bandwidth), aperture, start, tracks, is_monostatic, reference,
+        errors, remarks,
+    )  # fmt: skip
+
+
+def _dtype(xml: Element, block: str) -> "np.dtype[Any]":
+    """Form of the parameters of a vector, or of a pulse that was sent, as the XML describes it."""
+    module: Any = import_module("sarkit.cphd" if xml.tag == "CPHD" else "sarkit.crsd")
+    reads = module.get_ppp_dtype if block == "PPP" else module.get_pvp_dtype
+    try:
+        dtype: np.dtype[Any] = reads(xml.node.getroottree())
+    except (AttributeError, IndexError, KeyError, SyntaxError, TypeError, ValueError) as error:
+        raise xml.fault(f"describes no parameters ({shown(str(error))})", block) from None
+    return dtype
+
+
+def _fields(xml: Element, vectors: "NDArray[Any]", block: str, *names: str) -> list["Floats"]:
+    import numpy as np
+
+    found = []
+    for name in names:
+        if name not in (vectors.dtype.names or ()):
+            raise xml.fault("is missing", f"{block}/{name}")
+        values = vectors[name]
+        if values.dtype.names == ("Int", "Frac"):
+            values = values["Int"] + values["Frac"]
+        if values.dtype.kind not in "iuf" or values.shape[1:] != ((3,) if name.endswith(("Pos", "Vel")) else ()):
+            raise xml.fault("has another form than the standard's", f"{block}/{name}")
+        found.append(np.asarray(values, dtype=float))
+    return found
+
+
+def _pulses_of_cphd(container: Container, vectors: "NDArray[Any]", parameters: Element) -> tuple[_Pulses, Vector]:
+    import numpy as np
+
+    names = ("TxTime", "TxPos", "RcvTime", "RcvPos", "SRPPos")
+    sent, transmitter, received, receiver, points = _fields(container.xml, vectors, "PVP", *names)
+    reference = parameters.whole("RefVectorIndex")
+    if reference >= len(vectors):
+        raise parameters.fault(f"is beyond the {len(vectors)} vectors", "RefVectorIndex")
+    usable = np.isfinite(sent) & np.isfinite(received)
+    for places in (transmitter, receiver, points):
+        usable &= np.isfinite(places).all(axis=1)
+    if not usable[reference]:
+        raise parameters.fault("is a vector without times or places", "RefVectorIndex")
+    x, y, z = (float(value) for value in points[reference])
+    kept = _Pulses(
+        sent[usable], transmitter[usable], received[usable], receiver[usable], int(usable[:reference].sum())
+    )
+    return kept, (x, y, z)
+
+
+def _scene_time(pulses: _Pulses, point: "Floats") -> "Floats":
+    """When each pulse is at the scene point: reference time of CPHD 1.1.0, section 6.5.1 (5). [s]"""
+    import numpy as np
+
+    out = np.linalg.norm(pulses.transmitter - point, axis=1)
+    back = np.linalg.norm(pulses.receiver - point, axis=1)
+    scene_time: Floats = pulses.sent + out / (out + back) * (pulses.received - pulses.sent)
+    return scene_time
+
+
+def _dwell(xml: Element, dwell: Element | None, used: Element, point: Vector) -> _Aperture:
+    """Centre of dwell and dwell time at the scene point, section 6.5.1 (6) of CPHD 1.1.0."""
+    if dwell is None:
+        raise xml.fault("is missing: nothing says how long the scene point is seen", "Dwell")
+    found = []
+    x, y = _image_coordinates(xml.one("SceneCoordinates"), point)
+    for name, key in (("CODTime", "CODId"), ("DwellTime", "DwellId")):
+        polynomial = dwell.with_child(name, "Identifier", used.text(key))
+        if polynomial is None:
+            raise used.fault(f"names no {name} of {dwell.path}", key)
+        found.append(_at(polynomial.polynomial_2d(f"{name}Poly"), x, y))
+    if not found[1] > 0:
+        raise used.fault(f"gives a dwell time of {found[1]:g} s at the scene point")
+    return _Aperture(*found)
+
+
+def _at(polynomial: "Floats", x: float, y: float) -> float:
+    import numpy as np
+
+    return float(np.polynomial.polynomial.polyval2d(x, y, polynomial))
+
+
+def _image_coordinates(scene: Element, point: Vector) -> tuple[float, float]:
+    """IAX and IAY of a point: image area coordinates of CPHD, on a plane or on a surface of constant height. [m]"""
+    import numpy as np
+
+    planar = scene.maybe("ReferenceSurface/Planar")
+    if planar is not None:
+        away = np.subtract(point, scene.vector("IARP/ECF"))
+        return float(away @ planar.vector("uIAX")), float(away @ planar.vector("uIAY"))
+    level = scene.one("ReferenceSurface/HAE")
+    place = geodetic(point)
+    origin = [math.radians(scene.number(f"IARP/LLH/{name}")) for name in ("Lat", "Lon")]
+    axes = np.array([[level.number(f"{axis}/{name}") for name in ("Lat", "Lon")] for axis in ("uIAXLL", "uIAYLL")])
+    turned = math.remainder(place.longitude - origin[1], 2 * math.pi)
+    try:
+        x, y = np.linalg.solve(axes.T, [place.latitude - origin[0], turned])
+    except np.linalg.LinAlgError:
+        raise level.fault("has axes along one line") from None
+    return float(x), float(y)
+
+
+def _off_reference_point(xml: Element, point: Vector) -> list[str]:
+    origin = xml.maybe("SceneCoordinates/IARP/ECF")
+    away = 0.0 if origin is None else math.dist(origin.vector(), point)
+    if away < 1e-3:
+        return []
+    return [f"The scene point is {away:.6g} m from the image area's reference point (IARP)."]
+
+
+def _stated(xml: Element, axes: SceneAxes, is_monostatic: bool) -> tuple[Track, Track]:
+    """Both platforms of CPHD's `ReferenceGeometry`."""
+    geometry = xml.one("ReferenceGeometry")
+    paths = (
+        ("Monostatic/ARP", "Monostatic/ARP") if is_monostatic else ("Bistatic/TxPlatform/", "Bistatic/RcvPlatform/")
+    )
+    tracks = []
+    for path in paths:
+        position, velocity = (geometry.vector(f"{path}{what}") for what in ("Pos", "Vel"))
+        tracks.append(Track(PlatformState(position=axes.place(position), velocity=axes.turned(velocity)), 1))
+    return tracks[0], tracks[1]
+
+
+# ---------------------------------------------------------------------- CRSD
+def _crsd(container: Container, channel: str | None) -> Imported:
+    """CRSD 1.0 of a SAR collection (NGA.STND.0080-2): pulses that were sent, and what each receive window heard."""
+    xml = container.xml
+    if xml.tag != "CRSDsar":
+        raise FormatError(container.file, f"/{xml.tag} is one way of a collection; accepted: CRSDsar, which has both")
+    channel, parameters = _chosen(xml, channel, "Channel/Parameters", "Identifier")
+    sar = parameters.one("SARImage")
+    sequence = xml.with_child("TxSequence/Parameters", "Identifier", sar.text("TxId"))
+    if sequence is None:
+        raise sar.fault("names no transmit sequence of the file", "TxId")
+    is_monostatic = xml.text("SARInfo/CollectType") == "MONOSTATIC"
+    point = xml.vector("ReferenceGeometry/RefPoint/ECF")
+    axes = axes_at(geodetic(point))
+    used = sar.one("DwellTimes/Polynomials")
+    aperture = _dwell(xml, xml.maybe("DwellPolynomials"), used, point)
+    if "PVP" not in container.blocks or "PPP" not in container.blocks:
+        raise FormatError(container.file, "byte 0: has no parameters of pulses (PPP) and of receive windows (PVP)")
+    heard = xml.with_child("Data/Receive/Channel", "ChId", channel)
+    sent = xml.with_child("Data/Transmit/TxSequence", "TxId", sar.text("TxId"))
+    if heard is None or sent is None:
+        raise xml.fault("lacks the channel or its transmit sequence", "Data")
+    vectors = container.vectors(
+        "PVP", heard.whole("PVPArrayByteOffset"), heard.whole("NumVectors"), _dtype(xml, "PVP")
+    )
+    sends = container.vectors("PPP", sent.whole("PPPArrayByteOffset"), sent.whole("NumPulses"), _dtype(xml, "PPP"))
+    pulses = _pulses_of_crsd(container, vectors, sends, point, parameters)
+    center, bandwidth = sequence.number("FxC"), sequence.number("FxBW")
+    tracks = _tracks(container, pulses, axes, aperture, center)
+    seen = Seen(tracks[0].state, tracks[1].state, axes)
+    errors = of_matrices(xml.maybe("ErrorParameters/SARImage"), seen, ("PosVelError", "TimeFreqCov"), (2, 3))
+    remarks = [*_coverage(pulses, axes, aperture), *_off_reference_point(xml, point)]
+    name = xml.maybe("ProductInfo/ProductName")
+    return _imported(
+        container, channel, name.text() if name is not None else "", point, (center, bandwidth), aperture,
+        xml.one("Global/CollectionRefTime"), tracks, is_monostatic, _at_reference(pulses, axes, aperture, tracks),
+        errors, remarks,
+    )  # fmt: skip
+
+
+def _pulses_of_crsd(
+    container: Container, vectors: "NDArray[Any]", sends: "NDArray[Any]", point: Vector, parameters: Element
+) -> _Pulses:
+    """Pulses with the time at which the echo of the scene point comes back.
+
+    The receiver's place is stated for the start of its window. Its velocity carries it to the echo, less than a
+    millisecond later.
+    """
+    import numpy as np
+
+    xml = container.xml
+    begun, places, velocities, index = _fields(xml, vectors, "PVP", "RcvStart", "RcvPos", "RcvVel", "TxPulseIndex")
+    sent, transmitter = _fields(xml, sends, "PPP", "TxTime", "TxPos")
+    known = np.isfinite(index) & (index >= 0) & (index < len(sends)) & np.isfinite(begun)
+    reference = parameters.whole("RefVectorIndex")
+    if reference >= len(vectors) or not known[reference]:
+        raise parameters.fault("is no vector with a pulse", "RefVectorIndex")
+    which = index[known].astype(int)
+    sent, transmitter, begun = sent[which], transmitter[which], begun[known]
+    places, velocities = places[known], velocities[known]
+    out = np.linalg.norm(transmitter - point, axis=1)
+    received, receiver = begun, places
+    for _ in range(_SETTLING):
+        received = sent + (out + np.linalg.norm(receiver - point, axis=1)) / SPEED_OF_LIGHT
+        receiver = places + velocities * (received - begun)[:, None]
+    return _Pulses(sent, transmitter, received, receiver, int(known[:reference].sum()))
+
+
+# ---------------------------------------------------------------------- SICD
+def _sicd(container: Container, channel: str | None) -> Imported:
+    """SICD (NGA.STND.0024-1): the platforms' polynomials, and the part of them that the image was formed from."""
+    import numpy as np
+
+    xml = container.xml
+    if channel is not None:
+        raise FormatError(container.file, f"a SICD is one image and has no channel {shown(channel)!r}")
+    if (xml.maybe("RadarCollection/RefFreqIndex") or xml).tag == "RefFreqIndex" and xml.whole(
+        "RadarCollection/RefFreqIndex"
+    ):
+        raise xml.fault("counts frequencies from one that the file keeps to itself", "RadarCollection/RefFreqIndex")
+    band = xml.one("ImageFormation/TxFrequencyProc")
+    low, high = band.number("MinProc"), band.number("MaxProc")
+    is_monostatic = xml.text("CollectionInfo/CollectType") == "MONOSTATIC"
+    point = xml.vector("GeoData/SCP/ECF")
+    axes = axes_at(geodetic(point))
+    middle = xml.number("SCPCOA/SCPTime")
+    sent_from, heard_at = _polynomials_of_sicd(xml, is_monostatic)
+
+    def pulses_at(times: "Floats") -> _Pulses:
+        """Pulses that are at the scene point at some times."""
+        out, back = times, times
+        if not is_monostatic:  # the aperture reference point of one platform is that of the time in between
+            for _ in range(_SETTLING):
+                out = times - np.linalg.norm(_over(sent_from, out) - point, axis=1) / SPEED_OF_LIGHT
+                back = times + np.linalg.norm(_over(heard_at, back) - point, axis=1) / SPEED_OF_LIGHT
+        return _Pulses(out, _over(sent_from, out), back, _over(heard_at, back), times.size // 2)
+
+    aperture, remarks = _aperture_of_sicd(xml, axes, middle, (low + high) / 2, pulses_at)
+    times: Floats = middle + np.linspace(-0.5, 0.5, _SAMPLES) * aperture.length
+    pulses = pulses_at(times)
+    try:
+        transmitter, receiver = (
+            fitted(times - middle, in_scene(axes, places), aperture.length, 2 * SPEED_OF_LIGHT / (low + high))
+            for places in (pulses.transmitter, pulses.receiver)
+        )
+    except NoPathError as error:
+        raise FormatError(container.file, str(error)) from None
+    tracks = (transmitter, receiver)
+    seen = Seen(transmitter.state, receiver.state, axes)
+    statistics = xml.maybe("ErrorStatistics")
+    components = statistics.maybe("BistaticComponents") if statistics is not None else None
+    errors = (
+        of_matrices(components, seen, ("PosVelErr", "TxRcvTimeFreq"), (1, 3))
+        if components is not None
+        else of_sigmas(statistics, seen, is_monostatic=is_monostatic)
+    )
+    reference = reference_of(transmitter.state, receiver.state, 0.0)
+    name, collectors = _names(xml, "CollectionInfo")
+    remarks = [*collectors, *remarks]
+    return _imported(
+        container, "", name, point, ((low + high) / 2, high - low), aperture, xml.one("Timeline/CollectStart"),
+        tracks, is_monostatic, reference, errors, remarks,
+    )  # fmt: skip
+
+
+def _over(polynomial: "Floats", times: "Floats") -> "Floats":
+    """Places (n, 3) of a path polynomial at times (n,)."""
+    import numpy as np
+
+    places: Floats = np.asarray(np.polynomial.polynomial.polyval(times, polynomial).T, dtype=float)
+    return places
+
+
+def _polynomials_of_sicd(xml: Element, is_monostatic: bool) -> tuple["Floats", "Floats"]:
+    position = xml.one("Position")
+    if is_monostatic:
+        both = position.path_polynomial("ARPPoly")
+        return both, both
+    channel = (
+        xml.text("ImageFormation/RcvChanProc/ChanIndex") if xml.maybe("ImageFormation/RcvChanProc/ChanIndex") else "1"
+    )
+    found = next(
+        (one for one in xml.all("RadarCollection/RcvChannels/ChanParameters") if one.node.get("index") == channel),
+        None,
+    )
+    wanted = found.text("RcvAPCIndex") if found is not None and found.maybe("RcvAPCIndex") is not None else "1"
+    receiver = next((one for one in position.all("RcvAPC/RcvAPCPoly") if one.node.get("index") == wanted), None)
+    if receiver is None:
+        raise position.fault(
+            f"has no phase centre {shown(wanted)} that the processed channel was received by", "RcvAPC"
+        )
+    holder = Element(xml.file, receiver.node.getparent())
+    index = [node is receiver.node for node in holder.node.findall("{*}RcvAPCPoly")].index(True) + 1
+    return position.path_polynomial("TxAPCPoly"), holder.path_polynomial(f"RcvAPCPoly[{index}]")
+
+
+def _aperture_of_sicd(
+    xml: Element, axes: SceneAxes, middle: float, center: float, pulses_at: Callable[["Floats"], _Pulses]
+) -> tuple[_Aperture, list[str]]:
+    """Aperture of a pixel at the scene point: what the processed time gives, or less where the image's band says so.
+
+    The wave vector of the image moves by |d(u_t + u_r)/dt · col| f/c a second; the band ImpRespBW of a column is what
+    it moved in the aperture. A stripmap is processed for longer than a point is seen.
+    """
+    import numpy as np
+
+    formation = xml.one("ImageFormation")
+    begin, end = formation.number("TStartProc"), formation.number("TEndProc")
+    processed = end - begin
+    if not processed > 0:
+        raise formation.fault("ends before it begins", "TEndProc")
+    step = min(0.01, processed / 10)
+    near = pulses_at(np.array([middle - step, middle + step]))
+    origin = np.array(axes.origin)
+    t, r = near.transmitter - origin, near.receiver - origin
+    sights: Floats = t / np.linalg.norm(t, axis=1, keepdims=True) + r / np.linalg.norm(r, axis=1, keepdims=True)
+    rate = (
+        abs(float((sights[1] - sights[0]) @ xml.vector("Grid/Col/UVectECF"))) / (2 * step) * center / SPEED_OF_LIGHT
+    )
+    seen = xml.number("Grid/Col/ImpRespBW") / rate if rate else math.inf
+    if seen < (1 - _COVERED) * processed:
+        return _Aperture(middle, seen), [
+            f"The aperture is what the band of an image column takes (Grid/Col/ImpRespBW); the file was processed "
+            f"from {processed:.6g} s."
+        ]
+    if abs((begin + end) / 2 - middle) > _COVERED * processed:
+        return _Aperture(middle, processed), [
+            f"The aperture is as long as the time processed; its middle is {middle - (begin + end) / 2:+.6g} s from "
+            "the middle of that, at the centre of aperture of the scene point (SCPCOA)."
+        ]
+    return _Aperture(middle, processed), []
+
+
+# ---------------------------------------------------------------------- all of them
+def _chosen(xml: Element, channel: str | None, path: str, key: str) -> tuple[str, Element]:
+    """Identifier and parameters of a channel."""
+    name = xml.text("Channel/RefChId") if channel is None else channel
+    found = xml.with_child(path, key, name)
+    if found is None:
+        known = ", ".join(shown(one.text(key)) for one in xml.all(path))
+        raise xml.fault(f"has no channel {shown(name)!r}; it has {known}", path)
+    return name, found
+
+
+def _tracks(
+    container: Container, pulses: _Pulses, axes: SceneAxes, aperture: _Aperture, center: float
+) -> tuple[Track, Track]:
+    import numpy as np
+
+    if not center > 0:
+        raise FormatError(container.file, f"its centre frequency is {center:g} Hz")
+    times = _scene_time(pulses, np.array(axes.origin)) - aperture.middle
+    try:
+        transmitter, receiver = (
+            fitted(times, in_scene(axes, places), aperture.length, SPEED_OF_LIGHT / center)
+            for places in (pulses.transmitter, pulses.receiver)
+        )
+    except NoPathError as error:
+        raise FormatError(container.file, f"{container.xml.path}: {error}") from None
+    return transmitter, receiver
+
+
+def _coverage(pulses: _Pulses, axes: SceneAxes, aperture: _Aperture) -> list[str]:
+    import numpy as np
+
+    times = _scene_time(pulses, np.array(axes.origin)) - aperture.middle
+    inside = times[np.abs(times) <= aperture.length / 2]
+    lacking = [inside.min() + aperture.length / 2, aperture.length / 2 - inside.max()]
+    if max(lacking) <= _COVERED * aperture.length:
+        return []
+    return [
+        f"Pulses cover the aperture from {inside.min():.6g} s to {inside.max():.6g} s of slow time; its ends are "
+        "the polynomials' own."
+    ]
+
+
+def _names(xml: Element, path: str) -> tuple[str, list[str]]:
+    """Name of the collection, and who collected it."""
+    found = {key: xml.maybe(f"{path}/{key}") for key in ("CoreName", "CollectorName", "IlluminatorName")}
+    core, collector, illuminator = (one.text() if one is not None else "" for one in found.values())
+    by = f"Collected by {shown(collector)}" if collector else ""
+    lit = f"{'lit' if by else 'Lit'} by {shown(illuminator)}" if illuminator else ""
+    return core, [f"{', '.join(part for part in (by, lit) if part)}."] if by or lit else []
+
+
+def _at_reference(
+    pulses: _Pulses, axes: SceneAxes, aperture: _Aperture, tracks: tuple[Track, Track]
+) -> Reference | None:
+    import numpy as np
+
+    at = float(_scene_time(pulses, np.array(axes.origin))[pulses.reference]) - aperture.middle
+    if abs(at) > aperture.length / 2 * (1 + 1e-9):
+        return None  # the paths are not fitted there
+    return reference_of(tracks[0].state, tracks[1].state, at)
+
+
+def _imported(
+    container: Container,
+    channel: str,
+    name: str,
+    point: Vector,
+    band: tuple[float, float],
+    aperture: _Aperture,
+    start: Element,
+    tracks: tuple[Track, Track],
+    is_monostatic: bool,
+    reference: Reference | None,
+    errors: Errors,
+    remarks: list[str],
+) -> Imported:
+    if not (0 < aperture.length <= LONGEST and abs(aperture.middle) <= LONGEST):
+        raise FormatError(
+            container.file, f"{container.xml.path}: an aperture of {aperture.length:g} s at {aperture.middle:g} s"
+        )
+    if not 0 < band[1] < 2 * band[0]:
+        raise FormatError(
+            container.file, f"{container.xml.path}: a band of {band[1]:g} Hz about {band[0]:g} Hz, which is none"
+        )
+    place: Place = geodetic(point)
+    axes = axes_at(place)
+    transmitter, receiver = (
+        track._replace(state=replace(track.state, radial=axes.radial(track.state.position, track.state.velocity)))
+        for track in tracks
+    )
+    return Imported(
+        file=os.path.basename(container.file),
+        format=container.format,
+        xml_sha256=hashlib.sha256(container.xml_data).hexdigest(),
+        channel=channel,
+        name=printable(name) or os.path.basename(container.file),
+        scene=place,
+        center_frequency=band[0],
+        bandwidth=band[1],
+        aperture_time=aperture.length,
+        center_time=_center_time(start, aperture.middle),
+        transmitter=transmitter,
+        receiver=receiver,
+        is_monostatic=is_monostatic,
+        reference=reference,
+        transmitter_error=errors.transmitter,
+        receiver_error=errors.receiver,
+        common_error=errors.common,
+        timing_constant=errors.timing_constant,
+        timing_linear=errors.timing_linear,
+        errors_at=errors.at,
+        remarks=(*remarks, *errors.remarks),
+    )
+
+
+def _center_time(start: Element, middle: float) -> str:
+    instant = parse_instant(start.text(), needs_zone=False)
+    if instant is None:
+        raise start.fault(f"is no instant of UTC (got {shown(start.text())!r})")
+    return instant.after(middle).as_text()
+
+
+_READERS: dict[str, Callable[[Container, str | None], Imported]] = {"CPHD": _cphd, "CRSD": _crsd, "SICD": _sicd}
