@@ -111,7 +111,11 @@ class Page:
         """Check a mission file; what has no `schema_version` is put into one."""
         part = yaml.load(text, yaml.BaseLoader)
         if "schema_version" not in part:
-            text = yaml.safe_dump(_merged(yaml.load(_WHOLE, yaml.BaseLoader), part), sort_keys=False)
+            whole = _merged(yaml.load(_WHOLE, yaml.BaseLoader), part)
+            for platform in whole["platforms"].values():
+                if platform.keys() & {"orbit", "trajectory", "latitude"}:  # another way to say where it flies
+                    del platform["position"], platform["velocity"]
+            text = yaml.safe_dump(whole, sort_keys=False)
         told = self._shell("bisar-budget check -q -", text)
         exit_code, self.exit_code = self.exit_code, 0
         if exit_code > 1:
