@@ -5,8 +5,6 @@ import math
 import signal
 from collections.abc import Callable
 from datetime import date
-from functools import cache
-from importlib import import_module
 from inspect import signature
 from pathlib import Path
 from typing import Any
@@ -100,19 +98,6 @@ def row(found: MissionFindings, row_id: str) -> Row:
     """Find a row by id."""
     (match,) = [row for row in found.rows if row.id == row_id]
     return match
-
-
-@cache
-def _derived(emitter: str) -> str:
-    return str(import_module(emitter).source())
-
-
-@pytest.fixture
-def one_derivation(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The generated texts, derived once for all tests: it takes ten seconds."""
-    for emitter in ("bisar_budget.theory.emit", "bisar_budget.theory.emit_catalogue"):
-        text = _derived(emitter)
-        monkeypatch.setattr(f"{emitter}.source", lambda text=text: text)
 
 
 @pytest.fixture

@@ -58,22 +58,22 @@ MUTANTS = (
     Mutant(
         "(31): sign",
         _DERIVED,
-        "return in_angles(adjugate[:, 1], platforms)",
-        "return in_angles(-adjugate[:, 1], platforms)",
+        "in_angles(adjugate[:, 1], platforms)",
+        "in_angles(-adjugate[:, 1], platforms)",
         (_SMEAR_DIRECTION,),
     ),
     Mutant(
         "(31): turned by 90°",
         _DERIVED,
-        "return in_angles(adjugate[:, 1], platforms)",
-        "return in_angles(Matrix([adjugate[1, 1], -adjugate[0, 1]]), platforms)",
+        "in_angles(adjugate[:, 1], platforms)",
+        "in_angles(Matrix([adjugate[1, 1], -adjugate[0, 1]]), platforms)",
         (_SMEAR_DIRECTION,),
     ),
     Mutant(
         "(31): the first column of Q⁻¹",
         _DERIVED,
-        "return in_angles(adjugate[:, 1], platforms)",
-        "return in_angles(adjugate[:, 0], platforms)",
+        "in_angles(adjugate[:, 1], platforms)",
+        "in_angles(adjugate[:, 0], platforms)",
         (_SMEAR_DIRECTION,),
     ),
     Mutant(
