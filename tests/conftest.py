@@ -2,12 +2,19 @@
 
 import copy
 import math
+import os
 import signal
 from collections.abc import Callable
 from datetime import date
 from inspect import signature
 from pathlib import Path
 from typing import Any
+
+# Processes that test side by side have a core each: threads that wait for each other there take time from the others.
+# Read by NumPy's algebra and by finufft when they are imported. Kernels of Numba keep their threads.
+if "PYTEST_XDIST_WORKER" in os.environ:
+    for _library in ("OPENBLAS", "OMP", "MKL"):
+        os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 
 import numpy as np
 import pytest

@@ -19,7 +19,7 @@ from bisar_budget.simulate.point import PointImages, simulate_point
 from bisar_budget.simulate.resampling import resampled
 from bisar_budget.simulate.targets import Target, Targets, parse_targets
 from tests.conftest import ROOT, mission_text
-from tests.simulate.conftest import images_of
+from tests.simulate.conftest import images_of, load_kernels
 
 SECTION_V = ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml"
 # Nothing about these three is the same after a transposition, a mirror or a half turn.
@@ -257,6 +257,7 @@ SHORT = {"collection__aperture_time": "1 s", "radar__bandwidth": "20 MHz"}
 def of_a_short_aperture(image_former: str) -> tuple[PointImages, int]:
     """Images from as few pulses as the patch takes, once by each image former, and the peak of memory. [B]"""
     mission = parse_mission(mission_text(**SHORT))
+    load_kernels()
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(point_module, "_MIN_PULSES", 64)
         tracemalloc.start()
@@ -364,8 +365,12 @@ class TestTargets:
         assert result.exit_code == 2
         assert said in result.stderr
 
-    def test_a_scene_is_refocused_by_one_correction(self, run, tmp_path) -> None:
-        """Spatial invariance: the same phase and displacement at each target, and one phase takes it from all."""
+    def test_a_scene_is_refocused_by_one_correction(self, run, tmp_path, monkeypatch) -> None:
+        """Spatial invariance: the same phase and displacement at each target, and one phase takes it from all.
+
+        What is measured is measured in (x′, y′): of the image in (x, y) a small middle is enough.
+        """
+        monkeypatch.setattr(point_module, "_SCENE_PIXELS", 1 << 12)
         archive = tmp_path / "scene.npz"
         targets = "0, 0; 9 m, -5 m, -6 dB; -7, 8; clutter -40 dB"
         result = run("simulate", SECTION_V, "--targets", targets, "-o", archive)
