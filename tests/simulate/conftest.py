@@ -13,7 +13,6 @@ from bisar_budget.geometry import BistaticGeometry, PlatformState, state_from_an
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.simulate import point
 from bisar_budget.simulate.phase_history import PathError, PhaseHistory, cell_centres, path, phase_history
-from tests.conftest import mission_text
 
 
 @dataclass(frozen=True)
@@ -113,15 +112,6 @@ def collection(squint_deg: float = 0.0, **options) -> Collection:
 @pytest.fixture
 def broadside() -> Collection:
     return collection()
-
-
-@cache
-def load_kernels() -> None:
-    """Import what forms images: under tracemalloc that takes ten seconds, and is no memory of an image."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(point, "_MARGIN_CELLS", 6)
-        patch.setattr(point, "_SCENE_PIXELS", 1 << 10)
-        point.simulate_point(parse_mission(mission_text(collection__aperture_time="1 s", radar__bandwidth="20 MHz")))
 
 
 @cache

@@ -19,7 +19,7 @@ from bisar_budget.simulate.point import PointImages, simulate_point
 from bisar_budget.simulate.resampling import resampled
 from bisar_budget.simulate.targets import Target, Targets, parse_targets
 from tests.conftest import ROOT, mission_text
-from tests.simulate.conftest import images_of, load_kernels
+from tests.simulate.conftest import images_of
 
 SECTION_V = ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml"
 # Nothing about these three is the same after a transposition, a mirror or a half turn.
@@ -257,7 +257,6 @@ SHORT = {"collection__aperture_time": "1 s", "radar__bandwidth": "20 MHz"}
 def of_a_short_aperture(image_former: str) -> tuple[PointImages, int]:
     """Images from as few pulses as the patch takes, once by each image former, and the peak of memory. [B]"""
     mission = parse_mission(mission_text(**SHORT))
-    load_kernels()
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(point_module, "_MIN_PULSES", 64)
         tracemalloc.start()
