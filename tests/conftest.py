@@ -2,14 +2,19 @@
 
 import copy
 import math
+import os
 import signal
 from collections.abc import Callable
 from datetime import date
-from functools import cache
-from importlib import import_module
 from inspect import signature
 from pathlib import Path
 from typing import Any
+
+# Processes that test side by side have a core each: threads that wait for each other there take time from the others.
+# Read by NumPy's algebra and by finufft when they are imported. Kernels of Numba keep their threads.
+if "PYTEST_XDIST_WORKER" in os.environ:
+    for _library in ("OPENBLAS", "OMP", "MKL"):
+        os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 
 import numpy as np
 import pytest
@@ -100,19 +105,6 @@ def row(found: MissionFindings, row_id: str) -> Row:
     """Find a row by id."""
     (match,) = [row for row in found.rows if row.id == row_id]
     return match
-
-
-@cache
-def _derived(emitter: str) -> str:
-    return str(import_module(emitter).source())
-
-
-@pytest.fixture
-def one_derivation(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The generated texts, derived once for all tests: it takes ten seconds."""
-    for emitter in ("bisar_budget.theory.emit", "bisar_budget.theory.emit_catalogue"):
-        text = _derived(emitter)
-        monkeypatch.setattr(f"{emitter}.source", lambda text=text: text)
 
 
 @pytest.fixture

@@ -46,7 +46,7 @@ _PLOT = "bisar_budget/report/drawing/point_plot.py"
 _FIGURES = "bisar_budget/report/drawing/point_figures.py"
 
 _FIGURES_3_TO_7 = "tests/simulate/test_figures.py::"
-_BORDERS = "tests/simulate/test_verdict_borders.py::"
+_BORDERS = "tests/verify/test_verdict_borders.py::"
 _IMAGES = "tests/simulate/test_point_against_images.py::"
 _POINTS_OF_29 = f"{_IMAGES}test_points_of_29_are_where_each_third_of_the_aperture_puts_the_response"
 _SMEAR_DIRECTION = "tests/theory/test_smear_direction.py::test_a_range_rate_moves_the_image_along_31"
@@ -58,22 +58,22 @@ MUTANTS = (
     Mutant(
         "(31): sign",
         _DERIVED,
-        "return in_angles(adjugate[:, 1], platforms)",
-        "return in_angles(-adjugate[:, 1], platforms)",
+        "in_angles(adjugate[:, 1], platforms)",
+        "in_angles(-adjugate[:, 1], platforms)",
         (_SMEAR_DIRECTION,),
     ),
     Mutant(
         "(31): turned by 90°",
         _DERIVED,
-        "return in_angles(adjugate[:, 1], platforms)",
-        "return in_angles(Matrix([adjugate[1, 1], -adjugate[0, 1]]), platforms)",
+        "in_angles(adjugate[:, 1], platforms)",
+        "in_angles(Matrix([adjugate[1, 1], -adjugate[0, 1]]), platforms)",
         (_SMEAR_DIRECTION,),
     ),
     Mutant(
         "(31): the first column of Q⁻¹",
         _DERIVED,
-        "return in_angles(adjugate[:, 1], platforms)",
-        "return in_angles(adjugate[:, 0], platforms)",
+        "in_angles(adjugate[:, 1], platforms)",
+        "in_angles(adjugate[:, 0], platforms)",
         (_SMEAR_DIRECTION,),
     ),
     Mutant(
@@ -228,7 +228,7 @@ MUTANTS = (
         _EVALUATORS,
         "(0.0, 0.0, constant_y*shared_3, linear_y*shared_4),  # acceleration y",
         "(0.0, 0.0, constant_y*shared_3, -linear_y*shared_4),  # acceleration y",
-        ("tests/theory/test_against_exact_ranges.py", "tests/simulate/test_verify.py::TestTogether"),
+        ("tests/theory/test_against_exact_ranges.py", "tests/verify/test_verify.py::TestTogether"),
     ),
     Mutant(
         "Table I as transcribed: sign of an expression",

@@ -213,9 +213,10 @@ def displacement(beta_0: Expr, beta_1: Expr, platforms: tuple[PlatformSymbols, .
     return adjugate * Matrix([beta_0, beta_1]) / determinant
 
 
+@cache
 def look_vector(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Matrix:
     """Sum of the unit vectors to the platforms on the ground, (2,): (8) without f/2. [-]"""
-    return Matrix([-diff(far_field_in_angles(platforms), x) for x in point[:2]])
+    return ImmutableMatrix([-diff(far_field_in_angles(platforms), x) for x in point[:2]])
 
 
 def look_azimuth(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Expr:
@@ -224,7 +225,8 @@ def look_azimuth(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Expr:
     return atan2(s_y, s_x)
 
 
+@cache
 def smear_direction(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Matrix:
     """Return (31), (2,): direction of the second column of Q⁻¹, along which quadratic errors smear. [-]"""
     adjugate, _ = ground_inverse(platforms)
-    return in_angles(adjugate[:, 1], platforms)
+    return ImmutableMatrix(in_angles(adjugate[:, 1], platforms))

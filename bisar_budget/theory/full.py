@@ -241,6 +241,7 @@ def table() -> Table:
     )
 
 
+@cache
 def equations() -> tuple[Equation, ...]:
     """How the line of sight turns, where a response goes, and what defocuses there."""
     platform = PLATFORMS[0]
@@ -304,6 +305,7 @@ def at_constant_range(expression: Expr) -> Expr:
     return expand(expression)
 
 
+@cache
 def vibration() -> Table:
     """Vibration from first principles: what a phase of peak φ or rms σ does, and the motion that does it.
 

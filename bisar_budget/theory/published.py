@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from functools import cache
 
-from sympy import Abs, Eq, Expr, Function, Rational, Symbol, diff, pi, solve
+from sympy import Abs, Eq, Expr, Function, Integer, Rational, Symbol, diff, pi, solve
 
 from bisar_budget.theory import differential_range as dr
 from bisar_budget.theory.symbols import (
@@ -73,7 +73,7 @@ def motion_errors(platform: PlatformSymbols) -> tuple[Symbol, ...]:
 def single_error(expression: Expr, error: Symbol, platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Expr:
     """Keep what one error alone does: every other error is set to zero."""
     every = [*clock_coefficients, *(e for platform in platforms for e in motion_errors(platform))]
-    return expression.subs({other: 0 for other in every if other != error})
+    return expression.xreplace({other: Integer(0) for other in every if other != error})
 
 
 @cache
@@ -176,6 +176,7 @@ def one_way_phase(motion: Expr) -> Expr:
     return 2 * pi * motion / wavelength
 
 
+@cache
 def vibration() -> Table:
     """Vibration limits of Section V, amplitude and rms along the line of sight, with a share of power.
 

@@ -121,6 +121,7 @@ class Figure(NamedTuple):
     phase: Moments
 
 
+@cache
 def inertial() -> tuple[Figure, ...]:
     """Figures of an inertial sensor over one aperture, in the order of the mission file. [rad²/unit²]"""
     k = one_way_phase(Integer(1))
@@ -203,6 +204,7 @@ def tone() -> Moments:
     return Moments(LEADING[2] * 5 * parts[2], LEADING[3] * 7 * parts[3], left)
 
 
+@cache
 def tone_in_terms() -> Moments:
     """`tone` in `sine` and `cosine` of `angle`."""
     return Moments(*(part.subs({sin(angle): sine, cos(angle): cosine}) for part in tone()))
@@ -232,6 +234,7 @@ def power_law_integral(n: int, slope: int) -> Expr:
     return simplify(pi / 2 * bessel * pi ** (slope - 1))
 
 
+@cache
 def power_law(order: int) -> tuple[Expr, ...]:
     """Mean squares of the quadratic (2) or cubic (3) phase of a spectrum f⁰ … f⁻⁴ of density 1. [s^(n−1)]"""
     return tuple(
@@ -265,6 +268,7 @@ def interpolated_noise() -> Expr:
 
 
 # ---------------------------------------------------------------------- for a reader
+@cache
 def table() -> Table:
     """What a figure of an inertial sensor does at the aperture edge."""
     rows = tuple(

@@ -148,15 +148,15 @@ def _smooth_noise(study: Study, error: RandomError, rng: np.random.Generator) ->
     """
     T, time = study.collection.aperture_time, correlation_time(study.mission, error)
     times = _moments(study, _FINE)
-    legendre, found = np.polynomial.legendre, []
-    for _ in range(_DRAWS // _AT_ONCE):
-        drawn = np.moveaxis(position_courses(study.mission, error, times, _AT_ONCE, rng), 1, 0)
-        fit = legendre.legfit(2 * times / T, drawn.reshape(times.size, -1), SMOOTH)
-        found.append(legendre.legval(2 * aperture_nodes(T) / T, fit).reshape(*drawn.shape[1:], -1))
+    legendre = np.polynomial.legendre
+    fit = np.linalg.pinv(legendre.legvander(2 * times / T, SMOOTH))
+    at_nodes = legendre.legvander(2 * aperture_nodes(T) / T, SMOOTH) @ fit
+    drawn = (position_courses(study.mission, error, times, _AT_ONCE, rng) for _ in range(_DRAWS // _AT_ONCE))
+    found = np.concatenate([at_nodes @ one for one in drawn])
     # Samples a step Δ apart have more power at low frequencies than the noise: Δ·coth(Δ/2τ_c), not 2τ_c.
     step = float(times[1] - times[0])
     power = 2 * time / step * math.tanh(step / (2 * time))
-    courses: Floats = (np.moveaxis(np.concatenate(found), 2, 1) * math.sqrt(power)).astype(float)
+    courses: Floats = found * math.sqrt(power)
     return courses
 
 

@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import sys
+import sysconfig
 from pathlib import Path
 
 import pytest
@@ -140,12 +141,22 @@ class TestExample:
         assert (design / job["artifacts"]["reports"]["junit"]).exists()
 
 
+AT_HAND = """import os, sys
+sys.path += [path for path in os.environ["AT_HAND"].split(os.pathsep) if path not in sys.path]
+"""
+
+
 class TestPreCommit:
-    """The hook as pre-commit runs it: the tool cloned, built and installed, then both missions."""
+    """The hook as pre-commit runs it: the tool cloned, built and installed, then both missions.
+
+    What the tool imports is not installed anew: it is found behind the packages of the hook's own environment, where
+    this run has it. CI installs the wheel with all that it asks for, outside the
+    checkout.
+    """
 
     @pytest.fixture
     def tool(self, tmp_path: Path) -> Path:
-        """A repository with the files of this checkout, whether committed or not."""
+        """A repository with the files of this checkout, whether committed or not, that asks for no other package."""
         pytest.importorskip("pre_commit", reason="pre-commit is not installed (extra `test`)")
         listed = subprocess.run(
             ["git", "ls-files", "-co", "--exclude-standard"],
@@ -174,6 +185,10 @@ class TestPreCommit:
             if (ROOT / name).is_file():
                 (folder / name).parent.mkdir(parents=True, exist_ok=True)
                 shutil.copy(ROOT / name, folder / name)
+        project = (folder / "pyproject.toml").read_text(encoding="utf-8")
+        alone, found = re.subn(r"(?ms)^dependencies = \[.*?^\]$", "dependencies = []", project)
+        assert found == 1
+        (folder / "pyproject.toml").write_text(alone, encoding="utf-8")
         git(folder, "init", "-q")
         git(folder, "add", "-A")
         git(folder, "commit", "-q", "-m", "tool")
@@ -189,12 +204,20 @@ class TestPreCommit:
         config = re.sub("https://github.com/OWNER/bisar-budget", str(tool), config)
         (design / ".pre-commit-config.yaml").write_text(config, encoding="utf-8")
         git(design, "add", ".pre-commit-config.yaml")
+        (tmp_path / "start").mkdir()
+        (tmp_path / "start" / "sitecustomize.py").write_text(AT_HAND, encoding="utf-8")
+        here = [sysconfig.get_path(name) for name in ("purelib", "platlib")]
+        at_hand = {
+            "PRE_COMMIT_HOME": str(tmp_path / "cache"),
+            "PYTHONPATH": str(tmp_path / "start"),
+            "AT_HAND": os.pathsep.join(dict.fromkeys(here)),
+        }
 
         def hook(*files: str) -> subprocess.CompletedProcess[str]:
             return subprocess.run(
                 [sys.executable, "-m", "pre_commit", "run", "bisar-budget", "--files", *files],
                 cwd=design,
-                env=environment(PRE_COMMIT_HOME=str(tmp_path / "cache")),
+                env=environment(**at_hand),
                 capture_output=True,
                 text=True,
                 check=False,
@@ -204,6 +227,8 @@ class TestPreCommit:
         assert bad.returncode == 1, bad.stdout + bad.stderr
         assert "FAIL missions/fine_survey.yaml" in bad.stdout
         assert "pass missions/survey.yaml" in bad.stdout
+        (installed,) = (tmp_path / "cache").glob("repo*/py_env-*/lib/python*/site-packages/bisar_budget")
+        assert not (installed.parent / "yaml").exists()
         good = hook("missions/survey.yaml", "pyproject.toml")
         assert good.returncode == 0, good.stdout + good.stderr
         assert "Passed" in good.stdout

@@ -11,8 +11,10 @@ import time
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 from bisar_budget.budget.check import check_mission
+from bisar_budget.cli import cli
 from bisar_budget.cli.streams import harmless
 from bisar_budget.faults import MissionError
 from bisar_budget.findings.mission import Report
@@ -352,9 +354,10 @@ class TestPlots:
         assert theirs == plain
         assert b"<dc:date>" not in plain
 
-    def test_an_archive_has_the_name_that_was_asked_for(self, folder) -> None:
-        done = run("simulate", "m.yaml", "-o", "X.NPZ", cwd=folder)
-        assert done.returncode == 0, done.stderr
+    def test_an_archive_has_the_name_that_was_asked_for(self, folder, monkeypatch) -> None:
+        monkeypatch.chdir(folder)
+        done = CliRunner().invoke(cli, ["simulate", "m.yaml", "-o", "X.NPZ"])
+        assert done.exit_code == 0, done.output
         assert (folder / "X.NPZ").exists()
         assert not (folder / "X.NPZ.npz").exists()
 

@@ -15,7 +15,7 @@ from bisar_budget.theory import render
 from tests.conftest import ROOT, TODAY, mission_text
 from tests.effects.test_random_errors import MISSION as SENSORS
 from tests.effects.test_random_errors import OSCILLATORS
-from tests.simulate.test_random_errors import REST
+from tests.verify.test_random_errors import REST
 
 LAMBDA = 299_792_458.0 / 10e9
 MISSIONS = [

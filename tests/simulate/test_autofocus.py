@@ -114,7 +114,7 @@ class TestPhaseGradient:
         want = np.zeros(1024)
         want[s.band] = focused.phase[s.band]
         by_hand = np.fft.ifft(np.fft.fft(s.image, axis=1) * np.exp(-1j * want), axis=1)
-        assert focused.image == pytest.approx(by_hand, abs=1e-12)
+        assert np.abs(focused.image - by_hand).max() < 1e-12
 
     @pytest.mark.parametrize(
         "options",
@@ -250,7 +250,7 @@ class TestMapDrift:
         s = scene(quadratic, points=0)
         focused = map_drift(s.image, sub_apertures)
         assert not focused.phase.any()
-        assert focused.image == pytest.approx(s.image, abs=1e-12)
+        assert np.abs(focused.image - s.image).max() < 1e-12
 
     def test_phase_gradient_agrees(self) -> None:
         s = scene(of(5, -3), points=200)

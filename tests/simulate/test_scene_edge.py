@@ -38,10 +38,10 @@ def edge_of(mission, members) -> ScenePhases:
     return ScenePhases(analysis)
 
 
-def exact_at(mission, source, size: float, point):
+def exact_at(study: Study, source, size: float, point):
     """Effect of one error at a point of the scene, by exact ranges from there."""
-    slow_time = cell_centres(6.0, 256)
-    errors = Study(mission).errors(source, size)
+    mission, slow_time = study.mission, cell_centres(6.0, 256)
+    errors = study.errors(source, size)
     states = (mission.geometry.transmitter, mission.geometry.receiver)
     flown = []
     for state, error in zip(states, (errors.transmitter, errors.receiver), strict=True):
@@ -60,18 +60,19 @@ def test_phases_at_the_edge_are_those_of_exact_ranges(squint: float, radius: flo
     at the edge and at the centre.
     """
     mission = squinted(squint)
-    analysis = Analysis(mission)
+    study = Study(mission)
+    analysis = study.analysis
     largest, seen = 0.0, 0
     for source in analysis.sources:
         size = analysis.full.allowable(source, QUADRATIC, math.pi / 8) if source.is_motion else None
         if size is None:
             continue
         edge = edge_of(mission, [source._replace(declared=size)])
-        centre = [exact_at(mission, source, signed, (0.0, 0.0)).quadratic for signed in (size, -size)]
+        centre = [exact_at(study, source, signed, (0.0, 0.0)).quadratic for signed in (size, -size)]
         for azimuth in np.arange(8) * math.pi / 4:
             point = at(radius, azimuth)
             (difference,) = edge.differences(radius, azimuth)
-            there = [exact_at(mission, source, signed, point).quadratic for signed in (size, -size)]
+            there = [exact_at(study, source, signed, point).quadratic for signed in (size, -size)]
             exact = max(abs(a - b) for a, b in zip(there, centre, strict=True))
             assert abs(difference) == pytest.approx(exact, abs=2 * 0.002 * math.pi / 8), (source.id, azimuth)
             largest, seen = max(largest, exact), seen + 1
@@ -92,7 +93,7 @@ def test_images_at_the_edge_show_them(row_id: str, radius: float, azimuth: float
     for signed in (size, -size):
         errors, phases = study.errors(source, signed), []
         for point in ((0.0, 0.0), at(radius, azimuth)):
-            moved = exact_at(mission, source, signed, point).displacement
+            moved = exact_at(study, source, signed, point).displacement
             there = (point[0] + moved[0], point[1] + moved[1])
             chip = study.collection.chip(there, errors, scatterer=point, range_cells=RANGE_CELLS)
             reference = study.collection.chip(
@@ -256,10 +257,11 @@ class TestRow:
         """A constant clock error moves the image, and so bends it differently at the edge: exact ranges agree."""
         mission = parse_mission(mission_text(timing_error={"constant": "20 ns"}, scene={"radius": 1000}))
         variance = row(check_mission(mission, TODAY), "mission.spatial_variance")
-        source = next(s for s in Study(mission).sources if s.id == "timing.constant")
-        centre = exact_at(mission, source, 20e-9, (0, 0)).quadratic
+        study = Study(mission)
+        source = next(s for s in study.sources if s.id == "timing.constant")
+        centre = exact_at(study, source, 20e-9, (0, 0)).quadratic
         worst = max(
-            abs(exact_at(mission, source, 20e-9, at(1000, azimuth)).quadratic - centre)
+            abs(exact_at(study, source, 20e-9, at(1000, azimuth)).quadratic - centre)
             for azimuth in np.linspace(0, 2 * math.pi, 72)
         )
         assert variance.qpe_full_rad == pytest.approx(worst, rel=0.02, abs=1e-3)

@@ -1,0 +1,271 @@
+"""What commands and reports say of verdicts: exit codes, statuses that they change, words, conditions."""
+
+import csv
+import json
+import math
+import re
+
+import pytest
+from click.testing import CliRunner
+
+from bisar_budget.budget.verdicts import with_verdicts
+from bisar_budget.cli import cli
+from bisar_budget.findings.images import Verdict, VerifiedMission
+from bisar_budget.verify.limits import verify_mission
+from tests.conftest import findings, mission_text
+from tests.conftest import row as row_of
+from tests.verify.test_verify import SECTION_V, verdicts
+
+
+@pytest.fixture
+def one_row_verified(monkeypatch):
+    """Let `check --verify` form the images of some rows alone: what is held here is what one of them does."""
+
+    def only(rows: str) -> None:
+        monkeypatch.setattr(
+            "bisar_budget.cli.verify.verify_all",
+            lambda missions, *_: [verify_mission(mission, rows) for mission in missions],
+        )
+
+    return only
+
+
+def _verified(*rows: Verdict) -> VerifiedMission:
+    return VerifiedMission(file="mission.yaml", name="base", rows=rows)
+
+
+class TestNothingVerified:
+    """A gate on whose limits no image gave a verdict has verified nothing, and does not pass."""
+
+    @pytest.fixture
+    def too_few_pulses(self, tmp_path):
+        path = tmp_path / "mission.yaml"
+        path.write_text(mission_text(collection__pulses=20, timing_error={"constant": "1 ps"}), encoding="utf-8")
+        return path
+
+    def test_verify_exits_with_2_and_says_so(self, run, too_few_pulses) -> None:
+        result = run("verify", too_few_pulses)
+        assert result.exit_code == 2
+        assert "mission.yaml: nothing was verified: 9 rows with a limit" in result.stderr
+        assert "aliases below" in result.stdout  # the reasons
+        document = json.loads(run("verify", too_few_pulses, "--format", "json").stdout)
+        assert document["missions"][0]["status"] == "not_evaluated"
+
+    def test_unverified_wins_over_optimistic(self, run, too_few_pulses) -> None:
+        assert run("verify", SECTION_V, too_few_pulses, "--only", "receiver.velocity.y").exit_code == 2
+
+    def test_check_warns_and_fails_under_strict(self, run, too_few_pulses) -> None:
+        plain = run("check", too_few_pulses, "--verify")
+        assert plain.exit_code == 0
+        assert "warning: " in plain.stdout
+        assert "nothing was verified: 9 rows" in plain.stdout
+        assert "NOT EVAL " in plain.stdout
+        assert run("check", too_few_pulses, "--verify", "--strict").exit_code == 1
+        assert run("check", too_few_pulses, "--strict").exit_code == 0  # no images were asked for
+
+    def test_one_verdict_is_enough(self, run) -> None:
+        """Other phases and root-sum-squares never have an image: they do not fail a mission that was verified."""
+        verdict = Verdict(id="timing.quadratic", model="published", boundary_error=1.0, unit="1/s")
+        unknown = _verified(verdict)
+        assert unknown.status == "not_evaluated"
+        assert with_verdicts(findings(), unknown).status == "not_evaluated"
+        confirmed = _verified(verdict, verdict._replace(verdict="confirmed"))
+        assert (confirmed.status, confirmed.doubt) == ("pass", "")
+        declared = findings(timing_error={"constant": "1 ps"})
+        assert with_verdicts(declared, confirmed).status == declared.status == "pass"
+
+
+@pytest.fixture(scope="module")
+def reports(tmp_path_factory):
+    """Section V checked with images once, in every format that is read here."""
+    folder = tmp_path_factory.mktemp("verified")
+    names = [folder / f"r.{suffix}" for suffix in ("txt", "csv", "json")]
+    options = [part for name in names for part in ("--report", str(name))]
+    CliRunner().invoke(cli, ["check", str(SECTION_V), "--verify", *options])
+    return [name.read_text(encoding="utf-8") for name in names]
+
+
+class TestCheckWithImages:
+    def test_json_carries_the_verdicts_and_a_row_says_when_its_limit_is_optimistic(self, reports) -> None:
+        (mission,) = json.loads(reports[2])["missions"]
+        verdict = {row["id"]: row["verdict"] for row in mission["verification"]}
+        assert verdict["receiver.velocity.y"] == "optimistic"
+        row = next(row for row in mission["rows"] if row["id"] == "receiver.velocity.y")
+        assert row["status"] == "not_declared"
+        assert any("0.417 rad at it, the budget is 0.392 rad" in note for note in row["notes"])
+
+    @pytest.mark.parametrize(("declared", "status"), [(0.0390, "pass"), (0.0405, "warn")])
+    def test_the_full_model_knows_what_the_image_shows(
+        self, run, tmp_path, one_row_verified, declared, status
+    ) -> None:
+        """The published limit is 41.7 mm/s, the true one 6 % less: 39.3 mm/s."""
+        one_row_verified("receiver.velocity.y")
+        error = f"    motion_azimuth: 135 deg\n    motion_error: {{velocity: [0, {declared}, 0]}}\n"
+        text = SECTION_V.read_text(encoding="utf-8").replace("    motion_azimuth: 135 deg\n", error)
+        text += "allocation: {warn_above: 1}\n"
+        path = tmp_path / "mission.yaml"
+        path.write_text(text, encoding="utf-8")
+        plain, verified = (
+            {row["id"]: row["status"] for row in json.loads(run("check", path, *more, "--format", "json").stdout)[
+                "missions"][0]["rows"]}
+            for more in ((), ("--verify",))
+        )  # fmt: skip
+        assert plain["receiver.velocity.y"] == verified["receiver.velocity.y"] == status
+
+    @pytest.mark.parametrize(("excess", "status"), [(1.05, "pass"), (1.30, "warn")])
+    def test_a_pass_that_the_image_contradicts_is_a_warning(self, excess: float, status: str) -> None:
+        """At 78 % of a limit that the image shows to be 30 % too generous: 1.01 times what is true."""
+        vibration = {"wideband": {"rms": 0.78 * 0.03 / (2 * math.pi) * math.sqrt(0.005)}}
+        found = findings(requirements__islr=-20, platforms__receiver__motion_error={"vibration": vibration})
+        verdict = Verdict(
+            id="receiver.vibration.wideband", model="published", boundary_error=1.0, unit="m", requirement_db=-20,
+            measured_db=-20 + 20 * math.log10(excess), verdict="optimistic",
+        )  # fmt: skip
+        judged = row_of(with_verdicts(found, _verified(verdict)), verdict.id)
+        assert row_of(found, verdict.id).status == "pass"
+        assert judged.status == status
+        assert any("optimistic limit" in note for note in judged.notes)
+
+    @pytest.mark.parametrize(
+        ("verdict_autofocus", "status"), [("confirmed", "pass_with_autofocus"), ("optimistic", "warn")]
+    )
+    def test_a_pass_by_an_autofocus_that_the_image_refutes_is_a_warning(self, verdict_autofocus, status) -> None:
+        changes = {"platforms__receiver__motion_error": {"acceleration": [2e-3, 0, 0]}, "autofocus": {"n_pull": 2}}
+        found = findings(**changes)
+        verdict = Verdict(
+            id="receiver.acceleration.x", model="published", boundary_error=1.0, unit="m/s^2", verdict="confirmed",
+            verdict_autofocus=verdict_autofocus, reason_autofocus="autofocus leaves 0.7 of 0.393 rad",
+        )  # fmt: skip
+        assert row_of(found, verdict.id).status == "pass_with_autofocus"
+        judged = row_of(with_verdicts(found, _verified(verdict)), verdict.id)
+        assert judged.status == status
+
+    @pytest.mark.parametrize(("verdict", "status"), [("conservative", "pass"), ("optimistic", "warn")])
+    def test_a_location_that_the_image_contradicts_is_a_warning(self, verdict: str, status: str) -> None:
+        error = {"platforms__receiver__motion_error": {"position": [1, 0, 0]}}
+        found = findings(requirements__location_error=5, **error)
+        shown = Verdict(
+            id="mission.location_error",
+            model="published",
+            boundary_error=5,
+            unit="m",
+            verdict=verdict,
+            reason="elsewhere",
+        )
+        assert row_of(found, shown.id).status == "pass"
+        assert row_of(with_verdicts(found, _verified(shown)), shown.id).status == status
+
+    def test_an_optimistic_limit_without_a_row_is_a_warning_of_the_file(self) -> None:
+        verdict = Verdict(
+            id="mission.vibration.wideband", model="published", boundary_error=1.0, unit="m", requirement_db=-20,
+            measured_db=-17, verdict="optimistic",
+        )  # fmt: skip
+        (warning,) = [
+            w for w in with_verdicts(findings(), _verified(verdict)).warnings if "mission.vibration" in w.message
+        ]
+        assert "-17.0 dB" in warning.message
+
+    def test_text_and_csv_show_them(self, reports) -> None:
+        assert "Images with each error at its limit" in reports[0]
+        table = csv.DictReader(reports[1].splitlines())
+        (verdict,) = [row["verdict"] for row in table if row["id"] == "receiver.velocity.y"]
+        assert verdict == "optimistic"
+
+    def test_without_it_there_are_none(self, run) -> None:
+        (mission,) = json.loads(run("check", SECTION_V, "--format", "json").stdout)["missions"]
+        assert mission["verification"] is None
+
+
+class TestCommand:
+    KEYS = {
+        "id", "model", "boundary_error", "unit", "budget_rad", "predicted_qpe_rad", "measured_qpe_rad", "irw_ratio",
+        "peak_loss_db", "pslr_db", "islr_db", "displacement_m", "verdict",
+    }  # fmt: skip
+
+    def test_json_contract(self, run) -> None:
+        result = run("verify", SECTION_V, "--format", "json", "--only", "receiver.velocity.*")
+        document = json.loads(result.stdout)
+        assert document["format"] == "bisar-budget/verify/1"
+        (mission,) = document["missions"]
+        assert [row["id"] for row in mission["rows"]] == ["receiver.velocity.x", "receiver.velocity.y"]
+        assert all(row.keys() >= self.KEYS for row in mission["rows"])
+
+    def test_exit_1_if_a_limit_is_optimistic(self, run) -> None:
+        assert run("verify", SECTION_V, "--only", "receiver.velocity.y").exit_code == 1
+        assert run("verify", SECTION_V, "--only", "receiver.acceleration.*").exit_code == 0
+
+    def test_text_names_limit_budget_image_and_verdict(self, run) -> None:
+        line = next(
+            line
+            for line in run("verify", SECTION_V, "--only", "receiver.velocity.y").stdout.splitlines()
+            if line.startswith("receiver.velocity.y")
+        )
+        assert line.split()[1:] == ["41.7", "mm/s", "0.392", "0.417", "0.417", "0.417", "optimistic"]
+
+    def test_unusable_mission_is_2(self, run, tmp_path) -> None:
+        result = run("verify", tmp_path / "none.yaml")
+        assert result.exit_code == 2
+        assert "cannot be read" in result.stderr
+
+    def test_a_glob_without_rows_is_wrong_usage(self, run) -> None:
+        result = run("verify", SECTION_V, "--only", "nothing")
+        assert result.exit_code == 2
+        assert "nothing was verified" in result.stderr
+
+    def test_output_file(self, run, tmp_path) -> None:
+        run("verify", SECTION_V, "--only", "timing.*", "--format", "json", "-o", tmp_path / "v.json")
+        assert json.loads((tmp_path / "v.json").read_text())["missions"]
+
+
+class TestConditions:
+    """What changes how a verdict is to be read stands in the text, not in the JSON alone."""
+
+    def test_window_noise_and_pulses(self, run, tmp_path, one_row_verified) -> None:
+        one_row_verified("timing.*")
+        path = tmp_path / "m.yaml"
+        path.write_text(mission_text(simulation={"window": "taylor", "noise": "-30 dB"}, collection__pulses=500))
+        text = " ".join(run("verify", path, "--only", "timing.*").stdout.split())
+        assert "Images: one point, exact ranges, taylor window, no noise (simulation.noise is for `simulate`)" in text
+        assert "pulses as needed (the 500 of collection.pulses must not alias)" in text
+        assert "images: one point, exact ranges, taylor window" in " ".join(
+            run("check", path, "--verify", "-v").stdout.split()
+        )
+
+    def test_a_frequency_that_the_file_does_not_give_is_said_to_be_assumed(self) -> None:
+        row = verdicts("receiver.vibration.sinusoidal.0", requirements__pslr=-30)["receiver.vibration.sinusoidal.0"]
+        assert "10 cells from the peak" in row.reason
+        assert "assumed: the file declares no vibration" in row.reason
+
+
+@pytest.mark.parametrize(("model", "rule"), [("published", "(25)"), ("full", "the full model")])
+def test_displacement_is_compared_with_the_gating_models(run, tmp_path, model: str, rule: str) -> None:
+    path = tmp_path / "m.yaml"
+    path.write_text(mission_text(allocation={"model": model}), encoding="utf-8")
+    text = " ".join(run("verify", path, "--only", "receiver.velocity.y").stdout.split())
+    assert re.search(rf"displacement of the images: within [\d.]+ \w+ of {re.escape(rule)}, farthest", text)
+
+
+@pytest.mark.parametrize(("model", "header"), [("published", "full"), ("full", "II"), ("strictest", "other")])
+def test_beside_the_budget_stands_what_the_other_model_says(run, tmp_path, model: str, header: str) -> None:
+    """Table II row 2 by hand, of the receiver of the base mission: 2π/λ·v_y·ṽ_y/R·(T/2)²."""
+    path, row_id = tmp_path / "m.yaml", "receiver.velocity.y"
+    path.write_text(mission_text(allocation={"model": model}), encoding="utf-8")
+    found = verdicts(row_id, allocation={"model": model})[row_id]
+    by_hand = 2 * math.pi / 0.0299792458 * 40 * found.boundary_error / math.sqrt(76e6) * 9
+    assert found.published_qpe_rad == pytest.approx(by_hand, rel=1e-9)
+    assert found.published_qpe_rad < 0.97 * found.full_qpe_rad
+    assert found.budget_rad == pytest.approx(by_hand if model == "published" else found.full_qpe_rad)
+    assert found.measured_qpe_rad == pytest.approx(found.full_qpe_rad, rel=0.05)
+    lines = [line.split() for line in run("verify", path, "--only", row_id).stdout.splitlines() if line]
+    other = found.full_qpe_rad if model == "published" else found.published_qpe_rad
+    assert next(line for line in lines if line[0] == "row")[2:4] == ["budget", header]
+    assert next(line for line in lines if line[0] == row_id)[3:5] == ["0.392", f"{other:.3f}"]
+
+
+def test_a_reason_of_the_refocused_image_says_that_it_is_about_it(run, tmp_path) -> None:
+    """A limit whose smear takes more than the largest patch has no verdict with autofocus, and one without."""
+    path = tmp_path / "m.yaml"
+    path.write_text(mission_text(autofocus={"n_pull": 200}), encoding="utf-8")
+    text = " ".join(run("verify", path, "--only", "receiver.acceleration.x").stdout.split())
+    assert re.search(r"receiver\.acceleration\.x \S+ \S+ [\d. ]+ confirmed", text)
+    assert "receiver.acceleration.x, with autofocus: autofocus needs a patch of" in text
