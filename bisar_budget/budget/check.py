@@ -26,6 +26,7 @@ from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import RANK
 from bisar_budget.mission.model import FlownPath, Mission
 from bisar_budget.phrases import NOTHING, Note
+from bisar_budget.units import format_quantity
 
 if TYPE_CHECKING:
     from bisar_budget.analysis.scene import SceneEdge
@@ -86,6 +87,7 @@ def check_mission(mission: Mission, today: date, *, is_brief: bool = False) -> M
             *pull_in_caps(mission, resolution),
             *_nothing_declared(rows),
         ),
+        place=_place(mission),
         paths=tuple((name, path) for name, path in _paths(mission) if path.source),
         scene=checked.scene,
         notes=(*collection_notes(analysis), *_unused_keys(mission)),
@@ -223,6 +225,17 @@ def _nothing_declared(rows: Sequence[Row]) -> Iterator[FileWarning]:
 
 def _unused_correlations(mission: Mission) -> Iterator[FileWarning]:
     return (FileWarning(line, message) for line, message in unused_correlations(mission))
+
+
+def _place(mission: Mission) -> str:
+    scene, instant, said = mission.scene, mission.collection.center_time, []
+    if scene.latitude is not None and scene.longitude is not None:
+        for angle, (positive, negative) in ((scene.latitude, "NS"), (scene.longitude, "EW")):
+            said.append(f"{abs(math.degrees(angle)):.5f}° {positive if angle >= 0 else negative}")
+        said.append(f"{format_quantity(scene.height or 0.0, 'm', 4)} above the ellipsoid")
+    if instant is not None:
+        said.append(f"mid-aperture {instant.as_text()}")
+    return ", ".join(said)
 
 
 def _paths(mission: Mission) -> Iterator[tuple[str, FlownPath]]:

@@ -57,6 +57,7 @@ class MissionFindings(NamedTuple):
     rows: tuple[Row, ...]
     warnings: tuple[FileWarning, ...]
     notes: tuple[Note, ...]
+    place: str = ""  # of the scene on the Earth, and the instant of mid-aperture, where the file says them
     paths: tuple[tuple[str, FlownPath], ...] = ()  # of platforms whose path the file does not state itself
     scene: "SceneEdge | None" = None  # of missions with a scene.radius and declared errors
     verdicts: "tuple[Verdict, ...] | None" = None  # of images, if any were formed

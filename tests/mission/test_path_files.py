@@ -307,3 +307,10 @@ def test_a_missing_package_is_named(run: Callable[..., Any], folder: Path, monke
     result = run("check", folder / "m.yaml")
     assert result.exit_code == 2
     assert "pip install 'bisar-budget[orbits]'" in result.stderr
+
+
+def test_a_report_says_where_and_when(run: Callable[..., Any], folder: Path) -> None:
+    (folder / "m.yaml").write_text(aircraft(platforms__receiver__motion_error={"position": "1 mm"}))
+    place = "48.10000° N, 11.30000° E, 600 m above the ellipsoid, mid-aperture 2026-06-01T05:20:06.250Z"
+    assert place in " ".join(run("check", folder / "m.yaml").stdout.split())
+    assert place in html.unescape(run("check", folder / "m.yaml", "--format", "html").stdout)

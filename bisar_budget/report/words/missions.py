@@ -40,6 +40,8 @@ def head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
     for name, state in (("Transmitter", geometry.transmitter), ("Receiver", geometry.receiver)):
         yield name, _platform(state, is_first)
         is_first = is_first and state.squint is None
+    if mission.place:
+        yield "Place", mission.place
     for name, path in mission.paths:
         yield "Path", f"{name}: {path_words(path)}"
     yield (
