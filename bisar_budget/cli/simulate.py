@@ -1,12 +1,16 @@
 """`bisar-budget simulate`: the image of a point with the declared errors."""
 
 import os
+from typing import TYPE_CHECKING
 
 import click
 
-from bisar_budget.cli.streams import FILE, deliver, fail, load_all, spare, write_file
+from bisar_budget.cli.streams import FILE, SET, deliver, fail, load_all, spare, write_file
 from bisar_budget.cli.verify import announce, faster, progress_bar
 from bisar_budget.faults import printable
+
+if TYPE_CHECKING:
+    from bisar_budget.faults import Change
 
 
 @click.command()
@@ -29,7 +33,15 @@ from bisar_budget.faults import printable
     metavar="LIST",
     help="What stands in the scene, instead of one point at its centre: EAST, NORTH[, LEVEL]; ...; clutter LEVEL.",
 )
-def simulate(mission: str, plot: str | None, output: str | None, image_former: str, targets: str | None) -> None:
+@SET
+def simulate(
+    mission: str,
+    plot: str | None,
+    output: str | None,
+    image_former: str,
+    targets: str | None,
+    changes: "tuple[Change, ...]",
+) -> None:
     """Form the image of a point, or of a scene, with the declared errors.
 
     All errors of the file together, with its signs, are flown once: they may cancel, and the worst case is that
@@ -48,7 +60,7 @@ def simulate(mission: str, plot: str | None, output: str | None, image_former: s
         standing = Targets() if targets is None else parse_targets(targets)
     except ValueError as error:
         raise click.UsageError(f"--targets: {printable(str(error))}.") from None
-    (loaded,) = load_all([mission])
+    (loaded,) = load_all([mission], changes=changes)
     from bisar_budget.report.drawing import point_plot
     from bisar_budget.simulate.point import SimulationError, simulate_point
 

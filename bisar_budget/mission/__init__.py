@@ -1,4 +1,4 @@
 """The mission file: what it may say (`model`), how it is read (`load`), its JSON Schema (`schema`)."""
 
 # What other rooms may use.
-__all__ = ["instruments", "load", "model", "parts", "readers", "revision", "schema", "symmetric"]
+__all__ = ["changes", "instruments", "load", "model", "parts", "readers", "revision", "schema", "symmetric"]
