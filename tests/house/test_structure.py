@@ -24,6 +24,7 @@ FLOORS = [
     {"budget"},
     {"simulate"},
     {"verify"},
+    {"design"},
     {"report"},
     {"cli"},
     {"__main__"},
