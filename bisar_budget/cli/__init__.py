@@ -26,6 +26,7 @@ _MODULES = {
     "schema": "mission_files",
     "sensors": "sensors",
     "simulate": "simulate",
+    "solve": "solve",
     "verify": "verify",
 }
 
