@@ -45,6 +45,11 @@ class Number(NamedTuple):
             number = float(context.create_decimal(repr(number)))
         return f"{number:.{DIGITS}g}{' ' if self.unit else ''}{self.unit}"
 
+    def said_like(self, between: str | None) -> "Number":
+        """The number said in the unit of the range's end, where the file has no value to say it like."""
+        unit = _UNIT.sub("", (between or "").rpartition("..")[2].strip()).strip()
+        return self._replace(unit=unit) if self.value is None and unit in self.dimension.scales and unit else self
+
     def read(self, text: str) -> float:
         """Read what `text` wrote; within a rounding of what the file's reader makes of it, which is the same."""
         return parse_quantity(text, self.dimension)

@@ -5,7 +5,8 @@ worst utilization turns between places, the turn is looked for first: compliance
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from datetime import date
 from itertools import pairwise
 
@@ -135,26 +136,30 @@ class _Question:
             self.number = Number("the factor", FACTOR, 1.0, "")
             scaled(self.base, key, 1.0)  # says what is wrong with the key
         else:
-            self.number = number_of(self._tree(), key)
+            self.number = number_of(self._tree(), key).said_like(between)
         self.range: Range = range_of(self.number, between)
         found = check_mission(self.base, today)
-        if found.is_empty:
-            raise QuestionError("the mission declares no error: nothing decides whether it complies")
-        self._row_of(found)
+        self._decides([found, *self._at_the_end()])
         self.given = None if self.number.value is None else self._state(self.number.value, found)
 
-    def _row_of(self, found: MissionFindings) -> None:
-        """Hold `row` to a row that is judged."""
+    def _at_the_end(self) -> Iterator[MissionFindings]:
+        """Findings at the end of the range: the number may be an error that the file does not declare."""
+        with suppress(MissionError):
+            yield check_mission(self.at(self.range.high), self.today)
+
+    def _decides(self, findings: Sequence[MissionFindings]) -> None:
+        """Refuse what nothing can decide: a mission without errors, a row that is not there or not judged."""
+        if all(found.is_empty for found in findings):
+            raise QuestionError("the mission declares no error: nothing decides whether it complies")
         if self.row is None:
             return
-        known = {row.id: row for row in found.rows}
-        if self.row not in known:
-            hint = did_you_mean(self.row, tuple(known))
+        rows = [row for found in findings for row in found.rows]
+        statuses = [STATUS[row.status] for row in rows if row.id == self.row]
+        if not statuses:
+            hint = did_you_mean(self.row, tuple(row.id for row in rows))
             raise QuestionError(f"--row {self.row}: no row has this id. {hint or 'A check lists them.'}")
-        if not STATUS[known[self.row].status].gates:
-            raise QuestionError(
-                f"--row {self.row}: is {STATUS[known[self.row].status].words}: nothing is judged there"
-            )
+        if not any(status.gates for status in statuses):
+            raise QuestionError(f"--row {self.row}: is {statuses[0].words}: nothing is judged there")
 
     def _tree(self) -> dict[str, object]:
         """What the file says with the options that changed it, as text."""

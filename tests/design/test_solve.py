@@ -193,6 +193,16 @@ def test_a_row_alone() -> None:
         solve("collection.aperture_time", row="receiver.velocity.x")
 
 
+def test_an_error_that_the_file_does_not_declare() -> None:
+    """Table II row 1: what the table of the check allows."""
+    mission = load_mission(SECTION_V)
+    allowed = {row.id: row.allowable for row in check_mission(mission, DAY).rows}["receiver.velocity.x"]
+    key = "platforms.receiver.motion_error.velocity"
+    found = solve(key, between="1..100 mm/s", row="receiver.velocity.x")
+    assert found.value == pytest.approx(allowed, rel=1e-6)
+    assert found.given is None
+
+
 def test_nothing_complies(run: Callable) -> None:
     done = run("solve", SECTION_V, "--for", "collection.aperture_time", "--between", "3..5 s")
     assert done.exit_code == 1
