@@ -44,8 +44,8 @@ class Solution(NamedTuple):
     `key` is what was solved for, `unit` that of its values, `is_scale` whether they are factors of all numbers
     below the key. `low` and `high` are the ends of the range, `is_circle` whether they are one direction. `nearest`
     is the nearest miss where nothing complies, or where everything does the value with the least left. `given` is
-    the value of the file. `texts` has every value as the file would have it. `skipped` counts the places of the
-    range at which there is no mission.
+    the value of the file. `texts` has every value as the file would have it. `is_constant` is whether the number
+    changes no utilization that decides. `skipped` counts the places of the range at which there is no mission.
     """
 
     file: str
@@ -62,6 +62,7 @@ class Solution(NamedTuple):
     given: State | None
     crossings: tuple[Crossing, ...]
     nearest: State
+    is_constant: bool
     skipped: int
     texts: Mapping[float, str]
     changes: tuple[Change, ...] = ()

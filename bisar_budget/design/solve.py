@@ -101,6 +101,7 @@ def solve(
         given=question.given,
         crossings=crossings,
         nearest=nearest,
+        is_constant=len({(state.row, state.utilization) for state in missions}) == 1,
         skipped=sum(bool(state.reason) for state in scanned),
         changes=mission.changes,
         **question.texts(crossings, nearest),

@@ -217,6 +217,20 @@ def test_everything_complies(run: Callable) -> None:
     assert "Least left   1.2 s: pass, transmitter.acceleration.x uses 47.1 %" in done.stdout
 
 
+def test_a_number_that_changes_nothing_is_said_to(run: Callable) -> None:
+    done = run("solve", SECTION_V, "--for", "radar.bandwidth")
+    assert "No effect    radar.bandwidth changes nothing that decides" in done.stdout
+    assert "No effect" not in run("solve", SECTION_V, "--for", "collection.aperture_time").stdout
+
+
+def test_a_signed_error_is_bounded_from_both_sides() -> None:
+    key = "platforms.transmitter.motion_error.acceleration.0"
+    low, high = solve(key, between="-5..5 mm/s^2").crossings
+    assert (low.is_upper, high.is_upper) == (False, True)
+    assert -low.inside.value == pytest.approx(high.inside.value, rel=1e-6)
+    assert high.inside.value == pytest.approx(R * WAVELENGTH / (2 * X * 6**2), rel=1e-6)
+
+
 def test_json(run: Callable) -> None:
     options = ("--for", "collection.aperture_time", "--format", "json")
     done = run("solve", SECTION_V, *options, "--set", "radar.bandwidth=150MHz")

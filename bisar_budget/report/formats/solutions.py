@@ -41,6 +41,7 @@ def _mission(solution: Solution) -> dict[str, Any]:
         "binding_row": None if best is None else best.outside.row,
         "binding_requirement": None if best is None else best.outside.requirement,
         "is_monotonic": solution.is_monotonic,
+        "is_constant": solution.is_constant,
         "given": None if solution.given is None else _state(solution.given),
         "crossings": [_crossing(crossing) for crossing in solution.crossings],
         "nearest": _state(solution.nearest),
@@ -129,6 +130,11 @@ def _facts(solution: Solution) -> Iterator[tuple[str, str]]:
             yield "Checked", "both, as they are written here"
         else:
             yield "Not checked", "compliance changes again within the digits written here"
+    if solution.is_constant and not solution.crossings:
+        yield (
+            "No effect",
+            f"{printable(solution.key)} changes nothing that decides: the use is the same at every value",
+        )
     if not solution.crossings:
         is_miss = solution.status == "none"
         nearest = solution.nearest
