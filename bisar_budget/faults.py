@@ -1,5 +1,6 @@
 """What goes wrong with input, said so that it can be mended: where, what, the value given, what is accepted."""
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 KeyPath = tuple[str | int, ...]
@@ -61,6 +62,36 @@ def shown(text: str) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
+class Change(NamedTuple):
+    """A value that an option puts in place of what a mission file says: `--set radar.bandwidth=150MHz`.
+
+    `text` is the value as a file would have it.
+    """
+
+    key: str
+    text: str
+
+    @property
+    def option(self) -> str:
+        """What a message about the value begins with."""
+        return f"--set {printable(self.key)}"
+
+
+class Changed:
+    """Stands where the parser's event of a value would: the value is from an option, and has no line."""
+
+    start_mark = None
+
+
+def changes_words(changes: Sequence[Change]) -> str:
+    """Write the options that changed a mission as they can be given again; empty if there is none."""
+    if not changes:
+        return ""
+    from shlex import quote
+
+    return " ".join(f"--set {quote(printable(f'{change.key}={change.text}'))}" for change in changes)
+
+
 class Problem(NamedTuple):
     """Something wrong with a value, before anybody knows which file it stands in.
 
@@ -82,7 +113,10 @@ class InvalidValueError(ValueError):
 
 
 class Fault(NamedTuple):
-    """One fault of a mission file. Line and column count from 1; None where the whole file is meant."""
+    """One fault of a mission file. Line and column count from 1; None where the whole file is meant.
+
+    `option` is the option that the value comes from, instead of a line; empty if it stands in the file.
+    """
 
     line: int | None
     column: int | None
@@ -91,10 +125,12 @@ class Fault(NamedTuple):
     given: str = ""
     accepted: str = ""
     hint: str = ""
+    option: str = ""
 
     def __str__(self) -> str:
-        """Write `key: what is wrong (got value); what is accepted. Hint`."""
-        text = f"{self.key}: " if self.key else ""
+        """Write `key: what is wrong (got value); what is accepted. Hint`, with the option before the key."""
+        text = f"{self.option}: " if self.option else ""
+        text += f"{self.key}: " if self.key and self.option != f"--set {self.key}" else ""
         text += self.problem
         if self.given:
             text += f" (got {self.given})"

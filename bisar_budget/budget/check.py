@@ -21,6 +21,7 @@ from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
 from bisar_budget.effects.correlation import unused_correlations
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.subject import subject
+from bisar_budget.faults import changes_words
 from bisar_budget.findings.mission import FileWarning, MissionFindings, Resolution
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import RANK
@@ -77,6 +78,7 @@ def check_mission(mission: Mission, today: date, *, is_brief: bool = False) -> M
         allocation=analysis.allocation,
         rows=tuple(rows),
         warnings=(
+            *_changed(mission),
             *_unknown_requirement_ids(mission, rows),
             *_overruled_model(mission),
             *warnings,
@@ -92,6 +94,7 @@ def check_mission(mission: Mission, today: date, *, is_brief: bool = False) -> M
         scene=checked.scene,
         notes=(*collection_notes(analysis), *_unused_keys(mission)),
         document=mission.document,
+        changes=mission.changes,
     )
 
 
@@ -197,6 +200,13 @@ def _of_instruments(analysis: Analysis) -> Iterator[FileWarning]:
                 line=mission.line(error.path),
                 message=f"{key}: acceleration and the accelerometer bias are both stated; they add",
             )
+
+
+def _changed(mission: Mission) -> Iterator[FileWarning]:
+    """Say that another mission was checked than the file has."""
+    if mission.changes:
+        message = f"checked is not the mission of the file: {changes_words(mission.changes)}"
+        yield FileWarning(line=None, message=message, is_of_options=True)
 
 
 def _unknown_requirement_ids(mission: Mission, rows: Sequence[Row]) -> Iterator[FileWarning]:

@@ -11,7 +11,7 @@ from functools import partial
 from typing import TypeVar
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.faults import MissionError
+from bisar_budget.faults import Change, MissionError
 from bisar_budget.findings.mission import MissionFindings, UnusableMission
 from bisar_budget.mission.load import load_mission
 from bisar_budget.resources import cores
@@ -40,6 +40,7 @@ def check_files(
     *,
     is_brief: bool = False,
     drawn: tuple[int, int | None] | None = None,
+    changes: Sequence[Change] = (),
 ) -> list[Kept]:
     """Check files, in their order; many are shared out between the cores.
 
@@ -57,13 +58,15 @@ def check_files(
         Leave out what a terminal does not show.
     drawn : tuple, optional
         Number of draws of a Monte Carlo, and their seed; None: no draws.
+    changes : sequence of Change
+        Values in place of each file's.
 
     Returns
     -------
     list
         What `keep` made of each.
     """
-    one = partial(_kept, today=today, model=model, keep=keep, is_brief=is_brief, drawn=drawn)
+    one = partial(_kept, today=today, model=model, keep=keep, is_brief=is_brief, drawn=drawn, changes=changes)
     count = cores()
     if len(files) < MANY or count == 1 or "-" in files or keep is whole:
         return _of(files, one)
@@ -92,9 +95,10 @@ def _kept(
     keep: Callable[[Found], Kept],
     is_brief: bool,
     drawn: tuple[int, int | None] | None,
+    changes: Sequence[Change],
 ) -> Kept:
     try:
-        found = check_mission(load_mission(file, model), today, is_brief=is_brief)
+        found = check_mission(load_mission(file, model, changes), today, is_brief=is_brief)
     except MissionError as error:
         return keep(UnusableMission(file=file, faults=error.faults, data=error.data))
     if drawn is not None:

@@ -28,6 +28,7 @@ _MODULES = {
     "schema": "mission_files",
     "sensors": "sensors",
     "simulate": "simulate",
+    "solve": "solve",
     "verify": "verify",
 }
 

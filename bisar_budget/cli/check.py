@@ -15,6 +15,7 @@ from bisar_budget import __version__
 from bisar_budget.cli.streams import (
     EXIT_BROKEN,
     FILE,
+    SET,
     ParamType,
     complain,
     day_of_run,
@@ -31,6 +32,7 @@ from bisar_budget.faults import printable
 from bisar_budget.report import FORMATS
 
 if TYPE_CHECKING:
+    from bisar_budget.faults import Change
     from bisar_budget.findings.mission import MissionFindings, Option, Report, UnusableMission
     from bisar_budget.report import Style
 
@@ -150,6 +152,7 @@ class _Draws(ParamType[int]):
     help="Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC). A compliance report shows "
     "it only if it is given.",
 )
+@SET
 @click.option("--verify", "verifying", is_flag=True, help="Also form images at the limits and add their verdicts.")
 @click.option(
     "--monte-carlo",
@@ -198,6 +201,7 @@ def check(
     exit_zero: bool,
     model: str | None,
     today: datetime | None,
+    changes: "tuple[Change, ...]",
     verifying: bool,
     draws: int | None,
     seed: int | None,
@@ -230,7 +234,7 @@ def check(
             raise click.UsageError(
                 "--explain writes text; it cannot be combined with --format, --report or --monte-carlo."
             )
-        _explain(files, explain, today.date() if today else day_of_run(), model, output)
+        _explain(files, explain, today.date() if today else day_of_run(), model, output, changes)
         return
     illustrated = any(FORMATS[name].is_illustrated for name in (format_name, *(name for _, name in written)))
     drawn = None if draws is None else (draws, seed)
@@ -244,13 +248,13 @@ def check(
 
         is_brief = format_name == "text" and verbosity <= 0 and not all_rows
         keep = partial(piece, format_name=format_name, style=style)
-        pieces = check_files(files, day, model, keep, is_brief=is_brief)
+        pieces = check_files(files, day, model, keep, is_brief=is_brief, changes=changes)
         if says_faults:
             _say_faults(piece.unusable for piece in pieces)
         deliver(joined(format_name, pieces, __version__, style), output, format_name)
         statuses = {piece.status for piece in pieces}
     else:
-        report = check_all(files, day, model, verifying, illustrated, drawn)
+        report = check_all(files, day, model, verifying, illustrated, drawn, changes)
         judged_on = _given_day(today) or (day if _has_waivers(report.missions) else None)
         report = report._replace(options=tuple(_options(judged_on)), day=judged_on)
         if says_faults:
@@ -295,6 +299,9 @@ def _options(judged_on: date | None) -> "Iterator[Option]":
                 origin = "environment, SOURCE_DATE_EPOCH" if by_environment else "the day of the run"
             unrecorded = "the day of the run (not recorded: no waiver depends on it)"
             yield Option("--date", judged_on.isoformat() if judged_on else unrecorded, origin)
+        elif name == "changes":
+            if value:
+                yield Option("--set", ", ".join(f"{change.key}={change.text}" for change in value), origin)
         elif name == "draws":
             yield Option("--monte-carlo", "no" if value is None else f"{value:,} draws", origin)
         elif name == "seed" and context.params["draws"] is not None:
@@ -317,16 +324,17 @@ def check_all(
     verifying: bool,
     illustrated: bool = False,
     drawn: tuple[int, int | None] | None = None,
+    changes: "Sequence[Change]" = (),
 ) -> "Report":
     """Check every file; `verifying` adds verdicts of images. `illustrated` keeps the analyses, and the images.
 
-    `drawn` is the number of draws of a Monte Carlo and their seed.
+    `drawn` is the number of draws of a Monte Carlo and their seed, `changes` are values in place of the files'.
     """
     from bisar_budget.budget.fleet import check_files, whole, without_analysis
     from bisar_budget.findings.mission import Report
 
     keep = whole if verifying or illustrated else without_analysis
-    missions = check_files(files, today, model, keep, drawn=drawn)
+    missions = check_files(files, today, model, keep, drawn=drawn, changes=changes)
     if verifying:
         missions = _with_images(missions, illustrated)
     return Report(version=__version__, missions=tuple(missions))
@@ -356,7 +364,14 @@ def _with_images(
     return result
 
 
-def _explain(files: Sequence[str], row_id: str, today: date, model: str | None, output: str | None) -> None:
+def _explain(
+    files: Sequence[str],
+    row_id: str,
+    today: date,
+    model: str | None,
+    output: str | None,
+    changes: "Sequence[Change]",
+) -> None:
     """Explain a row in every mission that has it."""
     from bisar_budget.budget.check import check_mission
     from bisar_budget.mission.readers import did_you_mean
@@ -364,7 +379,7 @@ def _explain(files: Sequence[str], row_id: str, today: date, model: str | None, 
 
     texts: list[str] = []
     known: dict[str, None] = {}
-    for mission in load_all(files, model):
+    for mission in load_all(files, model, changes):
         found = check_mission(mission, today)
         known |= dict.fromkeys(row.id for row in found.rows)
         if any(row.id == row_id for row in found.rows):

@@ -5,11 +5,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bisar_budget.cli.streams import FILE, complain, deliver, fail, load_all, spare, write_file
+from bisar_budget.cli.streams import FILE, SET, complain, deliver, fail, load_all, spare, write_file
 from bisar_budget.cli.verify import announce, faster, progress_bar
 from bisar_budget.faults import printable
 
 if TYPE_CHECKING:
+    from bisar_budget.faults import Change
     from bisar_budget.mission.model import Mission
     from bisar_budget.simulate.targets import Targets
 
@@ -39,7 +40,15 @@ if TYPE_CHECKING:
     help="What stands in the scene, instead of one point at its centre: EAST, NORTH[, LEVEL]; ...; "
     "grid:NXxNY:SPACING; FILE.csv; clutter LEVEL.",
 )
-def simulate(mission: str, plot: str | None, output: str | None, image_former: str, targets: str | None) -> None:
+@SET
+def simulate(
+    mission: str,
+    plot: str | None,
+    output: str | None,
+    image_former: str,
+    targets: str | None,
+    changes: "tuple[Change, ...]",
+) -> None:
     """Form the image of a point, or of a scene, with the declared errors.
 
     All errors of the file together, with its signs, are flown once: they may cancel, and the worst case is that
@@ -65,7 +74,7 @@ def simulate(mission: str, plot: str | None, output: str | None, image_former: s
         standing = Targets() if targets is None else parse_targets(targets)
     except ValueError as error:
         raise click.UsageError(f"--targets: {printable(str(error))}.") from None
-    (loaded,) = load_all([mission])
+    (loaded,) = load_all([mission], changes=changes)
     if is_phase_history:
         _export(mission, loaded, str(output), standing)
         return

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from click import ParamType as ParamType
     from click.shell_completion import CompletionItem
 
+    from bisar_budget.faults import Change
     from bisar_budget.mission.model import Mission
 else:
 
@@ -49,6 +50,31 @@ class FileName(ParamType[str]):
 FILE = FileName()
 
 
+def _read_changes(ctx: click.Context, param: click.Parameter, texts: tuple[str, ...]) -> "tuple[Change, ...]":
+    if not texts:
+        return ()
+    from bisar_budget.faults import InvalidValueError
+    from bisar_budget.mission.changes import read_changes
+
+    try:
+        return read_changes(texts)
+    except InvalidValueError as error:
+        raise click.UsageError(f"--set: {error.problem.problem}; {error.problem.accepted}.") from None
+
+
+# Not a setting of a project, nor of the environment: a gate judges the file that is in the repository.
+SET = click.option(
+    "--set",
+    "changes",
+    multiple=True,
+    metavar="KEY=VALUE",
+    callback=_read_changes,
+    help="Put a value in place of the mission's own, or beside it: KEY is its path in the file, such as "
+    "platforms.receiver.azimuth or other_errors.0.name, VALUE as the file would have it. Repeatable; every report "
+    "says it.",
+)
+
+
 def expand(patterns: Iterable[str]) -> list[str]:
     """Expand the glob patterns that the shell left; a pattern without a match stays and fails to load."""
     files: list[str] = []
@@ -64,15 +90,15 @@ def expand(patterns: Iterable[str]) -> list[str]:
     return list(dict.fromkeys(files))
 
 
-def load_all(files: Sequence[str], model: str | None = None) -> "list[Mission]":
-    """Load every mission, or say every fault of every file and exit."""
+def load_all(files: Sequence[str], model: str | None = None, changes: "Sequence[Change]" = ()) -> "list[Mission]":
+    """Load every mission with values in place of its own, or say every fault of every file and exit."""
     from bisar_budget.faults import MissionError
     from bisar_budget.mission.load import load_mission
 
     loaded, is_usable = [], True
     for file in files:
         try:
-            loaded.append(load_mission(file, model))
+            loaded.append(load_mission(file, model, changes))
         except MissionError as error:
             is_usable = False
             for line in error.lines():

@@ -12,6 +12,7 @@ from bisar_budget.cli.streams import (
     EXIT_BROKEN,
     EXIT_USAGE,
     FILE,
+    SET,
     complain,
     deliver,
     expand,
@@ -27,6 +28,7 @@ LONG = 60.0  # s; what takes longer is announced
 if TYPE_CHECKING:
     from click._termui_impl import ProgressBar
 
+    from bisar_budget.faults import Change
     from bisar_budget.findings.images import VerifiedMission
     from bisar_budget.mission.model import Mission
 
@@ -43,13 +45,21 @@ if TYPE_CHECKING:
     help="Format of the verdicts.",
 )
 @click.option("-o", "--output", type=FILE, metavar="FILE", help="Write to FILE instead of standard output.")
+@SET
 @click.option(
     "--jobs",
     type=click.IntRange(min=1),
     metavar="N",
     help="Processes to use; default: the number of cores, or 1 with the extra `fast`, which uses all cores itself.",
 )
-def verify(missions: Sequence[str], only: str, format_name: str, output: str | None, jobs: int | None) -> None:
+def verify(
+    missions: Sequence[str],
+    only: str,
+    format_name: str,
+    output: str | None,
+    changes: "tuple[Change, ...]",
+    jobs: int | None,
+) -> None:
     """Form images at the limits and measure whether they are true.
 
     The data come from exact ranges, and the phase is measured in the image. A limit is confirmed if the
@@ -62,7 +72,7 @@ def verify(missions: Sequence[str], only: str, format_name: str, output: str | N
 
     files = expand(missions)
     spare(files, [output])
-    verified = verify_all(load_all(files), only, jobs)
+    verified = verify_all(load_all(files, changes=changes), only, jobs)
     if format_name == "json":
         text = verification.as_json(__version__, verified)
     else:

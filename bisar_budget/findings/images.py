@@ -6,6 +6,7 @@ the bistatic look direction φ_b, y′ across it, counter-clockwise.
 
 from typing import NamedTuple
 
+from bisar_budget.faults import Change
 from bisar_budget.geometry import GroundVector
 
 FLOOR_DB = -40.0  # of the error-free peak: black in a chip
@@ -58,12 +59,16 @@ class Verdict(NamedTuple):
 
 
 class VerifiedMission(NamedTuple):
-    """The verdicts on one mission's limits; `conditions` says of what images they are."""
+    """The verdicts on one mission's limits; `conditions` says of what images they are.
+
+    `changes` are values that options put in place of the file's.
+    """
 
     file: str
     name: str
     rows: tuple[Verdict, ...]
     conditions: str = ""
+    changes: tuple[Change, ...] = ()
 
     @property
     def status(self) -> str:

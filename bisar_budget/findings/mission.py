@@ -4,7 +4,7 @@ from datetime import date
 from typing import TYPE_CHECKING, NamedTuple
 
 from bisar_budget.analysis.allocation import Allocation
-from bisar_budget.faults import Fault
+from bisar_budget.faults import Change, Fault
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUSES, worst
 from bisar_budget.geometry import BistaticGeometry
@@ -22,11 +22,13 @@ class FileWarning(NamedTuple):
     """Something about the mission file that should not go unsaid.
 
     Most change no verdict. One that `is_doubt` puts in doubt what was checked: the status is `warn` at least.
+    `is_of_options` marks the one that says which options changed the mission.
     """
 
     line: int | None
     message: str
     is_doubt: bool = False
+    is_of_options: bool = False
 
 
 class Resolution(NamedTuple):
@@ -65,6 +67,7 @@ class MissionFindings(NamedTuple):
     image_evidence: "tuple[ImageEvidence, ...]" = ()  # a few of those images, where a report shows them
     monte_carlo: "MonteCarlo | None" = None  # if errors were drawn
     document: Document = Document()
+    changes: tuple[Change, ...] = ()  # values that options put in place of the file's
 
     @property
     def mission(self) -> Mission | None:

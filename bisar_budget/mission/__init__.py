@@ -1,4 +1,16 @@
 """The mission file: what it may say (`model`), how it is read (`load`), its JSON Schema (`schema`)."""
 
 # What other rooms may use.
-__all__ = ["instruments", "load", "model", "parts", "readers", "revision", "schema", "symmetric"]
+__all__ = [
+    "changes",
+    "instruments",
+    "keys",
+    "load",
+    "model",
+    "parts",
+    "readers",
+    "revision",
+    "schema",
+    "symmetric",
+    "tree",
+]

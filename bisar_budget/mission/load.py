@@ -5,18 +5,20 @@ A text gives a `Mission` or a `MissionError`, nothing else.
 
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import BinaryIO, cast
 
-from bisar_budget.faults import MissionError
+from bisar_budget.faults import Change, Fault, MissionError, changes_words
 from bisar_budget.mission.model import MISSION, Mission, flies_on_earth, names_parts
 from bisar_budget.mission.readers import INVALID
 from bisar_budget.mission.tree import MAX_BYTES, UnusableError, file_fault, read_tree
 
 
-def load_mission(path: str, model: str | None = None) -> Mission:
-    """Read the mission file at `path`; `-` is standard input. `model` stands in for the file's own.
+def load_mission(path: str, model: str | None = None, changes: Sequence[Change] = ()) -> Mission:
+    """Read the mission file at `path`; `-` is standard input.
+
+    `model` stands in for the file's own, `changes` for values.
 
     Raises
     ------
@@ -37,7 +39,7 @@ def load_mission(path: str, model: str | None = None) -> Mission:
         problem = "not found, and no file matches the pattern" if is_pattern else f"cannot be read: {reason}"
         raise MissionError(path, (file_fault(problem),)) from None
     try:
-        return parse_mission(data, path, model)
+        return parse_mission(data, path, model, changes=changes)
     except MissionError as error:
         error.data = data if len(data) <= MAX_BYTES else None
         raise
@@ -54,6 +56,7 @@ def parse_mission(
     file: str = "-",
     model: str | None = None,
     beside: Callable[[str], bytes] | None = None,
+    changes: Sequence[Change] = (),
 ) -> Mission:
     """Turn the content of a mission file into a `Mission`.
 
@@ -67,6 +70,8 @@ def parse_mission(
         Gating model in place of `allocation.model`.
     beside : callable, optional
         Gives the content of a file that the mission names, and raises `PathFileError`; omitted: files beside it.
+    changes : sequence of Change
+        Values in place of the file's, and beside them, in this order.
 
     Raises
     ------
@@ -74,6 +79,11 @@ def parse_mission(
         Not a usable mission; carries every fault.
     """
     tree = read_tree(data, file)
+    if changes:
+        from bisar_budget.mission.changes import apply_changes
+
+        with suppress(UnusableError):
+            apply_changes(tree, changes)
     if model is not None and isinstance(tree.root.get("allocation"), dict):
         tree.root["allocation"]["model"] = model
     mission = INVALID
@@ -90,7 +100,23 @@ def parse_mission(
             mission = with_parts(mission, folder, tree.report)
     if tree.faults:
         ordered = sorted(dict.fromkeys(tree.faults), key=lambda fault: (fault.line or 0, fault.column or 0))
+        if changes:
+            ordered = [_with_changes(fault, changes) for fault in ordered]
         raise MissionError(file, tuple(ordered))
     as_bytes = data.encode("utf-8", "surrogatepass") if isinstance(data, str) else data
-    read = cast(Mission, mission._replace(file=file, places=tree.values, data=as_bytes))
+    read = cast(Mission, mission._replace(file=file, places=tree.values, data=as_bytes, changes=tuple(changes)))
     return read if model is None else read._replace(allocation=read.allocation._replace(model=model))
+
+
+def _with_changes(fault: Fault, changes: Sequence[Change]) -> Fault:
+    """Say of an unknown key of an option which was meant, and with what options a fault of the file was found.
+
+    Without them there may be none.
+    """
+    if fault.option:
+        if fault.hint or not fault.problem.endswith("is not a known key"):
+            return fault
+        from bisar_budget.mission.keys import nearest_keys
+
+        return fault._replace(hint=nearest_keys(fault.option.removeprefix("--set ")))
+    return fault._replace(hint=f"{fault.hint}{'. ' if fault.hint else ''}Read with {changes_words(changes)}")

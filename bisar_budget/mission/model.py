@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from bisar_budget import units
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.faults import KeyPath, Place, Problem
+from bisar_budget.faults import Change, Changed, KeyPath, Place, Problem
 from bisar_budget.geometry import (
     STRAIGHT,
     BistaticGeometry,
@@ -642,7 +642,7 @@ class Mission(NamedTuple):
     """A mission file that can be used.
 
     `file` and `places` say where it stands: the path of each value to the parser's event. `data` is the file as
-    read, byte for byte.
+    read, byte for byte. `changes` are the values that options put in place of the file's.
     """
 
     schema_version: Annotated[int, Key(Version())]
@@ -670,6 +670,7 @@ class Mission(NamedTuple):
     file: str = ""
     places: Mapping[KeyPath, Any] = {}
     data: bytes = b""
+    changes: tuple[Change, ...] = ()
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
@@ -701,14 +702,20 @@ class Mission(NamedTuple):
     def line(self, path: KeyPath) -> Place | None:
         """Line of a value in the mission file, from 1, else of the nearest key above it that exists.
 
-        At last that is the file's first key; None for a mission that came from no file.
+        At last that is the file's first key; None for a mission that came from no file, and for a value that an
+        option set.
         """
         get = self.places.get
         event = get(path)
         while event is None and path:
             path = path[:-1]
             event = get(path)
-        return None if event is None else Place.of(event)
+        return None if event is None or isinstance(event, Changed) else Place.of(event)
+
+    def is_changed(self, path: KeyPath) -> bool:
+        """Whether a value, or what holds it, comes from an option."""
+        above = (self.places.get(path[:length]) for length in range(len(path), 0, -1))
+        return bool(self.changes) and isinstance(next(filter(None, above), None), Changed)
 
 
 @lru_cache(maxsize=4)  # asked for when a mission is read and again when it is checked

@@ -12,7 +12,7 @@ from typing import Any
 import yaml
 from yaml import AliasEvent, MappingEndEvent, ScalarEvent
 
-from bisar_budget.faults import Fault, KeyPath, MissionError, Problem, printable, shown
+from bisar_budget.faults import Change, Fault, KeyPath, MissionError, Problem, printable, shown
 from bisar_budget.mission.readers import INVALID
 
 MAX_BYTES = 1 << 20  # a mission file has a few kilobytes
@@ -27,6 +27,12 @@ _NULLS = ("", "~", "null", "Null", "NULL")
 def file_fault(problem: str, hint: str = "") -> Fault:
     """A fault of the file as a whole."""
     return Fault(line=None, column=None, key="", problem=problem, hint=hint)
+
+
+def events(text: str) -> Callable[[], Any]:
+    """Give the parser's events of a text, one at each call; raises `yaml.YAMLError`."""
+    next_event: Callable[[], Any] = _PARSER(text).get_event
+    return next_event
 
 
 def _decoded(data: bytes | str, file: str) -> str:
@@ -51,7 +57,8 @@ class UnusableError(Exception):
 class Tree:
     """What the file says: nested dict, list and str, with the parser's event of every key and value.
 
-    What cannot be read is reported and stands in the tree as `INVALID`.
+    What cannot be read is reported and stands in the tree as `INVALID`. `changes` are the options that put values
+    into it, each at the highest path that it changed.
     """
 
     def __init__(self) -> None:
@@ -59,14 +66,27 @@ class Tree:
         self.keys: dict[KeyPath, Any] = {}
         self.values: dict[KeyPath, Any] = {}  # events, which hold the marks of start and end
         self.faults: list[Fault] = []
+        self.changes: dict[KeyPath, Change] = {}
 
     def fault(self, mark: Any, path: KeyPath, problem: str, **more: str) -> None:
         """Note a fault at a place of the file; without a mark, at its start. Of too many only the first are said."""
-        line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
-        self.faults.append(Fault(line=line, column=column, key=_dotted(path), problem=problem, **more))
+        change = self._change_at(path)
+        if change is not None:
+            more["option"] = change.option
+            self.faults.append(Fault(line=None, column=None, key=_dotted(path), problem=problem, **more))
+        else:
+            line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
+            self.faults.append(Fault(line=line, column=column, key=_dotted(path), problem=problem, **more))
         if len(self.faults) >= MAX_FAULTS:
             self.faults.append(file_fault(f"has {MAX_FAULTS} faults or more; what follows them was not read"))
             raise UnusableError
+
+    def _change_at(self, path: KeyPath) -> Change | None:
+        """The option that a value, or what holds it, comes from."""
+        if not self.changes:
+            return None
+        above = (self.changes.get(path[:length]) for length in range(len(path), 0, -1))
+        return next(filter(None, above), None)
 
     def report(self, path: KeyPath, problem: Problem) -> None:
         """Note what a reader found wrong, at the value's place, else at the nearest key's above it."""
@@ -93,13 +113,13 @@ class Tree:
         while type(event := next_event()) is not yaml.DocumentStartEvent:
             if type(event) is yaml.StreamEndEvent:
                 return
-        self.root = self._node(next_event, next_event(), ())
+        self.root = self.node(next_event, next_event(), ())
         while type(event := next_event()) is not yaml.StreamEndEvent:
             if type(event) is yaml.DocumentStartEvent:
                 self.fault(event.start_mark, (), "has a second YAML document", accepted="one mission to a file")
                 raise UnusableError
 
-    def _node(self, next_event: Callable[[], Any], event: Any, path: KeyPath) -> Any:
+    def node(self, next_event: Callable[[], Any], event: Any, path: KeyPath) -> Any:
         """Read one value; the depth of the recursion is bounded by `MAX_DEPTH`."""
         self.values[path] = event
         if len(self.values) > MAX_VALUES:
@@ -110,7 +130,8 @@ class Tree:
         if kind is ScalarEvent:
             value: Any = event.value
             if not event.style and value in _NULLS:  # plain: "" from libyaml, None from pure Python
-                self.fault(mark, path, "has no value", hint="Give it one, or remove the key")
+                hint = "Give it one" + ("" if self._change_at(path) else ", or remove the key")
+                self.fault(mark, path, "has no value", hint=hint)
                 value = INVALID
         elif kind is AliasEvent:
             self.fault(mark, path, "is an alias (*)", accepted="write the value out")
@@ -125,7 +146,7 @@ class Tree:
             items: list[Any] = []
             while type(item := next_event()) is not yaml.SequenceEndEvent:
                 items.append(item)
-                value.append(self._node(next_event, item, (*path, len(value))))
+                value.append(self.node(next_event, item, (*path, len(value))))
             if event.flow_style:
                 self._decimal_commas(items, path)
         if event.tag is not None and event.tag != "!":
@@ -168,15 +189,15 @@ class Tree:
                 first = self.keys[here].start_mark.line + 1
                 problem = f"is a duplicate key; the first is in line {first}"
                 self.fault(mark, here, problem, accepted="each key once")
-                self._node(next_event, next_event(), (*path, f"{key} (again)"))
+                self.node(next_event, next_event(), (*path, f"{key} (again)"))
                 continue
             self.keys[here] = event
             event = next_event()
             if type(event) is ScalarEvent and event.tag is None and event.value not in _NULLS:
-                self.values[here] = event  # as `_node` would: most values are such
+                self.values[here] = event  # as `node` would: most values are such
                 mapping[key] = event.value
             else:
-                mapping[key] = self._node(next_event, event, here)
+                mapping[key] = self.node(next_event, event, here)
         return mapping
 
 
@@ -191,8 +212,8 @@ def read_tree(data: bytes | str, file: str) -> Tree:
     text = _decoded(data, file)
     tree = Tree()
     try:
-        parser = _PARSER(text)
-        tree.read_document(parser.get_event)
+        next_event = events(text)
+        tree.read_document(next_event)
         if not isinstance(tree.root, dict) and not tree.faults:
             problem = "is empty" if tree.root is INVALID else "is not a mapping of keys to values"
             tree.faults.append(file_fault(problem, "`bisar-budget init` writes a mission file to start from"))

@@ -60,7 +60,11 @@ def verify_mission(
                 rows.append(row)
                 progress(row.id)
     return VerifiedMission(
-        file=mission.file, name=mission.name, rows=tuple(rows), conditions=", ".join(_conditions(mission))
+        file=mission.file,
+        name=mission.name,
+        rows=tuple(rows),
+        conditions=", ".join(_conditions(mission)),
+        changes=mission.changes,
     )
 
 

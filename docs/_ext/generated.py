@@ -126,11 +126,12 @@ def _documents() -> list[dict[str, Any]]:
         ("specs/missions/one_stationary_spotlight.yaml", "--verify"),
         ("specs/missions/drones_same_gnss.yaml", "--monte-carlo", "1000"),
         ("no such file.yaml",),
+        ("specs/missions/rigling_moses_section_v.yaml", "--set", "radar.bandwidth=200 m"),
     )
     texts = [_output("check", *arguments, "--format", "json") for arguments in checked]
     more = "scene: { radius: 250 m }\nwaivers: [{ id: timing.linear, until: 2000-01-01, reason: expired }]\n"
     text = (MISSIONS / "rigling_moses_section_v.yaml").read_text(encoding="utf-8") + more
-    texts.append(_output("check", "-", "--format", "json", given=text))
+    texts.append(_output("check", "-", "--set", "radar.bandwidth=200 MHz", "--format", "json", given=text))
     return [json.loads(text) for text in texts]
 
 

@@ -25,6 +25,7 @@ FLOORS = [
     {"simulate"},
     {"verify"},
     {"formats"},
+    {"design"},
     {"report"},
     {"cli"},
     {"__main__"},

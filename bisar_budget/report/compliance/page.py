@@ -14,7 +14,7 @@ from bisar_budget.catalogue import EQUATIONS
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.effect import MOTION_UNITS, ErrorSource
 from bisar_budget.effects.subject import Subject
-from bisar_budget.faults import KeyPath
+from bisar_budget.faults import KeyPath, changes_words
 from bisar_budget.findings.images import PointImage
 from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
 from bisar_budget.findings.row import Row, worst_first
@@ -62,6 +62,7 @@ if TYPE_CHECKING:
 
 _NOTHING = "Nothing was judged"
 _ALONE = "; each error alone"
+_CHANGED = "; with values set by options"
 _OWNERS = ("transmitter", "receiver", "clock", "reserve")
 _DRIVERS = 3
 _MATRIX_ROWS = 40  # of a summary; beyond, those that use least are left to the annex
@@ -134,6 +135,8 @@ def _overall(report: Report, pages: Sequence[MissionPage]) -> str:
         return _NOTHING
     if empty:
         verdict = f"{verdict}; of {len(pages)} missions {empty} declare no error"
+    if any(mission.changes for mission in usable):
+        verdict += _CHANGED
     alone = sum(bool(page.alone) for page in pages)
     if not alone:
         return verdict
@@ -199,7 +202,8 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
         alone=_ALONE if judged and found.combine == "each" else "",
         narrow=narrow_gradients(found.geometry),
         status=found.status,
-        verdict=_verdict(found.status, found.summary.get("waived", 0)) if judged else _NOTHING,
+        verdict=(_verdict(found.status, found.summary.get("waived", 0)) if judged else _NOTHING)
+        + (_CHANGED if found.changes else ""),
         name=found.name,
         counts=", ".join(f"{count} {STATUS[status].words}" for status, count in found.summary.items()),
         worst=judged[0].id if judged else "",
@@ -520,6 +524,8 @@ def _general(mission: Mission) -> Iterator[General]:
 
 
 def _validity(mission: Mission, found: MissionFindings) -> Iterator[tuple[str, str]]:
+    if found.changes:
+        yield "Mission", f"not that of the file, but that of the file with {changes_words(found.changes)}"
     yield "Model", _VALIDITY[found.model]
     if mission.has_direct_path:
         yield (
@@ -576,6 +582,8 @@ def _inputs(mission: Mission, found: MissionFindings, file: str) -> Iterator[Inp
     """Values that the findings rest on, with the line of the file or `default`."""
 
     def given(name: str, value: str, path: KeyPath) -> Input:
+        if mission.is_changed(path):
+            return Input(name, value, "--set")
         is_in_file = path in mission.places
         return Input(name, value, f"{file}:{mission.line(path)}" if is_in_file else "default")
 

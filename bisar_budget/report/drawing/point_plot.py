@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.faults import printable
+from bisar_budget.faults import changes_words, printable
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
 from bisar_budget.report.drawing.point_figures import FLOOR_DB, ImagePanel, Limits, Sheet, rotated_back, sheet
 from bisar_budget.report.words.layout import wrapped
@@ -140,6 +140,7 @@ def summary(images: PointImages, mission: Mission) -> str:
     is_point = len(images.responses) == 1 and images.targets.clutter_db is None
     lines = [
         mission.name,
+        *(wrapped(f"  {changes_words(mission.changes)}", "    ") if mission.changes else ()),
         "",
         *wrapped(f"errors         {_flown(mission)}", " " * 15),
         f"displacement   {east + 0.0:.3f} m east, {north + 0.0:.3f} m north",

@@ -15,7 +15,7 @@ from bisar_budget.effects.effect import ErrorSource, image_plane
 from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.slow_vibration import cubic_part, quadratic_part
 from bisar_budget.effects.vibration_lines import lines_of, sight_of
-from bisar_budget.faults import KeyPath, printable
+from bisar_budget.faults import KeyPath, changes_words, printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
@@ -49,7 +49,9 @@ def explain(mission: Mission, found: MissionFindings, row_id: str) -> str:
     """
     row = next(row for row in found.rows if row.id == row_id)
     own_id = f" [{printable(row.requirement_id)}]" if row.requirement_id else ""
-    lines = [f"{STATUS[row.status].text} {printable(row.id)}{own_id} of {printable(mission.name)}", ""]
+    lines = [f"{STATUS[row.status].text} {printable(row.id)}{own_id} of {printable(mission.name)}"]
+    lines += [f"Not as the file says: {changes_words(mission.changes)}"] if mission.changes else []
+    lines.append("")
     lines += [line for step in chain(mission, found, row) for line in step.lines]
     lines += _verdict(row)
     return "\n".join(part for line in lines for part in _fitted(line)) + "\n"

@@ -4,7 +4,7 @@ import csv
 import io
 from collections.abc import Iterable, Iterator, Sequence
 
-from bisar_budget.faults import printable
+from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.mission import MissionFindings, UnusableMission
 from bisar_budget.report import Piece, Style
 
@@ -37,6 +37,7 @@ COLUMNS = (
     "binding_requirement",
     "cubic_rad",
     "islr_db",
+    "set",
 )
 
 
@@ -70,6 +71,7 @@ def _faults(mission: UnusableMission) -> Iterator[list[object]]:
 
 def _rows(mission: MissionFindings) -> Iterator[list[object]]:
     file, name = _text(mission.file), _text(mission.name)
+    changed = _text(changes_words(mission.changes)) or None
     verdicts = {verdict.id: verdict.verdict for verdict in mission.verdicts or ()}
     for row in mission.rows:
         x, y = row.displacement_m or (None, None)
@@ -102,6 +104,7 @@ def _rows(mission: MissionFindings) -> Iterator[list[object]]:
             row.binding_requirement,
             row.cubic_rad,
             row.islr_db,
+            changed,
         ]
 
 

@@ -6,7 +6,7 @@ The runner shows ten errors and ten warnings of a step, so the worst come first.
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from bisar_budget.faults import Fault, Place, Region
+from bisar_budget.faults import Fault, Place, Region, changes_words
 from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
 from bisar_budget.findings.row import worst_first
 from bisar_budget.findings.status import STATUS
@@ -91,6 +91,8 @@ def step_summary(report: Report, style: Style) -> str:
         row, use = worst_first(mission.rows)[0], ""
         if row.utilization is not None and row.allowable is not None:
             use = percent(row.utilization)
+        if mission.changes:
+            file += " " + markdown_text(changes_words(mission.changes))
         status = STATUS[mission.status].text + ("; each error alone" if mission.combine == "each" else "")
         lines.append(f"| {status} | {file} | {markdown_text(row.id)} | {use} |")
     broken = [

@@ -80,6 +80,7 @@ def _unusable(mission: UnusableMission) -> dict[str, Any]:
                 "given": fault.given or None,
                 "accepted": fault.accepted or None,
                 "hint": fault.hint or None,
+                "option": fault.option or None,
             }
             for fault in mission.faults
         ],
@@ -93,6 +94,7 @@ def _mission(mission: MissionFindings) -> dict[str, Any]:
         "name": mission.name,
         "document": mission.document._asdict(),
         "status": mission.status,
+        "set": [change._asdict() for change in mission.changes],
         "model": mission.model,
         "combine": mission.combine,
         "coverage_factor": mission.coverage_factor,

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from functools import cache
 from os.path import splitext
 
+from bisar_budget.faults import changes_words
 from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
@@ -54,6 +55,8 @@ def _mission(mission: MissionFindings, style: Style, counts: Counter[str]) -> It
     yield _property("file", source_path(mission.file, style.root))
     yield _property("model", mission.model)
     yield _property("combine", mission.combine)
+    if mission.changes:
+        yield _property("set", changes_words(mission.changes))
     said = mission.document._asdict().items()
     yield from [_property(f"document_{name}", value) for name, value in said if value is not None]
     yield "</properties>"

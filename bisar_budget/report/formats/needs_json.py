@@ -10,6 +10,7 @@ import re
 from os.path import splitext
 from typing import Any
 
+from bisar_budget.faults import changes_words
 from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
 from bisar_budget.findings.row import Row
 from bisar_budget.report import Style
@@ -51,6 +52,7 @@ def _row(row: Row, mission: MissionFindings, file: str) -> dict[str, Any]:
     texts = [measure(row), cause(row), f"From {row.equation}."]
     texts += [f"Evidence: {row.evidence}"] if row.evidence else []
     texts.append(f"{mission.name}, {file}" + (f":{row.line}" if row.line is not None else ""))
+    texts += [f"Not as the file says: {changes_words(mission.changes)}"] if mission.changes else []
     return {
         "type": "test",
         "title": need_text(f"{row.id} of {mission.name}"),

@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator, Sequence
 from functools import cache
 
-from bisar_budget.faults import printable
+from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.mission import MissionFindings, UnusableMission
 from bisar_budget.findings.row import Row, worst_first
 from bisar_budget.findings.status import STATUS, worst
@@ -42,11 +42,12 @@ def _unusable(mission: UnusableMission, style: Style) -> list[str]:
 
 def _mission(mission: MissionFindings, style: Style) -> list[str]:
     if style.verbosity < 0:
-        count = len(mission.warnings)
+        count = sum(not warning.is_of_options for warning in mission.warnings)
         warned = f"; {count} warning{'s' if count != 1 else ''} about the file" if count else ""
         return [_lead(_summary(mission) + warned, mission.status, style)]
     alone = "; each error alone" if mission.combine == "each" else ""
-    first, *rest = wrapped_counts(_summary(mission) + alone)
+    said = _summary(mission) + alone
+    first, *rest = wrapped(said, "  ") if mission.changes else wrapped_counts(said)
     document = ", ".join(filter(None, (document_words(mission.document), mission.document.author)))
     name = f"{mission.name} ({document})" if document else mission.name
     lines = [_lead(first, mission.status, style), *rest, *wrapped(name, "  ")]
@@ -186,6 +187,8 @@ def _more(row: Row) -> Iterator[str]:
 
 def _asides(mission: MissionFindings, style: Style) -> Iterator[str]:
     for warning in mission.warnings:
+        if warning.is_of_options:
+            continue  # the first line says it
         place = f"{printable(mission.file)}:{warning.line}: " if warning.line is not None else ""
         yield f"warning: {place}{printable(warning.message)}"
     if style.verbosity > 0:
@@ -194,7 +197,8 @@ def _asides(mission: MissionFindings, style: Style) -> Iterator[str]:
 
 def _summary(mission: MissionFindings) -> str:
     counts = ", ".join(f"{count} {STATUS[status].text}" for status, count in mission.summary.items())
-    return f"{STATUS[mission.status].text} {printable(mission.file)}: {counts}"
+    changed = f" {changes_words(mission.changes)}" if mission.changes else ""
+    return f"{STATUS[mission.status].text} {printable(mission.file)}{changed}: {counts}"
 
 
 def _overall(statuses: Sequence[str], style: Style) -> str:

@@ -4,7 +4,7 @@ import json
 import math
 from collections.abc import Iterator, Sequence
 
-from bisar_budget.faults import printable
+from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.report import Style
 from bisar_budget.report.words.layout import table, wrapped, wrapped_counts
@@ -31,6 +31,7 @@ def as_json(version: str, missions: Sequence[VerifiedMission]) -> str:
                 "file": mission.file,
                 "name": mission.name,
                 "status": mission.status,
+                "set": [change._asdict() for change in mission.changes],
                 "conditions": mission.conditions,
                 "rows": [row._asdict() for row in mission.rows],
             }
@@ -51,7 +52,8 @@ def _mission(mission: VerifiedMission, style: Style) -> list[str]:
     counts = ", ".join(f"{found.count(verdict)} {word}" for verdict, word in WORDS.items() if verdict in found)
     refuted = sum(row.verdict_autofocus == "optimistic" for row in mission.rows)
     counts += f"; {refuted} optimistic with autofocus" if refuted else ""  # they decide the exit code too
-    summary = f"{printable(mission.file)}: {counts or 'no row has a limit here'}"
+    changed = f" {changes_words(mission.changes)}" if mission.changes else ""
+    summary = f"{printable(mission.file)}{changed}: {counts or 'no row has a limit here'}"
     conditions = wrapped(f"Images: {mission.conditions}.", "  ") if mission.conditions else []
     return [
         *wrapped(printable(mission.name), "  "),

@@ -1,0 +1,126 @@
+"""`bisar-budget solve`: where a number of a mission begins or ceases to comply."""
+
+import sys
+from collections.abc import Sequence
+from datetime import datetime
+from typing import TYPE_CHECKING
+
+import click
+
+from bisar_budget import __version__
+from bisar_budget.cli.streams import (
+    EXIT_BROKEN,
+    FILE,
+    SET,
+    day_of_run,
+    deliver,
+    expand,
+    fail,
+    load_all,
+    spare,
+    wants_color,
+)
+
+if TYPE_CHECKING:
+    from bisar_budget.faults import Change
+
+
+@click.command()
+@click.argument("missions", type=FILE, nargs=-1, required=True, metavar="MISSION...")
+@click.option(
+    "--for",
+    "key",
+    required=True,
+    metavar="KEY",
+    help="Path of the number in the file, such as collection.aperture_time or platforms.receiver.azimuth.",
+)
+@click.option(
+    "--scale",
+    "is_scale",
+    is_flag=True,
+    help="KEY is a section of errors: solve for the factor that multiplies all of them.",
+)
+@click.option(
+    "--between",
+    metavar="A..B",
+    help="Range to look at, with units (default: a tenth to ten times the file's value; of azimuths the circle).",
+)
+@click.option("--row", metavar="ID", help="The row that has to comply, instead of the whole mission.")
+@click.option(
+    "--target",
+    type=click.Choice(["fail", "warn"]),
+    default="fail",
+    show_default=True,
+    help="What must not happen: fail, or also warn and what check --strict breaks on.",
+)
+@click.option(
+    "--model",
+    type=click.Choice(["published", "full", "strictest"]),
+    help="Model that decides, instead of the mission file's.",
+)
+@SET
+@click.option(
+    "--date",
+    "today",
+    type=click.DateTime(["%Y-%m-%d"]),
+    help="Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC).",
+)
+@click.option(
+    "--format",
+    "format_name",
+    type=click.Choice(["text", "json"]),
+    default="text",
+    show_default=True,
+    help="Format of the answer.",
+)
+@click.option("-o", "--output", type=FILE, metavar="FILE", help="Write to FILE instead of standard output.")
+def solve(
+    missions: Sequence[str],
+    key: str,
+    is_scale: bool,
+    between: str | None,
+    row: str | None,
+    target: str,
+    model: str | None,
+    changes: "tuple[Change, ...]",
+    today: datetime | None,
+    format_name: str,
+    output: str | None,
+) -> None:
+    """Find the values of a number at which a mission begins or ceases to comply.
+
+    Every such value of the range is found, what binds on both sides of it is named, and both sides are checked as
+    they are written. A pair of values closer than the places looked at is found only if the worst utilization turns
+    there. Exit code: 0, 1 if no value of the range complies, 2 for wrong usage or an unusable mission file.
+    """
+    from bisar_budget.design import solve as solving
+    from bisar_budget.design.quantities import QuestionError
+    from bisar_budget.report import Style
+    from bisar_budget.report.formats import solutions
+
+    files = expand(missions)
+    spare(files, [output])
+    day = today.date() if today else day_of_run()
+    solved = []
+    for mission in load_all(files, model, changes):
+        try:
+            solved.append(
+                solving.solve(
+                    mission,
+                    key,
+                    between=between,
+                    row=row,
+                    target=target,
+                    model=model,
+                    is_scale=is_scale,
+                    today=day,
+                )
+            )
+        except QuestionError as error:
+            fail(f"{mission.file}: {error}")
+    if format_name == "json":
+        text = solutions.as_json(__version__, solved)
+    else:
+        text = solutions.as_text(solved, Style(color=output is None and wants_color()))
+    deliver(text, output, format_name)
+    sys.exit(EXIT_BROKEN if any(solution.status == "none" for solution in solved) else 0)

@@ -1,0 +1,191 @@
+"""The number of a mission file that a question is about: its reader, its value, how it is written."""
+
+import math
+import re
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context
+from typing import Any, NamedTuple
+
+from bisar_budget import units
+from bisar_budget.faults import InvalidValueError, shown
+from bisar_budget.mission.changes import parts_of
+from bisar_budget.mission.keys import nearest_keys
+from bisar_budget.mission.model import DIRECTION, ELEVATION, LATITUDE, MISSION
+from bisar_budget.mission.readers import INVALID, Late, ListOf, OneOf, Quantity, Reader, Section, Triple
+from bisar_budget.units import Dimension, parse_quantity
+
+DIGITS = 8  # of values that are said: both sides of a crossing stay within 1e-6
+_DECADE = 10.0
+_UNIT = re.compile(r"^[^A-Za-z°µμ/%√]*", re.ASCII)
+FACTOR = Quantity(units.RATIO, gt=0, ge=1e-12, le=1e12)
+
+
+class QuestionError(Exception):
+    """A question that cannot be asked of a mission; the message says why, and what can."""
+
+
+class Number(NamedTuple):
+    """A number of the file: its reader, its value in SI (None: the file has none) and the unit that it is said in."""
+
+    key: str
+    reader: Quantity
+    value: float | None
+    unit: str
+
+    @property
+    def dimension(self) -> Dimension:
+        """What kind of quantity it is."""
+        return self.reader.dimension
+
+    def text(self, value: float, *, is_up: bool | None = None) -> str:
+        """Write a value as the file would have it, with `DIGITS` digits, rounded up or down; None: to the nearest."""
+        factor, divisor = self.dimension.scales.get(self.unit) or (1.0, 1.0)
+        number = value / factor * divisor
+        if is_up is not None:
+            context = Context(prec=DIGITS, rounding=ROUND_CEILING if is_up else ROUND_FLOOR)
+            number = float(context.create_decimal(repr(number)))
+        return f"{number:.{DIGITS}g}{' ' if self.unit else ''}{self.unit}"
+
+    def said_like(self, between: str | None) -> "Number":
+        """The number said in the unit of the range's end, where the file has no value to say it like."""
+        unit = _UNIT.sub("", (between or "").rpartition("..")[2].strip()).strip()
+        return self._replace(unit=unit) if self.value is None and unit in self.dimension.scales and unit else self
+
+    def read(self, text: str) -> float:
+        """Read what `text` wrote; within a rounding of what the file's reader makes of it, which is the same."""
+        return parse_quantity(text, self.dimension)
+
+
+def number_of(tree: dict[str, Any], key: str) -> Number:
+    """Find the number that a key names.
+
+    Parameters
+    ----------
+    tree : dict
+        What the file says, as text.
+    key : str
+        Path of the number; a scalar that stands for each axis is one number.
+
+    Raises
+    ------
+    QuestionError
+        No such key, or no number.
+    """
+    reader, value = reader_of(tree, key)
+    if isinstance(reader, Triple):
+        if isinstance(value, list) or not reader.or_scalar:
+            of_all = ", or --scale for all of them" if reader.or_scalar else ""
+            raise QuestionError(f"{key}: has three components; accepted: {key}.0, .1 or .2{of_all}")
+        reader = reader.component
+    if isinstance(reader, Section):
+        raise QuestionError(f"{key}: is a section; accepted: one of its keys, {', '.join(reader.keys)}")
+    if not isinstance(reader, Quantity):
+        raise QuestionError(f"{key}: is no number with a unit, and cannot be solved for")
+    dimension = reader.dimension
+    number = parse_quantity(value, dimension) if isinstance(value, str) else None
+    unit = _UNIT.sub("", value).strip() if isinstance(value, str) else ""
+    if unit not in dimension.scales or not unit:
+        unit = "deg" if dimension is units.ANGLE else dimension.usual[0] if dimension.usual else dimension.si
+    return Number(key, reader, number, unit if unit in dimension.scales else "")
+
+
+def reader_of(tree: dict[str, Any], key: str) -> tuple[Reader, Any]:
+    """Go down to a key: its reader, and what the file says there, None if nothing."""
+    reader: Reader = MISSION
+    value: Any = tree
+    for part in parts_of(key):
+        reader = _form(reader, value)
+        inner: Reader | None = None
+        if isinstance(reader, Section) and part in reader.keys:
+            inner = reader.keys[part].reader
+            value = value.get(part) if isinstance(value, dict) else None
+        elif isinstance(reader, ListOf | Triple) and part.isascii() and part.isdigit() and len(part) < 9:
+            inner = reader.section if isinstance(reader, ListOf) else reader.component
+            listed = value if isinstance(value, list) else []
+            if int(part) >= len(listed):
+                raise QuestionError(f"{key}: the list has {len(listed)} entries, and none has the number {part}")
+            value = listed[int(part)]
+        if inner is None:
+            known = f"; accepted: {', '.join(reader.keys)}" if isinstance(reader, Section) else ""
+            hint = nearest_keys(key)
+            raise QuestionError(
+                f"{shown(key)}: {shown(part)!r} is not a known key{known}{f'. {hint}' if hint else ''}"
+            )
+        reader, value = inner, None if value is INVALID else value
+    return _form(reader, value), value
+
+
+def _form(reader: Reader, value: Any) -> Reader:
+    while isinstance(reader, Late | OneOf):
+        reader = reader.load() if isinstance(reader, Late) else reader.pick(value)
+    return reader
+
+
+class Range(NamedTuple):
+    """Where a question looks: from `low` to `high` in SI, `is_log` in steps of a ratio, `is_circle` once around."""
+
+    low: float
+    high: float
+    is_log: bool
+    is_circle: bool = False
+
+    def places(self, count: int) -> list[float]:
+        """Spread `count` values over the range, its ends among them."""
+        parts = [index / (count - 1) for index in range(1, count - 1)]
+        if self.is_log:
+            between = [self.low * (self.high / self.low) ** part for part in parts]
+        else:
+            between = [self.low + (self.high - self.low) * part for part in parts]
+        return [self.low, *between, self.high]
+
+
+def range_of(number: Number, between: str | None) -> Range:
+    """Read `A..B`; without it two decades around the file's value, angles from end to end.
+
+    Raises
+    ------
+    QuestionError
+        No range, an empty one, values that the key cannot have, or no value to look around.
+    """
+    gt, ge, lt, le = number.reader.bounds
+    if between is None:
+        if number.reader is DIRECTION:
+            return Range(0.0, 2 * math.pi, is_log=False, is_circle=True)
+        if number.reader in (ELEVATION, LATITUDE):
+            return Range(ge, le, is_log=False)
+        if not number.value:
+            said = "is 0" if number.value == 0 else "has no value"
+            raise QuestionError(f"{number.key}: {said} in the file; say where to look, --between A..B")
+        ends = sorted((number.value / _DECADE, number.value * _DECADE))
+        if number.dimension in (units.POWER_RATIO, units.TONE, units.PHASE_NOISE):  # a level, its decades are 20 dB
+            ends = [number.value - 20.0, number.value + 20.0]
+        low, high = max(ends[0], ge, gt), min(ends[1], le, lt)
+        low, high = (low * (1 + 1e-9) if low == gt else low), (high * (1 - 1e-9) if high == lt else high)
+    else:
+        first, dots, last = between.partition("..")
+        if not dots:
+            raise QuestionError(
+                f"--between {shown(between)}: is no range; accepted: A..B, such as {_example(number)}"
+            )
+        first, last = first.strip(), last.strip()
+        if _UNIT.sub("", first) == "" and first:  # 1..10 km starts at 1 km
+            first += f" {_UNIT.sub('', last)}".rstrip()
+        low, high = (_end(number, between, end) for end in (first, last))
+    if not low < high:
+        raise QuestionError(
+            f"--between {shown(between or '')}: is {'empty' if low == high else 'reversed'}; accepted: A < B"
+        )
+    return Range(low, high, is_log=low > 0 and high / low >= 4)
+
+
+def _end(number: Number, between: str, text: str) -> float:
+    try:
+        return number.reader.leaf(text)
+    except InvalidValueError as error:
+        said, accepted, hint, _ = error.problem
+        parts = [f"--between {shown(between)}: {shown(text)!r} {said}", accepted, hint]
+        raise QuestionError("; ".join(filter(None, parts))) from None
+
+
+def _example(number: Number) -> str:
+    low, high = (1.0, 10.0) if number.value is None else (number.value / 2, number.value * 2)
+    return f"{number.text(low)}..{number.text(high)}".replace(" ", "")

@@ -1,0 +1,290 @@
+"""Solve a mission for one of its numbers: every value at which compliance begins or ends.
+
+The range is looked at in places, and between two places where compliance differs, the border is bracketed. Where the
+worst utilization turns between places, the turn is looked for first: compliance may change there and back.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from datetime import date
+from itertools import pairwise
+
+from bisar_budget.budget.check import check_mission
+from bisar_budget.design.quantities import FACTOR, Number, QuestionError, Range, number_of, range_of
+from bisar_budget.design.scaled import scaled
+from bisar_budget.design.solution import Crossing, Solution, State
+from bisar_budget.faults import Change, MissionError
+from bisar_budget.findings.mission import MissionFindings
+from bisar_budget.findings.row import Row
+from bisar_budget.findings.status import STATUS
+from bisar_budget.mission.changes import apply_changes, parts_of
+from bisar_budget.mission.load import parse_mission
+from bisar_budget.mission.model import Mission
+from bisar_budget.mission.readers import did_you_mean
+from bisar_budget.mission.tree import read_tree
+
+PLACES = 65  # of a range
+PLACES_OF_CIRCLE = 181  # every 2 degrees: geometry changes fast where gradients are nearly parallel
+_NARROW = 2e-7  # of the value, between the two sides of a crossing before they are written
+_GOLDEN = (math.sqrt(5) - 1) / 2
+_STEPS_TO_TURN = 20  # a golden section to 7e-5 of two places
+_TURNS = 16  # that are looked for
+
+Evaluate = Callable[[float], State]
+
+
+def solve(
+    mission: Mission,
+    key: str,
+    *,
+    between: str | None = None,
+    row: str | None = None,
+    target: str = "fail",
+    model: str | None = None,
+    is_scale: bool = False,
+    today: date,
+) -> Solution:
+    """Find every value of a number of a mission at which its compliance begins or ends.
+
+    Parameters
+    ----------
+    mission : Mission
+        As loaded; the file that it came from is read anew for each value, with the options that changed it.
+    key : str
+        Path of the number in the mission file, such as `collection.aperture_time`; with `is_scale` of a section.
+    between : str, optional
+        Range to look at, `A..B` with units. Omitted: a tenth to ten times the file's value; of an azimuth the circle;
+        of a factor 0.1 to 10.
+    row : str, optional
+        Id of the row that has to comply, instead of the whole mission.
+    target : str
+        fail: what `check` exits with 0 on complies; warn: what `check --strict` does.
+    model : str, optional
+        Gating model in place of the mission's own.
+    is_scale : bool
+        Solve for the factor that multiplies all errors below the key.
+    today : date
+        Day on which waivers are judged, UTC.
+
+    Returns
+    -------
+    Solution
+        Crossings in rising order, values in SI.
+
+    Raises
+    ------
+    QuestionError
+        The question cannot be asked of this mission; says why.
+    """
+    question = _Question(mission, key, between, row, target, model, is_scale, today)
+    scanned = _scan(question.evaluate, question.places())
+    crossings = tuple(
+        question.crossing(low, high) for low, high in pairwise(scanned) if low.complies != high.complies
+    )
+    missions = [state for state in scanned if not state.reason]
+    if not missions:
+        raise QuestionError(f"{key}: no value of the range makes a mission. {scanned[0].reason}")
+    nearest = _nearest(missions)
+    return Solution(
+        file=mission.file,
+        name=mission.name,
+        key=key,
+        unit=question.number.dimension.si,
+        is_scale=is_scale,
+        target=target,
+        row=row,
+        model=question.base.gating_model,
+        low=question.range.low,
+        high=question.range.high,
+        is_circle=question.range.is_circle,
+        given=question.given,
+        crossings=crossings,
+        nearest=nearest,
+        is_constant=len({(state.row, state.utilization) for state in missions}) == 1,
+        skipped=sum(bool(state.reason) for state in scanned),
+        changes=mission.changes,
+        **question.texts(crossings, nearest),
+    )
+
+
+def _nearest(states: Sequence[State]) -> State:
+    """Of places that all comply the one with the least left, of others the one that lacks the least."""
+    if all(state.complies for state in states):
+        return max(states, key=lambda state: state.utilization or 0.0)
+    return min(states, key=lambda state: math.inf if state.utilization is None else state.utilization)
+
+
+class _Question:
+    """One mission and one number of it; `evaluate` is all that the search sees."""
+
+    def __init__(
+        self,
+        mission: Mission,
+        key: str,
+        between: str | None,
+        row: str | None,
+        target: str,
+        model: str | None,
+        is_scale: bool,
+        today: date,
+    ) -> None:
+        self.mission, self.key, self.row, self.model, self.today = mission, key, row, model, today
+        self.breaks = {name for name, one in STATUS.items() if (one.fails if target == "fail" else one.fails_strict)}
+        self.is_scale = is_scale
+        self.base = self._read(())
+        if is_scale:
+            self.number = Number("the factor", FACTOR, 1.0, "")
+            scaled(self.base, key, 1.0)  # says what is wrong with the key
+        else:
+            self.number = number_of(self._tree(), key).said_like(between)
+        self.range: Range = range_of(self.number, between)
+        found = check_mission(self.base, today)
+        self._decides([found, *self._at_the_end()])
+        self.given = None if self.number.value is None else self._state(self.number.value, found)
+
+    def _at_the_end(self) -> Iterator[MissionFindings]:
+        """Findings at the end of the range: the number may be an error that the file does not declare."""
+        with suppress(MissionError):
+            yield check_mission(self.at(self.range.high), self.today)
+
+    def _decides(self, findings: Sequence[MissionFindings]) -> None:
+        """Refuse what nothing can decide: a mission without errors, a row that is not there or not judged."""
+        if all(found.is_empty for found in findings):
+            raise QuestionError("the mission declares no error: nothing decides whether it complies")
+        if self.row is None:
+            return
+        rows = [row for found in findings for row in found.rows]
+        statuses = [STATUS[row.status] for row in rows if row.id == self.row]
+        if not statuses:
+            hint = did_you_mean(self.row, tuple(row.id for row in rows))
+            raise QuestionError(f"--row {self.row}: no row has this id. {hint or 'A check lists them.'}")
+        if not any(status.gates for status in statuses):
+            raise QuestionError(f"--row {self.row}: is {statuses[0].words}: nothing is judged there")
+
+    def _tree(self) -> dict[str, object]:
+        """What the file says with the options that changed it, as text."""
+        tree = read_tree(self.mission.data, self.mission.file)
+        apply_changes(tree, self.mission.changes)
+        root: dict[str, object] = tree.root
+        return root
+
+    def _read(self, changes: Sequence[Change]) -> Mission:
+        anew = {parts_of(change.key) for change in changes}
+        given = [change for change in self.mission.changes if parts_of(change.key) not in anew]
+        return parse_mission(self.mission.data, self.mission.file, self.model, changes=(*given, *changes))
+
+    def places(self) -> list[float]:
+        """Values that the scan looks at, in rising order; that of the file is among them."""
+        places = self.range.places(PLACES_OF_CIRCLE if self.range.is_circle else PLACES)
+        value = self.number.value
+        if value is not None and self.range.low < value < self.range.high:
+            places = sorted({*places, value})
+        return places
+
+    def at(self, value: float) -> Mission:
+        """The mission with another value, or raises `MissionError`."""
+        if self.is_scale:
+            return scaled(self.base, self.key, value)
+        unit = self.number.dimension.si
+        return self._read([Change(self.key, f"{value!r} {unit}".rstrip())])
+
+    def evaluate(self, value: float, *, is_brief: bool = True) -> State:
+        """Check the mission with another value."""
+        try:
+            return self._state(value, check_mission(self.at(value), self.today, is_brief=is_brief))
+        except MissionError as error:
+            fault = error.faults[0]
+            return State(value, complies=False, status="error", reason=f"{fault.key}: {fault.problem}")
+
+    def _state(self, value: float, found: MissionFindings) -> State:
+        rows = [row for row in found.rows if self.row is None or row.id == self.row]
+        status = found.status if self.row is None else rows[0].status if rows else "not_evaluated"
+        complies = status not in self.breaks
+        decisive = [row for row in rows if STATUS[row.status].is_judged and row.status != "waived"]
+        if "warn" not in self.breaks:  # what only ever warns decides nothing
+            decisive = [row for row in decisive if row.subject.kind != "autofocus_pull_in"]
+        if not complies:
+            decisive = [row for row in decisive if row.status in self.breaks]
+        worst = max(decisive, key=_use, default=None)
+        return State(
+            value,
+            complies,
+            status,
+            None if worst is None else worst.id,
+            None if worst is None else worst.binding_requirement or worst.metric,
+            None if worst is None else worst.utilization,
+            found.resolution.range,
+            found.resolution.cross_range,
+        )
+
+    def crossing(self, low: State, high: State) -> Crossing:
+        """Bracket the border between two places, write both sides with few digits, check them as they are written."""
+        is_upper = low.complies
+        least = 1e-9 * (self.range.high - self.range.low)  # around 0, where no part of the value is small
+        while high.value - low.value > _NARROW * max(abs(low.value), abs(high.value), least):
+            middle = (low.value + high.value) / 2
+            if not low.value < middle < high.value:
+                break
+            state = self.evaluate(middle)
+            low, high = (state, high) if state.complies == low.complies else (low, state)
+        texts = [self.number.text(low.value, is_up=False), self.number.text(high.value, is_up=True)]
+        below, above = (self._checked(text) for text in texts)
+        is_verified = below.complies == low.complies and above.complies == high.complies
+        if not is_verified:  # compliance changes again within the digits that are written
+            below, above = low, high
+        inside, outside = (below, above) if is_upper else (above, below)
+        return Crossing(inside, outside, is_upper, is_verified)
+
+    def _checked(self, text: str) -> State:
+        """Check the mission with a value as it would stand in the file, in full."""
+        value = self.number.read(text)
+        if self.is_scale:
+            return self.evaluate(value, is_brief=False)
+        try:
+            return self._state(value, check_mission(self._read([Change(self.key, text)]), self.today))
+        except MissionError as error:
+            fault = error.faults[0]
+            return State(value, complies=False, status="error", reason=f"{fault.key}: {fault.problem}")
+
+    def texts(self, crossings: Sequence[Crossing], nearest: State) -> dict[str, dict[float, str]]:
+        """Every value that is said, as the file would have it."""
+        values = [self.range.low, self.range.high, nearest.value]
+        values += [state.value for crossing in crossings for state in (crossing.inside, crossing.outside)]
+        values += [] if self.number.value is None else [self.number.value]
+        return {"texts": {value: self.number.text(value) for value in values}}
+
+
+def _use(row: Row) -> float:
+    return -1.0 if row.utilization is None else row.utilization
+
+
+def _scan(evaluate: Evaluate, places: Sequence[float]) -> list[State]:
+    """Look at every place, and where the utilization turns without a change of compliance, at the turn."""
+    states = [evaluate(place) for place in places]
+    found = list(states)
+    turns = 0
+    for before, here, after in zip(states, states[1:], states[2:], strict=False):
+        uses = [state.utilization for state in (before, here, after)]
+        if not before.complies == here.complies == after.complies or any(use is None for use in uses):
+            continue
+        sign = 1.0 if here.complies else -1.0  # of what complies the highest may not, of the rest the lowest may
+        first, middle, last = (sign * use for use in uses if use is not None)
+        if first <= middle >= last and (first < middle or last < middle) and turns < _TURNS:
+            turns += 1
+            if (turned := _turn(evaluate, before.value, after.value, here, sign)) is not None:
+                found.append(turned)
+    return sorted(found, key=lambda state: state.value)
+
+
+def _turn(evaluate: Evaluate, low: float, high: float, here: State, sign: float) -> State | None:
+    """Where the utilization turns between two places, the first value whose compliance differs; None if none does."""
+    for _ in range(_STEPS_TO_TURN):
+        left, right = (evaluate(high - _GOLDEN * (high - low)), evaluate(low + _GOLDEN * (high - low)))
+        for state in (left, right):
+            if state.complies != here.complies and not state.reason:
+                return state
+        if left.utilization is None or right.utilization is None:
+            return None
+        low, high = (low, right.value) if sign * left.utilization > sign * right.utilization else (left.value, high)
+    return None

@@ -1,0 +1,148 @@
+"""Values that options put into a mission: `--set KEY=VALUE` for a question that is asked once.
+
+They are put into the tree that was read, before anybody asks what it means: every check works as for a file.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import yaml
+
+from bisar_budget.faults import Change, Changed, InvalidValueError, KeyPath, shown
+from bisar_budget.mission.readers import INVALID
+from bisar_budget.mission.tree import MAX_BYTES, Tree, UnusableError, events
+
+_ACCEPTED = "accepted: KEY=VALUE, such as radar.bandwidth=150MHz"
+_MAX_KEY = 500  # characters; a path of the schema has a tenth
+_NAMED_BY_IDS = "requirement_ids"  # its keys are ids of rows, which have dots
+
+
+def read_changes(texts: Sequence[str]) -> tuple[Change, ...]:
+    """Read `KEY=VALUE` of each option.
+
+    Raises
+    ------
+    InvalidValueError
+        One has no key or no `=`, or two have the same key.
+    """
+    changes: dict[tuple[str, ...], Change] = {}
+    for text in texts:
+        key, equals, value = text.partition("=")
+        key = key.strip()
+        if not equals or not key:
+            raise InvalidValueError(f"{shown(text)!r} is not KEY=VALUE", _ACCEPTED)
+        if len(key) > _MAX_KEY or len(value) > MAX_BYTES:
+            raise InvalidValueError(f"{shown(text)!r} is too long", _ACCEPTED)
+        parts = parts_of(key)
+        if "" in parts:
+            raise InvalidValueError(f"{shown(key)!r} is no path of keys", _ACCEPTED)
+        if parts in changes:
+            raise InvalidValueError(f"{shown(key)} is set twice", "accepted: each key once")
+        changes[parts] = Change(key, value.strip())
+    return tuple(changes.values())
+
+
+def parts_of(key: str) -> tuple[str, ...]:
+    """Split a path of keys: `other_errors[0].name` and `other_errors.0.name` have the parts other_errors, 0, name."""
+    return tuple(key.replace("[", ".").replace("]", "").split("."))
+
+
+def apply_changes(tree: Tree, changes: Sequence[Change]) -> None:
+    """Put each value into the tree, in place of what stands there or beside it; what is wrong is a fault of the tree.
+
+    Raises
+    ------
+    UnusableError
+        Nothing after it is worth reading; the fault is in the tree.
+    """
+    for change in changes:
+        _apply(tree, change)
+
+
+def _apply(tree: Tree, change: Change) -> None:
+    """Go down to the value, making the sections that are not there."""
+    parts = parts_of(change.key)
+    container: Any = tree.root
+    path: KeyPath = ()
+    first_new: KeyPath | None = None
+    while True:
+        name, rest = _next_name(container, parts, is_of_ids=path == (_NAMED_BY_IDS,))
+        if name is None:
+            tree.changes[path] = change
+            is_list = isinstance(container, list)
+            problem = f"has {len(container)} entries, and none has this number" if is_list else "has no keys"
+            accepted = f"accepted: 0 to {len(container)}, where the last adds one" if is_list else ""
+            given = "" if is_list else shown(str(container))
+            tree.fault(None, path, problem, given=parts[0] if is_list else given, accepted=accepted)
+            return
+        path = (*path, name)
+        is_there = name in container if isinstance(container, dict) else int(name) < len(container)
+        if not is_there and first_new is None:
+            first_new = path
+        if not rest:
+            break
+        if not is_there:
+            _put(container, name, {})
+        container, parts = container[name], rest
+        if container is INVALID:
+            return  # the file's own fault says what is wrong
+    tree.changes[first_new or path] = change
+    value = _value(tree, change, path)
+    _forget(tree, path)
+    tree.values[first_new or path] = Changed()
+    _put(container, name, value)
+
+
+def _next_name(
+    container: Any, parts: tuple[str, ...], is_of_ids: bool = False
+) -> tuple[str | int | None, tuple[str, ...]]:
+    """The key or number that the path goes on with, and the parts behind it; None if there can be none."""
+    if isinstance(container, list):
+        is_entry = parts[0].isascii() and parts[0].isdigit() and len(parts[0]) < 9 and int(parts[0]) <= len(container)
+        return (int(parts[0]) if is_entry else None), parts[1:]
+    if not isinstance(container, dict):
+        return None, ()
+    if is_of_ids:
+        return ".".join(parts), ()
+    for length in range(len(parts), 1, -1):  # a key that has dots itself
+        if (name := ".".join(parts[:length])) in container:
+            return name, parts[length:]
+    return parts[0], parts[1:]
+
+
+def _put(container: Any, name: str | int, value: Any) -> None:
+    if isinstance(container, list) and name == len(container):
+        container.append(value)
+    else:
+        container[name] = value
+
+
+def _value(tree: Tree, change: Change, path: KeyPath) -> Any:
+    """Read the text of the value as the file's own would be; its faults name the option."""
+    try:
+        next_event = events(change.text)
+        while type(event := next_event()) is not yaml.DocumentStartEvent:
+            if type(event) is yaml.StreamEndEvent:
+                tree.fault(None, path, "has no value", hint="Give it one")
+                return INVALID
+        _forget(tree, path)
+        value = tree.node(next_event, next_event(), path)
+        while type(event := next_event()) is not yaml.StreamEndEvent:
+            if type(event) is yaml.DocumentStartEvent:
+                tree.fault(None, path, "has a second YAML document", accepted="one value")
+                raise UnusableError
+    except yaml.MarkedYAMLError as error:
+        said = " ".join(filter(None, (error.context, error.problem)))
+        tree.fault(None, path, f"is not valid YAML: {said}", given=shown(change.text))
+        return INVALID
+    except yaml.reader.ReaderError as error:
+        tree.fault(None, path, f"is not text: {error.reason}")
+        return INVALID
+    return value
+
+
+def _forget(tree: Tree, path: KeyPath) -> None:
+    """Forget where the file had what stood at a path: nothing may point there."""
+    for places in (tree.keys, tree.values):
+        for other in [other for other in places if other[: len(path)] == path]:
+            del places[other]

@@ -1,0 +1,79 @@
+"""`--set KEY=VALUE`: every report of the run says that it is not about the mission of the file."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from bisar_budget.report import FORMATS
+from tests.conftest import ROOT
+
+MISSION = str(ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml")
+SET = "collection.aperture_time=1.2s"
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_every_format_says_what_was_set(run, name: str) -> None:
+    text = run("check", MISSION, "--set", SET, "--format", name).output.replace("\\", "")
+    assert "1.2s" in text
+    assert "1.2s" not in run("check", MISSION, "--format", name).output
+
+
+def test_the_first_line_says_it(run) -> None:
+    for more in ([], ["-q"]):
+        done = run("check", MISSION, "--set", SET, *more)
+        first = " ".join(done.output.split())
+        assert first.startswith(f"pass {MISSION} --set {SET}: 3 pass")
+        assert done.exit_code == 0
+
+
+def test_json_has_it(run) -> None:
+    (mission,) = json.loads(run("check", MISSION, "--set", SET, "--format", "json").output)["missions"]
+    assert mission["set"] == [{"key": "collection.aperture_time", "text": "1.2s"}]
+    (mission,) = json.loads(run("check", MISSION, "--format", "json").output)["missions"]
+    assert mission["set"] == []
+
+
+def test_a_compliance_report_has_it_in_its_verdict_and_its_inputs(run, tmp_path: Path) -> None:
+    report = tmp_path / "r.md"
+    run("check", MISSION, "--set", SET, "--report", str(report), "--detail", "full")
+    text = report.read_text(encoding="utf-8").replace("&#45;", "-")
+    assert "with values set by options" in text
+    assert "- aperture time: 1.2 s (--set)" in text
+    assert "| --set | collection.aperture_time=1.2s | command line |" in text
+
+
+def test_it_applies_to_each_of_several_missions(run) -> None:
+    other = str(ROOT / "specs" / "missions" / "tandem_x.yaml")
+    done = run("check", "-q", MISSION, other, "--set", "radar.bandwidth=100MHz", "--format", "json")
+    found = json.loads(done.output)["missions"]
+    assert [mission["set"][0]["text"] for mission in found] == ["100MHz"] * 2
+
+
+def test_a_wrong_value_is_a_fault_of_the_mission(run) -> None:
+    done = run("check", MISSION, "--set", "radar.bandwidth=3 m", "--format", "json")
+    (mission,) = json.loads(done.stdout)["missions"]
+    (error,) = mission["errors"]
+    assert done.exit_code == 2
+    assert (error["line"], error["key"], error["option"]) == (None, "radar.bandwidth", "--set radar.bandwidth")
+    assert f"{MISSION}: --set radar.bandwidth: must be a frequency" in done.stderr
+
+
+def test_what_is_no_key_and_value_is_wrong_usage(run) -> None:
+    done = run("check", MISSION, "--set", "radar.bandwidth")
+    assert done.exit_code == 2
+    assert "--set: 'radar.bandwidth' is not KEY=VALUE; accepted: KEY=VALUE, such as" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["check", "--explain", "transmitter.acceleration.x"],
+        ["verify", "--only", "transmitter.acceleration.x", "--jobs", "1"],
+        ["verify", "--only", "transmitter.acceleration.x", "--jobs", "1", "--format", "json"],
+        ["simulate"],
+    ],
+)
+def test_the_other_commands_take_and_say_it(run, command: list[str]) -> None:
+    name, *options = command
+    assert "1.2s" in run(name, MISSION, "--set", SET, *options).output

@@ -1,0 +1,143 @@
+"""Values that options put into a mission: read and checked as if a file had them, never taken for its own."""
+
+from datetime import date
+
+import pytest
+
+from bisar_budget.budget.check import check_mission
+from bisar_budget.faults import Change, InvalidValueError, MissionError, changes_words
+from bisar_budget.mission.changes import read_changes
+from bisar_budget.mission.keys import all_keys, nearest_keys
+from bisar_budget.mission.load import load_mission, parse_mission
+from bisar_budget.mission.model import Mission
+from tests.conftest import ROOT
+
+FILE = ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml"
+TEXT = FILE.read_text(encoding="utf-8")
+
+
+def changed(*texts: str, data: str = TEXT) -> Mission:
+    return parse_mission(data, "m.yaml", changes=read_changes(texts))
+
+
+def fault(*texts: str, data: str = TEXT) -> str:
+    with pytest.raises(MissionError) as error:
+        changed(*texts, data=data)
+    (line,) = error.value.lines()
+    return line
+
+
+def test_a_set_value_is_read_as_one_of_the_file() -> None:
+    """The findings are those of a file that has the value, but for the line of it."""
+    edited = parse_mission(TEXT.replace("aperture_time: 6 s", "aperture_time: 2 s"), "m.yaml")
+    by_file = check_mission(edited, date(2026, 1, 1))
+    by_option = check_mission(changed("collection.aperture_time=2 s"), date(2026, 1, 1))
+    assert by_option.rows == by_file.rows
+    assert changed("collection.aperture_time=2s").collection == edited.collection
+
+
+def test_values_are_added_where_there_is_none() -> None:
+    mission = changed(
+        "timing_error.linear=1ppb",
+        "platforms.receiver.motion_error.velocity=[1 mm/s, 0, 2mm/s]",
+        "other_errors=[{name: drift, quadratic_phase_error: 3deg}]",
+        "requirement_ids.receiver.velocity.x=REQ-7",
+    )
+    assert mission.timing_error.linear == 1e-9
+    assert mission.platforms.receiver.motion_error.velocity == (1e-3, 0.0, 2e-3)
+    assert mission.requirement_ids == {"receiver.velocity.x": "REQ-7"}
+    assert [other.name for other in mission.other_errors] == ["drift"]
+
+
+@pytest.mark.parametrize("key", ["platforms.transmitter.position[1]", "platforms.transmitter.position.1"])
+def test_entries_of_lists_go_by_their_number(key: str) -> None:
+    assert changed(f"{key}=1 km").platforms.transmitter.position == (30414.0, 1000.0, 6000.0)
+
+
+def test_an_entry_is_added_behind_the_last() -> None:
+    listed = TEXT + "other_errors:\n  - {name: a, quadratic_phase_error: 1 deg}\n"
+    mission = changed("other_errors.1={name: b, quadratic_phase_error: 2 deg}", data=listed)
+    assert [other.name for other in mission.other_errors] == ["a", "b"]
+    assert "other_errors: has 1 entries, and none has this number (got 3); accepted: 0 to 1" in fault(
+        "other_errors.3.name=c", data=listed
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (
+            "radar.bandwidth=150 m",
+            "--set radar.bandwidth: must be a frequency, but 'm' makes it a length (got 150 m)",
+        ),
+        (
+            "radar.bandwith=3 MHz",
+            "--set radar.bandwith: is not a known key; accepted: center_frequency, bandwidth. Did",
+        ),
+        ("aperture_time=3 s", "Did you mean 'collection.aperture_time'?"),
+        ("reciever.azimuth=3deg", "'platforms.transmitter.azimuth' or 'platforms.receiver.azimuth'?"),
+        ("radar.bandwidth=", "--set radar.bandwidth: has no value. Give it one"),
+        ("radar.bandwidth=~", "--set radar.bandwidth: has no value. Give it one"),
+        ("radar.bandwidth=[1", "--set radar.bandwidth: is not valid YAML: "),
+        ("radar.bandwidth=*x", "--set radar.bandwidth: is an alias (*); write the value out"),
+        ("radar.bandwidth=!!float 3", "--set radar.bandwidth: carries a YAML tag"),
+        ("radar.bandwidth=1 MHz\n---\n2 MHz", "--set radar.bandwidth: has a second YAML document"),
+        ("radar=3", "--set radar: must be a mapping of keys to values (got 3)"),
+        ("radar.bandwidth.x=3", "--set radar.bandwidth.x: radar.bandwidth: has no keys (got 300 MHz)"),
+        ("radar={center_frequency: 1 GHz}", "--set radar: radar.bandwidth: is missing"),
+        ("platforms.receiver.position=[1 km, 0 km, 1 km]", "--set platforms.receiver.position: "),
+    ],
+)
+def test_a_fault_names_the_option_instead_of_a_line(text: str, said: str) -> None:
+    line = fault(text)
+    assert line.startswith("m.yaml: --set " if "position" not in text else "m.yaml:")
+    assert said in line or "mixes position with slant_range" in line
+
+
+def test_a_fault_of_the_file_says_what_it_was_read_with() -> None:
+    line = fault("radar.center_frequency=1MHz")
+    assert line == (
+        "m.yaml:15:14: radar.bandwidth: must be less than twice the centre frequency (got 300 MHz). "
+        "Read with --set radar.center_frequency=1MHz"
+    )
+
+
+@pytest.mark.parametrize(
+    ("texts", "said"),
+    [
+        (["x"], "'x' is not KEY=VALUE"),
+        (["=3"], "'=3' is not KEY=VALUE"),
+        (["a..b=3"], "'a..b' is no path of keys"),
+        (["a[0]=3", "a.0=4"], "a.0 is set twice"),
+        (["a" * 600 + "=1"], "is too long"),
+    ],
+)
+def test_what_is_no_key_and_value_is_refused(texts: list[str], said: str) -> None:
+    with pytest.raises(InvalidValueError, match=r".") as error:
+        read_changes(texts)
+    assert said in error.value.problem.problem
+
+
+def test_a_set_value_has_no_line() -> None:
+    mission = changed("platforms.transmitter.motion_error.acceleration=5 mm/s^2", "scene.radius=100m")
+    assert mission.line(("platforms", "transmitter", "motion_error", "acceleration", 0)) is None
+    assert mission.line(("scene", "radius")) is None
+    assert mission.line(("platforms", "transmitter", "motion_error", "source")) == 24
+    assert mission.is_changed(("scene", "radius"))
+    assert not mission.is_changed(("radar", "bandwidth"))
+    assert not load_mission(str(FILE)).is_changed(("radar", "bandwidth"))
+
+
+def test_options_are_written_so_that_a_shell_reads_them_again() -> None:
+    changes = (Change("radar.bandwidth", "150MHz"), Change("a.b", "[0, 40, 0]"))
+    assert changes_words(changes) == "--set radar.bandwidth=150MHz --set 'a.b=[0, 40, 0]'"
+    assert changes_words(()) == ""
+
+
+def test_every_key_is_found() -> None:
+    keys = all_keys()
+    assert {"collection.aperture_time", "platforms.receiver.motion_error.imu.gyro_bias", "other_errors.name"} <= set(
+        keys
+    )
+    assert nearest_keys("colection.aperture") == "Did you mean 'collection.aperture_time'?"
+    assert nearest_keys("qqqqqqqq") == ""
