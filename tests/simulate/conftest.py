@@ -115,8 +115,12 @@ def broadside() -> Collection:
 
 
 @cache
-def images_of(text: str, model: str | None = None, *, rotated_only: bool = False, **how: Any) -> point.PointImages:
+def images_of(
+    text: str, model: str | None = None, *, file: str = "-", rotated_only: bool = False, **how: Any
+) -> point.PointImages:
     """Images of a mission file's text by `simulate_point`, formed once for all tests; nobody writes to them.
+
+    What the text names is beside `file`.
 
     Forming takes pixels times pulses, most of them for the image along (x, y): a test that does not look at that one
     asks for the rotated ones only, and gets a small middle of it.
@@ -124,7 +128,7 @@ def images_of(text: str, model: str | None = None, *, rotated_only: bool = False
     with pytest.MonkeyPatch.context() as patch:
         if rotated_only:
             patch.setattr(point, "_SCENE_PIXELS", 1 << 10)
-        images = point.simulate_point(parse_mission(text, model=model), **how)
+        images = point.simulate_point(parse_mission(text, file, model), **how)
     for one in images:
         if isinstance(one, np.ndarray):
             one.setflags(write=False)

@@ -105,7 +105,7 @@ def test_autofocus_never_beats_the_error_free_image_within_the_aperture(path) ->
 
     Close to a platform the image carries a chirp; taken for a phase error it gave 0.6 dB more than there is.
     """
-    images = images_of(path.read_text(encoding="utf-8"), rotated_only=True)
+    images = images_of(path.read_text(encoding="utf-8"), file=str(path), rotated_only=True)
     band = aperture_of(images.error_free)
     gain = in_band_peak(images.focused, band) / in_band_peak(images.error_free, band)
     assert 20 * math.log10(gain) < 0.005
