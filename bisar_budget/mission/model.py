@@ -351,6 +351,7 @@ class FlownPath(NamedTuple):
     rms: float | None = None
     samples: int | None = None
     doubts: tuple[str, ...] = ()
+    accuracy: tuple[str, str] | None = None  # file that states its errors, and its SHA-256
 
 
 class Platform(NamedTuple):

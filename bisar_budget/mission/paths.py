@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from bisar_budget.faults import Problem
-from bisar_budget.geometry import PlatformState, Vector
+from bisar_budget.geometry import STRAIGHT, PlatformState
 from bisar_budget.mission import routes
 from bisar_budget.mission.model import FlownPath, Mission, MotionError, Platform, without_image
 from bisar_budget.mission.readers import INVALID, Report
@@ -20,6 +20,7 @@ from bisar_budget.paths.instant import Instant
 Beside = Callable[[str], bytes]  # content of a file that a mission names
 
 _MOST_BYTES = 500_000_000
+_FARTHEST_M = 4.1e8  # of a satellite from the Earth's centre
 _PLACE = "accepted: scene.latitude, scene.longitude and scene.height"
 
 
@@ -97,7 +98,7 @@ def _with_path(mission: Mission, platform: Platform, axes: earth.SceneAxes | Non
     elif platform.trajectory is not None:
         path = _of_log(mission, platform.trajectory, axes, read)
     elif platform.latitude is not None:
-        path = _of_place(platform, _known(axes, "latitude"))
+        path = _of_place(platform, _known(axes, "latitude"), mission.collection.aperture_time)
     else:
         path = FlownPath(platform.state)
     if path.state.position[2] < 0:
@@ -108,7 +109,9 @@ def _with_path(mission: Mission, platform: Platform, axes: earth.SceneAxes | Non
     found = platform._replace(path=path)
     trajectory = platform.trajectory
     if trajectory is not None and trajectory.accuracy is not None:
-        found = found._replace(motion_error=_by_accuracy(mission, trajectory, platform.motion_error, read))
+        stated, digest = _by_accuracy(mission, trajectory, platform.motion_error, read)
+        path = path._replace(accuracy=(trajectory.accuracy, digest))
+        found = found._replace(motion_error=stated, path=path)
     return found
 
 
@@ -134,7 +137,8 @@ def _of_orbit(mission: Mission, route: routes.Orbit, axes: earth.SceneAxes, read
     file = named if isinstance(named, str) else None
     try:
         data = read(file) if file is not None else "\n".join(named).encode()
-        orbit = _read_orbit(form, data, file or "the element set", route.object, center)
+        name = file or "the element set"
+        orbit = _read_orbit(form, data, name, route.object, center)
         widest = math.inf
         if orbit.span is not None:
             before, after = center.since(orbit.span[0]), orbit.span[1].since(center)
@@ -144,10 +148,16 @@ def _of_orbit(mission: Mission, route: routes.Orbit, axes: earth.SceneAxes, read
                     f"{mission.collection.aperture_time:g} s around {center.as_text()}"
                 )
             widest = 2 * min(before, after)
-        fitted = interpolated(
-            lambda tau: axes.place(orbit.place(center.after(tau))), mission.collection.aperture_time, widest
-        )
-        doubts = tuple(orbit.doubts(center))
+        far = math.hypot(*orbit.place(center))
+        if far > _FARTHEST_M:
+            raise PathFileError(
+                f"{name}: is {far:.4g} m from the Earth's centre, farther than the Moon; are its units km?"
+            )
+        half = mission.collection.aperture_time / 2
+        fitted = interpolated(lambda tau: axes.place(orbit.place(center.after(tau))), 2 * half, widest)
+        # An interpolation is worst between the places of a file.
+        of_orbit = max((orbit.doubts(center.after(part * half)) for part in (0.0, -0.5, 0.5, -1.0, 1.0)), key=len)
+        doubts = (*of_orbit, *fitted.doubts)
     except PathFileError as error:
         raise _UnusablePathError(("orbit", form), Problem(str(error))) from None
     age = None if orbit.epoch is None else center.since(orbit.epoch)
@@ -178,8 +188,13 @@ def _of_log(mission: Mission, route: routes.Trajectory, axes: earth.SceneAxes | 
         times = slow_times(log, mission.collection.center_time, route.center, aperture_time, route.file)
         fitted = smoothed(times, log.places, aperture_time)
     except PathFileError as error:
-        raise _UnusablePathError(("trajectory", "file"), Problem(str(error))) from None
-    return _flown(fitted, log.words, route.file, data)
+        said = str(error)
+        said = f"{route.file} {said}" if said.startswith("has ") else said
+        raise _UnusablePathError(("trajectory", "file"), Problem(said)) from None
+    words = log.words
+    if log.start is None:
+        words += f", {route.center or 0.0:.12g} s of it at mid-aperture"
+    return _flown(fitted, words, route.file, data)._replace(doubts=fitted.doubts)
 
 
 def _log(route: routes.Trajectory, data: bytes) -> Log:
@@ -189,6 +204,8 @@ def _log(route: routes.Trajectory, data: bytes) -> Log:
         from bisar_budget.paths import sbet
 
         return sbet.read_sbet(data, route.file, route.week)
+    if route.week is not None:
+        raise _UnusablePathError(("trajectory", "week"), Problem("is for an SBET; this log is read as CSV"))
     from bisar_budget.paths import flight_log
 
     return flight_log.read_csv(data, route.file)
@@ -200,17 +217,20 @@ def _in_scene(log: Log, axes: earth.SceneAxes) -> Log:
     return log._replace(places=(log.places - np.array(axes.origin)) @ np.array(axes.axes).T, is_earth_fixed=False)
 
 
-def _by_accuracy(mission: Mission, route: routes.Trajectory, error: MotionError, read: Beside) -> MotionError:
-    """Errors that the accuracy file of a log states, where the mission file states none."""
+def _by_accuracy(
+    mission: Mission, route: routes.Trajectory, error: MotionError, read: Beside
+) -> tuple[MotionError, str]:
+    """Errors that the accuracy file of a log states, where the mission file states none; and its SHA-256."""
     from bisar_budget.paths import sbet
 
     file = route.accuracy or ""
     key = ("trajectory", "accuracy")
     if error.frame != "scene":
-        raise _UnusablePathError(key, Problem("is stated east, north, up", "accepted: motion_error.frame: scene"))
+        raise _UnusablePathError(key, Problem("states errors east, north, up", "accepted: motion_error.frame: scene"))
     try:
+        data = read(file)
         stated = sbet.read_accuracy(
-            read(file),
+            data,
             file,
             route.week,
             mission.collection.center_time,
@@ -225,24 +245,19 @@ def _by_accuracy(mission: Mission, route: routes.Trajectory, error: MotionError,
             error = error._replace(position=stated.position, of_parts=(*error.of_parts, ("position", source)))
         if error.velocity is None:
             error = error._replace(velocity=stated.velocity, of_parts=(*error.of_parts, ("velocity", source)))
-    return error
+    return error, hashlib.sha256(data).hexdigest()
 
 
-def _of_place(platform: Platform, axes: earth.SceneAxes) -> FlownPath:
-    """Flight along the geodesic at the height that climb leaves; level flight follows the ellipsoid's curvature."""
+def _of_place(platform: Platform, axes: earth.SceneAxes, aperture_time_s: float) -> FlownPath:
+    """Flight along the geodesic, `speed` over ground at its height, which `climb` changes."""
     place = earth.Place(platform.latitude or 0.0, platform.longitude or 0.0, platform.altitude or 0.0)
-    speed, heading = platform.speed or 0.0, platform.heading or 0.0
-    local = earth.axes_at(place)
-
-    def in_scene(vector: Vector) -> Vector:
-        return axes.turned(local.turned_back(vector))
-
-    state = PlatformState(
-        position=axes.place(local.origin),
-        velocity=in_scene((speed * math.sin(heading), speed * math.cos(heading), platform.climb or 0.0)),
-        acceleration=in_scene((0.0, 0.0, -(speed**2) / earth.radius_along(place, heading))),
-    )
-    return FlownPath(state, "geodetic place, flight along the geodesic" if speed else "geodetic place")
+    speed, heading, climb = platform.speed or 0.0, platform.heading or 0.0, platform.climb or 0.0
+    if not speed and not climb:
+        return FlownPath(
+            PlatformState(position=axes.place(earth.earth_fixed(place)), velocity=STRAIGHT), "geodetic place"
+        )
+    fitted = interpolated(lambda tau: axes.place(earth.flown(place, heading, speed, climb, tau)), aperture_time_s)
+    return FlownPath(fitted.state, "geodetic place, flight along the geodesic")
 
 
 def _flown(fitted: Fitted, words: str, file: str | None, data: bytes) -> FlownPath:

@@ -14,6 +14,7 @@ FLATTENING = 1 / 298.257223563
 ROTATION_RATE = 7.292115e-5  # rad/s
 _ECCENTRICITY_SQUARED = FLATTENING * (2 - FLATTENING)
 _POLAR_RADIUS = EQUATORIAL_RADIUS * (1 - FLATTENING)
+_STEPS = 4
 _SETTLED = 1e-15  # rad; a metre on the ground is 1.6e-7
 
 
@@ -112,12 +113,59 @@ def axes_at(place: Place) -> SceneAxes:
     return SceneAxes(earth_fixed(place), (east, north, up))
 
 
-def radius_along(place: Place, heading: float) -> float:
+def flown(place: Place, heading: float, speed: float, climb: float, time_s: float) -> Vector:
+    """Earth-fixed place after a flight along the geodesic, at a height that `climb` changes. [m]
+
+    Parameters
+    ----------
+    place : Place
+        At the beginning.
+    heading : float
+        There, from north, clockwise. [rad]
+    speed, climb : float
+        Level, at the height that is flown, and vertical; both constant. [m/s]
+    time_s : float
+        May be negative.
+
+    Notes
+    -----
+    Derived here. The direction turns with the ellipsoid's normal alone, at speed over radius of curvature, which is
+    Euler's formula. Runge and Kutta's fourth order, in Earth-fixed axes: there a pole is a place like others.
+    """
+    axes = axes_at(place)
+    here = axes.origin
+    along = axes.turned_back((math.sin(heading), math.cos(heading), 0.0))
+    step = time_s / _STEPS
+
+    def rates(point: Vector, direction: Vector) -> tuple[Vector, Vector]:
+        at = geodetic(point)
+        east, north, up = axes_at(at).axes
+        turn = speed / _radius_along(at, math.atan2(dot(direction, east), dot(direction, north)))
+        moves = _sum((speed, direction), (climb, up))
+        return moves, (-turn * up[0], -turn * up[1], -turn * up[2])
+
+    for _ in range(_STEPS):
+        a, p = rates(here, along)
+        b, q = rates(_sum((1, here), (step / 2, a)), _sum((1, along), (step / 2, p)))
+        c, r = rates(_sum((1, here), (step / 2, b)), _sum((1, along), (step / 2, q)))
+        d, s = rates(_sum((1, here), (step, c)), _sum((1, along), (step, r)))
+        here = _sum((1, here), (step / 6, a), (step / 3, b), (step / 3, c), (step / 6, d))
+        along = _sum((1, along), (step / 6, p), (step / 3, q), (step / 3, r), (step / 6, s))
+    return here
+
+
+def _radius_along(place: Place, heading: float) -> float:
     """Radius of curvature of the way of constant height over a place, by its compass heading: Euler's formula. [m]"""
     sine = math.sin(place.latitude)
     across = _prime_vertical(sine)
     along = across * (1 - _ECCENTRICITY_SQUARED) / (1 - _ECCENTRICITY_SQUARED * sine * sine)
     return 1 / (math.cos(heading) ** 2 / along + math.sin(heading) ** 2 / across) + place.height
+
+
+def _sum(*parts: tuple[float, Vector]) -> Vector:
+    """Sum of vectors times their factors."""
+    x, y, z = (math.fsum(factor * vector[axis] for factor, vector in parts) for axis in range(3))
+    return (x, y, z)
 
 
 def _prime_vertical(sine: float) -> float:

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 _NODES = 15  # Chebyshev points of an interpolation, so many coefficients
 _LEAST_WINDOW = 10.0  # s; in a shorter one rounding of an Earth-fixed place, 1e-9 m, is an acceleration
 _UNSEEN_M = 1e-7  # a coefficient that moves the path by less is rounding
+_ROUGH_M = 5e-3  # an orbit that is farther from its polynomial is not smooth; messages have places to 1 mm
+_TRIFLE_M = 1e-3
+_STRAY = 8  # times the usual residual; noise of thousands of places reaches 4
 _HIGHEST = 8  # order of a smoothed path
 _WIDEST_GAP = 5  # usual intervals between samples
 _ROUNDED = 1 + 1e-6  # of an interval whose ends are rounded
@@ -60,6 +63,7 @@ class Fitted(NamedTuple):
     """A path as a polynomial, its order, and how far it is from the file's places, at most and root mean square [m].
 
     `samples` is how many of a log's places the polynomial smooths; none of an orbit, which is interpolated.
+    `doubts` are warnings.
     """
 
     state: PlatformState
@@ -67,6 +71,7 @@ class Fitted(NamedTuple):
     farthest: float
     rms: float
     samples: int = 0
+    doubts: tuple[str, ...] = ()
 
 
 def interpolated(place: Callable[[float], Vector], aperture_time_s: float, widest_s: float = math.inf) -> Fitted:
@@ -107,7 +112,10 @@ def interpolated(place: Callable[[float], Vector], aperture_time_s: float, wides
         tau = aperture_time_s / 2 * math.cos(math.pi * n / _NODES)
         apart.append(math.dist(state.at(tau)[0], place(tau)))
     rms = math.sqrt(math.fsum(one * one for one in apart) / len(apart))
-    return Fitted(state, len(state.bends) + 2, max(apart), rms)
+    doubts: tuple[str, ...] = ()
+    if max(apart) > _ROUGH_M:
+        doubts = (f"its places are up to {max(apart):.3g} m from a smooth path: interpolate more finely",)
+    return Fitted(state, len(state.bends) + 2, max(apart), rms, doubts=doubts)
 
 
 def smoothed(times: "NDArray[np.float64]", places: "NDArray[np.float64]", aperture_time_s: float) -> Fitted:
@@ -157,10 +165,18 @@ def smoothed(times: "NDArray[np.float64]", places: "NDArray[np.float64]", apertu
 
     found, left = min(fits, key=lambda fit: information(fit[1], len(fit[0]) - 1))
     rms = math.sqrt(float((left**2).sum()) / max(count - len(found), 1))
-    farthest = float(np.linalg.norm(left, axis=1).max())
+    apart = np.linalg.norm(left, axis=1)
+    farthest, usual = float(apart.max()), float(np.median(apart))
+    doubts: tuple[str, ...] = ()
+    if farthest > _STRAY * usual + _TRIFLE_M:
+        when = float(times[inside][apart.argmax()])
+        doubts = (
+            f"a place of the log, {when:+.4g} s from mid-aperture, is {farthest:.3g} m from the smooth path; half of "
+            f"the places are within {usual:.2g} m",
+        )
     powers = np.stack([_padded(np.polynomial.legendre.leg2poly(found[:, axis]), len(found)) for axis in range(3)])
     state = _state([tuple(float(p) for p in powers[:, n] / half**n) for n in range(len(found))])  # type: ignore[misc]
-    return Fitted(state, len(found) - 1, farthest, rms, count)
+    return Fitted(state, len(found) - 1, farthest, rms, count, doubts)
 
 
 def slow_times(

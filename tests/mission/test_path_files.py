@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bisar_budget.geometry import Vector
 from bisar_budget.mission.load import load_mission
 from bisar_budget.paths import earth, two_lines
 from bisar_budget.paths.instant import Instant
 from tests.conftest import mission_text
 from tests.paths.flown import flight, geodetic_csv, sbet, smrmsg
-from tests.paths.orbit_files import CENTER, EPOCH, LINE_1, LINE_2, TLE, oem, omm_json
+from tests.paths.orbit_files import CENTER, EPOCH, LINE_1, LINE_2, TLE, oem, omm_json, on_circle
 from tests.report.test_report_diff import git
 
 BELOW_FLIGHT = {"latitude": "48.1 deg", "longitude": "11.3 deg", "height": "600 m"}  # beside `flown.flight`
@@ -151,6 +152,45 @@ class TestWhatIsSaid:
         assert "7.1 days" in doubt
         assert found["status"] == "warn"
 
+    def test_a_place_that_strays_is_a_doubt(self, run: Callable[..., Any], folder: Path) -> None:
+        """One height of 501 is wrong by 6 km: the path is smooth all the same, and wrong."""
+        stated = {"trajectory": {"file": "flight.csv"}, "motion_error": {"position": "1 mm"}}
+        (folder / "m.yaml").write_text(aircraft(platforms__receiver=stated))
+        assert run("check", "--strict", folder / "m.yaml").exit_code == 0
+        header, *rest = geodetic_csv(flight()).split(b"\n")
+        cells = rest[240].split(b",")
+        rest[240] = b",".join([*cells[:3], b"9000"])
+        (folder / "flight.csv").write_bytes(b"\n".join([header, *rest]))
+        found = run("check", "--strict", folder / "m.yaml")
+        assert found.exit_code == 1
+        assert "a place of the log, -0.2 s from mid-aperture, is" in " ".join(found.stdout.split())
+
+    def test_chords_of_an_ephemeris_are_a_doubt_wherever_the_middle_is(
+        self, run: Callable[..., Any], folder: Path
+    ) -> None:
+        (folder / "a.oem").write_text(oem(interpolation=("INTERPOLATION = LINEAR", "INTERPOLATION_DEGREE = 1")))
+        place, _ = on_circle(1200.0)
+        below = earth.geodetic(place)
+        scene = {"latitude": f"{below.latitude} rad", "longitude": f"{below.longitude + 0.05} rad", "height": 0}
+        receiver = {
+            **FLIGHT,
+            "latitude": f"{below.latitude + 0.001} rad",
+            "longitude": f"{below.longitude + 0.05} rad",
+        }
+        for center in ("2026-06-01T05:19:00Z", "2026-06-01T05:19:30Z"):  # at a place of the file, and between two
+            (folder / "m.yaml").write_text(_text({"orbit": {"oem": "a.oem"}}, receiver, scene, center))
+            found = json.loads(run("check", folder / "m.yaml", "--format", "json").stdout)["missions"][0]
+            assert found["warnings"], found
+
+    def test_the_accuracy_of_a_log_is_hashed_too(self, run: Callable[..., Any], folder: Path) -> None:
+        route = {"file": "sbet.out", "week": 2421, "accuracy": "smrmsg.out"}
+        (folder / "m.yaml").write_text(aircraft(platforms__receiver={"trajectory": route}))
+        digest = hashlib.sha256((folder / "smrmsg.out").read_bytes()).hexdigest()
+        assert digest in run("check", folder / "m.yaml", "--format", "html").stdout
+        report = json.loads(run("check", folder / "m.yaml", "--format", "json").stdout)
+        path = report["missions"][0]["geometry"]["receiver"]["path"]
+        assert path["accuracy"] == {"file": "smrmsg.out", "sha256": digest}
+
     def test_diff_reads_files_as_they_were_committed(self, run: Callable[..., Any], folder: Path) -> None:
         (folder / "m.yaml").write_text(satellite())
         git(folder, "init", "-q")
@@ -171,6 +211,11 @@ def rows(keep: Callable[[list[bytes]], list[bytes]]) -> bytes:
     """The log of the flight with some of its rows."""
     header, *rest = geodetic_csv(flight()).split(b"\n")
     return b"\n".join([header, *keep(rest)])
+
+
+def in_metres(seconds: float) -> tuple[Vector, Vector]:
+    place, velocity = on_circle(seconds)
+    return tuple(1000 * one for one in place), velocity
 
 
 BROKEN: dict[str, tuple[Callable[[], str], dict[str, bytes | str], str]] = {
@@ -268,7 +313,19 @@ BROKEN: dict[str, tuple[Callable[[], str], dict[str, bytes | str], str]] = {
             }
         ),
         {},
-        "is stated east, north, up",
+        "states errors east, north, up",
+    ),
+    "an ephemeris in metres": (
+        lambda: satellite(
+            platforms__transmitter={"orbit": {"oem": "a.oem"}}, collection__center_time="2026-06-01T05:10:00Z"
+        ),
+        {"a.oem": oem(path=in_metres, interpolation=("INTERPOLATION = LAGRANGE", "INTERPOLATION_DEGREE = 7"))},
+        "farther than the Moon; are its units km?",
+    ),
+    "a week of a log in UTC": (
+        lambda: aircraft(platforms__receiver={"trajectory": {"file": "flight.csv", "week": 2421}}),
+        {},
+        "is for an SBET; this log is read as CSV",
     ),
     "a path below the ground": (lambda: aircraft(height="3500 m"), {}, "below the scene's horizon"),
     "a name with a control character": (

@@ -90,6 +90,29 @@ class TestLevelFlight:
         assert math.degrees(math.atan2(east, north)) == pytest.approx(60, abs=0.2)  # radii to 0.1 %
         assert math.hypot(north, east) == pytest.approx(5 * 120 * 1852 / 3600, rel=2e-3)
 
+    @pytest.mark.parametrize(
+        ("latitude", "speed", "climb"), [(48.2, 250.0, 30.0), (-89.9, 250.0, 0.0), (0.0, 1500.0, 0.0)]
+    )
+    def test_fast_and_climbing_it_keeps_what_a_geodesic_keeps(
+        self, latitude: float, speed: float, climb: float
+    ) -> None:
+        """Height and level speed as stated; of level flight Clairaut's constant."""
+        start, heading = earth.Place(math.radians(latitude), 0.3, 9e3), 1.1
+        constants = []
+        for tau in np.linspace(-30, 30, 7):
+            before, here, after = (
+                np.array(earth.flown(start, heading, speed, climb, tau + step)) for step in (-0.05, 0.0, 0.05)
+            )
+            at = earth.geodetic(tuple(here))
+            assert at.height == pytest.approx(9e3 + climb * tau, abs=1e-5)
+            east, north, _ = earth.axes_at(at).axes
+            level = np.array([np.dot(axis, after - before) / 0.1 for axis in (east, north)])
+            # A difference over 0.1 s rounds places of 6e6 m to 2e-8 m/s, and leaves v³t²/6R² = 1e-8 m/s at most.
+            assert math.hypot(*level) == pytest.approx(speed, abs=1e-6)
+            constants.append(math.hypot(*here[:2]) * level[0] / speed)
+        if not climb:
+            assert np.ptp(constants) < 1e-3 * max(1.0, speed / 250)  # m, of up to 6.4e6 m: 5e-9 rad of heading
+
     def test_a_place_that_does_not_move_needs_no_heading(self) -> None:
         fixed = {key: FLIGHT[key] for key in ("latitude", "longitude", "altitude")}
         found = mission(platforms__receiver={**fixed, "speed": 0})

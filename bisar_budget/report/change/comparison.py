@@ -121,6 +121,10 @@ def _inputs(before: Mission | None, after: Mission | None) -> Iterator[Moved]:
         if None not in files and files[0].file == files[1].file and files[0].sha256 != files[1].sha256:
             contents = [file.sha256 and file.sha256[:12] for file in files]
             yield Moved(f"platforms.{name}: content of {files[1].file}", "", *contents)
+        stated = [file.accuracy for file in files if file is not None and file.accuracy is not None]
+        if len(stated) == 2 and stated[0][0] == stated[1][0] and stated[0][1] != stated[1][1]:
+            contents = [digest[:12] for _, digest in stated]
+            yield Moved(f"platforms.{name}: content of {stated[1][0]}", "", *contents)
 
 
 def _written(mission: Mission) -> dict[KeyPath, str]:

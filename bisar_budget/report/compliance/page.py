@@ -538,6 +538,8 @@ def _validity(mission: Mission, found: MissionFindings) -> Iterator[tuple[str, s
         yield f"Path of the {name}", path_words(path)
         if path.sha256 is not None:
             yield f"File of the {name}’s path", f"{path.file or 'in the mission file'}, SHA-256 {path.sha256}"
+        if path.accuracy is not None:
+            yield f"Accuracy of the {name}’s path", "{}, SHA-256 {}".format(*path.accuracy)
     yield "Combination", _RULES[found.combine]
     yield "Phases", f"at the centre frequency, c = {SPEED_OF_LIGHT / 1e3:.3f} km/s; at the aperture edge, ±T/2"
     factor = f"{found.coverage_factor:g} times the file’s value" if found.coverage_factor != 1 else "the file’s value"

@@ -172,6 +172,7 @@ def _platform(mission: MissionFindings, name: str) -> dict[str, Any]:
             "residual_max_m": path.farthest,
             "residual_rms_m": path.rms,
             "samples": path.samples,
+            "accuracy": None if path.accuracy is None else dict(zip(("file", "sha256"), path.accuracy, strict=True)),
         }
     return found
 
