@@ -6,6 +6,8 @@ import click
 
 from bisar_budget.cli.streams import FILE, complain, deliver, fail
 
+_SEEN = 20  # of a wavelength: what a place is off the path turns the phase by 0.3 rad
+
 
 @click.command("import")
 @click.argument("file", type=FILE)
@@ -28,10 +30,27 @@ def import_file(file: str, output: str | None, channel: str | None, force: bool)
             fail(f"{output} exists; --force replaces it")
         if os.path.exists(file) and os.path.samefile(file, output):
             fail(f"{output} is the file to read")
+    from bisar_budget.constants import SPEED_OF_LIGHT
+    from bisar_budget.faults import MissionError
+    from bisar_budget.mission.load import parse_mission
+    from bisar_budget.units import format_quantity
+
     try:
-        text = mission_text(import_collection(file, channel))
+        found = import_collection(file, channel)
+        text = mission_text(found)
     except (FormatError, MissingExtraError) as error:
         fail(str(error))
+    try:
+        parse_mission(text, "the mission")
+    except MissionError as error:
+        fail(f"{file}: no mission can be made of it: {error.faults[0]}")
+    for name, track in (("transmitter", found.transmitter), ("receiver", found.receiver)):
+        if track.farthest > track.state.slant_range / 100:
+            away = format_quantity(track.farthest, "m")
+            fail(f"{file}: a place of the {name} is {away} from its path, more than a hundredth of its range")
+        if track.farthest > SPEED_OF_LIGHT / found.center_frequency / _SEEN:
+            away = format_quantity(track.farthest, "m")
+            complain(f"warning: places of the {name} are up to {away} from its path; the comments say more")
     deliver(text, output, "yaml")
     if output not in (None, "-"):
         complain(f"Wrote {output}. Next: bisar-budget check {output}")
