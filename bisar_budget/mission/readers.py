@@ -89,10 +89,9 @@ class Quantity(Reader):
             )
             if not holds
         )
-        said = format_quantity(bound, self.dimension.si)
-        if self.dimension.usual and str(value).strip().endswith(("deg", "°")):
-            said = f"{math.degrees(bound):.6g} deg"
-        raise InvalidValueError(f"must be {words} {said}", hint=self._meant(value))
+        raise InvalidValueError(
+            f"must be {words} {format_quantity(bound, self.dimension.si)}", hint=self._meant(value)
+        )
 
     def _meant(self, value: Any) -> str:
         """Hint at the unit that a bare number may lack."""

@@ -173,7 +173,7 @@ class TestAPathInOneOfItsWays:
             ({**FLIGHT, "azimuth": "3 deg"}, "mixes latitude with azimuth"),
             ({**FLIGHT, "acceleration": [0, 0, 1]}, "mixes latitude with acceleration"),
             ({**FLIGHT, "speed": 0}, "a platform with speed 0 has none"),
-            ({**FLIGHT, "latitude": "91 deg"}, "must be at most 90 deg (got 91 deg)"),
+            ({**FLIGHT, "latitude": "91 deg"}, "must be at most 1.57 rad (got 91 deg)"),
             ({"orbit": {}}, "is empty"),
             ({"orbit": {"tle": "a.tle", "oem": "b.oem"}}, "mixes tle with oem"),
             ({"orbit": {"tle": ["only one"]}}, "must be the name of a file, or the two lines of an element set"),
