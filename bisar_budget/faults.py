@@ -62,7 +62,7 @@ def shown(text: str) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-class Change(NamedTuple):
+class SetValue(NamedTuple):
     """A value that an option puts in place of what a mission file says: `--set radar.bandwidth=150MHz`.
 
     `text` is the value as a file would have it.
@@ -83,7 +83,7 @@ class Changed:
     start_mark = None
 
 
-def changes_words(changes: Sequence[Change]) -> str:
+def changes_words(changes: Sequence[SetValue]) -> str:
     """Write the options that changed a mission as they can be given again; empty if there is none."""
     if not changes:
         return ""

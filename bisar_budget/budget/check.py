@@ -25,7 +25,8 @@ from bisar_budget.faults import changes_words
 from bisar_budget.findings.mission import FileWarning, MissionFindings, Resolution
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import RANK
-from bisar_budget.mission.model import FlownPath, Mission
+from bisar_budget.mission.model import Mission
+from bisar_budget.mission.platforms import FlownPath
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.units import format_quantity
 

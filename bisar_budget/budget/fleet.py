@@ -11,7 +11,7 @@ from functools import partial
 from typing import TypeVar
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.faults import Change, MissionError
+from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.findings.mission import MissionFindings, UnusableMission
 from bisar_budget.mission.load import load_mission
 from bisar_budget.resources import cores
@@ -40,7 +40,7 @@ def check_files(
     *,
     is_brief: bool = False,
     drawn: tuple[int, int | None] | None = None,
-    changes: Sequence[Change] = (),
+    changes: Sequence[SetValue] = (),
 ) -> list[Kept]:
     """Check files, in their order; many are shared out between the cores.
 
@@ -58,7 +58,7 @@ def check_files(
         Leave out what a terminal does not show.
     drawn : tuple, optional
         Number of draws of a Monte Carlo, and their seed; None: no draws.
-    changes : sequence of Change
+    changes : sequence of SetValue
         Values in place of each file's.
 
     Returns
@@ -95,7 +95,7 @@ def _kept(
     keep: Callable[[Found], Kept],
     is_brief: bool,
     drawn: tuple[int, int | None] | None,
-    changes: Sequence[Change],
+    changes: Sequence[SetValue],
 ) -> Kept:
     try:
         found = check_mission(load_mission(file, model, changes), today, is_brief=is_brief)

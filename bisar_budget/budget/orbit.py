@@ -5,13 +5,18 @@ Over an aperture T the missing acceleration a moves the true path by aT²/8 agai
 
 import math
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 from bisar_budget.constants import EARTH_GRAVITATIONAL_PARAMETER, EARTH_RADIUS
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.faults import KeyPath
 from bisar_budget.findings.mission import FileWarning
 from bisar_budget.geometry import PlatformState, Vector, norm
-from bisar_budget.mission.model import Mission, Platform
+from bisar_budget.mission.model import Mission
+from bisar_budget.mission.platforms import Platform
+
+if TYPE_CHECKING:
+    from bisar_budget.paths.earth import SceneAxes
 
 FASTEST_FLIGHT = 3e3  # m/s; no aircraft is as fast, and no satellite in a low orbit as slow
 
@@ -35,15 +40,13 @@ def orbital_acceleration(position: Vector) -> Vector:
     return (factor * x, factor * y, factor * from_centre[2])
 
 
-def free_fall(mission: Mission, state: PlatformState) -> Vector:
+def free_fall(axes: "SceneAxes", state: PlatformState) -> Vector:
     """Acceleration of a satellite in the axes of a scene on the Earth: −μr/r³ − 2ω×v − ω×(ω×r). [m/s²]
 
     Derived here: r against the stars, written in axes that turn at ω.
     """
-    from bisar_budget.paths.earth import ROTATION_RATE, Place, axes_at
+    from bisar_budget.paths.earth import ROTATION_RATE
 
-    scene = mission.scene
-    axes = axes_at(Place(scene.latitude or 0.0, scene.longitude or 0.0, scene.height or 0.0))
     x, y, z = axes.earth_fixed(state.position)
     u, v, _ = axes.turned_back(state.velocity)
     factor = -EARTH_GRAVITATIONAL_PARAMETER / math.hypot(x, y, z) ** 3
@@ -68,8 +71,9 @@ def straight_orbits(mission: Mission) -> Iterator[FileWarning]:
         if speed <= FASTEST_FLIGHT or platform.acceleration is not None or platform.is_of_the_earth:
             continue
         key: KeyPath = ("speed",) if platform.velocity is None else ("velocity",)
-        if mission.scene.is_on_earth:
-            acceleration = free_fall(mission, platform.state)
+        axes = mission.scene.axes
+        if axes is not None:
+            acceleration = free_fall(axes, platform.state)
             how = "(gravity of a point mass, less what the Earth's rotation adds)"
         else:
             acceleration = orbital_acceleration(platform.state.position)

@@ -19,7 +19,8 @@ from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.vibration_lines import Line, counted, lines_of, projected
 from bisar_budget.faults import KeyPath
 from bisar_budget.findings.row import Row
-from bisar_budget.mission.model import Mission, MotionError
+from bisar_budget.mission.model import Mission
+from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.units import format_quantity
 

@@ -32,7 +32,7 @@ from bisar_budget.faults import printable
 from bisar_budget.report import FORMATS
 
 if TYPE_CHECKING:
-    from bisar_budget.faults import Change
+    from bisar_budget.faults import SetValue
     from bisar_budget.findings.mission import MissionFindings, Option, Report, UnusableMission
     from bisar_budget.report import Style
 
@@ -201,7 +201,7 @@ def check(
     exit_zero: bool,
     model: str | None,
     today: datetime | None,
-    changes: "tuple[Change, ...]",
+    changes: "tuple[SetValue, ...]",
     verifying: bool,
     draws: int | None,
     seed: int | None,
@@ -324,7 +324,7 @@ def check_all(
     verifying: bool,
     illustrated: bool = False,
     drawn: tuple[int, int | None] | None = None,
-    changes: "Sequence[Change]" = (),
+    changes: "Sequence[SetValue]" = (),
 ) -> "Report":
     """Check every file; `verifying` adds verdicts of images. `illustrated` keeps the analyses, and the images.
 
@@ -370,7 +370,7 @@ def _explain(
     today: date,
     model: str | None,
     output: str | None,
-    changes: "Sequence[Change]",
+    changes: "Sequence[SetValue]",
 ) -> None:
     """Explain a row in every mission that has it."""
     from bisar_budget.budget.check import check_mission

@@ -10,7 +10,7 @@ from bisar_budget.cli.verify import announce, faster, progress_bar
 from bisar_budget.faults import printable
 
 if TYPE_CHECKING:
-    from bisar_budget.faults import Change
+    from bisar_budget.faults import SetValue
     from bisar_budget.mission.model import Mission
     from bisar_budget.simulate.targets import Targets
 
@@ -47,7 +47,7 @@ def simulate(
     output: str | None,
     image_former: str,
     targets: str | None,
-    changes: "tuple[Change, ...]",
+    changes: "tuple[SetValue, ...]",
 ) -> None:
     """Form the image of a point, or of a scene, with the declared errors.
 

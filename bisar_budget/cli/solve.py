@@ -22,7 +22,7 @@ from bisar_budget.cli.streams import (
 )
 
 if TYPE_CHECKING:
-    from bisar_budget.faults import Change
+    from bisar_budget.faults import SetValue
 
 
 @click.command()
@@ -82,7 +82,7 @@ def solve(
     row: str | None,
     target: str,
     model: str | None,
-    changes: "tuple[Change, ...]",
+    changes: "tuple[SetValue, ...]",
     today: datetime | None,
     format_name: str,
     output: str | None,

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from click import ParamType as ParamType
     from click.shell_completion import CompletionItem
 
-    from bisar_budget.faults import Change
+    from bisar_budget.faults import SetValue
     from bisar_budget.mission.model import Mission
 else:
 
@@ -50,7 +50,7 @@ class FileName(ParamType[str]):
 FILE = FileName()
 
 
-def _read_changes(ctx: click.Context, param: click.Parameter, texts: tuple[str, ...]) -> "tuple[Change, ...]":
+def _read_changes(ctx: click.Context, param: click.Parameter, texts: tuple[str, ...]) -> "tuple[SetValue, ...]":
     if not texts:
         return ()
     from bisar_budget.faults import InvalidValueError
@@ -90,7 +90,7 @@ def expand(patterns: Iterable[str]) -> list[str]:
     return list(dict.fromkeys(files))
 
 
-def load_all(files: Sequence[str], model: str | None = None, changes: "Sequence[Change]" = ()) -> "list[Mission]":
+def load_all(files: Sequence[str], model: str | None = None, changes: "Sequence[SetValue]" = ()) -> "list[Mission]":
     """Load every mission with values in place of its own, or say every fault of every file and exit."""
     from bisar_budget.faults import MissionError
     from bisar_budget.mission.load import load_mission

@@ -28,7 +28,7 @@ LONG = 60.0  # s; what takes longer is announced
 if TYPE_CHECKING:
     from click._termui_impl import ProgressBar
 
-    from bisar_budget.faults import Change
+    from bisar_budget.faults import SetValue
     from bisar_budget.findings.images import VerifiedMission
     from bisar_budget.mission.model import Mission
 
@@ -57,7 +57,7 @@ def verify(
     only: str,
     format_name: str,
     output: str | None,
-    changes: "tuple[Change, ...]",
+    changes: "tuple[SetValue, ...]",
     jobs: int | None,
 ) -> None:
     """Form images at the limits and measure whether they are true.

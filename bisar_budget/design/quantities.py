@@ -7,9 +7,10 @@ from typing import Any, NamedTuple
 
 from bisar_budget import units
 from bisar_budget.faults import InvalidValueError, shown
+from bisar_budget.mission.bounds import DIRECTION, ELEVATION, LATITUDE
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.keys import nearest_keys
-from bisar_budget.mission.model import DIRECTION, ELEVATION, LATITUDE, MISSION
+from bisar_budget.mission.model import MISSION
 from bisar_budget.mission.readers import INVALID, Late, ListOf, OneOf, Quantity, Reader, Section, Triple
 from bisar_budget.units import Dimension, parse_quantity
 

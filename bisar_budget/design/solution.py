@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from bisar_budget.faults import Change
+from bisar_budget.faults import SetValue
 
 
 class State(NamedTuple):
@@ -65,7 +65,7 @@ class Solution(NamedTuple):
     is_constant: bool
     skipped: int
     texts: Mapping[float, str]
-    changes: tuple[Change, ...] = ()
+    changes: tuple[SetValue, ...] = ()
 
     @property
     def value(self) -> float | None:

@@ -14,7 +14,7 @@ from bisar_budget.budget.check import check_mission
 from bisar_budget.design.quantities import FACTOR, Number, QuestionError, Range, number_of, range_of
 from bisar_budget.design.scaled import scaled
 from bisar_budget.design.solution import Crossing, Solution, State
-from bisar_budget.faults import Change, MissionError
+from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
@@ -169,7 +169,7 @@ class _Question:
         root: dict[str, object] = tree.root
         return root
 
-    def _read(self, changes: Sequence[Change]) -> Mission:
+    def _read(self, changes: Sequence[SetValue]) -> Mission:
         anew = {parts_of(change.key) for change in changes}
         given = [change for change in self.mission.changes if parts_of(change.key) not in anew]
         return parse_mission(self.mission.data, self.mission.file, self.model, changes=(*given, *changes))
@@ -187,7 +187,7 @@ class _Question:
         if self.is_scale:
             return scaled(self.base, self.key, value)
         unit = self.number.dimension.si
-        return self._read([Change(self.key, f"{value!r} {unit}".rstrip())])
+        return self._read([SetValue(self.key, f"{value!r} {unit}".rstrip())])
 
     def evaluate(self, value: float, *, is_brief: bool = True) -> State:
         """Check the mission with another value."""
@@ -242,7 +242,7 @@ class _Question:
         if self.is_scale:
             return self.evaluate(value, is_brief=False)
         try:
-            return self._state(value, check_mission(self._read([Change(self.key, text)]), self.today))
+            return self._state(value, check_mission(self._read([SetValue(self.key, text)]), self.today))
         except MissionError as error:
             fault = error.faults[0]
             return State(value, complies=False, status="error", reason=f"{fault.key}: {fault.problem}")

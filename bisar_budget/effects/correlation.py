@@ -14,7 +14,8 @@ from bisar_budget.effects.effect import PLATFORMS, ErrorSource
 from bisar_budget.effects.subject import subject
 from bisar_budget.faults import Place
 from bisar_budget.geometry import FRAME_AXES, GroundVector
-from bisar_budget.mission.model import Mission, MotionError
+from bisar_budget.mission.model import Mission
+from bisar_budget.mission.platforms import MotionError
 from bisar_budget.mission.symmetric import quadratic_form
 from bisar_budget.phrases import Note
 

@@ -23,7 +23,8 @@ from bisar_budget.effects.vibration_lines import sight_of
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import BistaticGeometry, PlatformState, Vector, dot
 from bisar_budget.mission.instruments import IMU_KINDS, GaussMarkov, Imu
-from bisar_budget.mission.model import Mission, MotionError
+from bisar_budget.mission.model import Mission
+from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import NOTHING, Note
 
 IMU_UNITS = dict(zip(IMU_KINDS, ("m/s^2", "rad", "rad/s", "m/s/sqrt(s)", "rad/sqrt(s)"), strict=True))

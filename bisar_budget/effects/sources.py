@@ -23,7 +23,8 @@ from bisar_budget.effects.exact_ranges import ExactRanges
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, PlatformState, Vector
-from bisar_budget.mission.model import Mission, MotionError
+from bisar_budget.mission.model import Mission
+from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import NOTHING, Note
 
 _AXES: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

@@ -10,7 +10,8 @@ from typing import NamedTuple
 from bisar_budget import phrases
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.geometry import FRAME_AXES, PlatformState, Vector, dot, without_rounding
-from bisar_budget.mission.model import Mission, MotionError
+from bisar_budget.mission.model import Mission
+from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import Note
 from bisar_budget.units import format_quantity
 

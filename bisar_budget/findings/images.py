@@ -6,7 +6,7 @@ the bistatic look direction φ_b, y′ across it, counter-clockwise.
 
 from typing import NamedTuple
 
-from bisar_budget.faults import Change
+from bisar_budget.faults import SetValue
 from bisar_budget.geometry import GroundVector
 
 FLOOR_DB = -40.0  # of the error-free peak: black in a chip
@@ -68,7 +68,7 @@ class VerifiedMission(NamedTuple):
     name: str
     rows: tuple[Verdict, ...]
     conditions: str = ""
-    changes: tuple[Change, ...] = ()
+    changes: tuple[SetValue, ...] = ()
 
     @property
     def status(self) -> str:

@@ -4,11 +4,12 @@ from datetime import date
 from typing import TYPE_CHECKING, NamedTuple
 
 from bisar_budget.analysis.allocation import Allocation
-from bisar_budget.faults import Change, Fault
+from bisar_budget.faults import Fault, SetValue
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUSES, worst
 from bisar_budget.geometry import BistaticGeometry
-from bisar_budget.mission.model import Document, FlownPath, Mission
+from bisar_budget.mission.model import Document, Mission
+from bisar_budget.mission.platforms import FlownPath
 from bisar_budget.phrases import Note
 
 if TYPE_CHECKING:
@@ -67,7 +68,7 @@ class MissionFindings(NamedTuple):
     image_evidence: "tuple[ImageEvidence, ...]" = ()  # a few of those images, where a report shows them
     monte_carlo: "MonteCarlo | None" = None  # if errors were drawn
     document: Document = Document()
-    changes: tuple[Change, ...] = ()  # values that options put in place of the file's
+    changes: tuple[SetValue, ...] = ()  # values that options put in place of the file's
 
     @property
     def mission(self) -> Mission | None:

@@ -9,7 +9,7 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 from bisar_budget.geometry import STRAIGHT, PlatformState, Vector, cross, dot, norm, unit
-from bisar_budget.paths.earth import Place, SceneAxes
+from bisar_budget.paths.earth import Geodetic, SceneAxes
 
 if TYPE_CHECKING:
     import numpy as np
@@ -83,7 +83,7 @@ class Imported(NamedTuple):
     xml_sha256: str
     channel: str
     name: str
-    scene: Place
+    scene: Geodetic
     center_frequency: float
     bandwidth: float
     aperture_time: float

@@ -23,7 +23,7 @@ from bisar_budget.formats.declared import ADDED, KINDS
 from bisar_budget.formats.document import MissingExtraError
 from bisar_budget.geometry import Axes, PlatformState, Vector
 from bisar_budget.mission.model import Mission, Simulation
-from bisar_budget.paths.earth import Place, SceneAxes, axes_at, geodetic
+from bisar_budget.paths.earth import Geodetic, SceneAxes, axes_at, geodetic
 from bisar_budget.paths.instant import Instant, parse_instant
 from bisar_budget.simulate.exact import exact_effect
 from bisar_budget.simulate.phase_history import phase_history
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 NAMESPACE = "http://api.nsgreg.nga.mil/schema/cphd/1.1.0"
-NOWHERE = Place(0.0, 0.0, 0.0)  # of a scene whose mission does not say where it is
+NOWHERE = Geodetic(0.0, 0.0, 0.0)  # of a scene whose mission does not say where it is
 UNDATED = "2000-01-01T12:00:00Z"
 _MARGIN_CELLS = 24  # of the image area beyond the targets, each way
 _FINE = 2049  # slow times at which the extent of the signal is foreseen
@@ -66,7 +66,7 @@ class Exported(NamedTuple):
     vectors: int
     samples: int
     half: float
-    place: Place
+    place: Geodetic
     scatterers: int
     remarks: tuple[str, ...]
 
@@ -141,7 +141,7 @@ def export_phase_history(mission: Mission, targets: Targets) -> Exported:
         place = NOWHERE
         remarks.append("the mission does not say where its scene is (scene.latitude): it is put at 0 deg N, 0 deg E")
     else:
-        place = Place(scene.latitude, scene.longitude, scene.height)
+        place = Geodetic(scene.latitude, scene.longitude, scene.height)
     middle = mission.collection.center_time
     if middle is None:
         remarks.append(f"the mission has no collection.center_time: the collection is put at {UNDATED}")
@@ -413,7 +413,7 @@ def _xy(x: float, y: float) -> _Branch:
     return [("X", x), ("Y", y)]
 
 
-def _degrees(place: Place) -> _Branch:
+def _degrees(place: Geodetic) -> _Branch:
     return [("Lat", math.degrees(place.latitude)), ("Lon", math.degrees(place.longitude))]
 
 

@@ -24,7 +24,7 @@ from bisar_budget.formats.containers import Container, open_container
 from bisar_budget.formats.declared import Errors, Seen, of_matrices, of_sigmas
 from bisar_budget.formats.document import Element, FormatError, MissingExtraError
 from bisar_budget.geometry import PlatformState, Vector
-from bisar_budget.paths.earth import Place, SceneAxes, axes_at, geodetic
+from bisar_budget.paths.earth import Geodetic, SceneAxes, axes_at, geodetic
 from bisar_budget.paths.instant import parse_instant
 
 if TYPE_CHECKING:
@@ -529,7 +529,7 @@ def _imported(
         raise FormatError(
             container.file, f"{container.xml.path}: a band of {band[1]:g} Hz about {band[0]:g} Hz, which is none"
         )
-    place: Place = geodetic(point)
+    place: Geodetic = geodetic(point)
     axes = axes_at(place)
     transmitter, receiver = (
         track._replace(state=replace(track.state, radial=axes.radial(track.state.position, track.state.velocity)))

@@ -2,12 +2,14 @@
 
 # What other rooms may use.
 __all__ = [
+    "bounds",
     "changes",
     "instruments",
     "keys",
     "load",
     "model",
     "parts",
+    "platforms",
     "readers",
     "revision",
     "schema",

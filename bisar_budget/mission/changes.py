@@ -8,7 +8,7 @@ from typing import Any
 
 import yaml
 
-from bisar_budget.faults import Change, Changed, InvalidValueError, KeyPath, shown
+from bisar_budget.faults import Changed, InvalidValueError, KeyPath, SetValue, shown
 from bisar_budget.mission.readers import INVALID
 from bisar_budget.mission.tree import MAX_BYTES, Tree, UnusableError, events
 
@@ -17,7 +17,7 @@ _MAX_KEY = 500  # characters; a path of the schema has a tenth
 _NAMED_BY_IDS = "requirement_ids"  # its keys are ids of rows, which have dots
 
 
-def read_changes(texts: Sequence[str]) -> tuple[Change, ...]:
+def read_changes(texts: Sequence[str]) -> tuple[SetValue, ...]:
     """Read `KEY=VALUE` of each option.
 
     Raises
@@ -25,7 +25,7 @@ def read_changes(texts: Sequence[str]) -> tuple[Change, ...]:
     InvalidValueError
         One has no key or no `=`, or two have the same key.
     """
-    changes: dict[tuple[str, ...], Change] = {}
+    changes: dict[tuple[str, ...], SetValue] = {}
     for text in texts:
         key, equals, value = text.partition("=")
         key = key.strip()
@@ -38,7 +38,7 @@ def read_changes(texts: Sequence[str]) -> tuple[Change, ...]:
             raise InvalidValueError(f"{shown(key)!r} is no path of keys", _ACCEPTED)
         if parts in changes:
             raise InvalidValueError(f"{shown(key)} is set twice", "accepted: each key once")
-        changes[parts] = Change(key, value.strip())
+        changes[parts] = SetValue(key, value.strip())
     return tuple(changes.values())
 
 
@@ -47,7 +47,7 @@ def parts_of(key: str) -> tuple[str, ...]:
     return tuple(key.replace("[", ".").replace("]", "").split("."))
 
 
-def apply_changes(tree: Tree, changes: Sequence[Change]) -> None:
+def apply_changes(tree: Tree, changes: Sequence[SetValue]) -> None:
     """Put each value into the tree, in place of what stands there or beside it; what is wrong is a fault of the tree.
 
     Raises
@@ -59,7 +59,7 @@ def apply_changes(tree: Tree, changes: Sequence[Change]) -> None:
         _apply(tree, change)
 
 
-def _apply(tree: Tree, change: Change) -> None:
+def _apply(tree: Tree, change: SetValue) -> None:
     """Go down to the value, making the sections that are not there."""
     parts = parts_of(change.key)
     container: Any = tree.root
@@ -117,7 +117,7 @@ def _put(container: Any, name: str | int, value: Any) -> None:
         container[name] = value
 
 
-def _value(tree: Tree, change: Change, path: KeyPath) -> Any:
+def _value(tree: Tree, change: SetValue, path: KeyPath) -> Any:
     """Read the text of the value as the file's own would be; its faults name the option."""
     try:
         next_event = events(change.text)

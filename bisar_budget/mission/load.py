@@ -9,13 +9,13 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import BinaryIO, cast
 
-from bisar_budget.faults import Change, Fault, MissionError, changes_words
+from bisar_budget.faults import Fault, MissionError, SetValue, changes_words
 from bisar_budget.mission.model import MISSION, Mission, flies_on_earth, names_parts
 from bisar_budget.mission.readers import INVALID
 from bisar_budget.mission.tree import MAX_BYTES, UnusableError, file_fault, read_tree
 
 
-def load_mission(path: str, model: str | None = None, changes: Sequence[Change] = ()) -> Mission:
+def load_mission(path: str, model: str | None = None, changes: Sequence[SetValue] = ()) -> Mission:
     """Read the mission file at `path`; `-` is standard input.
 
     `model` stands in for the file's own, `changes` for values.
@@ -56,7 +56,7 @@ def parse_mission(
     file: str = "-",
     model: str | None = None,
     beside: Callable[[str], bytes] | None = None,
-    changes: Sequence[Change] = (),
+    changes: Sequence[SetValue] = (),
 ) -> Mission:
     """Turn the content of a mission file into a `Mission`.
 
@@ -70,7 +70,7 @@ def parse_mission(
         Gating model in place of `allocation.model`.
     beside : callable, optional
         Gives the content of a file that the mission names, and raises `PathFileError`; omitted: files beside it.
-    changes : sequence of Change
+    changes : sequence of SetValue
         Values in place of the file's, and beside them, in this order.
 
     Raises
@@ -108,7 +108,7 @@ def parse_mission(
     return read if model is None else read._replace(allocation=read.allocation._replace(model=model))
 
 
-def _with_changes(fault: Fault, changes: Sequence[Change]) -> Fault:
+def _with_changes(fault: Fault, changes: Sequence[SetValue]) -> Fault:
     """Say of an unknown key of an option which was meant, and with what options a fault of the file was found.
 
     Without them there may be none.

@@ -12,6 +12,7 @@ from typing import Annotated, Any, NamedTuple
 
 from bisar_budget.faults import KeyPath, MissionError, Problem, shown
 from bisar_budget.geometry import Vector
+from bisar_budget.mission.bounds import COORDINATE, VELOCITY
 from bisar_budget.mission.instruments import (
     FORMS,
     IMU_KINDS,
@@ -28,7 +29,8 @@ from bisar_budget.mission.instruments import (
     PowerLawFigures,
     VelocityRandomWalk,
 )
-from bisar_budget.mission.model import COORDINATE, VELOCITY, Mission, MotionError
+from bisar_budget.mission.model import Mission
+from bisar_budget.mission.platforms import MotionError
 from bisar_budget.mission.readers import (
     INVALID,
     Choice,

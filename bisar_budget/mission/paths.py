@@ -11,7 +11,8 @@ from typing import Any
 from bisar_budget.faults import Problem
 from bisar_budget.geometry import STRAIGHT, PlatformState
 from bisar_budget.mission import routes
-from bisar_budget.mission.model import FlownPath, Mission, MotionError, Platform, without_image
+from bisar_budget.mission.model import Mission
+from bisar_budget.mission.platforms import FlownPath, MotionError, Platform, without_image
 from bisar_budget.mission.readers import INVALID, Report
 from bisar_budget.paths import earth
 from bisar_budget.paths.flight import Fitted, Log, Orbit, PathFileError, interpolated, slow_times, smoothed
@@ -68,10 +69,7 @@ def with_paths(mission: Mission, read: Beside, report: Report) -> Any:
     report : callable
         Takes what is wrong, and where.
     """
-    scene, axes = mission.scene, None
-    if scene.is_on_earth:
-        axes = earth.axes_at(earth.Place(scene.latitude or 0.0, scene.longitude or 0.0, scene.height or 0.0))
-    platforms, is_valid = mission.platforms, True
+    axes, platforms, is_valid = mission.scene.axes, mission.platforms, True
     for name in platforms._fields:
         platform: Platform = getattr(platforms, name)
         try:
@@ -86,7 +84,8 @@ def with_paths(mission: Mission, read: Beside, report: Report) -> Any:
         platforms = platforms._replace(**{name: found})
     if not is_valid:
         return INVALID
-    for problem in without_image(platforms, mission.collection, mission.synchronization):
+    aperture_time = mission.collection.aperture_time
+    for problem in without_image(platforms, aperture_time, has_direct_path=mission.has_direct_path):
         report((), problem)
         is_valid = False
     return mission._replace(platforms=platforms) if is_valid else INVALID
@@ -128,7 +127,7 @@ def _with_radial(state: PlatformState, axes: earth.SceneAxes) -> PlatformState:
         return state
 
 
-def _of_orbit(mission: Mission, route: routes.Orbit, axes: earth.SceneAxes, read: Beside) -> FlownPath:
+def _of_orbit(mission: Mission, route: routes.OrbitSource, axes: earth.SceneAxes, read: Beside) -> FlownPath:
     center = mission.collection.center_time
     if center is None:
         raise _UnusablePathError(("orbit",), Problem("needs an instant", "accepted: collection.center_time"))
@@ -178,7 +177,9 @@ def _read_orbit(form: str, data: bytes, name: str, wanted: str | None, center: I
     return two_lines.read_tle(fields.decoded(data, name), name, wanted, center)
 
 
-def _of_log(mission: Mission, route: routes.Trajectory, axes: earth.SceneAxes | None, read: Beside) -> FlownPath:
+def _of_log(
+    mission: Mission, route: routes.TrajectorySource, axes: earth.SceneAxes | None, read: Beside
+) -> FlownPath:
     aperture_time = mission.collection.aperture_time
     try:
         data = read(route.file)
@@ -197,7 +198,7 @@ def _of_log(mission: Mission, route: routes.Trajectory, axes: earth.SceneAxes | 
     return _flown(fitted, words, route.file, data)._replace(doubts=fitted.doubts)
 
 
-def _log(route: routes.Trajectory, data: bytes) -> Log:
+def _log(route: routes.TrajectorySource, data: bytes) -> Log:
     """Read a log; its format is stated, or that of its name."""
     is_sbet = route.format == "sbet" or (route.format is None and route.file.lower().endswith((".out", ".sbet")))
     if is_sbet:
@@ -218,7 +219,7 @@ def _in_scene(log: Log, axes: earth.SceneAxes) -> Log:
 
 
 def _by_accuracy(
-    mission: Mission, route: routes.Trajectory, error: MotionError, read: Beside
+    mission: Mission, route: routes.TrajectorySource, error: MotionError, read: Beside
 ) -> tuple[MotionError, str]:
     """Errors that the accuracy file of a log states, where the mission file states none; and its SHA-256."""
     from bisar_budget.paths import sbet
@@ -250,7 +251,7 @@ def _by_accuracy(
 
 def _of_place(platform: Platform, axes: earth.SceneAxes, aperture_time_s: float) -> FlownPath:
     """Flight along the geodesic, `speed` over ground at its height, which `climb` changes."""
-    place = earth.Place(platform.latitude or 0.0, platform.longitude or 0.0, platform.altitude or 0.0)
+    place = earth.Geodetic(platform.latitude or 0.0, platform.longitude or 0.0, platform.altitude or 0.0)
     speed, heading, climb = platform.speed or 0.0, platform.heading or 0.0, platform.climb or 0.0
     if not speed and not climb:
         return FlownPath(

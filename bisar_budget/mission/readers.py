@@ -9,6 +9,7 @@ library would, in a fifth of the import time: `check` starts in every commit of 
 import math
 import re
 from collections.abc import Callable, Mapping
+from importlib import import_module
 from typing import Any, NamedTuple
 
 from bisar_budget.faults import InvalidValueError, KeyPath, Problem
@@ -432,10 +433,15 @@ class OneOf(Reader):
 
 
 class Late(Reader):
-    """A reader of a rare key, imported when a file has it."""
+    """A reader of a rare key, `name` in a module of this room: it is imported when a file has the key."""
 
-    def __init__(self, load: Callable[[], Reader]) -> None:
-        self.load = load
+    def __init__(self, module: str, name: str) -> None:
+        self.module, self.name = module, name
+
+    def load(self) -> Reader:
+        """Import it."""
+        reader: Reader = getattr(import_module(f"bisar_budget.mission.{self.module}"), self.name)
+        return reader
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
         """Read by it."""

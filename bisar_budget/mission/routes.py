@@ -28,7 +28,7 @@ class _Lines(Reader):
         return {"type": "array", "items": {"type": "string"}, "minItems": 2, "maxItems": 2}
 
 
-class Orbit(NamedTuple):
+class OrbitSource(NamedTuple):
     """An orbit; the mission needs the scene's latitude, longitude and height, and `collection.center_time`."""
 
     tle: Annotated[
@@ -73,7 +73,7 @@ class _Instant(Reader):
 FORMATS = ("csv", "sbet")
 
 
-class Trajectory(NamedTuple):
+class TrajectorySource(NamedTuple):
     """A log of a flight."""
 
     file: Annotated[str, Key(_FILE, "Beside the mission file.")]
@@ -91,4 +91,4 @@ class Trajectory(NamedTuple):
     ] = None
 
 
-ORBIT, TRAJECTORY, INSTANT = Section(Orbit), Section(Trajectory), _Instant()
+ORBIT, TRAJECTORY, INSTANT = Section(OrbitSource), Section(TrajectorySource), _Instant()

@@ -12,7 +12,7 @@ from typing import Any
 import yaml
 from yaml import AliasEvent, MappingEndEvent, ScalarEvent
 
-from bisar_budget.faults import Change, Fault, KeyPath, MissionError, Problem, printable, shown
+from bisar_budget.faults import Fault, KeyPath, MissionError, Problem, SetValue, printable, shown
 from bisar_budget.mission.readers import INVALID
 
 MAX_BYTES = 1 << 20  # a mission file has a few kilobytes
@@ -66,7 +66,7 @@ class Tree:
         self.keys: dict[KeyPath, Any] = {}
         self.values: dict[KeyPath, Any] = {}  # events, which hold the marks of start and end
         self.faults: list[Fault] = []
-        self.changes: dict[KeyPath, Change] = {}
+        self.changes: dict[KeyPath, SetValue] = {}
 
     def fault(self, mark: Any, path: KeyPath, problem: str, **more: str) -> None:
         """Note a fault at a place of the file; without a mark, at its start. Of too many only the first are said."""
@@ -81,7 +81,7 @@ class Tree:
             self.faults.append(file_fault(f"has {MAX_FAULTS} faults or more; what follows them was not read"))
             raise UnusableError
 
-    def _change_at(self, path: KeyPath) -> Change | None:
+    def _change_at(self, path: KeyPath) -> SetValue | None:
         """The option that a value, or what holds it, comes from."""
         if not self.changes:
             return None

@@ -18,7 +18,7 @@ _STEPS = 4
 _SETTLED = 1e-15  # rad; a metre on the ground is 1.6e-7
 
 
-class Place(NamedTuple):
+class Geodetic(NamedTuple):
     """Geodetic latitude and longitude [rad], height above the ellipsoid [m]."""
 
     latitude: float
@@ -67,7 +67,7 @@ class SceneAxes(NamedTuple):
         return self.turned(radial), self.turned(cross(across, radial)), self.turned(across)
 
 
-def earth_fixed(place: Place) -> Vector:
+def earth_fixed(place: Geodetic) -> Vector:
     """Earth-fixed coordinates of a geodetic place. [m]"""
     sine, cosine = math.sin(place.latitude), math.cos(place.latitude)
     normal = _prime_vertical(sine)
@@ -79,7 +79,7 @@ def earth_fixed(place: Place) -> Vector:
     )
 
 
-def geodetic(point: Vector) -> Place:
+def geodetic(point: Vector) -> Geodetic:
     """Geodetic place of Earth-fixed coordinates, more than a few kilometres from the Earth's centre.
 
     Bowring's iteration, on the reduced latitude.
@@ -87,7 +87,7 @@ def geodetic(point: Vector) -> Place:
     x, y, z = point
     level = math.hypot(x, y)
     if not level:
-        return Place(math.copysign(math.pi / 2, z), 0.0, abs(z) - _POLAR_RADIUS)
+        return Geodetic(math.copysign(math.pi / 2, z), 0.0, abs(z) - _POLAR_RADIUS)
     tangent = z / (level * (1 - FLATTENING))
     latitude = math.atan2(z, level)
     for _ in range(10):
@@ -100,10 +100,10 @@ def geodetic(point: Vector) -> Place:
         tangent = (1 - FLATTENING) * math.tan(latitude)
     sine, cosine = math.sin(latitude), math.cos(latitude)
     height = level * cosine + z * sine - EQUATORIAL_RADIUS * math.sqrt(1 - _ECCENTRICITY_SQUARED * sine * sine)
-    return Place(latitude, math.atan2(y, x), height)
+    return Geodetic(latitude, math.atan2(y, x), height)
 
 
-def axes_at(place: Place) -> SceneAxes:
+def axes_at(place: Geodetic) -> SceneAxes:
     """East, north and up at a place."""
     sine, cosine = math.sin(place.latitude), math.cos(place.latitude)
     sine_l, cosine_l = math.sin(place.longitude), math.cos(place.longitude)
@@ -113,12 +113,12 @@ def axes_at(place: Place) -> SceneAxes:
     return SceneAxes(earth_fixed(place), (east, north, up))
 
 
-def flown(place: Place, heading: float, speed: float, climb: float, time_s: float) -> Vector:
+def flown(place: Geodetic, heading: float, speed: float, climb: float, time_s: float) -> Vector:
     """Earth-fixed place after a flight along the geodesic, at a height that `climb` changes. [m]
 
     Parameters
     ----------
-    place : Place
+    place : Geodetic
         At the beginning.
     heading : float
         There, from north, clockwise. [rad]
@@ -154,7 +154,7 @@ def flown(place: Place, heading: float, speed: float, climb: float, time_s: floa
     return here
 
 
-def _radius_along(place: Place, heading: float) -> float:
+def _radius_along(place: Geodetic, heading: float) -> float:
     """Radius of curvature of the way of constant height over a place, by its compass heading: Euler's formula. [m]"""
     sine = math.sin(place.latitude)
     across = _prime_vertical(sine)

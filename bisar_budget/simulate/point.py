@@ -16,7 +16,7 @@ from bisar_budget.effects.pieces import LinePiece, gradients_of, indicated_point
 from bisar_budget.effects.vibration_lines import counted, lines_of
 from bisar_budget.geometry import BistaticGeometry, GroundVector, Vector
 from bisar_budget.mission.model import Mission, Simulation
-from bisar_budget.mission.model import MotionError as DeclaredError
+from bisar_budget.mission.platforms import MotionError as DeclaredError
 from bisar_budget.simulate.autofocus import ALGORITHMS
 from bisar_budget.simulate.collection import superposed_motion
 from bisar_budget.simulate.exact import ExactEffect, exact_effect

@@ -17,7 +17,8 @@ from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.effects.random_errors import RandomError
 from bisar_budget.effects.spectra import Piece
 from bisar_budget.mission.instruments import GaussMarkov
-from bisar_budget.mission.model import Mission, MotionError, Simulation
+from bisar_budget.mission.model import Mission, Simulation
+from bisar_budget.mission.platforms import MotionError
 from bisar_budget.simulate.phase_history import Course, Floats
 
 _STEPS = 512  # from mid-aperture to the end of it, in which a walk is summed up

@@ -14,7 +14,7 @@ from bisar_budget.effects.slow_vibration import cubic_part, quadratic_part
 from bisar_budget.effects.vibration_lines import along_line_of_sight
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.mission.model import MotionError
+from bisar_budget.mission.platforms import MotionError
 from bisar_budget.units import format_limit
 from tests.conftest import TODAY, findings, mission_text, row
 

@@ -14,7 +14,7 @@ from bisar_budget.design import solve as solving
 from bisar_budget.design.quantities import QuestionError
 from bisar_budget.design.scaled import scaled
 from bisar_budget.design.solution import Solution, State
-from bisar_budget.faults import Change
+from bisar_budget.faults import SetValue
 from bisar_budget.mission.changes import read_changes
 from bisar_budget.mission.load import load_mission, parse_mission
 from tests.conftest import ROOT, mission_text
@@ -87,7 +87,7 @@ def test_check_passes_just_inside_and_fails_just_outside(file, monkeypatch) -> N
     """Of the gate itself, with the values as they are written: aperture time, and the errors of a platform."""
     monkeypatch.setattr(solving, "PLACES", 5)
     found = solve("collection.aperture_time", file=str(file))
-    asked = [(found, lambda text: load_mission(str(file), changes=[Change(found.key, text)]))]
+    asked = [(found, lambda text: load_mission(str(file), changes=[SetValue(found.key, text)]))]
     mission = load_mission(str(file))
     key = "platforms.receiver.motion_error"
     try:

@@ -5,7 +5,7 @@ from datetime import date
 import pytest
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.faults import Change, InvalidValueError, MissionError, changes_words
+from bisar_budget.faults import InvalidValueError, MissionError, SetValue, changes_words
 from bisar_budget.mission.changes import read_changes
 from bisar_budget.mission.keys import all_keys, nearest_keys
 from bisar_budget.mission.load import load_mission, parse_mission
@@ -129,7 +129,7 @@ def test_a_set_value_has_no_line() -> None:
 
 
 def test_options_are_written_so_that_a_shell_reads_them_again() -> None:
-    changes = (Change("radar.bandwidth", "150MHz"), Change("a.b", "[0, 40, 0]"))
+    changes = (SetValue("radar.bandwidth", "150MHz"), SetValue("a.b", "[0, 40, 0]"))
     assert changes_words(changes) == "--set radar.bandwidth=150MHz --set 'a.b=[0, 40, 0]'"
     assert changes_words(()) == ""
 

@@ -26,10 +26,10 @@ BELOW_FLIGHT = {"latitude": "48.1 deg", "longitude": "11.3 deg", "height": "600 
 FLIGHT = {"latitude": "48.2 deg", "longitude": "11.1 deg", "altitude": "3 km", "heading": "60 deg", "speed": "120 kn"}
 
 
-def overpass(center: Instant) -> earth.Place:
+def overpass(center: Instant) -> earth.Geodetic:
     """A place some 300 km beside the satellite of `TLE`."""
     below = earth.geodetic(two_lines.read_tle(TLE, "x", None, center).place(center))
-    return earth.Place(below.latitude, below.longitude + 0.05 / math.cos(below.latitude), 500.0)
+    return earth.Geodetic(below.latitude, below.longitude + 0.05 / math.cos(below.latitude), 500.0)
 
 
 def satellite(center: Instant = CENTER, **changes: Any) -> str:
@@ -99,7 +99,7 @@ class TestEveryKindOfPath:
     def test_a_log_and_a_trajectory_are_where_the_flight_was(self, folder: Path) -> None:
         flown = flight()
         middle = flown.places[250]
-        axes = earth.axes_at(earth.Place(math.radians(48.1), math.radians(11.3), 600.0))
+        axes = earth.axes_at(earth.Geodetic(math.radians(48.1), math.radians(11.3), 600.0))
         for route in (
             {"file": "flight.csv"},
             {"file": "sbet.out", "week": 2421},

@@ -56,7 +56,7 @@ def ellipsoid(latitude: float, longitude: float, height: float) -> np.ndarray:
 
 @given(st.floats(-1.57, 1.57), st.floats(-math.pi, math.pi), st.floats(-5e3, 4e7))
 def test_geodetic_places_are_those_of_the_ellipsoid_and_come_back(latitude, longitude, height) -> None:
-    place = earth.earth_fixed(earth.Place(latitude, longitude, height))
+    place = earth.earth_fixed(earth.Geodetic(latitude, longitude, height))
     # Rounding of a coordinate of 4e7 m is 7e-9 m.
     assert np.allclose(place, ellipsoid(latitude, longitude, height), rtol=0, atol=5e-8)
     back = earth.geodetic(place)
@@ -79,8 +79,8 @@ class TestLevelFlight:
         What is left over 5 s, the third order and the turn of the geodesic, is v³t³/6R² = 0.1 µm and less.
         """
         state = mission(platforms__receiver=FLIGHT).platforms.receiver.state
-        axes = earth.axes_at(earth.Place(math.radians(48.0866), math.radians(11.2797), 590.0))
-        start = earth.Place(math.radians(48.2), math.radians(11.1), 3000.0)
+        axes = earth.axes_at(earth.Geodetic(math.radians(48.0866), math.radians(11.2797), 590.0))
+        start = earth.Geodetic(math.radians(48.2), math.radians(11.1), 3000.0)
         for tau in (-5.0, 0.0, 5.0):
             there = earth.geodetic(axes.earth_fixed(state.at(tau)[0]))
             assert there.height == pytest.approx(3000 + 2 * tau, abs=1e-3)
@@ -97,7 +97,7 @@ class TestLevelFlight:
         self, latitude: float, speed: float, climb: float
     ) -> None:
         """Height and level speed as stated; of level flight Clairaut's constant."""
-        start, heading = earth.Place(math.radians(latitude), 0.3, 9e3), 1.1
+        start, heading = earth.Geodetic(math.radians(latitude), 0.3, 9e3), 1.1
         constants = []
         for tau in np.linspace(-30, 30, 7):
             before, here, after = (
@@ -127,7 +127,7 @@ class TestRadialAxes:
     )
     def test_they_are_those_of_positions_against_the_stars(self, position, velocity) -> None:
         """By brute force: Earth-fixed places a second apart, turned with the Earth, span the plane of the orbit."""
-        axes = earth.axes_at(earth.Place(0.7, -1.2, 300.0))
+        axes = earth.axes_at(earth.Geodetic(0.7, -1.2, 300.0))
         places = []
         for tau in (-0.5, 0.5):
             place = np.array(axes.earth_fixed(tuple(p + tau * v for p, v in zip(position, velocity, strict=True))))
@@ -229,7 +229,7 @@ def test_a_straight_orbit_over_the_earth_is_told_the_acceleration_of_its_own() -
         platforms__transmitter={"position": position.tolist(), "velocity": velocity.tolist()},
         platforms__receiver=FLIGHT,
     )
-    axes = earth.axes_at(earth.Place(math.radians(48.0866), math.radians(11.2797), 590.0))
+    axes = earth.axes_at(earth.Geodetic(math.radians(48.0866), math.radians(11.2797), 590.0))
     r = np.array(axes.earth_fixed(tuple(position)))
     w = np.array([0, 0, OMEGA])
     v = np.array(axes.turned_back(tuple(velocity))) + np.cross(w, r)
@@ -245,6 +245,6 @@ def test_a_straight_orbit_over_the_earth_is_told_the_acceleration_of_its_own() -
         return np.array(axes.place(tuple(turn @ place)))
 
     want = fallen(1.0) - 2 * position + fallen(-1.0)  # per s²; the fourth order leaves ω⁴r/12, 1e-6 m/s²
-    assert free_fall(found, found.platforms.transmitter.state) == pytest.approx(want, abs=2e-5)
+    assert free_fall(found.scene.axes, found.platforms.transmitter.state) == pytest.approx(want, abs=2e-5)
     (warning,) = straight_orbits(found)
     assert f"acceleration: [{want[0]:.3f} m/s^2, {want[1]:.3f} m/s^2, {want[2]:.3f} m/s^2]" in warning.message

@@ -13,7 +13,7 @@ from skyfield.framelib import itrs
 
 from bisar_budget.geometry import Vector
 from bisar_budget.paths import elements, mean_elements, two_lines
-from bisar_budget.paths.earth import Place, axes_at
+from bisar_budget.paths.earth import Geodetic, axes_at
 from bisar_budget.paths.flight import Orbit, PathFileError, interpolated
 from bisar_budget.paths.instant import Instant
 from tests.conftest import ROOT
@@ -101,7 +101,7 @@ def test_an_aperture_of_a_second_is_smooth_to_a_micrometre(days: int) -> None:
     """The polynomial of a budget against places that it does not go through; old elements too."""
     center = EPOCH.after(86400 * days + 4321.123456789)
     orbit = two_lines.read_tle(TLE, "s.tle", None, center)
-    axes = axes_at(Place(0.8, 0.2, 100.0))
+    axes = axes_at(Geodetic(0.8, 0.2, 100.0))
 
     def place(tau: float) -> Vector:
         return axes.place(orbit.place(center.after(tau)))

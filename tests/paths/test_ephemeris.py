@@ -13,7 +13,7 @@ from skyfield.positionlib import Geocentric
 
 from bisar_budget.geometry import Vector
 from bisar_budget.paths import elements, two_lines
-from bisar_budget.paths.earth import Place, axes_at
+from bisar_budget.paths.earth import Geodetic, axes_at
 from bisar_budget.paths.ephemeris import read_oem
 from bisar_budget.paths.flight import Orbit, PathFileError, interpolated
 from bisar_budget.paths.instant import Instant
@@ -222,7 +222,7 @@ def test_axes_of_the_earth_stay_as_they_are(frame: str) -> None:
 def test_an_aperture_of_a_second_is_smooth_to_a_micrometre(frame: str) -> None:
     center = START.after(617.123456789)
     orbit = read(oem(frame=frame, step=10.0, count=121), center)
-    axes = axes_at(Place(0.8, 0.2, 100.0))
+    axes = axes_at(Geodetic(0.8, 0.2, 100.0))
 
     def place(tau: float) -> Vector:
         return axes.place(orbit.place(center.after(tau)))

@@ -12,7 +12,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from bisar_budget.paths import flight_log
-from bisar_budget.paths.earth import Place, earth_fixed
+from bisar_budget.paths.earth import Geodetic, earth_fixed
 from bisar_budget.paths.flight import PathFileError, slow_times, smoothed
 from bisar_budget.paths.flight_log import earth_fixed_places, read_csv
 from bisar_budget.paths.instant import parse_instant
@@ -30,7 +30,7 @@ def read(text: str) -> flight_log.Log:
 @given(st.floats(-math.pi / 2, math.pi / 2), st.floats(-math.pi, 2 * math.pi), st.floats(-1e4, 1e6))
 def test_arrays_of_places_are_those_of_the_earth(latitude: float, longitude: float, height: float) -> None:
     found = earth_fixed_places(*(np.array([one]) for one in (latitude, longitude, height)))
-    assert found[0] == pytest.approx(earth_fixed(Place(latitude, longitude, height)), abs=4e-9)  # 4 ulp of 7e6 m
+    assert found[0] == pytest.approx(earth_fixed(Geodetic(latitude, longitude, height)), abs=4e-9)  # 4 ulp of 7e6 m
 
 
 def test_a_level_flight_is_where_it_was() -> None:

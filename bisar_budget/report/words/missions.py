@@ -5,7 +5,8 @@ from collections.abc import Iterator
 
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.geometry import BistaticGeometry, PlatformState
-from bisar_budget.mission.model import Document, FlownPath
+from bisar_budget.mission.model import Document
+from bisar_budget.mission.platforms import FlownPath
 from bisar_budget.units import format_quantity
 
 _MODELS = {

@@ -1,0 +1,439 @@
+"""Platforms of a mission file: where they fly, in one of five ways, and how wrong their motion is measured."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+
+from bisar_budget.faults import KeyPath, Problem
+from bisar_budget.geometry import (
+    STRAIGHT,
+    BistaticGeometry,
+    PlatformState,
+    UndefinedFrameError,
+    Vector,
+    norm,
+    state_from_angles,
+)
+from bisar_budget.mission.bounds import (
+    ACCELERATION,
+    COORDINATE,
+    DIRECTION,
+    DISTRIBUTION,
+    DISTRIBUTIONS,
+    ELEVATION,
+    HEIGHT,
+    JERK,
+    LATITUDE,
+    RANGE,
+    SIZE,
+    SNAP,
+    SPEED,
+    VELOCITY,
+    VIBRATION_FREQUENCY,
+)
+from bisar_budget.mission.readers import Choice, Key, Late, ListOf, OneOf, Section, Text, TextList, Triple
+
+if TYPE_CHECKING:
+    from bisar_budget.mission.covariance import Covariance
+    from bisar_budget.mission.instruments import GaussMarkov, Imu, Oscillator
+    from bisar_budget.mission.routes import OrbitSource, TrajectorySource
+
+STILL = 1e-6  # m/s; slower than this no platform flies an aperture
+_LEAST_BASELINE = 1.0  # m, between platforms of which one hears the other
+_FARTHEST_BY = 3  # times the least baseline, that they move by in half an aperture: so far a fit of 16 nodes is true
+
+SIZES = Triple(SIZE)
+ALONG_SIGHT_OR_AXES = OneOf(lambda value: SIZES if isinstance(value, list) else SIZE, (SIZE, SIZES))
+
+
+class Sinusoid(NamedTuple):
+    """One sinusoidal vibration."""
+
+    amplitude: Annotated[
+        float | Vector,
+        Key(ALONG_SIGHT_OR_AXES, "0 to peak, along the line of sight; a vector: along each axis of the frame."),
+    ]
+    frequency: Annotated[float, Key(VIBRATION_FREQUENCY)]
+
+
+class Wideband(NamedTuple):
+    """Noise-like vibration."""
+
+    rms: Annotated[
+        float | Vector,
+        Key(ALONG_SIGHT_OR_AXES, "Root mean square, along the line of sight; a vector: along each axis."),
+    ]
+
+
+class Vibration(NamedTuple):
+    """High-frequency motion that the navigation does not measure."""
+
+    sinusoidal: Annotated[tuple[Sinusoid, ...], Key(ListOf(Sinusoid), "One entry per line.")] = ()
+    wideband: Annotated[Wideband | None, Key(Section(Wideband))] = None
+
+
+PART = Text()
+PARTS = OneOf(lambda value: TextList() if isinstance(value, list) else PART, (PART, TextList()))
+
+
+class MotionError(NamedTuple):
+    """How wrong the measured motion of one platform may be. A scalar means each axis.
+
+    `of_parts` names the figures that come from parts of the catalogue, and the source of each.
+    """
+
+    frame: Annotated[
+        str,
+        Key(
+            Choice("scene", "track", "look", "ric"),
+            "scene: east, north, up; track: along, cross, up; look: line of sight, cross, up; ric: radial, in-track, "
+            "cross-track.",
+        ),
+    ] = "scene"
+    position: Annotated[Vector | None, Key(Triple(COORDINATE, or_scalar=True), "At the midpoint.")] = None
+    velocity: Annotated[Vector | None, Key(Triple(VELOCITY, or_scalar=True), "Constant part.")] = None
+    acceleration: Annotated[Vector | None, Key(Triple(ACCELERATION, or_scalar=True), "Constant part.")] = None
+    covariance: Annotated[
+        "Covariance | None",
+        Key(
+            Late("covariance", "COVARIANCE"),
+            "Of position and velocity, instead of the two: 6 x 6 in m and s, or sigmas with correlations.",
+        ),
+    ] = None
+    distribution: Annotated[str, Key(DISTRIBUTION, DISTRIBUTIONS)] = "normal"
+    vibration: Annotated[Vibration, Key(Section(Vibration))] = Vibration()
+    sensor: Annotated[
+        str | tuple[str, ...] | None,
+        Key(PARTS, "Parts of the catalogue (`bisar-budget sensors`), or files; keys of this file override theirs."),
+    ] = None
+    imu: Annotated["Imu | None", Key(Late("instruments", "IMU"), "Figures of the inertial sensor.")] = None
+    random: Annotated[
+        "tuple[GaussMarkov, ...]",
+        Key(Late("instruments", "RANDOM"), "Position errors that change within the aperture."),
+    ] = ()
+    source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
+    of_parts: tuple[tuple[str, str], ...] = ()
+
+    @staticmethod
+    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+        """Hold a covariance to standing alone, to its frame and to a normal distribution; names to one each."""
+        seen: set[str] = set()
+        for index, one in enumerate(values.get("random", ())):
+            if one.name in seen:
+                yield Problem("is the name of an earlier error", at=("random", index, "name"))
+            seen.add(one.name)
+        covariance: Covariance | None = values.get("covariance")
+        if covariance is None:
+            return
+        from bisar_budget.mission.covariance import misplaced_axes
+
+        both = [kind for kind in ("position", "velocity") if values.get(kind) is not None]
+        if both:
+            yield Problem(f"replaces position and velocity, but there is also a {both[0]}", at=("covariance",))
+        if values.get("distribution", "normal") != "normal":
+            yield Problem("a covariance is that of a normal distribution", "accepted: normal", at=("distribution",))
+        if "frame" in values:
+            yield from misplaced_axes(covariance, values["frame"])
+
+    def stated(self, kind: str) -> Vector | None:
+        """Position, velocity or acceleration error along the frame's axes; of a covariance the marginal sigmas."""
+        if self.covariance is not None and kind != "acceleration":
+            return self.covariance.of(kind)
+        stated: Vector | None = getattr(self, kind)
+        return stated
+
+    def evidence(self, figure: str) -> str | None:
+        """Where a figure comes from: a part of the catalogue, else what the file says of all."""
+        return dict(self.of_parts).get(figure, self.source)
+
+    def key_of(self, figure: str) -> str:
+        """Key under which the file states a figure, or the part that it is taken from."""
+        return "sensor" if figure in dict(self.of_parts) else figure
+
+
+class CommonMotionError(NamedTuple):
+    """The same error on both platforms, such as the bias of one GNSS service. A scalar means each axis."""
+
+    frame: Annotated[
+        str,
+        Key(
+            Choice(
+                "scene",
+                refused=dict.fromkeys(
+                    ("track", "look", "ric"), "each platform has its own, an error of both has none"
+                ),
+            ),
+            "east, north, up.",
+        ),
+    ] = "scene"
+    position: Annotated[Vector | None, Key(Triple(COORDINATE, or_scalar=True), "At the midpoint.")] = None
+    velocity: Annotated[Vector | None, Key(Triple(VELOCITY, or_scalar=True), "Constant part.")] = None
+    acceleration: Annotated[Vector | None, Key(Triple(ACCELERATION, or_scalar=True), "Constant part.")] = None
+    distribution: Annotated[str, Key(DISTRIBUTION, DISTRIBUTIONS)] = "normal"
+    source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
+
+
+class Way(NamedTuple):
+    """A way to state the path of a platform: keys that it needs, others that it may have, and those of it alone.
+
+    `direction` is the key that a platform which does not move has no use for.
+    """
+
+    keys: tuple[str, ...]
+    optional: tuple[str, ...]
+    own: tuple[str, ...]
+    direction: str = ""
+
+
+_CURVES = ("acceleration", "jerk", "snap")
+WAYS = (
+    Way(("position", "velocity"), _CURVES, ("position", "velocity")),
+    Way(("orbit",), (), ("orbit",)),
+    Way(("trajectory",), (), ("trajectory",)),
+    Way(
+        ("latitude", "longitude", "altitude", "speed", "heading"),
+        ("climb",),
+        ("latitude", "longitude", "altitude", "heading"),
+        "heading",
+    ),
+    Way(
+        ("slant_range", "azimuth", "elevation", "speed", "motion_azimuth"),
+        ("climb", *_CURVES),
+        ("slant_range", "azimuth", "elevation", "motion_azimuth"),
+        "motion_azimuth",
+    ),
+)
+_PATH_KEYS = tuple(dict.fromkeys(key for way in WAYS for key in (*way.keys, *way.optional)))
+ACCEPTED_WAYS = (
+    "accepted: position and velocity; slant_range, azimuth, elevation, speed, motion_azimuth (and climb); latitude, "
+    "longitude, altitude, speed, heading (and climb); orbit; or trajectory. A fixed platform has speed 0 and no "
+    "direction"
+)
+
+
+class FlownPath(NamedTuple):
+    """The path of a platform that the scene's place on the Earth, an orbit or a log of a flight decide.
+
+    `source` says where it comes from, empty where the file states it; `file` and `sha256` are those of the file it
+    was read from, `age` that of its elements [s]. Of a fit the order, the residual at most and root mean square [m],
+    and the number of places of a log. `doubts` are warnings, for reports.
+    """
+
+    state: PlatformState
+    source: str = ""
+    file: str | None = None
+    sha256: str | None = None
+    age: float | None = None
+    order: int | None = None
+    farthest: float | None = None
+    rms: float | None = None
+    samples: int | None = None
+    doubts: tuple[str, ...] = ()
+    accuracy: tuple[str, str] | None = None  # file that states its errors, and its SHA-256
+
+
+class Platform(NamedTuple):
+    """Its path over the aperture, in one of five ways, and the motion error."""
+
+    position: Annotated[Vector | None, Key(Triple(COORDINATE), "East, north, up of the scene centre.")] = None
+    velocity: Annotated[Vector | None, Key(Triple(VELOCITY), "East, north, up.")] = None
+    acceleration: Annotated[
+        Vector | None, Key(Triple(ACCELERATION), "East, north, up, at the midpoint: a curved path.")
+    ] = None
+    jerk: Annotated[Vector | None, Key(Triple(JERK), "Rate of the acceleration, at the midpoint.")] = None
+    snap: Annotated[Vector | None, Key(Triple(SNAP), "Rate of the jerk.")] = None
+    orbit: Annotated["OrbitSource | None", Key(Late("routes", "ORBIT"), "A satellite, by its orbit.")] = None
+    trajectory: Annotated["TrajectorySource | None", Key(Late("routes", "TRAJECTORY"), "A log of a flight.")] = None
+    latitude: Annotated[float | None, Key(LATITUDE, "Geodetic, WGS-84.")] = None
+    longitude: Annotated[float | None, Key(DIRECTION, "Positive to the east.")] = None
+    altitude: Annotated[float | None, Key(HEIGHT, "Above the ellipsoid; level flight follows it.")] = None
+    heading: Annotated[float | None, Key(DIRECTION, "Of the way over ground, from north, clockwise.")] = None
+    slant_range: Annotated[float | None, Key(RANGE, "Distance to the scene centre.")] = None
+    azimuth: Annotated[float | None, Key(DIRECTION, "From east, counter-clockwise.")] = None
+    elevation: Annotated[float | None, Key(ELEVATION, "Above the ground, seen from the scene centre.")] = None
+    speed: Annotated[float | None, Key(SPEED, "Over ground; 0 is a fixed platform.")] = None
+    motion_azimuth: Annotated[
+        float | None, Key(DIRECTION, "Direction of motion, counted like azimuth (not a compass heading).")
+    ] = None
+    climb: Annotated[float | None, Key(VELOCITY, "Vertical speed, up positive.")] = None
+    motion_error: Annotated[MotionError, Key(Section(MotionError))] = MotionError()
+    oscillator: Annotated[
+        "Oscillator | None", Key(Late("instruments", "OSCILLATOR"), "The oscillator and its noise.")
+    ] = None
+    path: FlownPath | None = None
+
+    @staticmethod
+    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+        """Hold it to one complete geometry, above the ground, off the scene centre."""
+        if not values.keys() >= set(_PATH_KEYS):
+            return  # one of them is wrong by itself
+        platform = Platform(**{key: values[key] for key in _PATH_KEYS})
+        unclear = platform._unclear_geometry()
+        if unclear is not None:
+            yield unclear
+        if platform.position is not None and platform.position[2] < 0:
+            yield Problem("puts the platform below the ground, z < 0", at=("position", 2))
+        if unclear is None and not platform.is_of_the_earth:
+            yield from platform.without_image(values.get("motion_error"))
+
+    def without_image(self, error: MotionError | None) -> Iterator[Problem]:
+        """Say what keeps its path from forming an image, and its errors from their frame."""
+        state = self.state
+        if state.slant_range < 1:
+            where: KeyPath = ("slant_range",) if self.slant_range is not None else (self.way,)
+            yield Problem("puts the platform within 1 m of the scene centre", at=where)
+        elif error is not None and (error.frame != "ric" or self.path is not None):
+            try:
+                state.frame(error.frame)
+            except UndefinedFrameError as undefined:
+                yield Problem(str(undefined), "accepted: scene", at=("motion_error", "frame"))
+
+    def _unclear_geometry(self) -> Problem | None:
+        given = [key for key in _PATH_KEYS if getattr(self, key) is not None]
+        ways = [way for way in WAYS if any(key in way.own for key in given)] or WAYS[-1:]
+        known = (*ways[0].keys, *ways[0].optional)
+        strange = [key for key in given if key not in known]
+        if strange:
+            own = next(key for key in given if key in ways[0].own)
+            other = next((key for key in strange if any(key in way.own for way in ways[1:])), strange[0])
+            return Problem(f"mixes {own} with {other}", ACCEPTED_WAYS, at=(other,))
+        is_fixed, direction = self.speed == 0, ways[0].direction
+        if is_fixed and direction in given:
+            return Problem("a platform with speed 0 has none", ACCEPTED_WAYS, at=(direction,))
+        missing = [key for key in ways[0].keys if key not in given and not (is_fixed and key == direction)]
+        return Problem(f"lacks {', '.join(missing)}", ACCEPTED_WAYS) if missing else None
+
+    @property
+    def way(self) -> str:
+        """First key of the way in which its path is stated."""
+        keys = ("position", "orbit", "trajectory", "latitude")
+        return next((key for key in keys if getattr(self, key) is not None), "slant_range")
+
+    @property
+    def is_of_the_earth(self) -> bool:
+        """Whether its path needs to be found: by a file, or where the scene is on the Earth."""
+        return self.way in ("orbit", "trajectory", "latitude")
+
+    @property
+    def state(self) -> PlatformState:
+        """Its path in the frame of the scene; of a way that needs to be found once it is, see `is_of_the_earth`."""
+        if self.path is not None:
+            return self.path.state
+        curves = (self.acceleration, self.jerk, self.snap)
+        if self.position is not None and self.velocity is not None:
+            return _state_from_vectors(self.position, self.velocity, *curves)
+        polar = (self.slant_range, self.azimuth, self.elevation, self.speed, self.motion_azimuth, self.climb)
+        return _state_from_angles(*polar, *curves)
+
+
+def _bends(jerk: Vector | None, snap: Vector | None) -> tuple[Vector, ...]:
+    """Coefficients of τ³ and τ⁴."""
+    if jerk is None and snap is None:
+        return ()
+    (a, b, c), (x, y, z) = jerk or STRAIGHT, snap or STRAIGHT
+    return ((a / 6, b / 6, c / 6), (x / 24, y / 24, z / 24))
+
+
+# Asked for while a platform is read, while its mission is, and when that is checked.
+@lru_cache(maxsize=8)
+def _state_from_vectors(
+    position: Vector, velocity: Vector, acceleration: Vector | None, jerk: Vector | None, snap: Vector | None
+) -> PlatformState:
+    return PlatformState(
+        position=position, velocity=velocity, acceleration=acceleration or STRAIGHT, bends=_bends(jerk, snap)
+    )
+
+
+@lru_cache(maxsize=8)
+def _state_from_angles(
+    slant_range: float | None,
+    azimuth: float | None,
+    elevation: float | None,
+    speed: float | None,
+    motion_azimuth: float | None,
+    climb: float | None,
+    acceleration: Vector | None,
+    jerk: Vector | None,
+    snap: Vector | None,
+) -> PlatformState:
+    state = state_from_angles(
+        slant_range=slant_range or 0.0,
+        azimuth=azimuth or 0.0,
+        elevation=elevation or 0.0,
+        speed=speed or 0.0,
+        motion_azimuth=motion_azimuth or 0.0,
+        climb=climb or 0.0,
+        acceleration=acceleration or STRAIGHT,
+    )
+    return replace(state, bends=_bends(jerk, snap)) if jerk or snap else state
+
+
+class Platforms(NamedTuple):
+    """The two of them."""
+
+    transmitter: Annotated[Platform, Key(Section(Platform))]
+    receiver: Annotated[Platform, Key(Section(Platform))]
+
+
+@lru_cache(maxsize=4)  # asked for when a mission is read and again when it is checked
+def geometry_of(platforms: Platforms) -> BistaticGeometry:
+    """Both platforms in the frame of the scene."""
+    return BistaticGeometry(transmitter=platforms.transmitter.state, receiver=platforms.receiver.state)
+
+
+def without_image(platforms: Platforms, aperture_time_s: float | None, *, has_direct_path: bool) -> Iterator[Problem]:
+    """Say what keeps paths from forming an image; no aperture is one that is wrong by itself."""
+    yield from _no_image(geometry_of(platforms))
+    if aperture_time_s is not None:
+        yield from _dives(platforms, aperture_time_s)
+        if has_direct_path:
+            yield from _no_baseline(geometry_of(platforms).apart, aperture_time_s / 2)
+
+
+def _no_image(geometry: BistaticGeometry) -> Iterator[Problem]:
+    if all(norm(platform.velocity) < STILL for platform in (geometry.transmitter, geometry.receiver)):
+        yield Problem("both platforms are still: no aperture", at=("platforms",))
+    elif degeneracy := geometry.degeneracy():
+        yield Problem(degeneracy, at=("platforms",))
+
+
+def _dives(platforms: Platforms, aperture_time: float) -> Iterator[Problem]:
+    for name, platform in (("transmitter", platforms.transmitter), ("receiver", platforms.receiver)):
+        state = platform.state
+        lowest = min(state.at(tau)[0][2] for tau in _turning_points(state, aperture_time / 2))
+        if lowest < 0 <= state.position[2]:
+            key: KeyPath = ("climb",) if platform.velocity is None else ("velocity", 2)
+            if platform.acceleration is not None:
+                key = ("acceleration", 2)
+            if platform.is_of_the_earth:
+                key = (platform.way,)
+            yield Problem(
+                f"takes the platform below the ground within the aperture, to z = {lowest:.4g} m",
+                at=("platforms", name, *key),
+            )
+
+
+def _no_baseline(apart: PlatformState, half: float) -> Iterator[Problem]:
+    # A 32nd of the way from one place to the next, the distance between is not smaller by as much as matters.
+    least = min(norm(apart.at(half * part / 32)[0]) for part in range(-32, 33))
+    way = apart.travelled(half)
+    if least < max(_LEAST_BASELINE, way / _FARTHEST_BY):
+        yield Problem(
+            f"there is no direct path to follow: the platforms come within {least:.3g} m of each other, and move "
+            f"{way:.3g} m against each other in half an aperture",
+            f"accepted: at least {_LEAST_BASELINE:g} m and a {_FARTHEST_BY}rd of that way, or linear",
+            at=("synchronization", "method"),
+        )
+
+
+def _turning_points(state: PlatformState, half: float) -> Iterator[float]:
+    """Slow times within the aperture where a platform can be lowest: its ends, and where it stops sinking.
+
+    Of a path that bends more than once, places a 64th of the aperture apart.
+    """
+    yield from (-half, half)
+    if state.bends:
+        yield from (half * part / 32 for part in range(-31, 32))
+    elif state.acceleration[2] > 0:
+        yield max(-half, min(half, -state.velocity[2] / state.acceleration[2]))
