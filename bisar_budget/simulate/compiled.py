@@ -23,6 +23,7 @@ from bisar_budget.simulate.range_profile import (
     cells_per_metre,
     harmonics,
     kernel,
+    kernel_shape,
     kernel_transform,
     profile_length,
     range_profiles,
@@ -40,7 +41,7 @@ _REFINEMENT = {"linear": 16, "cubic": 8}  # samples per sample from the FFT
 _ORDER = {"linear": 1, "cubic": 3}
 _MARGIN = 8  # samples beyond the last pixel on each side
 _BLOCK_BYTES = 24e6  # of profiles held at once; about what a processor's last cache holds
-_WORTH = 4  # samples refined for a pixel; NumPy reads one in the time of about ten
+_WORTH = 8  # samples refined for a pixel: in that time the kernel itself reads it
 _PHASE_LIMIT = 1e-6  # rad, of the first neglected order of the expansion
 _OFF_LATTICE = 1e-8  # wavelengths
 
@@ -101,11 +102,11 @@ def lattice_of(points: Floats, tolerance: float) -> Lattice | None:
     return Lattice(origin, across, along, (lines, count))
 
 
-def backproject(history: PhaseHistory, points: Floats, spline: Spline) -> Complexes | None:
+def backproject(history: PhaseHistory, points: Floats, spline: Spline) -> Complexes:
     """Image by backprojection, see `image_formation.backprojection`; all inputs finite.
 
-    None where pixels are so few and so far apart in range that to refine what lies between them would take longer
-    than to read them one by one, or more memory than a block has.
+    Pixels may be so few and so far apart in range that to refine what lies between them would take longer than to
+    read them one by one, or more memory than a block has: they are read from profiles that are not refined.
 
     Parameters
     ----------
@@ -118,7 +119,7 @@ def backproject(history: PhaseHistory, points: Floats, spline: Spline) -> Comple
 
     Returns
     -------
-    (...) ndarray or None
+    (...) ndarray
         Complex image.
     """
     shape = points.shape[:-1]
@@ -149,9 +150,11 @@ def backproject(history: PhaseHistory, points: Floats, spline: Spline) -> Comple
         nearest, farthest = _reach(history.transmitter, history.receiver, *_boxes(by_line))
         within = _needed(history, nearest, farthest, image.size)
         if within is None:
-            return None
-        for block in _profile_blocks(history, within, spline):
-            _add_points(*block, axes, spline == "cubic", image.reshape(-1))
+            for unrefined in _unrefined_blocks(history):
+                _add_points_apart(*unrefined, axes, kernel_shape(_TAPS, _OVERSAMPLING), image.reshape(-1))
+        else:
+            for block in _profile_blocks(history, within, spline):
+                _add_points(*block, axes, spline == "cubic", image.reshape(-1))
     image /= history.samples.size
     return image
 
@@ -244,6 +247,35 @@ def _profile_blocks(history: PhaseHistory, needed: _Needed, spline: Spline) -> I
             history.receiver[part],
             reference[part],
             coarse * factor,
+            carrier_frequency(history) / SPEED_OF_LIGHT,
+        )
+
+
+class _Unrefined(NamedTuple):
+    """Profiles of some pulses as the FFT gives them, and what it takes to read them."""
+
+    profiles: Complexes
+    transmitter: Floats
+    receiver: Floats
+    reference: Floats
+    cells_per_metre: float
+    cycles_per_metre: float
+
+
+def _unrefined_blocks(history: PhaseHistory) -> Iterator[_Unrefined]:
+    """Whole profiles, of as many pulses as fit in a cache, for a kernel of `_TAPS`."""
+    length = profile_length(history, _OVERSAMPLING)
+    transform = kernel_transform(2 * math.pi * harmonics(history) / length, _TAPS, _OVERSAMPLING)
+    reference = _reference(history)
+    pulses = max(1, int(_BLOCK_BYTES / (PROFILE_BYTES * length)))
+    for start in range(0, history.slow_time.size, pulses):
+        part = slice(start, start + pulses)
+        yield _Unrefined(
+            range_profiles(history, length, transform, part),
+            history.transmitter[part],
+            history.receiver[part],
+            reference[part],
+            cells_per_metre(history, length),
             carrier_frequency(history) / SPEED_OF_LIGHT,
         )
 
@@ -595,3 +627,31 @@ def _add_points(profiles, first, transmitter, receiver, reference, per_metre, cy
             _add_taps(taps, between, turn, cubic, real, imag)
         for i in range(count):
             image[start + i] += complex(real[i], imag[i])
+
+
+@_parallel
+def _add_points_apart(profiles, transmitter, receiver, reference, per_metre, cycles, points, shape, image):
+    """Add some pulses to pixels anywhere, (3, n), each read by the kernel itself, in double precision."""
+    length = profiles.shape[1]
+    for i in prange(image.shape[0]):
+        total = 0j
+        for pulse in range(profiles.shape[0]):
+            distance = -reference[pulse]
+            for positions in (transmitter, receiver):
+                x, y, z = (
+                    points[0, i] - positions[pulse, 0],
+                    points[1, i] - positions[pulse, 1],
+                    points[2, i] - positions[pulse, 2],
+                )
+                distance += math.sqrt(x * x + y * y + z * z)
+            cell = distance * per_metre
+            before = math.floor(cell)
+            first = (int(before) - _TAPS // 2 + 1) % length
+            read = 0j
+            for tap in range(_TAPS):
+                offset = 2 / _TAPS * (cell - before + _TAPS // 2 - 1 - tap)
+                weight = math.exp(shape * (math.sqrt(max(0.0, 1 - offset * offset)) - 1))
+                read += weight * profiles[pulse, (first + tap) % length]
+            angle = 2 * math.pi * (distance * cycles - np.rint(distance * cycles))
+            total += read * complex(math.cos(angle), math.sin(angle))
+        image[i] += total

@@ -104,8 +104,7 @@ def backprojection(history: PhaseHistory, points: Floats, kernel: Kernel = "auto
         Pixels, anywhere. [m]
     kernel : "auto", "numpy", "cubic" or "linear"
         NumPy does every job; cubic and linear are compiled by Numba (extra `fast`), by splines of these orders.
-        Linear is faster and good to -80 dB. Auto is cubic where Numba is installed, else NumPy. Few pixels far apart
-        in range are left to NumPy.
+        Linear is faster and good to -80 dB. Auto is cubic where Numba is installed, else NumPy.
 
     Returns
     -------
@@ -131,8 +130,7 @@ def backprojection(history: PhaseHistory, points: Floats, kernel: Kernel = "auto
         raise ImportError(f"kernel {kernel} needs Numba, which is missing: pip install 'bisar-budget[fast]'")
     from bisar_budget.simulate.compiled import backproject
 
-    image = backproject(history, points, kernel)
-    return _backprojection(history, points) if image is None else image
+    return backproject(history, points, kernel)
 
 
 def kernel_within(memory_limit: float) -> Kernel:

@@ -21,9 +21,13 @@ def kernel(offset: Floats, taps: int, oversampling: int) -> Floats:
     Source: Barnett, Magland & af Klinteberg, "A parallel non-uniform fast Fourier transform library based on an
     'exponential of semicircle' kernel", 2019; the shape parameter is theirs for the oversampling.
     """
-    shape = 0.976 * math.pi * taps * (1 - 1 / (2 * oversampling))
     inside = np.clip(1 - (2 * offset / taps) ** 2, 0.0, None)
-    return np.exp(shape * (np.sqrt(inside) - 1))
+    return np.exp(kernel_shape(taps, oversampling) * (np.sqrt(inside) - 1))
+
+
+def kernel_shape(taps: int, oversampling: int) -> float:
+    """Shape parameter of the kernel."""
+    return 0.976 * math.pi * taps * (1 - 1 / (2 * oversampling))
 
 
 def kernel_transform(angle: Floats, taps: int, oversampling: int) -> Floats:

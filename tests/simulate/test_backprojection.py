@@ -98,6 +98,12 @@ class TestAgainstTheMatchedFilter:
         assert backprojection(history, points, kernel).shape == (3, 5, 7)
         assert difference_db(history, points, kernel) < PROMISED[kernel]
 
+    def test_few_pixels_far_apart(self, kernel) -> None:
+        """What lies between their ranges is not refined: compiled, each is read by the kernel itself."""
+        history = collection(30, pulses=48).record(SCATTERERS, AMPLITUDES)
+        points = np.concatenate((SCATTERERS, np.random.default_rng(2).uniform(-3e3, 3e3, (20, 3))))
+        assert difference_db(history, points, kernel) < PROMISED[kernel]
+
     def test_one_point_and_none(self, kernel) -> None:
         history = collection(pulses=16).record([1.0, 2.0, 0.0], [3 - 4j])
         assert backprojection(history, np.array([1.0, 2.0, 0.0]), kernel) == pytest.approx(3 - 4j, rel=1e-3)

@@ -50,9 +50,11 @@ class TestFarApart:
         assert traced(lambda: backprojection(history, points, kernel)) < 30e6
 
     @needs_numba
-    def test_it_is_what_numpy_gives(self, history) -> None:
+    @pytest.mark.parametrize("kernel", ["cubic", "linear"])
+    def test_it_is_the_matched_filter(self, history, kernel) -> None:
+        """To -120 dB of the strongest echo, whichever spline: pixels are read by a kernel of eight taps."""
         points = far_apart(1e6)
-        assert np.array_equal(backprojection(history, points, "cubic"), backprojection(history, points, "numpy"))
+        assert np.abs(backprojection(history, points, kernel) - matched_filter(history, points)).max() < 1e-6
 
     @needs_numba
     def test_a_lattice_whose_disc_is_too_large_is_read_at_each_pixel(self) -> None:
@@ -156,15 +158,25 @@ class TestTime:
         assert seconds_to_verify(load_mission(str(SECTION_V))) == 0.0
 
     def test_a_long_one_grows_with_its_rows(self, monkeypatch) -> None:
-        """Measured is one image; the rest is counted."""
+        """Measured are images of two sizes; the rest is counted."""
         monkeypatch.setattr("bisar_budget.verify.duration._SLOWEST", 1e3)
-        monkeypatch.setattr("bisar_budget.verify.duration._smallest_pair", lambda collection: 10.0)
+        monkeypatch.setattr("bisar_budget.verify.duration._seconds", lambda study, cells: 10.0)
         mission = load_mission(str(SECTION_V))
         rows = rows_to_verify(mission)
         whole = seconds_to_verify(mission)
         assert whole >= 10.0 * len(rows)
         assert seconds_to_verify(mission, jobs=2) == pytest.approx(whole / 2)
         assert 10.0 <= seconds_to_verify(mission, rows[0]) < whole / 2
+
+    def test_a_larger_image_takes_what_a_larger_one_took(self, monkeypatch) -> None:
+        """A small image takes more for its size than a large one: 97 s were foreseen as 216 s."""
+        monkeypatch.setattr("bisar_budget.verify.duration._SLOWEST", 1e3)
+        mission, seconds = load_mission(str(SECTION_V)), {}
+        for large in (10.0, 320.0):
+            took = {48: 10.0, 8 * 48: large}
+            monkeypatch.setattr("bisar_budget.verify.duration._seconds", lambda study, cells, took=took: took[cells])
+            seconds[large] = seconds_to_verify(mission)
+        assert seconds[10.0] < seconds[320.0]
 
     def test_the_smallest_pair_is_measured(self, monkeypatch) -> None:
         monkeypatch.setattr("bisar_budget.verify.duration._SLOWEST", 1e3)
