@@ -37,10 +37,10 @@ from bisar_budget.workers import worker_pool
 if TYPE_CHECKING:
     from concurrent.futures import Future
 
-_MANY = 16  # parts, from which processes of their own are worth their start
+_MANY = 8  # parts, from which processes of their own are worth their start
 _TOGETHER = 8192  # cases of a part: their arrays stay in a processor's cache
 _ALIKE = 1e-9  # of a utilization: a common error along x and along y may bind alike, but for rounding
-_ONE_BY_ONE = 64  # cases of a part where each is checked by itself
+_FEW = 64  # cases of a part where each is checked by itself
 
 GEOMETRY = (
     Column("range_resolution", "m", "Peak to first null along the bistatic look direction, on the ground."),
@@ -148,10 +148,16 @@ def sweep(
 
 
 def _parts(engine: "Engine", cases: Cases, jobs: int) -> Iterator[Part]:
-    """Find the parts in their order; of many cases several at once."""
-    size = _ONE_BY_ONE if engine.not_held else _TOGETHER
-    starts = range(0, cases.count, size)
-    if jobs == 1 or len(starts) < _MANY:
+    """Find the parts in their order. Few cases show whether arrays hold them; else processes share them out.
+
+    What arrays hold takes less time than to send it from one process to another.
+    """
+    probe = engine.part(0, min(_FEW, cases.count), cases.values(0, min(_FEW, cases.count)))
+    yield probe
+    is_slow = probe.by_case > _FEW // 8
+    size = _FEW if is_slow else _TOGETHER
+    starts = range(probe.stop, cases.count, size)
+    if not is_slow or jobs == 1 or len(starts) < _MANY:
         for start in starts:
             stop = min(start + size, cases.count)
             yield engine.part(start, stop, cases.values(start, stop))
