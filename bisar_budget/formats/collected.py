@@ -40,7 +40,7 @@ class Track(NamedTuple):
     samples: int = 0
 
 
-class Declared(NamedTuple):
+class DeclaredMotionError(NamedTuple):
     """Errors of the measured path of one platform, one sigma, along the axes of a frame of the mission.
 
     `sigmas` (6,) of position [m] and velocity [m/s], None where a kind is not declared; `correlation` (6, 6).
@@ -92,9 +92,9 @@ class Imported(NamedTuple):
     receiver: Track
     is_monostatic: bool
     reference: Reference | None
-    transmitter_error: Declared | None = None
-    receiver_error: Declared | None = None
-    common_error: Declared | None = None
+    transmitter_error: DeclaredMotionError | None = None
+    receiver_error: DeclaredMotionError | None = None
+    common_error: DeclaredMotionError | None = None
     timing_constant: float | None = None
     timing_linear: float | None = None
     errors_at: str = ""

@@ -21,7 +21,7 @@ from bisar_budget.formats.collected import (
     reference_of,
 )
 from bisar_budget.formats.containers import Container, open_container
-from bisar_budget.formats.declared import Errors, Seen, of_matrices, of_sigmas
+from bisar_budget.formats.declared import DeclaredErrors, Seen, of_matrices, of_sigmas
 from bisar_budget.formats.document import Element, FormatError, MissingExtraError
 from bisar_budget.geometry import PlatformState, Vector
 from bisar_budget.paths.earth import Geodetic, SceneAxes, axes_at, geodetic
@@ -518,7 +518,7 @@ def _imported(
     tracks: tuple[Track, Track],
     is_monostatic: bool,
     reference: Reference | None,
-    errors: Errors,
+    errors: DeclaredErrors,
     remarks: list[str],
 ) -> Imported:
     if not (0 < aperture.length <= LONGEST and abs(aperture.middle) <= LONGEST):

@@ -17,7 +17,7 @@ from bisar_budget.paths.flight import Orbit, PathFileError
 from bisar_budget.paths.instant import DAY, Instant
 from bisar_budget.paths.interpolation import Sample, interpolate
 from bisar_budget.paths.leap_seconds import FIRST_DAY, TAI_LESS, has_leap_second, tai, tai_less_utc, utc
-from bisar_budget.paths.markup import Element, parse_markup
+from bisar_budget.paths.markup import MessageElement, parse_markup
 from bisar_budget.paths.turning import Turn, celestial_turn, from_teme, unknown_rotation
 
 _EARTH_FIXED = re.compile(r"ITRF[- ]?(\d\d|\d{4})?|WGS[- ]?84")
@@ -427,7 +427,7 @@ def _from_markup(data: bytes, name: str) -> Iterator[_Block]:
             yield _Block(segment.line, metadata, rows)
 
 
-def _state(state: Element, name: str) -> tuple[int, str, Sequence[str]]:
+def _state(state: MessageElement, name: str) -> tuple[int, str, Sequence[str]]:
     where = f"{name}:{state.line}"
     parts = {one.name: one for one in state.children}
     for key in ("EPOCH", *_VECTOR):
