@@ -17,7 +17,6 @@ from bisar_budget.formats.collected import (
     Reference,
     Track,
     fitted,
-    in_scene,
     reference_of,
 )
 from bisar_budget.formats.containers import Container, open_container
@@ -353,7 +352,7 @@ def _sicd(container: Container, channel: str | None) -> Imported:
     pulses = pulses_at(times)
     try:
         transmitter, receiver = (
-            fitted(times - middle, in_scene(axes, places), aperture.length, 2 * SPEED_OF_LIGHT / (low + high))
+            fitted(times - middle, axes.places(places), aperture.length, 2 * SPEED_OF_LIGHT / (low + high))
             for places in (pulses.transmitter, pulses.receiver)
         )
     except NoPathError as error:
@@ -465,7 +464,7 @@ def _tracks(
     times = _scene_time(pulses, np.array(axes.origin)) - aperture.middle
     try:
         transmitter, receiver = (
-            fitted(times, in_scene(axes, places), aperture.length, SPEED_OF_LIGHT / center)
+            fitted(times, axes.places(places), aperture.length, SPEED_OF_LIGHT / center)
             for places in (pulses.transmitter, pulses.receiver)
         )
     except NoPathError as error:

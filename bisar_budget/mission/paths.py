@@ -185,7 +185,8 @@ def _of_log(
         data = read(route.file)
         log = _log(route, data)
         if log.is_earth_fixed:
-            log = _in_scene(log, _known(axes, "trajectory"))
+            known = _known(axes, "trajectory")
+            log = log._replace(places=known.places(log.places), is_earth_fixed=False)
         times = slow_times(log, mission.collection.center_time, route.center, aperture_time, route.file)
         fitted = smoothed(times, log.places, aperture_time)
     except PathFileError as error:
@@ -210,12 +211,6 @@ def _log(route: routes.TrajectorySource, data: bytes) -> Log:
     from bisar_budget.paths import flight_log
 
     return flight_log.read_csv(data, route.file)
-
-
-def _in_scene(log: Log, axes: earth.SceneAxes) -> Log:
-    import numpy as np
-
-    return log._replace(places=(log.places - np.array(axes.origin)) @ np.array(axes.axes).T, is_earth_fixed=False)
 
 
 def _by_accuracy(
