@@ -3,7 +3,6 @@
 import hashlib
 import math
 import os
-import stat
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -17,6 +16,7 @@ from bisar_budget.mission.readers import INVALID, Report
 from bisar_budget.paths import earth
 from bisar_budget.paths.flight import Fitted, Log, Orbit, PathFileError, interpolated, slow_times, smoothed
 from bisar_budget.paths.instant import Instant
+from bisar_budget.resources import UnreadableError, content
 
 Beside = Callable[[str], bytes]  # content of a file that a mission names
 
@@ -40,16 +40,10 @@ def reader_of(folder: str) -> Beside:
     """
 
     def read(name: str) -> bytes:
-        file = os.path.join(folder, name)
         try:
-            if not stat.S_ISREG(os.stat(file).st_mode):  # a pipe would wait for ever
-                raise PathFileError(f"{name} is no regular file")
-            with open(file, "rb") as stream:
-                data = stream.read(_MOST_BYTES + 1)
-        except OSError as error:
-            raise PathFileError(f"{name} cannot be read: {error.strerror}") from None
-        except ValueError:  # a NUL in the name
-            raise PathFileError("is no name of a file") from None
+            data = content(os.path.join(folder, name), _MOST_BYTES, name)
+        except UnreadableError as error:
+            raise PathFileError(str(error)) from None
         if len(data) > _MOST_BYTES:
             raise PathFileError(f"{name} is larger than {_MOST_BYTES // 10**6} MB")
         return data
