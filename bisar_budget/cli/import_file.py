@@ -4,14 +4,14 @@ import os
 
 import click
 
-from bisar_budget.cli.streams import FILE, complain, deliver, fail
+from bisar_budget.cli.streams import FILE, OUTPUT, complain, deliver, fail
 
 _SEEN = 20  # of a wavelength: what a place is off the path turns the phase by 0.3 rad
 
 
 @click.command("import")
 @click.argument("file", type=FILE)
-@click.option("-o", "--output", type=FILE, metavar="FILE", help="Write to FILE instead of standard output.")
+@OUTPUT
 @click.option("--channel", metavar="ID", help="Channel of CPHD or CRSD; without it the file's reference channel.")
 @click.option("--force", is_flag=True, help="Replace an existing file.")
 def import_file(file: str, output: str | None, channel: str | None, force: bool) -> None:
