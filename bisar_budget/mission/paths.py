@@ -150,11 +150,10 @@ def _of_orbit(mission: Mission, route: routes.OrbitSource, axes: earth.SceneAxes
         fitted = interpolated(lambda tau: axes.place(orbit.place(center.after(tau))), 2 * half, widest)
         # An interpolation is worst between the places of a file.
         of_orbit = max((orbit.doubts(center.after(part * half)) for part in (0.0, -0.5, 0.5, -1.0, 1.0)), key=len)
-        doubts = (*of_orbit, *fitted.doubts)
     except PathFileError as error:
         raise _UnusablePathError(("orbit", form), Problem(str(error))) from None
     age = None if orbit.epoch is None else center.since(orbit.epoch)
-    return _flown(fitted, orbit.words, file, data)._replace(age=age, doubts=doubts)
+    return _flown(fitted, orbit.words, file, data)._replace(age=age, doubts=(*of_orbit, *fitted.doubts))
 
 
 def _read_orbit(form: str, data: bytes, name: str, wanted: str | None, center: Instant) -> Orbit:
@@ -190,7 +189,7 @@ def _of_log(
     words = log.words
     if log.start is None:
         words += f", {route.center or 0.0:.12g} s of it at mid-aperture"
-    return _flown(fitted, words, route.file, data)._replace(doubts=fitted.doubts)
+    return _flown(fitted, words, route.file, data)
 
 
 def _log(route: routes.TrajectorySource, data: bytes) -> Log:
@@ -247,17 +246,18 @@ def _of_place(platform: Platform, axes: earth.SceneAxes, aperture_time_s: float)
             PlatformState(position=axes.place(earth.earth_fixed(place)), velocity=STRAIGHT), "geodetic place"
         )
     fitted = interpolated(lambda tau: axes.place(earth.flown(place, heading, speed, climb, tau)), aperture_time_s)
-    return FlownPath(fitted.state, "geodetic place, flight along the geodesic")
+    return _flown(fitted, "geodetic place, flight along the geodesic")
 
 
-def _flown(fitted: Fitted, words: str, file: str | None, data: bytes) -> FlownPath:
+def _flown(fitted: Fitted, words: str, file: str | None = None, data: bytes | None = None) -> FlownPath:
     return FlownPath(
         fitted.state,
         source=words,
         file=file,
-        sha256=hashlib.sha256(data).hexdigest(),
+        sha256=None if data is None else hashlib.sha256(data).hexdigest(),
         order=fitted.order,
         farthest=fitted.farthest,
         rms=fitted.rms,
         samples=fitted.samples or None,
+        doubts=fitted.doubts,
     )

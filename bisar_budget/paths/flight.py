@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _NODES = 15  # Chebyshev points of an interpolation, so many coefficients
 _LEAST_WINDOW = 10.0  # s; in a shorter one rounding of an Earth-fixed place, 1e-9 m, is an acceleration
 _UNSEEN_M = 1e-7  # a coefficient that moves the path by less is rounding
-_ROUGH_M = 5e-3  # an orbit that is farther from its polynomial is not smooth; messages have places to 1 mm
+_ROUGH_M = 5e-3  # a path that is farther from its polynomial is not smooth; messages have places to 1 mm
 _TRIFLE_M = 1e-3
 _STRAY = 8  # times the usual residual; noise of thousands of places reaches 4
 _HIGHEST = 8  # order of a smoothed path
@@ -114,7 +114,7 @@ def interpolated(place: Callable[[float], Vector], aperture_time_s: float, wides
     rms = math.sqrt(math.fsum(one * one for one in apart) / len(apart))
     doubts: tuple[str, ...] = ()
     if max(apart) > _ROUGH_M:
-        doubts = (f"its places are up to {max(apart):.3g} m from a smooth path: interpolate more finely",)
+        doubts = (f"the polynomial that is flown is up to {max(apart):.3g} m from the path",)
     return Fitted(state, len(state.bends) + 2, max(apart), rms, doubts=doubts)
 
 
