@@ -21,6 +21,8 @@ from bisar_budget.resources import UnreadableError, content
 Beside = Callable[[str], bytes]  # content of a file that a mission names
 
 _MOST_BYTES = 500_000_000
+_LOGS_KEPT = 2  # of a mission that is read again and again, such as by `solve`
+_logs: dict[tuple[object, ...], Log] = {}  # by what they were read from; the bytes themselves are let go
 _FARTHEST_M = 4.1e8  # of a satellite from the Earth's centre
 _PLACE = "accepted: scene.latitude, scene.longitude and scene.height"
 
@@ -153,7 +155,8 @@ def _of_orbit(mission: Mission, route: routes.OrbitSource, axes: earth.SceneAxes
     except PathFileError as error:
         raise _UnusablePathError(("orbit", form), Problem(str(error))) from None
     age = None if orbit.epoch is None else center.since(orbit.epoch)
-    return _flown(fitted, orbit.words, file, data)._replace(age=age, doubts=(*of_orbit, *fitted.doubts))
+    path = _flown(fitted, orbit.words, file, hashlib.sha256(data).hexdigest())
+    return path._replace(age=age, doubts=(*of_orbit, *fitted.doubts))
 
 
 def _read_orbit(form: str, data: bytes, name: str, wanted: str | None, center: Instant) -> Orbit:
@@ -176,7 +179,8 @@ def _of_log(
     aperture_time = mission.collection.aperture_time
     try:
         data = read(route.file)
-        log = _log(route, data)
+        digest = hashlib.sha256(data).hexdigest()
+        log = _log(route, data, digest)
         if log.is_earth_fixed:
             known = _known(axes, "trajectory")
             log = log._replace(places=known.places(log.places), is_earth_fixed=False)
@@ -189,10 +193,20 @@ def _of_log(
     words = log.words
     if log.start is None:
         words += f", {route.center or 0.0:.12g} s of it at mid-aperture"
-    return _flown(fitted, words, route.file, data)
+    return _flown(fitted, words, route.file, digest)
 
 
-def _log(route: routes.TrajectorySource, data: bytes) -> Log:
+def _log(route: routes.TrajectorySource, data: bytes, digest: str) -> Log:
+    """Read a log, or take it as it was read before."""
+    key = (route.file, route.format, route.week, digest)
+    log = _logs.pop(key, None) or _read_log(route, data)
+    _logs[key] = log  # the last one
+    for old in list(_logs)[:-_LOGS_KEPT]:
+        _logs.pop(old, None)
+    return log
+
+
+def _read_log(route: routes.TrajectorySource, data: bytes) -> Log:
     """Read a log; its format is stated, or that of its name."""
     is_sbet = route.format == "sbet" or (route.format is None and route.file.lower().endswith((".out", ".sbet")))
     if is_sbet:
@@ -249,12 +263,12 @@ def _of_place(platform: Platform, axes: earth.SceneAxes, aperture_time_s: float)
     return _flown(fitted, "geodetic place, flight along the geodesic")
 
 
-def _flown(fitted: Fitted, words: str, file: str | None = None, data: bytes | None = None) -> FlownPath:
+def _flown(fitted: Fitted, words: str, file: str | None = None, digest: str | None = None) -> FlownPath:
     return FlownPath(
         fitted.state,
         source=words,
         file=file,
-        sha256=None if data is None else hashlib.sha256(data).hexdigest(),
+        sha256=digest,
         order=fitted.order,
         farthest=fitted.farthest,
         rms=fitted.rms,

@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 
 from bisar_budget.geometry import Vector
+from bisar_budget.mission import paths
 from bisar_budget.mission.load import load_mission
-from bisar_budget.paths import earth, two_lines
+from bisar_budget.paths import earth, flight_log, two_lines
 from bisar_budget.paths.instant import Instant
 from tests.conftest import mission_text
 from tests.paths.flown import flight, geodetic_csv, sbet, smrmsg
@@ -112,6 +113,22 @@ class TestEveryKindOfPath:
             assert path.state.position == pytest.approx(axes.place(tuple(middle)), abs=1e-3)
             assert path.samples == 101
             assert path.farthest < 1e-6
+
+    def test_a_log_that_has_not_changed_is_read_once(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        """`solve` reads its mission some hundred times."""
+        monkeypatch.setattr(paths, "_logs", {})
+        read, reads = flight_log.read_csv, []
+        monkeypatch.setattr(flight_log, "read_csv", lambda *given: reads.append(given) or read(*given))
+        (folder / "m.yaml").write_text(aircraft())
+        first, again = (load_mission(str(folder / "m.yaml")).platforms.receiver.path for _ in range(2))
+        assert again == first
+        assert len(reads) == 1
+        higher = flight()
+        (folder / "flight.csv").write_bytes(geodetic_csv(higher._replace(height=higher.height + 100)))
+        other = load_mission(str(folder / "m.yaml")).platforms.receiver.path
+        assert len(reads) == 2
+        assert other.state.position[2] == pytest.approx(first.state.position[2] + 100, abs=0.1)
+        assert other.sha256 != first.sha256
 
     def test_an_accuracy_file_fills_what_the_mission_leaves_open(self, folder: Path) -> None:
         route = {"file": "sbet.out", "week": 2421, "accuracy": "smrmsg.out"}
