@@ -76,7 +76,8 @@ class Imported(NamedTuple):
     """A collection as a file has it.
 
     `is_monostatic`: transmitter and receiver are one platform, whose errors are the same on both ways; `common` says
-    then that they are those of both. `remarks` are for the reader of the mission file; each is one fact.
+    then that they are those of both. `remarks` are for the reader of the mission file; each is one fact. `unused` is
+    that of vectors that are not used, empty where there are none.
     """
 
     file: str
@@ -100,6 +101,7 @@ class Imported(NamedTuple):
     timing_linear: float | None = None
     errors_at: str = ""
     remarks: tuple[str, ...] = ()
+    unused: str = ""
 
 
 def reference_of(transmitter: PlatformState, receiver: PlatformState, slow_time: float) -> Reference:
