@@ -265,8 +265,17 @@ def _segment(block: _Block, name: str) -> _Segment:
         is_hermite=is_hermite,
         degree=degree,
         line=block.line,
-        words=f"OEM of {object_name}, {frame}, {'Hermite' if is_hermite else 'Lagrange'} degree {degree}",
+        words=f"OEM of {object_name}, {frame}, {'Hermite' if is_hermite else 'Lagrange'} degree {degree}"
+        + _not_stated(metadata),
     )
+
+
+def _not_stated(metadata: Mapping[str, tuple[int, str]]) -> str:
+    """What of the interpolation is our choice, since the message does not say it."""
+    kind, degree = (metadata.get(key, (0, ""))[1].upper() for key in ("INTERPOLATION", "INTERPOLATION_DEGREE"))
+    if not kind:
+        return " (the file states no interpolation)"
+    return "" if degree or kind == "LINEAR" else " (the file states no degree)"
 
 
 _LIMITS = ("START_TIME", "STOP_TIME", "USEABLE_START_TIME", "USEABLE_STOP_TIME")

@@ -128,6 +128,7 @@ def test_smoothing_stays_within_the_rounding_of_sgp4() -> None:
 MESSAGES = {
     "xml": omm_xml(),
     "json": omm_json(),
+    "json, one message": json.dumps(MESSAGE).encode(),
     "json of texts": json.dumps([{key: str(value) for key, value in {**MESSAGE, **CONSTANTS}.items()}]).encode(),
     "csv": omm_csv(),
     "csv with a mark of its encoding": b"\xef\xbb\xbf" + omm_csv(),
