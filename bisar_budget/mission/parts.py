@@ -278,7 +278,9 @@ def _parts_of(
             if part.kind not in kinds:
                 raise PartError(f"is an {part.kind}" if part.kind != "gnss" else "is a GNSS receiver")
         except PartError as error:
-            report(here, Problem(str(error), f"accepted: parts of the kind {' or '.join(kinds)}"))
+            accepted = f"accepted: parts of the kind {' or '.join(kinds)}"
+            names_file = str(error).startswith(os.path.join(beside, name))
+            report(here, Problem(str(error), accepted, names_value=names_file))
             is_valid = False
             continue
         if any(part.kind == other.kind for other in found):

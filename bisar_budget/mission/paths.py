@@ -110,6 +110,13 @@ def _with_path(mission: Mission, platform: Platform, axes: earth.SceneAxes | Non
     return found
 
 
+def _of_file(file: str | None, error: PathFileError) -> Problem:
+    """What is wrong with a file, which is the value of a key and is named once."""
+    said = str(error)
+    said = f"{file} {said}" if file is not None and said.startswith("has ") else said
+    return Problem(said, names_value=file is not None and said.startswith(file))
+
+
 def _known(axes: earth.SceneAxes | None, key: str) -> earth.SceneAxes:
     if axes is None:
         raise _UnusablePathError((key,), Problem("needs the scene's place on the Earth", _PLACE))
@@ -153,7 +160,7 @@ def _of_orbit(mission: Mission, route: routes.OrbitSource, axes: earth.SceneAxes
         # An interpolation is worst between the places of a file.
         of_orbit = max((orbit.doubts(center.after(part * half)) for part in (0.0, -0.5, 0.5, -1.0, 1.0)), key=len)
     except PathFileError as error:
-        raise _UnusablePathError(("orbit", form), Problem(str(error))) from None
+        raise _UnusablePathError(("orbit", form), _of_file(file, error)) from None
     age = None if orbit.epoch is None else center.since(orbit.epoch)
     path = _flown(fitted, orbit.words, file, hashlib.sha256(data).hexdigest())
     return path._replace(age=age, doubts=(*of_orbit, *fitted.doubts))
@@ -187,9 +194,7 @@ def _of_log(
         times = slow_times(log, mission.collection.center_time, route.center, aperture_time, route.file)
         fitted = smoothed(times, log.places, aperture_time)
     except PathFileError as error:
-        said = str(error)
-        said = f"{route.file} {said}" if said.startswith("has ") else said
-        raise _UnusablePathError(("trajectory", "file"), Problem(said)) from None
+        raise _UnusablePathError(("trajectory", "file"), _of_file(route.file, error)) from None
     words = log.words
     if log.start is None:
         words += f", {route.center or 0.0:.12g} s of it at mid-aperture"
@@ -241,7 +246,7 @@ def _by_accuracy(
             mission.collection.aperture_time,
         )
     except PathFileError as unusable:
-        raise _UnusablePathError(key, Problem(str(unusable))) from None
+        raise _UnusablePathError(key, _of_file(file, unusable)) from None
     if error.covariance is None:
         source = f"accuracy file {file}"
         if error.position is None:

@@ -378,6 +378,7 @@ def _has_leap_second(minute: Instant) -> bool:
 
 def _from_keywords(text: str, name: str) -> Iterator[_Block]:
     """Segments of a message that has a keyword and a value in each line."""
+    text = text.rstrip()
     lines = ((at, line.strip()) for at, line in enumerate(text.split("\n"), 1))
     rows: list[tuple[int, str, Sequence[str]]] = []
     metadata: dict[str, tuple[int, str]] | None = None
@@ -417,7 +418,8 @@ def _from_keywords(text: str, name: str) -> Iterator[_Block]:
         elif state == "metadata" or (state == "header" and not equals):
             raise PathFileError(f"{where}: must be a keyword, = and its value (got {shown(line)})")
     if state in ("metadata", "covariance"):
-        raise PathFileError(f"{name}: ends within {'metadata' if state == 'metadata' else 'a covariance'}")
+        last = text.count("\n") + 1
+        raise PathFileError(f"{name}:{last}: ends within {'metadata' if state == 'metadata' else 'a covariance'}")
     if metadata is not None:
         yield _Block(began, metadata, rows)
 

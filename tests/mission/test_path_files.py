@@ -370,6 +370,7 @@ def test_a_path_that_cannot_be_read_is_one_line_and_no_report(
     faults = [line for line in result.stderr.splitlines() if "m.yaml:" in line]
     assert len(faults) == 1, result.stderr
     assert said in faults[0]
+    assert all(faults[0].count(name) <= 1 for name in ("a.tle", "flight.csv", "sbet.out")), faults[0]
     assert "Traceback" not in result.stderr
     assert all(one.isprintable() for one in result.stderr.splitlines())
 

@@ -221,8 +221,8 @@ OEMS = {
         "\n".join(OEM.splitlines()[:-4]),
         "x:11: STOP_TIME is 2026-06-01T05:20:00.000000000, the ephemeris has nothing beyond 2026-06-01T05:16:00.000Z",
     ),
-    "cut off in the metadata": (OEM.partition("STOP_TIME")[0], "x: ends within metadata"),
-    "cut off in a covariance": (OEM + "COVARIANCE_START\n", "x: ends within a covariance"),
+    "cut off in the metadata": (OEM.partition("STOP_TIME")[0], "x:10: ends within metadata"),
+    "cut off in a covariance": (OEM + "COVARIANCE_START\n", "x:36: ends within a covariance"),
     "NaN": (OEM.replace(LAST.split()[2], "NaN"), "x:35: must be a number of km or km/s (got NaN)"),
     "infinite": (OEM.replace(LAST.split()[5], "1e999"), "x:35: must be a number of km or km/s (got 1e999)"),
     "time": (
