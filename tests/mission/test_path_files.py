@@ -24,6 +24,7 @@ from tests.paths.orbit_files import CENTER, EPOCH, LINE_1, LINE_2, TLE, oem, omm
 from tests.report.test_report_diff import git
 
 BELOW_FLIGHT = {"latitude": "48.1 deg", "longitude": "11.3 deg", "height": "600 m"}  # beside `flown.flight`
+needs_links = pytest.mark.skipif(sys.platform == "win32", reason="needs links without rights to make them")
 FLIGHT = {"latitude": "48.2 deg", "longitude": "11.1 deg", "altitude": "3 km", "heading": "60 deg", "speed": "120 kn"}
 
 
@@ -222,6 +223,37 @@ class TestWhatIsSaid:
         (folder / "m.yaml").write_text(satellite())
         changed = run("diff", folder / "m.yaml", "--base", "HEAD")
         assert "content of a.tle" in changed.stdout
+
+    @needs_links
+    @pytest.mark.parametrize(
+        ("target", "said"),
+        [
+            ("store/orbits/a.tle", ""),
+            ("../outside.tle", "a.tle is a link out of the repository, to ../outside.tle, in revision HEAD"),
+            ("none.tle", "a.tle is a link that leads nowhere in revision HEAD"),
+        ],
+    )
+    def test_diff_follows_links_within_the_revision(
+        self, run: Callable[..., Any], folder: Path, target: str, said: str
+    ) -> None:
+        """The text of the link was taken for the file. Here a file and a folder above it are links."""
+        repository = folder / "repository"
+        (repository / "real").mkdir(parents=True)
+        (repository / "real" / "a.tle").write_text(TLE)
+        (repository / "store").mkdir()
+        (repository / "store" / "orbits").symlink_to("../real")
+        (repository / "a.tle").symlink_to(target)
+        (repository / "real.yaml").write_text(satellite())
+        (repository / "m.yaml").symlink_to("real.yaml")
+        git(repository, "init", "-q")
+        git(repository, "add", ".")
+        git(repository, "-c", "user.name=t", "-c", "user.email=t@example.org", "commit", "-q", "-m", "x")
+        (repository / "a.tle").unlink()
+        (repository / "a.tle").write_text(TLE.replace("SENTINEL-1A", "SENTINEL"))
+        found = run("diff", repository / "m.yaml", "--base", "HEAD")
+        assert found.exit_code == (2 if said else 0), found.stderr
+        assert said in found.stderr
+        assert ("content of a.tle" in found.stdout) is (not said)
 
 
 def rows(keep: Callable[[list[bytes]], list[bytes]]) -> bytes:
