@@ -48,6 +48,7 @@ class FileName(ParamType[str]):
 
 
 FILE = FileName()
+OUTPUT = click.option("-o", "--output", type=FILE, metavar="FILE", help="Write to FILE instead of standard output.")
 
 
 def _read_changes(ctx: click.Context, param: click.Parameter, texts: tuple[str, ...]) -> "tuple[SetValue, ...]":
@@ -72,6 +73,15 @@ SET = click.option(
     help="Put a value in place of the mission's own, or beside it: KEY is its path in the file, such as "
     "platforms.receiver.azimuth or other_errors.0.name, VALUE as the file would have it. Repeatable; every report "
     "says it.",
+)
+
+TEXT_OR_JSON = click.option(
+    "--format",
+    "format_name",
+    type=click.Choice(["text", "json"]),
+    default="text",
+    show_default=True,
+    help="Format of the output.",
 )
 
 
