@@ -40,7 +40,8 @@ ALLOWED = (
 def test_committed_files_are_current_whatever_the_process() -> None:
     """By the command, in a process that has a seed of hashes of its own: each run of the tests tries another one.
 
-    The files were written by a process with one more; CI runs the command in two. One derivation takes ten seconds.
+    The files were written by a process with one more, and CI runs the command of the wheel. One derivation takes ten
+    seconds.
     """
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONHASHSEED"}
     command = [sys.executable, "-m", "bisar_budget", "derive", "--check"]
