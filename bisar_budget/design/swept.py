@@ -33,7 +33,7 @@ class Part(NamedTuple):
     by_case: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Swept:
     """A sweep: what its columns are, and its parts as they are found.
 
