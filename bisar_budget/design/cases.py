@@ -91,6 +91,25 @@ class Table:
         return {number.key: column[start:stop] for number, column in zip(self.numbers, self.columns, strict=True)}
 
 
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Cases `start` to `start + count` of others, as a table."""
+
+    cases: Cases
+    start: int
+    count: int
+    shape: None = None
+
+    @property
+    def numbers(self) -> tuple[Number, ...]:
+        """The keys that vary."""
+        return self.cases.numbers
+
+    def values(self, start: int, stop: int) -> Mapping[str, Floats]:
+        """Value of each key, in SI, of some cases: (stop - start,) by the key."""
+        return self.cases.values(self.start + start, self.start + stop)
+
+
 class TableError(QuestionError):
     """A table of cases that cannot be read: one line `file:line:column: fault` for each fault."""
 
