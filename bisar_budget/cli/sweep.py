@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 MAX_CASES = 100_000_000  # that are started without being asked twice: tens of gigabytes
 _MANY = 20_000  # cases from which on it is measured how long they will take
 _LONG = 60.0  # s; what takes longer is announced
-_TRIAL = 0.5  # s of measuring
+_TRIAL = 0.1  # s; a shorter one is too short to measure
 _PLOTS, _TABLES = (".svg", ".png", ".pdf"), (".csv", ".parquet", ".nc")
 
 
@@ -211,9 +211,9 @@ class _Run:
             for _ in self.swept(Stretch(self.cases, (self.cases.count - tried) // 2, tried), self.columns).parts:
                 pass
             seconds = perf_counter() - began
-            if seconds > _TRIAL / 4 or tried == self.cases.count:
-                return seconds * self.cases.count / tried
-            tried = min(10 * tried, self.cases.count)
+            if seconds > _TRIAL or 10 * tried > self.cases.count:
+                return seconds * self.cases.count / tried / min(self.jobs, cores())
+            tried *= 10
 
     def write(self, output: str | None, plot: str | None, plot_column: str | None, is_polar: bool) -> None:
         """Check the cases, write the table as they come, then the plot, and say what was found."""
@@ -273,14 +273,14 @@ class _Run:
 
         trade = gathered.trade(is_polar=is_polar)
         uses = {}
-        if len(trade.axes) == 1 and trade.column is None and (rows := rows_that_matter(trade)):
-            names = [f"{row}.utilization" for row in rows]
-            swept = self.swept(self.cases, names)
-            again = Gathered(Described(swept, self.cases, self.mission, __version__), names)
+        if len(trade.axes) == 1 and trade.column is None:
+            names = {f"{row}.utilization": row for row in rows_that_matter(trade)}
+            swept = self.swept(self.cases, tuple(names))
+            again = Gathered(Described(swept, self.cases, self.mission, __version__), tuple(names))
             for part in swept.parts:
                 again.add(part)
             found = again.trade().values
-            uses = {row: found[name] for row, name in zip(rows, names, strict=True)}
+            uses = {row: found[name] for name, row in names.items()}
         kind = os.path.splitext(plot)[1][1:].lower()
         write_file(plot, trade_plot.drawn(trade, uses, self.mission, kind, is_polar=is_polar))
 

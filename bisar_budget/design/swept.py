@@ -18,6 +18,11 @@ class Column(NamedTuple):
     words: str
     is_text: bool = False
 
+    @property
+    def heading(self) -> str:
+        """Name and unit, as a table and an axis have them."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
+
 
 class Part(NamedTuple):
     """Cases `start` to `stop` of a sweep, in their order.

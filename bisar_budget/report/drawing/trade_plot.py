@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping, Sequence
 from functools import cache
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -21,8 +22,10 @@ _HIGH = 3.0  # times the limit: above it utilizations are drawn in equal ratios
 _LEAST = 1e-3  # of the limit: what is smaller is not of interest there
 _PALETTE = ("transmitter", "receiver", "clock", "pass", "mission", "doubt", "reserve")
 _DASHES = ("-", "-", "-", "--", "--", "-.", ":")
-_TINTS = (0.72, 0.88, 0.58)  # part of white, of the first, second and third status of one colour
+_TINTS = (0.8, 0.9, 0.65)  # part of white, of the first, second and third status of one colour
 _EMPTY = "reserve"
+_WORST = "#b9bfc6"
+_FEW = 3  # rows without a name on a map that a legend names
 _LIMIT = {"color": "#1b1e22", "lw": 1.8}
 _SUBTITLE = {"fontsize": 8.5, "color": "#555b63"}
 
@@ -38,21 +41,52 @@ def drawn(trade: Trade, rows: Mapping[str, NDArray[Any]], mission: Mission, kind
 def figure(trade: Trade, rows: Mapping[str, NDArray[Any]], mission: Mission, *, is_polar: bool) -> Any:
     """Lay a sweep on a Matplotlib figure."""
     page = new_figure(figsize=_SIZE if len(trade.axes) == 1 else _SQUARE)
-    page.suptitle(printable(mission.name), parse_math=False, fontsize=12)
     panel = page.add_subplot(projection="polar") if is_polar else page.add_subplot()
     about = ", ".join(filter(None, (*trade.fixed, changes_words(mission.changes), f"{mission.gating_model} model")))
-    panel.set_title(about, parse_math=False, pad=18 if is_polar else 6, **_SUBTITLE)
+    if is_polar:
+        around, radius = trade.axes
+        about += f"\nangle: {around.label}, radius: {radius.label}"
+    away = 30 if is_polar else 6  # points
+    panel.set_title(
+        printable(mission.name), parse_math=False, fontsize=12, loc="left", pad=away + 15 * (1 + about.count("\n"))
+    )
+    panel.annotate(
+        about,
+        (0, 1),
+        xytext=(0, away),
+        xycoords="axes fraction",
+        textcoords="offset points",
+        parse_math=False,
+        **_SUBTITLE,
+    )
     if len(trade.axes) == 1:
         _curves(panel, trade, rows)
     elif is_polar:
         _polar(page, panel, trade, mission)
     else:
         x, y = trade.axes
-        _map(page, panel, trade, x.edges, y.edges, x.values, y.values)
+        _legend(page, _map(page, panel, trade, x.edges, y.edges, x.values, y.values))
         panel.set(xlabel=x.label, ylabel=y.label)
-        panel.set(xscale="log" if x.is_log else "linear", yscale="log" if y.is_log else "linear")
-        panel.set(xlim=(x.edges[0], x.edges[-1]), ylim=(y.edges[0], y.edges[-1]))
+        _scale(panel.xaxis, x)
+        _scale(panel.yaxis, y)
     return page
+
+
+def _scale(drawn: Any, axis: Axis) -> None:
+    """From the first value to the last, in equal ratios where the values are."""
+    if axis.is_log:
+        _in_ratios(drawn)
+    drawn.axes.set(**{f"{drawn.axis_name}lim": (axis.values[0], axis.values[-1])})
+
+
+def _in_ratios(drawn: Any) -> None:
+    """Scale in equal ratios, its numbers without powers of ten."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    drawn.axes.set(**{f"{drawn.axis_name}scale": "log"})
+    drawn.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    drawn.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    drawn.set_minor_formatter(NullFormatter())
 
 
 @cache
@@ -96,21 +130,24 @@ def _curves(panel: Any, trade: Trade, rows: Mapping[str, NDArray[Any]]) -> None:
     (axis,) = trade.axes
     fills = _fills(trade.statuses)
     for run in runs(axis, trade.values["status"]):
-        panel.axvspan(run.low, run.high, facecolor=fills[run.status], lw=0)
+        panel.axvspan(run.low, run.high, facecolor=fills[run.status], lw=0, zorder=0)
     marker = "." if axis.values.size <= 40 else ""
     lines = []
     if trade.column is not None:
         shown = trade.values[trade.column.name]
         lines += panel.plot(axis.values, shown, color=_tones()["transmitter"], marker=marker, label=trade.column.name)
-        panel.set_ylabel(f"{trade.column.words} [{trade.column.unit}]" if trade.column.unit else trade.column.words)
+        panel.set_ylabel(trade.column.heading)
     else:
+        worst = 100 * trade.values["utilization"]
+        lines += panel.plot(axis.values, worst, color=_WORST, lw=6, solid_capstyle="butt", label="worst row")
         for (row, use), tone, dashes in zip(rows.items(), _PALETTE, _DASHES, strict=False):
             style = {"color": _tones()[tone], "ls": dashes, "marker": marker, "lw": 1.8}
             lines += panel.plot(axis.values, 100 * use, label=printable(row), **style)
         lines.append(panel.axhline(100, color=_tones()["fail"], lw=1.4, ls=(0, (6, 3)), label="limit"))
-        _scale_uses(panel, np.concatenate([[1.0], *rows.values()]))
+        _scale_uses(panel, np.concatenate([[1.0], trade.values["utilization"], *rows.values()]))
         panel.set_ylabel("utilization [%]")
-    panel.set(xlabel=axis.label, xlim=(axis.values[0], axis.values[-1]), xscale="log" if axis.is_log else "linear")
+    panel.set_xlabel(axis.label)
+    _scale(panel.xaxis, axis)
     panel.grid(color="#ffffff", lw=0.8)
     panel.set_axisbelow(True)
     panel.legend(
@@ -125,31 +162,32 @@ def _curves(panel: Any, trade: Trade, rows: Mapping[str, NDArray[Any]]) -> None:
 
 def _scale_uses(panel: Any, uses: NDArray[Any]) -> None:
     """Scale of utilizations: from 0, or in equal ratios where some are far above their limit."""
-    from matplotlib.ticker import FuncFormatter
-
     finite = uses[np.isfinite(uses) & (uses > 0)]
     if finite.max() <= _HIGH:
         panel.set_ylim(0, 108 * finite.max())
         return
-    panel.set_yscale("log")
+    _in_ratios(panel.yaxis)
     panel.set_ylim(100 * max(_LEAST, finite.min()) / 1.3, 130 * finite.max())
-    panel.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
-def _map(page: Any, panel: Any, trade: Trade, *grid: NDArray[Any]) -> None:
-    """Draw a map between edges, with lines and names at the middles of its cells."""
+def _map(page: Any, panel: Any, trade: Trade, *grid: NDArray[Any]) -> list[Any]:
+    """Draw a map between edges, with lines and names at the middles of its cells; return what a legend says."""
     first_edges, second_edges, first, second = grid
     handles = _patches(trade.statuses)
     if trade.column is None:
         _statuses(panel, trade, first_edges, second_edges)
-        _what_binds(panel, trade, grid)
+        handles += _what_binds(panel, trade, grid)
     else:
         _heat(page, panel, trade, first_edges, second_edges)
         handles = [patch for patch, name in zip(handles, trade.statuses, strict=True) if _has_no_mission(name)]
     if _limit(panel, trade, first, second):
         handles.insert(0, panel.plot([], [], label="utilization 100 %", **_LIMIT)[0])
+    return handles
+
+
+def _legend(page: Any, handles: Sequence[Any]) -> None:
     if handles:
-        panel.figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False, fontsize=9)
+        page.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False, fontsize=9)
 
 
 def _statuses(panel: Any, trade: Trade, first: NDArray[Any], second: NDArray[Any]) -> None:
@@ -162,8 +200,8 @@ def _statuses(panel: Any, trade: Trade, first: NDArray[Any], second: NDArray[Any
     panel.pcolormesh(first, second, codes.T, cmap=colors, shading="flat", rasterized=True, **limits)
 
 
-def _what_binds(panel: Any, trade: Trade, grid: Sequence[NDArray[Any]]) -> None:
-    """Lines between the regions of the worst rows, and the name of each in it."""
+def _what_binds(panel: Any, trade: Trade, grid: Sequence[NDArray[Any]]) -> list[Any]:
+    """Lines between the regions of the worst rows, and the name of each in it; the legend has rows without a name."""
     from matplotlib.collections import LineCollection
     from matplotlib.patheffects import withStroke
 
@@ -172,20 +210,30 @@ def _what_binds(panel: Any, trade: Trade, grid: Sequence[NDArray[Any]]) -> None:
     lines = borders(rows, first_edges, second_edges)
     if len(lines):
         panel.add_collection(LineCollection(list(lines), colors="#6b7179", linewidths=0.8, linestyles=(0, (2, 1.5))))
-    for region in regions(rows):
+    named = regions(rows)
+    for region in named:
         i, j = region.place
-        is_tall = panel.name != "polar" and region.size[0] / rows.shape[0] < 0.3 < region.size[1] / rows.shape[1]
+        is_polar = panel.name == "polar"
+        x = np.cos(first[i]) if is_polar else 0.0  # a name runs towards the middle, not over the rim
+        is_tall = not is_polar and region.size[0] / rows.shape[0] < 0.3 < region.size[1] / rows.shape[1]
         panel.text(
             first[i],
             second[j],
             printable(region.row),
-            ha="center",
+            ha="left" if x < -0.3 else "right" if x > 0.3 else "center",
             va="center",
             rotation=90 if is_tall else 0,
             fontsize=8.5,
             parse_math=False,
             path_effects=[withStroke(linewidth=2.5, foreground="white", alpha=0.75)],
         )
+    others = sorted(set(rows.ravel().tolist()) - {"", *(region.row for region in named)})
+    if not others:
+        return []
+    few = ", ".join(map(printable, others[:_FEW])) + (f" and {len(others) - _FEW} more" * (len(others) > _FEW))
+    label = fill(f"small regions: {few}", 40)
+    handles: list[Any] = panel.plot([], [], color="#6b7179", lw=0.8, ls=(0, (2, 1.5)), label=label)
+    return handles
 
 
 def _heat(page: Any, panel: Any, trade: Trade, first: NDArray[Any], second: NDArray[Any]) -> None:
@@ -207,7 +255,7 @@ def _heat(page: Any, panel: Any, trade: Trade, first: NDArray[Any], second: NDAr
     )
     panel.set_facecolor(_fills(["error"])["error"])
     bar = page.colorbar(mesh, ax=panel, pad=0.1 if panel.name == "polar" else 0.02)
-    bar.set_label(f"{column.words} [{column.unit}]" if column.unit else column.words, parse_math=False)
+    bar.set_label(column.heading, parse_math=False)
 
 
 def _limit(panel: Any, trade: Trade, first: NDArray[Any], second: NDArray[Any]) -> bool:
@@ -229,16 +277,16 @@ def _polar(page: Any, panel: Any, trade: Trade, mission: Mission) -> None:
     turn = middles[-1] - middles[0]
     if abs(turn - 2 * np.pi) < 1e-6:  # the first direction again: it needs no cell beyond
         edges[0], edges[-1] = middles[0], middles[-1]
-    _map(page, panel, trade, edges, np.maximum(radius.edges, 0), middles, radius.values)
-    panel.set_rlim(0, radius.edges[-1])
+    handles = _map(page, panel, trade, edges, np.maximum(radius.edges, 0), middles, radius.values)
+    panel.set_rlim(0, radius.values[-1])
     ticks = np.arange(0, 360, 45)
     names = {0: "east", 90: "north", 180: "west", 270: "south"}
     panel.set_thetagrids(ticks, [names.get(tick, f"{tick}°") for tick in ticks.tolist()])
     panel.grid(color="#ffffff", lw=0.7, alpha=0.7)
     panel.set_rlabel_position(_free(edges))
     panel.tick_params(axis="y", labelsize=8)
-    page.text(0.01, 0.01, f"angle: {around.label}, radius: {radius.label}", ha="left", va="bottom", **_SUBTITLE)
-    _other_platform(panel, around, mission.geometry)
+    panel.tick_params(axis="x", pad=8)
+    _legend(page, [*handles, *_other_platform(panel, around, mission.geometry)])
 
 
 def _free(edges: NDArray[Any]) -> float:
@@ -246,26 +294,16 @@ def _free(edges: NDArray[Any]) -> float:
     return float(np.degrees(edges[0])) - 6 if edges[-1] - edges[0] < 1.9 * np.pi else 22.5
 
 
-def _other_platform(panel: Any, around: Axis, geometry: BistaticGeometry) -> None:
-    """Say at the rim from where the other platform looks."""
+def _other_platform(panel: Any, around: Axis, geometry: BistaticGeometry) -> list[Any]:
+    """Mark at the rim where the other platform stands; for a legend."""
     names = [name for name in ("transmitter", "receiver") if f".{name}." in f".{around.number.key}"]
     if len(names) != 1:
-        return
+        return []
     other = "receiver" if names == ["transmitter"] else "transmitter"
     x, y, _ = getattr(geometry, other).position
-    if not np.hypot(x, y):
-        return
-    angle, rim = float(np.arctan2(y, x)), panel.get_rmax()
-    panel.plot(angle, rim, marker=(3, 0, np.degrees(angle) + 90), ms=12, color=_tones()[other], clip_on=False)
-    side = "left" if np.cos(angle) > 0.1 else "right" if np.cos(angle) < -0.1 else "center"
-    panel.annotate(
-        other,
-        (angle, rim),
-        xytext=(18 * np.cos(angle), 18 * np.sin(angle) + 14),
-        textcoords="offset points",
-        color=_tones()[other],
-        ha=side,
-        va="center",
-        fontsize=9,
-        annotation_clip=False,
+    angle = np.arctan2(y, x)
+    style = {"marker": (3, 0, float(np.degrees(angle)) + 90), "ms": 12, "color": _tones()[other], "ls": "none"}
+    handles: list[Any] = panel.plot(
+        angle, panel.get_rmax(), label=f"direction of the {other}", clip_on=False, **style
     )
+    return handles

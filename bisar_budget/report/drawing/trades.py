@@ -187,7 +187,7 @@ def regions(rows: NDArray[Any]) -> list[Region]:
         seen |= one
         if one.mean() >= _LABELLED:
             place = _innermost(one)
-            along = (_run(one[:, place[1]], place[0]), _run(one[place], place[1]))
+            along = (_run(one[:, place[1]], place[0]), _run(one[place[0]], place[1]))
             found.append(
                 Region(
                     str(thin[first, second]),

@@ -22,10 +22,7 @@ def write(described: Described, parts: Iterable[Part], path: str) -> None:
 
 def texts(described: Described, parts: Iterable[Part]) -> Iterator[str]:
     """Write what stands above the cases, then each part."""
-    header = [
-        spreadsheet_text(f"{column.name} [{column.unit}]" if column.unit else column.name)
-        for column in described.columns
-    ]
+    header = [spreadsheet_text(column.heading) for column in described.columns]
     yield "".join(f"# {name}: {value}\n" for name, value in described.facts.items()) + _lines([header])
     for part in parts:
         values = described.values(part)
