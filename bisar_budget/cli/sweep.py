@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 MAX_CASES = 100_000_000  # that are started without being asked twice: tens of gigabytes
 _MANY = 20_000  # cases from which on it is measured how long they will take
 _LONG = 60.0  # s; what takes longer is announced
-_TRIAL = 0.1  # s; a shorter one is too short to measure
+_TRIAL = 0.3  # s; a shorter one is too short to measure
 _PLOTS, _TABLES = (".svg", ".png", ".pdf"), (".csv", ".parquet", ".nc")
 
 
@@ -205,15 +205,16 @@ class _Run:
         """Measure how long all cases will take, by some of the middle."""
         from bisar_budget.design.cases import Stretch
 
-        tried = 100
+        tried, is_warm = 100, False
         while True:
+            parts = self.swept(Stretch(self.cases, (self.cases.count - tried) // 2, tried), self.columns).parts
             began = perf_counter()
-            for _ in self.swept(Stretch(self.cases, (self.cases.count - tried) // 2, tried), self.columns).parts:
+            for _ in parts:
                 pass
             seconds = perf_counter() - began
-            if seconds > _TRIAL or 10 * tried > self.cases.count:
+            if is_warm and (seconds > _TRIAL or 10 * tried > self.cases.count):
                 return seconds * self.cases.count / tried / min(self.jobs, cores())
-            tried *= 10
+            tried, is_warm = tried * (10 if is_warm else 1), True  # the first one imports what it needs
 
     def write(self, output: str | None, plot: str | None, plot_column: str | None, is_polar: bool) -> None:
         """Check the cases, write the table as they come, then the plot, and say what was found."""

@@ -22,24 +22,34 @@ def write(described: Described, parts: Iterable[Part], path: str) -> None:
 
 def texts(described: Described, parts: Iterable[Part]) -> Iterator[str]:
     """Write what stands above the cases, then each part."""
-    header = [spreadsheet_text(column.heading) for column in described.columns]
-    yield "".join(f"# {name}: {value}\n" for name, value in described.facts.items()) + _lines([header])
+    yield "".join(f"# {name}: {value}\n" for name, value in described.facts.items())
+    yield ",".join(_quoted(spreadsheet_text(column.heading)) for column in described.columns) + "\n"
     for part in parts:
         values = described.values(part)
-        yield _lines(zip(*(_cells(column, values[column.name]) for column in described.columns), strict=True))
+        cells = (_cells(column, values[column.name]) for column in described.columns)
+        yield "".join(f"{line}\n" for line in map(",".join, zip(*cells, strict=True)))
 
 
-def _lines(rows: Iterable[Iterable[object]]) -> str:
+def _quoted(text: str | None) -> str:
     output = io.StringIO()
-    csv.writer(output, lineterminator="\n").writerows(rows)
-    return output.getvalue()
+    csv.writer(output, lineterminator="").writerow(("", text))
+    return output.getvalue()[1:]
 
 
-def _cells(column: Column, values: Values) -> list[object]:
-    cells: list[object] = values.tolist()
+def _cells(column: Column, values: Values) -> list[str]:
+    """Cells of a column; a value that many cases share is written once."""
     if column.is_text:
-        said = {text: spreadsheet_text(str(text)) for text in set(cells)}
-        return [said[text] for text in cells]
-    if np.isnan(np.asarray(values, float)).any():
-        return ["" if cell != cell else cell for cell in cells]
-    return cells
+        texts: list[str] = values.tolist()
+        said = {text: _quoted(spreadsheet_text(text)) for text in set(texts)}
+        return [said[text] for text in texts]
+    numbers = np.asarray(values, float)
+    few, places = np.unique(numbers, return_inverse=True)
+    if few.size > numbers.size / 2:
+        return [_number(number) for number in numbers.tolist()]
+    words = [_number(number) for number in few.tolist()]
+    return [words[place] for place in places.tolist()]
+
+
+def _number(number: float) -> str:
+    """All digits that a number needs to be read back; nothing for none."""
+    return repr(number) if number == number else ""
