@@ -253,7 +253,8 @@ def _heat(page: Any, panel: Any, trade: Trade, first: NDArray[Any], second: NDAr
         rasterized=True,
         norm=LogNorm() if is_log else None,
     )
-    panel.set_facecolor(_fills(["error"])["error"])
+    if any(map(_has_no_mission, trade.statuses)):
+        panel.set_facecolor(_fills(["error"])["error"])
     bar = page.colorbar(mesh, ax=panel, pad=0.1 if panel.name == "polar" else 0.02)
     bar.set_label(column.heading, parse_math=False)
 
