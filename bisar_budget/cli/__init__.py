@@ -29,6 +29,7 @@ _MODULES = {
     "sensors": "sensors",
     "simulate": "simulate",
     "solve": "solve",
+    "sweep": "sweep",
     "verify": "verify",
 }
 

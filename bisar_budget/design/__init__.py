@@ -1,4 +1,4 @@
 """Design questions of one mission: which values of a key comply, and where that changes."""
 
 # What other rooms may use.
-__all__ = ["quantities", "solution", "solve"]
+__all__ = ["cases", "quantities", "solution", "solve", "sweep", "swept"]

@@ -11,18 +11,17 @@ from datetime import date
 from itertools import pairwise
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.design.quantities import FACTOR, Number, QuestionError, Range, number_of, range_of
+from bisar_budget.design.quantities import FACTOR, Number, QuestionError, Range, number_of, range_of, tree_of
 from bisar_budget.design.scaled import scaled
 from bisar_budget.design.solution import Crossing, Solution, State
 from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
-from bisar_budget.mission.changes import apply_changes, parts_of
+from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.readers import did_you_mean
-from bisar_budget.mission.tree import read_tree
 
 PLACES = 65  # of a range
 PLACES_OF_CIRCLE = 181  # every 2 degrees: geometry changes fast where gradients are nearly parallel
@@ -137,7 +136,7 @@ class _Question:
             self.number = Number("the factor", FACTOR, 1.0, "")
             scaled(self.base, key, 1.0)  # says what is wrong with the key
         else:
-            self.number = number_of(self._tree(), key).said_like(between)
+            self.number = number_of(tree_of(mission), key).said_like(between)
         self.range: Range = range_of(self.number, between)
         found = check_mission(self.base, today)
         self._decides([found, *self._at_the_end()])
@@ -161,13 +160,6 @@ class _Question:
             raise QuestionError(f"--row {self.row}: no row has this id. {hint or 'A check lists them.'}")
         if not any(status.gates for status in statuses):
             raise QuestionError(f"--row {self.row}: is {statuses[0].words}: nothing is judged there")
-
-    def _tree(self) -> dict[str, object]:
-        """What the file says with the options that changed it, as text."""
-        tree = read_tree(self.mission.data, self.mission.file)
-        apply_changes(tree, self.mission.changes)
-        root: dict[str, object] = tree.root
-        return root
 
     def _read(self, changes: Sequence[SetValue]) -> Mission:
         anew = {parts_of(change.key) for change in changes}

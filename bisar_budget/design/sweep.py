@@ -22,16 +22,15 @@ from bisar_budget.arrays.judged import REQUIREMENTS, Judged, check_arrays, statu
 from bisar_budget.budget.check import check_mission
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.design.cases import Cases
-from bisar_budget.design.quantities import Number, QuestionError, number_of
+from bisar_budget.design.quantities import Number, QuestionError, number_of, tree_of
 from bisar_budget.design.swept import Column, Part, Swept, Values
 from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import RANK, STATUS
-from bisar_budget.mission.changes import apply_changes, parts_of
+from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.readers import did_you_mean
-from bisar_budget.mission.tree import read_tree
 from bisar_budget.workers import worker_pool
 
 if TYPE_CHECKING:
@@ -200,9 +199,8 @@ class Engine:
     def __init__(self, question: _Question, mission: Mission) -> None:
         self.question, model = question, question.model
         self.mission = mission if model is None else _gated(mission, model)
-        tree = read_tree(mission.data, mission.file)
-        apply_changes(tree, mission.changes)
-        self.numbers = tuple(number_of(tree.root, key) for key in question.keys)
+        tree = tree_of(mission)
+        self.numbers = tuple(number_of(tree, key) for key in question.keys)
         rows = {row.id: row for row in check_mission(self.mission, question.today).rows}
         self.asked = [_asked(name, rows) for name in question.columns]
         self.columns = tuple(

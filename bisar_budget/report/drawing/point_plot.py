@@ -1,7 +1,6 @@
 """Figures 3 to 7 of Rigling & Moses for a mission of one's own: drawn, saved, and said in a few lines."""
 
 import math
-import os
 from collections.abc import Callable, Mapping
 from io import BytesIO
 from typing import Any
@@ -11,6 +10,7 @@ import numpy as np
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
+from bisar_budget.report.drawing.figure_file import file_of, new_figure
 from bisar_budget.report.drawing.point_figures import FLOOR_DB, ImagePanel, Limits, Sheet, rotated_back, sheet
 from bisar_budget.report.words.layout import wrapped
 from bisar_budget.simulate.impulse_response import ImpulseResponse
@@ -30,12 +30,12 @@ _CUT_STYLES: tuple[Mapping[str, Any], ...] = (
 
 def drawn(images: PointImages, title: str, kind: str) -> bytes:
     """Draw the figures on one sheet, as a `png`, `svg` or `pdf` file."""
-    return _file(figure(sheet(images), title), kind)
+    return file_of(figure(sheet(images), title), kind)
 
 
 def figure(drawn: Sheet, title: str) -> Any:
     """Lay all panels on one Matplotlib figure."""
-    page = _page(figsize=(16.5, 8))
+    page = new_figure(figsize=(16.5, 8))
     panels = page.subplots(2, 4)
     for name, panel in zip(("fig3", "fig4", "fig5", "cuts", "fig6", "fig7", "fig7_back"), panels.flat, strict=False):
         artist = PANELS[name](panel, drawn)
@@ -59,36 +59,14 @@ def figure(drawn: Sheet, title: str) -> Any:
 
 def drawn_panel(name: str, drawn: Sheet) -> bytes:
     """Draw a single panel, small, for a page, as a PNG file; `name` is one of `PANELS`."""
-    page = _page(figsize=(4.4, 3.6))
+    page = new_figure(figsize=(4.4, 3.6))
     panel = page.subplots()
     artist = PANELS[name](panel, drawn)
     if name == "cuts":
         panel.legend(fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.06), frameon=False)  # above the data
     if artist is not None:
         page.colorbar(artist, ax=panel, pad=0.02).set_label("dB to the error-free peak")
-    return _file(page, "png", dpi=80)
-
-
-def _page(**settings: Any) -> Any:
-    """Give a Matplotlib figure that looks the same whatever a user's matplotlibrc and MPLBACKEND say."""
-    os.environ.pop("MPLBACKEND", None)  # a name that Matplotlib does not know would end its import
-    import logging
-
-    logging.getLogger("matplotlib").setLevel(logging.CRITICAL)  # of fonts and folders that it lacks
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    matplotlib.rcdefaults()
-    matplotlib.rcParams["svg.hashsalt"] = "bisar-budget"
-    return Figure(**settings, layout="constrained")
-
-
-def _file(page: Any, kind: str, dpi: int = 110) -> bytes:
-    """Give the file of a figure: of the same input the same bytes."""
-    undated = {"png": {"Software": None}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
-    file = BytesIO()
-    page.savefig(file, format=kind, dpi=dpi, metadata=undated[kind])
-    return file.getvalue()
+    return file_of(page, "png", dpi=80)
 
 
 def archive(images: PointImages) -> bytes:
