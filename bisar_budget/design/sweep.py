@@ -30,6 +30,7 @@ from bisar_budget.findings.status import RANK, STATUS
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
+from bisar_budget.mission.named import Named
 from bisar_budget.mission.readers import did_you_mean
 from bisar_budget.workers import worker_pool
 
@@ -80,7 +81,7 @@ _UNITS = {
 _IN_UNIT = ("declared", "allowable", "allowable_published", "allowable_full")
 
 
-class _Asked(NamedTuple):
+class _Field(NamedTuple):
     """A column that was asked for: a field of a row."""
 
     name: str
@@ -124,56 +125,108 @@ def sweep(
     QuestionError
         A column is of no row, or of no field.
     """
-    question = _Question(
-        mission.data,
-        mission.file,
-        mission.changes,
-        tuple(number.key for number in cases.numbers),
-        tuple(columns),
-        model,
-        today,
-    )
-    engine = Engine(question, mission)
-    varied = [Column(number.key, number.dimension.si, "Varies.") for number in cases.numbers]
-    return Swept(
-        mission_name=mission.name,
-        mission_sha256=sha256(mission.data).hexdigest(),
-        varied=tuple(column.name for column in varied),
-        shape=cases.shape,
-        count=cases.count,
-        columns=(*varied, *GEOMETRY, *VERDICT, *engine.columns, REASON),
-        parts=_parts(engine, cases, jobs),
-    )
+    asked = Asked(mission, cases, columns=columns, model=model, today=today)
+    return asked.swept(_parts(asked, jobs))
 
 
-def _parts(engine: "Engine", cases: Cases, jobs: int) -> Iterator[Part]:
-    """Find the parts in their order. Few cases show whether arrays hold them; else processes share them out.
+class Asked:
+    """The cases of a mission that a sweep is about, in chunks; arguments and faults are those of `sweep`.
 
-    What arrays hold takes less time than to send it from one process to another.
+    `named` is what the mission names where processes that check cases do not have it.
     """
-    probe = engine.part(0, min(_FEW, cases.count), cases.values(0, min(_FEW, cases.count)))
-    yield probe
-    is_slow = probe.by_case > _FEW // 8
-    size = _FEW if is_slow else _TOGETHER
-    starts = range(probe.stop, cases.count, size)
-    if not is_slow or jobs == 1 or len(starts) < _MANY:
-        for start in starts:
-            stop = min(start + size, cases.count)
-            yield engine.part(start, stop, cases.values(start, stop))
-        return
-    with worker_pool(jobs, "spawn") as pool:
-        waiting: deque[Future[Part]] = deque()
-        for start in starts:
-            stop = min(start + size, cases.count)
-            waiting.append(pool.submit(_part, engine.question, start, stop, cases.values(start, stop)))
-            if len(waiting) > 3 * jobs:  # none is far ahead of what has been asked for
+
+    def __init__(
+        self,
+        mission: Mission,
+        cases: Cases,
+        *,
+        columns: Sequence[str] = (),
+        model: str | None = None,
+        today: date,
+        named: Named | None = None,
+    ) -> None:
+        keys = tuple(number.key for number in cases.numbers)
+        self.question = Question(
+            mission.data, mission.file, mission.changes, keys, tuple(columns), model, today, named
+        )
+        self.mission, self.cases, self.engine = mission, cases, Engine(self.question, mission)
+
+    def swept(self, parts: Iterator[Part]) -> Swept:
+        """The sweep that has these parts."""
+        varied = [Column(number.key, number.dimension.si, "Varies.") for number in self.cases.numbers]
+        return Swept(
+            mission_name=self.mission.name,
+            mission_sha256=sha256(self.mission.data).hexdigest(),
+            varied=tuple(column.name for column in varied),
+            shape=self.cases.shape,
+            count=self.cases.count,
+            columns=(*varied, *GEOMETRY, *VERDICT, *self.engine.columns, REASON),
+            parts=parts,
+        )
+
+    def probe(self) -> Part:
+        """The first few cases; they show whether arrays hold what the mission needs."""
+        stop = min(_FEW, self.cases.count)
+        return self.engine.part(0, stop, self.cases.values(0, stop))
+
+    def chunks(self, probe: Part) -> "Chunks":
+        """What is left behind the first few cases."""
+        is_slow = probe.by_case > _FEW // 8
+        return Chunks(probe.stop, self.cases.count, _FEW if is_slow else _TOGETHER, is_slow)
+
+    def shared_out(self, chunks: "Chunks", starts: Sequence[int], jobs: int) -> Iterator[Part]:
+        """Check the chunks that begin at `starts`, in their order; where each case takes long, in processes.
+
+        What arrays hold takes less time than to send it from one process to another.
+        """
+        if not chunks.is_slow or jobs == 1 or len(starts) < _MANY:
+            for start in starts:
+                stop = chunks.stop(start)
+                yield self.engine.part(start, stop, self.cases.values(start, stop))
+            return
+        with worker_pool(jobs, "spawn") as pool:
+            waiting: deque[Future[Part]] = deque()
+            for start in starts:
+                waiting.append(pool.submit(part_of, self.question, *self.sent(chunks, start)))
+                if len(waiting) > 3 * jobs:  # none is far ahead of what has been asked for
+                    yield waiting.popleft().result()
+            while waiting:
                 yield waiting.popleft().result()
-        while waiting:
-            yield waiting.popleft().result()
+
+    def sent(self, chunks: "Chunks", start: int) -> tuple[int, int, Mapping[str, Any]]:
+        """What `part_of` takes of a chunk besides the question."""
+        stop = chunks.stop(start)
+        return start, stop, self.cases.values(start, stop)
 
 
-class _Question(NamedTuple):
-    """What a process needs to check cases of a mission."""
+class Chunks(NamedTuple):
+    """How cases from `first` to `end` are cut; `is_slow` where each is checked by itself."""
+
+    first: int
+    end: int
+    size: int
+    is_slow: bool
+
+    @property
+    def starts(self) -> range:
+        """First case of each chunk."""
+        return range(self.first, self.end, self.size)
+
+    def stop(self, start: int) -> int:
+        """End of the chunk that begins at a case."""
+        return min(start + self.size, self.end)
+
+
+def _parts(asked: Asked, jobs: int) -> Iterator[Part]:
+    """Find the parts in their order, as they are asked for."""
+    probe = asked.probe()
+    yield probe
+    chunks = asked.chunks(probe)
+    yield from asked.shared_out(chunks, chunks.starts, jobs)
+
+
+class Question(NamedTuple):
+    """What a process needs to check cases of a mission; `named` where it cannot read what the mission names."""
 
     data: bytes
     file: str
@@ -182,27 +235,35 @@ class _Question(NamedTuple):
     columns: tuple[str, ...]
     model: str | None
     today: date
+    named: Named | None = None
+
+    def parse(self, changes: Sequence[SetValue], model: str | None = None) -> Mission:
+        """Read the mission with values in place of its own; raises `MissionError`."""
+        if self.named is None:
+            return parse_mission(self.data, self.file, model, changes=changes)
+        return self.named.parse(self.data, self.file, model, changes)
 
 
 @lru_cache(maxsize=1)
-def _engine(question: _Question) -> "Engine":
-    return Engine(question, parse_mission(question.data, question.file, changes=question.changes))
+def _engine(question: Question) -> "Engine":
+    return Engine(question, question.parse(question.changes))
 
 
-def _part(question: _Question, start: int, stop: int, values: Mapping[str, Any]) -> Part:
+def part_of(question: Question, start: int, stop: int, values: Mapping[str, Any]) -> Part:
+    """Check a chunk of cases in a process that knows nothing else; it keeps the last question."""
     return _engine(question).part(start, stop, values)
 
 
 class Engine:
     """Checks cases of one mission; a process of its own can have one."""
 
-    def __init__(self, question: _Question, mission: Mission) -> None:
+    def __init__(self, question: Question, mission: Mission) -> None:
         self.question, model = question, question.model
         self.mission = mission if model is None else _gated(mission, model)
         tree = tree_of(mission)
         self.numbers = tuple(number_of(tree, key) for key in question.keys)
         rows = {row.id: row for row in check_mission(self.mission, question.today).rows}
-        self.asked = [_asked(name, rows) for name in question.columns]
+        self.asked = [_field(name, rows) for name in question.columns]
         self.columns = tuple(
             Column(
                 one.name,
@@ -327,7 +388,7 @@ class Engine:
         ]
         anew = {parts_of(change.key) for change in changes}
         given = [change for change in self.mission.changes if parts_of(change.key) not in anew]
-        return parse_mission(self.mission.data, self.mission.file, self.question.model, changes=(*given, *changes))
+        return self.question.parse((*given, *changes), self.question.model)
 
 
 def worst_row(rows: Sequence[Row]) -> Row | None:
@@ -401,7 +462,7 @@ def _gated(mission: Mission, model: str) -> Mission:
     return mission._replace(allocation=mission.allocation._replace(model=model))
 
 
-def _asked(name: str, rows: Mapping[str, Row]) -> _Asked:
+def _field(name: str, rows: Mapping[str, Row]) -> _Field:
     row, _, field = name.rpartition(".")
     if field not in _FIELDS:
         raise QuestionError(f"--column {name}: {field!r} is no field of a row; accepted: {', '.join(_FIELDS)}")
@@ -409,4 +470,4 @@ def _asked(name: str, rows: Mapping[str, Row]) -> _Asked:
         raise QuestionError(
             f"--column {name}: no row has the id {row!r}. {did_you_mean(row, tuple(rows)) or 'A check lists them.'}"
         )
-    return _Asked(name, row, field)
+    return _Field(name, row, field)

@@ -8,6 +8,7 @@ __all__ = [
     "keys",
     "load",
     "model",
+    "named",
     "parts",
     "platforms",
     "readers",

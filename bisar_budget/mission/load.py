@@ -57,6 +57,7 @@ def parse_mission(
     model: str | None = None,
     beside: Callable[[str], bytes] | None = None,
     changes: Sequence[SetValue] = (),
+    find: Callable[[str], tuple[str, bytes]] | None = None,
 ) -> Mission:
     """Turn the content of a mission file into a `Mission`.
 
@@ -72,6 +73,8 @@ def parse_mission(
         Gives the content of a file that the mission names, and raises `PathFileError`; omitted: files beside it.
     changes : sequence of SetValue
         Values in place of the file's, and beside them, in this order.
+    find : callable, optional
+        Gives file and content of a part that the mission names, and raises `PartError`; omitted: where parts are.
 
     Raises
     ------
@@ -89,15 +92,15 @@ def parse_mission(
     mission = INVALID
     with suppress(UnusableError):
         mission = MISSION.read(tree.root, (), tree.report)
-        folder = os.path.dirname(file) if file != "-" else ""
+        folder = folder_of(file)
         if mission is not INVALID and flies_on_earth(mission):
             from bisar_budget.mission.paths import reader_of, with_paths
 
             mission = with_paths(mission, beside or reader_of(folder), tree.report)
         if mission is not INVALID and names_parts(mission):
-            from bisar_budget.mission.parts import with_parts
+            from bisar_budget.mission.parts import finder_of, with_parts
 
-            mission = with_parts(mission, folder, tree.report)
+            mission = with_parts(mission, folder, find or finder_of(folder), tree.report)
     if tree.faults:
         ordered = sorted(dict.fromkeys(tree.faults), key=lambda fault: (fault.line or 0, fault.column or 0))
         if changes:
@@ -106,6 +109,11 @@ def parse_mission(
     as_bytes = data.encode("utf-8", "surrogatepass") if isinstance(data, str) else data
     read = cast(Mission, mission._replace(file=file, places=tree.values, data=as_bytes, changes=tuple(changes)))
     return read if model is None else read._replace(allocation=read.allocation._replace(model=model))
+
+
+def folder_of(file: str) -> str:
+    """Folder from which the names in a mission file start; that of standard input is the current one."""
+    return os.path.dirname(file) if file != "-" else ""
 
 
 def _with_changes(fault: Fault, changes: Sequence[SetValue]) -> Fault:

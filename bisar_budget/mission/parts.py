@@ -5,7 +5,7 @@ mission names parts, and what the mission says itself overrides single figures.
 """
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from typing import Annotated, Any, NamedTuple
 
@@ -46,6 +46,8 @@ from bisar_budget.mission.readers import (
 from bisar_budget.mission.tree import MAX_BYTES, UnusableError, read_tree
 from bisar_budget.resources import UnreadableError, content, resource
 from bisar_budget.settings import SettingsError, project_settings
+
+Find = Callable[[str], tuple[str, bytes]]  # file and content of a part by its name
 
 _NAME = Text()
 _SOURCE = OneOf(lambda value: TextMap() if isinstance(value, dict) else _NAME, (_NAME, TextMap()))
@@ -160,10 +162,19 @@ def read_part(file: str) -> Part:
 
 
 def _read(file: str) -> tuple[Part, Mapping[str, Any]]:
+    return _parsed(file, _content(file))
+
+
+def _content(file: str) -> bytes:
     try:
-        tree = read_tree(content(file, MAX_BYTES), file)
+        return content(file, MAX_BYTES)
     except UnreadableError as error:
         raise PartError(str(error)) from None
+
+
+def _parsed(file: str, data: bytes) -> tuple[Part, Mapping[str, Any]]:
+    try:
+        tree = read_tree(data, file)
     except MissionError as error:
         raise PartError(f"{file}: {error.faults[0]}") from None
     kind = tree.root.get("kind")
@@ -217,20 +228,33 @@ def catalogue(places: Sequence[str]) -> dict[str, str]:
     return found
 
 
-def _find(name: str, beside: str) -> Part:
+def finder_of(folder: str) -> Find:
+    """What finds the parts that a mission file in a folder names.
+
+    It raises `PartError` where there is none of a name, or its file cannot be read.
+    """
+
+    def find(name: str) -> tuple[str, bytes]:
+        file = _file_of(name, folder)
+        return file, _content(file)
+
+    return find
+
+
+def _file_of(name: str, beside: str) -> str:
     if name.endswith((".yaml", ".yml")):
-        return read_part(os.path.join(beside, name))
+        return os.path.join(beside, name)
     places = folders(beside)
     for folder in places:
         for suffix in (".yaml", ".yml"):
             file = os.path.join(folder, name + suffix)
             if os.sep not in name and os.path.exists(file):
-                return read_part(file)
+                return file
     near = did_you_mean(name.lower(), tuple(catalogue(places)))
     raise PartError(f"is no part of the catalogue; `bisar-budget sensors` lists them. {near}".rstrip())
 
 
-def with_parts(mission: Mission, beside: str, report: Report) -> Any:
+def with_parts(mission: Mission, beside: str, find: Find, report: Report) -> Any:
     """Put in the figures of the parts that a mission names; `INVALID` after a report.
 
     Parameters
@@ -239,6 +263,8 @@ def with_parts(mission: Mission, beside: str, report: Report) -> Any:
         As read.
     beside : str
         Folder of the mission file.
+    find : callable
+        File and content of a part by its name; raises `PartError`.
     report : callable
         Takes what is wrong, and where.
     """
@@ -247,12 +273,12 @@ def with_parts(mission: Mission, beside: str, report: Report) -> Any:
     for name in platforms._fields:
         platform = getattr(platforms, name)
         error, path = platform.motion_error, ("platforms", name, "motion_error", "sensor")
-        parts = _parts_of(error.sensor, path, ("imu", "gnss"), beside, report)
+        parts = _parts_of(error.sensor, path, ("imu", "gnss"), beside, find, report)
         error = INVALID if parts is INVALID else _motion_of(error, parts, path, report)
         oscillator = platform.oscillator
         if oscillator is not None and oscillator.sensor is not None:
             path = ("platforms", name, "oscillator", "sensor")
-            parts = _parts_of(oscillator.sensor, path, ("oscillator",), beside, report)
+            parts = _parts_of(oscillator.sensor, path, ("oscillator",), beside, find, report)
             oscillator = INVALID if parts is INVALID else _oscillator_of(oscillator, parts[0])
             if oscillator is not INVALID and oscillator.needs_frequency and oscillator.frequency is None:
                 problem = f"{shown(parts[0].name)} states no frequency, at which the mask or the tones are stated"
@@ -266,7 +292,12 @@ def with_parts(mission: Mission, beside: str, report: Report) -> Any:
 
 
 def _parts_of(
-    names: str | tuple[str, ...] | None, path: KeyPath, kinds: Sequence[str], beside: str, report: Report
+    names: str | tuple[str, ...] | None,
+    path: KeyPath,
+    kinds: Sequence[str],
+    beside: str,
+    find: Find,
+    report: Report,
 ) -> Any:
     is_list = isinstance(names, tuple)
     found: list[Part] = []
@@ -274,7 +305,7 @@ def _parts_of(
     for index, name in enumerate(names if isinstance(names, tuple) else [names] if names else []):
         here = (*path, index) if is_list else path
         try:
-            part = _find(name, beside)
+            part = _parsed(*find(name))[0]
             if part.kind not in kinds:
                 raise PartError(f"is an {part.kind}" if part.kind != "gnss" else "is a GNSS receiver")
         except PartError as error:
