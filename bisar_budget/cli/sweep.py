@@ -202,18 +202,18 @@ class _Run:
             complain(f"{count} cases will take about {_lasting(seconds)}.")
 
     def _seconds(self) -> float:
-        """Measure how long all cases will take, by some of the middle."""
-        from bisar_budget.design.cases import Stretch
+        """Measure how long all cases will take, by some of them."""
+        from bisar_budget.design.cases import some_of
 
         tried, is_warm = 100, False
         while True:
-            parts = self.swept(Stretch(self.cases, (self.cases.count - tried) // 2, tried), self.columns).parts
+            parts = self.swept(some_of(self.cases, tried), self.columns).parts
             began = perf_counter()
-            for _ in parts:
-                pass
+            alone = sum(part.by_case for part in parts)
             seconds = perf_counter() - began
             if is_warm and (seconds > _TRIAL or 10 * tried > self.cases.count):
-                return seconds * self.cases.count / tried / min(self.jobs, cores())
+                sharing = min(self.jobs, cores()) if alone > tried / 2 else 1  # processes: arrays are faster alone
+                return seconds * self.cases.count / tried / sharing
             tried, is_warm = tried * (10 if is_warm else 1), True  # the first one imports what it needs
 
     def write(self, output: str | None, plot: str | None, plot_column: str | None, is_polar: bool) -> None:

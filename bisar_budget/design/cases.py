@@ -20,6 +20,7 @@ Floats = NDArray[np.float64]
 
 MAX_VALUES = 10_000_000  # of one key, and of all keys of a table: 80 MB
 _FAULTS = 20  # of a table that are said
+_STRETCHES, _GOLDEN = 100, (math.sqrt(5) - 1) / 2  # no step of a grid meets the same values again and again
 _DIGITS = 15  # decimal ones that a float always holds
 _NUMBER = re.compile(r"^\s*[+-]?[\d.]*(?:[eE][+-]?\d+)?\s*", re.ASCII)
 _RANGE = "accepted: KEY=FROM:TO UNIT:COUNT, such as {key}=1:10 s:91, with :log behind it for equal ratios"
@@ -89,25 +90,6 @@ class Table:
     def values(self, start: int, stop: int) -> Mapping[str, Floats]:
         """Value of each key, in SI, of some cases: (stop - start,) by the key."""
         return {number.key: column[start:stop] for number, column in zip(self.numbers, self.columns, strict=True)}
-
-
-@dataclass(frozen=True, eq=False)
-class Stretch:
-    """Cases `start` to `start + count` of others, as a table."""
-
-    cases: Cases
-    start: int
-    count: int
-    shape: None = None
-
-    @property
-    def numbers(self) -> tuple[Number, ...]:
-        """The keys that vary."""
-        return self.cases.numbers
-
-    def values(self, start: int, stop: int) -> Mapping[str, Floats]:
-        """Value of each key, in SI, of some cases: (stop - start,) by the key."""
-        return self.cases.values(self.start + start, self.start + stop)
 
 
 class TableError(QuestionError):
@@ -256,8 +238,8 @@ def _read(option: str, number: Number, texts: Sequence[str]) -> tuple[Number, tu
         try:
             values.append(number.reader.leaf(whole))
         except InvalidValueError as error:
-            said, accepted, hint, _ = error.problem
-            parts = (f"{option}: {shown(text.strip())!r} {said}", accepted, hint)
+            wrong = error.problem
+            parts = (f"{option}: {shown(text.strip())!r} {wrong.problem}", wrong.accepted, wrong.hint)
             raise QuestionError("; ".join(filter(None, parts))) from None
     return number._replace(unit=_said_in(units[-1], number.dimension)), tuple(values)
 
@@ -286,6 +268,15 @@ def _spread(asked: _Asked, parts: Floats) -> Floats:
 
 def _scale(number: Number) -> tuple[float, float]:
     return number.dimension.scales.get(number.unit) or (1.0, 1.0)
+
+
+def some_of(cases: Cases, count: int) -> Table:
+    """Some cases, spread over all of them in short stretches, that stand for the others."""
+    length = max(1, count // _STRETCHES)
+    starts = [int((place * _GOLDEN + 0.5) % 1 * (cases.count - length)) for place in range(-(-count // length))]
+    found = [cases.values(start, start + length) for start in starts]
+    columns = (np.concatenate([values[number.key] for values in found]) for number in cases.numbers)
+    return Table(cases.numbers, tuple(columns))
 
 
 def in_unit(number: Number, values: Floats) -> Floats:
@@ -388,8 +379,8 @@ def _headed(
             if parts_of(number.key) in seen:
                 raise InvalidValueError("stands twice", "accepted: each key once")
         except InvalidValueError as error:
-            said, accepted, hint, _ = error.problem
-            faults.append(Fault(place, column, shown(cell), said, "", accepted, hint))
+            wrong = error.problem
+            faults.append(Fault(place, column, shown(cell), wrong.problem, "", wrong.accepted, wrong.hint))
         except QuestionError as error:
             faults.append(Fault(place, column, "", str(error)))
         else:

@@ -9,7 +9,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from bisar_budget import units
-from bisar_budget.design.cases import MAX_VALUES, Table, TableError, grid, in_unit, sample, table
+from bisar_budget.design.cases import MAX_VALUES, Table, TableError, grid, in_unit, sample, some_of, table
 from bisar_budget.design.quantities import QuestionError
 from bisar_budget.mission.tree import read_tree
 from bisar_budget.units import parse_quantity
@@ -148,6 +148,18 @@ def test_values_are_said_as_they_were_written(unit: str, value: float, digits: i
     if abs(float(text)) > 1e-9:
         said = in_unit(found.numbers[0], found.axes[0])[0]
         assert parse_quantity(f"{said.item()!r} {unit}", units.ANGLE) == found.axes[0][0]
+
+
+@given(st.integers(1, 300), st.integers(1, 20), st.data())
+def test_some_cases_are_cases_of_all_parts(first: int, second: int, data: st.DataObject) -> None:
+    cases = grid(TREE, [f"{TIME}={','.join(map(str, range(1, first + 1)))}s", f"{AZIMUTH}=0:90deg:{second + 1}"])
+    count = data.draw(st.integers(1, cases.count))
+    found = some_of(cases, count)
+    assert count <= found.count <= count + count // 100
+    assert set(found.columns[0]) <= set(cases.axes[0])
+    assert set(found.columns[1]) <= set(cases.axes[1])
+    if count >= 100:
+        assert np.ptp(found.columns[0]) >= 0.9 * (first - 1) - 1
 
 
 class TestTables:
