@@ -3,14 +3,15 @@
 import os
 import sys
 from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from datetime import date, datetime
-from io import StringIO
 from time import perf_counter
 from typing import TYPE_CHECKING
 
 import click
 
 from bisar_budget import __version__
+from bisar_budget.cli.keeping import Keeping, keeping, progress_bar
 from bisar_budget.cli.streams import (
     FILE,
     SET,
@@ -93,6 +94,18 @@ _PLOTS, _TABLES = (".svg", ".png", ".pdf"), (".csv", ".parquet", ".nc")
     help="Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC).",
 )
 @click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Processes to use (default: number of cores).")
+@click.option(
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Check on the workers of a Dask scheduler, tcp://HOST:PORT, or on local:N processes of its own. Parts are "
+    "kept in the folder FILE.parts of -o FILE, and joined to FILE at the end.",
+)
+@click.option(
+    "--resume",
+    "is_resumed",
+    is_flag=True,
+    help="Go on from the parts in FILE.parts that an earlier run left; without any, keep parts to go on from.",
+)
 @click.option("--force", is_flag=True, help=f"Start also with more than {MAX_CASES} cases.")
 def sweep(
     mission: str,
@@ -108,6 +121,8 @@ def sweep(
     changes: "tuple[SetValue, ...]",
     today: datetime | None,
     jobs: int | None,
+    scheduler: str | None,
+    is_resumed: bool,
     force: bool,
 ) -> None:
     """Check a mission for many values of its numbers: a table with one line for each case.
@@ -123,6 +138,8 @@ def sweep(
     if cases_file is not None and sample is not None:
         raise click.UsageError("--sample draws from the ranges of --vary; --cases has cases of its own.")
     spare([mission, *([cases_file] if cases_file else [])], [output, plot])
+    from bisar_budget.cluster.parts_folder import PartsError
+    from bisar_budget.cluster.scheduler import ClusterError
     from bisar_budget.design.cases import TableError
     from bisar_budget.design.quantities import QuestionError
     from bisar_budget.report.drawing.trades import check_plot
@@ -133,15 +150,19 @@ def sweep(
         cases = _cases(loaded, varied, cases_file, sample)
         if plot is not None:
             check_plot(cases, is_polar=is_polar)
-        run = _Run(loaded, cases, columns, model, today.date() if today else day_of_run(), jobs or cores())
-        run.foresee(force)
-        run.write(output, plot, plot_column, is_polar)
+        day = today.date() if today else day_of_run()
+        with keeping(output, scheduler, is_resumed, jobs or cores()) as kept:
+            run = _Run(loaded, cases, columns, model, day, jobs or cores(), kept)
+            run.foresee(force)
+            run.write(output, plot, plot_column, is_polar)
     except TableError as error:
         for line in error.lines:
             complain(line)
         sys.exit(2)
     except (QuestionError, MissingTablesError) as error:
         fail(f"{mission}: {error}")
+    except (PartsError, ClusterError) as error:
+        fail(str(error))
 
 
 def _usable(output: str | None, plot: str | None, plot_column: str | None, is_polar: bool) -> None:
@@ -175,10 +196,17 @@ class _Run:
     """One sweep on its way to a table and a plot; counts what it finds."""
 
     def __init__(
-        self, mission: "Mission", cases: "Cases", columns: Sequence[str], model: str | None, day: date, jobs: int
+        self,
+        mission: "Mission",
+        cases: "Cases",
+        columns: Sequence[str],
+        model: str | None,
+        day: date,
+        jobs: int,
+        kept: Keeping | None = None,
     ) -> None:
         self.mission, self.cases, self.columns, self.model = mission, cases, columns, model
-        self.day, self.jobs = day, jobs
+        self.day, self.jobs, self.kept = day, jobs, kept
         self.done = self.by_case = self.complying = self.missing = 0
 
     def swept(self, cases: "Cases", columns: Sequence[str]) -> "Swept":
@@ -212,7 +240,8 @@ class _Run:
             alone = sum(part.by_case for part in parts)
             seconds = perf_counter() - began
             if is_warm and (seconds > _TRIAL or 10 * tried > self.cases.count):
-                sharing = min(self.jobs, cores()) if alone > tried / 2 else 1  # processes: arrays are faster alone
+                threads = self.kept.threads if self.kept and self.kept.workers else min(self.jobs, cores())
+                sharing = threads if alone > tried / 2 else 1  # processes: arrays are faster alone
                 return seconds * self.cases.count / tried / sharing
             tried, is_warm = tried * (10 if is_warm else 1), True  # the first one imports what it needs
 
@@ -226,26 +255,32 @@ class _Run:
         columns = self.columns
         if plot_column is not None and "." in plot_column and plot_column not in columns:
             columns = (*columns, plot_column)
-        swept = self.swept(self.cases, columns)
-        described = Described(swept, self.cases, self.mission, __version__)
         gathered = None
-        if plot is not None:
-            from bisar_budget.report.drawing.trades import Gathered
+        with self._kept(columns) as swept:
+            described = Described(swept, self.cases, self.mission, __version__)
+            if plot is not None:
+                from bisar_budget.report.drawing.trades import Gathered
 
-            gathered = Gathered(described, column=plot_column)
-        with _progress_bar(self.cases.count) as bar:
-            parts = self._counted(swept.parts, bar, gathered)
-            if writer is not None:
-                with replacing(str(output)) as name:
-                    writer.write(described, parts, name)
-            elif output is None and plot is not None:
-                for _ in parts:
-                    pass
-            else:
-                deliver_parts(texts(described, parts), "csv")
+                gathered = Gathered(described, column=plot_column)
+            with progress_bar(self.cases.count, "Writing" if self.kept else "Checking cases") as bar:
+                parts = self._counted(swept.parts, bar, gathered)
+                if writer is not None:
+                    with replacing(str(output)) as name:
+                        writer.write(described, parts, name)
+                elif output is None and plot is not None:
+                    for _ in parts:
+                        pass
+                else:
+                    deliver_parts(texts(described, parts), "csv")
         if plot is not None and gathered is not None:
             self._draw(plot, gathered, is_polar)
         complain(self._summary())
+
+    def _kept(self, columns: Sequence[str]) -> "AbstractContextManager[Swept]":
+        """The sweep, with its parts kept where that is asked for."""
+        if self.kept is None:
+            return nullcontext(self.swept(self.cases, columns))
+        return self.kept.swept(self.mission, self.cases, columns, self.model, self.day)
 
     def _counted(
         self, parts: "Iterator[Part]", bar: "ProgressBar[int]", gathered: "Gathered | None"
@@ -312,9 +347,3 @@ def _lasting(seconds: float) -> str:
         if seconds >= 2 * size:
             return f"{seconds / size:.0f} {unit}"
     return f"{max(seconds, 1):.0f} s"
-
-
-def _progress_bar(total: int) -> "ProgressBar[int]":
-    """Bar with the time left on standard error, where somebody watches."""
-    watched = sys.stderr is not None and sys.stderr.isatty()
-    return click.progressbar(length=total, label="Checking cases", file=sys.stderr if watched else StringIO())

@@ -213,8 +213,8 @@ class Chunks(NamedTuple):
         return range(self.first, self.end, self.size)
 
     def stop(self, start: int) -> int:
-        """End of the chunk that begins at a case."""
-        return min(start + self.size, self.end)
+        """End of the chunk that begins at a case; of the cases before all chunks too."""
+        return min(start + self.size, self.end) if start else self.first
 
 
 def _parts(asked: Asked, jobs: int) -> Iterator[Part]:

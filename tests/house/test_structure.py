@@ -27,6 +27,7 @@ FLOORS = [
     {"verify"},
     {"formats"},
     {"design"},
+    {"cluster"},
     {"report"},
     {"cli"},
     {"__main__"},

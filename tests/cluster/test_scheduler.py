@@ -1,0 +1,295 @@
+"""A sweep on the workers of a scheduler: the bytes of one without, whoever is lost, and clear words otherwise."""
+
+import http.server
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+
+import pytest
+
+pytest.importorskip("distributed")
+pytest.importorskip("pyarrow")
+
+from bisar_budget import __version__
+from bisar_budget.cluster import scheduler
+from bisar_budget.cluster.scheduler import ClusterError, UnlikeWorkerError, Workers
+from bisar_budget.design.sweep import Chunks
+from tests.conftest import ROOT, heed_signals
+
+SPOTLIGHT = str(ROOT / "specs" / "missions" / "one_stationary_spotlight.yaml")
+AZIMUTH, TIME = "platforms.receiver.azimuth", "collection.aperture_time"
+# Each case is checked by itself, so that a part takes a third of a second: 8 parts.
+ASKED = (
+    "sweep",
+    SPOTLIGHT,
+    "--vary",
+    f"{AZIMUTH}=100:128deg:32",
+    "--vary",
+    f"{TIME}=1:2s:16",
+    "--date",
+    "2026-01-01",
+)
+PARTS = 8
+
+
+class Cluster(NamedTuple):
+    """A scheduler and its workers, as processes."""
+
+    address: str
+    start_worker: Callable[..., "subprocess.Popen[bytes]"]
+    workers: list["subprocess.Popen[bytes]"]
+
+
+def free_port() -> int:
+    with socket.socket() as found:
+        found.bind(("127.0.0.1", 0))
+        port: int = found.getsockname()[1]
+    return port
+
+
+def wait_until(is_so: Callable[[], object], seconds: float = 60) -> None:
+    deadline = time.monotonic() + seconds
+    while not is_so():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
+    folder = tmp_path_factory.mktemp("cluster")
+    log = (folder / "log").open("wb")
+    address = f"tcp://127.0.0.1:{free_port()}"
+    started: list[subprocess.Popen[bytes]] = []
+
+    def start(*line: str, path: str = "") -> "subprocess.Popen[bytes]":
+        environment = {
+            **os.environ,
+            "PYTHONPATH": os.pathsep.join(filter(None, (path, str(ROOT)))),
+            "OMP_NUM_THREADS": "1",
+        }
+        command = [sys.executable, "-W", "ignore", "-m", *line]
+        started.append(subprocess.Popen(command, env=environment, cwd=folder, stdout=log, stderr=log))
+        return started[-1]
+
+    def start_worker(path: str = "") -> "subprocess.Popen[bytes]":
+        options = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory", str(folder))
+        return start("distributed.cli.dask_worker", address, *options, path=path)
+
+    port = address.rpartition(":")[2]
+    start("distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard")
+    try:
+        workers = [start_worker(), start_worker()]
+        wait_until(lambda: (folder / "log").read_bytes().count(b"Starting established connection") >= 2)
+        yield Cluster(address, start_worker, workers)
+    finally:
+        for process in reversed(started):
+            process.kill()
+            process.wait()
+        log.close()
+
+
+@pytest.fixture(scope="module")
+def expected(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """The table without a scheduler."""
+    output = tmp_path_factory.mktemp("expected") / "t.csv"
+    with command("-o", str(output), "--jobs", "1") as process:
+        assert process.wait(timeout=120) == 0
+    return output.read_bytes()
+
+
+def command(*arguments: str) -> "subprocess.Popen[bytes]":
+    line = [sys.executable, "-m", "bisar_budget", *ASKED, *arguments]
+    return subprocess.Popen(line, cwd=ROOT, stderr=subprocess.PIPE, preexec_fn=heed_signals)
+
+
+def kept(output: Path) -> int:
+    """Parts that are kept."""
+    return len(list(Path(f"{output}.parts").glob("part-*")))
+
+
+def ended(process: "subprocess.Popen[bytes]") -> tuple[int, str]:
+    _, said = process.communicate(timeout=120)
+    return process.returncode, said.decode()
+
+
+def test_a_lost_worker_costs_only_its_chunks(cluster: Cluster, expected: bytes, tmp_path: Path) -> None:
+    output = tmp_path / "t.csv"
+    with command("-o", str(output), "--scheduler", cluster.address) as process:
+        wait_until(lambda: kept(output) >= 3)
+        cluster.workers.pop().kill()
+        assert kept(output) < PARTS - 1  # it had chunks
+        assert ended(process)[0] == 0
+    assert output.read_bytes() == expected
+    assert list(tmp_path.iterdir()) == [output]
+    cluster.workers.append(cluster.start_worker())
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_what_is_done_when_a_sweep_is_ended_is_not_done_again(
+    cluster: Cluster, expected: bytes, tmp_path: Path, number: int
+) -> None:
+    output = tmp_path / "t.csv"
+    with command("-o", str(output), "--scheduler", cluster.address) as process:
+        wait_until(lambda: kept(output) >= 2)
+        process.send_signal(number)
+        code, said = ended(process)
+    done = kept(output)
+    assert 2 <= done < PARTS
+    assert not output.exists()
+    if number != signal.SIGKILL:
+        assert code == 128 + number
+        assert said.strip().splitlines() == [
+            f"{output}.parts keeps {done} of 8 parts; the same command with --resume goes on from there."
+        ]
+    # On the workers again, or without them.
+    where = () if number == signal.SIGKILL else ("--scheduler", cluster.address)
+    with command("-o", str(output), "--resume", *where) as process:
+        code, said = ended(process)
+    assert code == 0
+    assert said.startswith(f"{output}.parts has {done} of 8 parts.\n")
+    assert output.read_bytes() == expected
+    assert list(tmp_path.iterdir()) == [output]
+
+
+def test_processes_of_its_own(run, tmp_path: Path) -> None:
+    """Of a grid in NetCDF, whose parts are not whole rows of it."""
+    few = ("sweep", SPOTLIGHT, "--vary", f"{AZIMUTH}=100:128deg:10", "--vary", f"{TIME}=1:2s:9")
+    assert run(*few, "-o", str(tmp_path / "a.nc")).exit_code == 0
+    line = [sys.executable, "-m", "bisar_budget", *few, "-o", str(tmp_path / "b.nc"), "--scheduler", "local:1"]
+    done = subprocess.run(line, cwd=ROOT, capture_output=True, check=True)
+    assert len(done.stderr.splitlines()) == 1
+    assert (tmp_path / "a.nc").read_bytes() == (tmp_path / "b.nc").read_bytes()
+
+
+def test_a_worker_of_another_version_is_refused(cluster: Cluster, tmp_path: Path) -> None:
+    (tmp_path / "bisar_budget").mkdir()
+    (tmp_path / "bisar_budget" / "__init__.py").write_text('__version__ = "0.0.1"\n')
+    other = cluster.start_worker(path=str(tmp_path))
+    try:
+        said = ""
+        deadline = time.monotonic() + 60
+        while "0.0.1" not in said:  # until it is there
+            assert time.monotonic() < deadline
+            with command("-o", str(tmp_path / "t.csv"), "--scheduler", cluster.address) as process:
+                wait_until(lambda: process.poll() is not None or kept(tmp_path / "t.csv"))
+                process.send_signal(signal.SIGINT)
+                code, said = ended(process)
+        assert code == 2
+        assert f"has bisar-budget 0.0.1; accepted: {__version__}, as here" in said
+    finally:
+        other.kill()
+
+
+@pytest.mark.parametrize(
+    ("address", "said"),
+    [
+        ("tcp://127.0.0.1:{closed}", "cannot be reached: Connection refused"),
+        ("tcp://127.0.0.1:{web}", "cannot be reached: "),
+        ("tcp://127.0.0.1", "is no scheduler; accepted: tcp://HOST:PORT, tls://HOST:PORT, or local:N"),
+        ("local:0", "is no scheduler; accepted: "),
+        ("127.0.0.1:8786", "is no scheduler; accepted: "),
+    ],
+)
+def test_an_address_that_leads_to_no_scheduler(tmp_path: Path, address: str, said: str) -> None:
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), http.server.BaseHTTPRequestHandler) as web:
+        threading.Thread(target=web.serve_forever, daemon=True).start()
+        address = address.format(closed=free_port(), web=web.server_port)
+        began = time.monotonic()
+        with command("-o", str(tmp_path / "t.csv"), "--scheduler", address) as process:
+            code, message = ended(process)
+        web.shutdown()
+    assert code == 2
+    assert message.startswith(f"Error: --scheduler {address}: {said}")
+    assert len(message.splitlines()) == 1
+    assert time.monotonic() - began < 20
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_scheduler_needs_a_file_and_its_library(run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = run(*ASKED, "--scheduler", "local:2")
+    assert found.exit_code == 2
+    assert "--scheduler and --resume need -o FILE" in found.stderr
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    found = run(*ASKED, "--scheduler", "local:2", "-o", str(tmp_path / "t.csv"))
+    assert found.exit_code == 2
+    assert "pip install 'bisar-budget[cluster]'" in found.stderr
+
+
+class Future:
+    """One of a chunk that failed, as Dask's are."""
+
+    key, status = "chunk", "error"
+
+    def __init__(self, error: BaseException) -> None:
+        self.error = error
+
+    def exception(self) -> BaseException:
+        return self.error
+
+    def add_done_callback(self, tell: Callable[[Any], None]) -> None:
+        tell(self)
+
+
+class Client:
+    """A client of two workers, whose chunks fail."""
+
+    def __init__(self, error: BaseException) -> None:
+        self.error = error
+
+    def nthreads(self) -> dict[str, int]:
+        return {"tcp://a:1": 1, "tcp://b:1": 2}
+
+    def submit(self, *arguments: Any, **options: Any) -> Future:
+        return Future(self.error)
+
+    def gather(self, futures: list[Future]) -> None:
+        raise futures[0].error
+
+    def cancel(self, futures: list[Future]) -> None:
+        self.is_cancelled = True
+
+
+@pytest.mark.parametrize(
+    ("error", "kind", "said"),
+    [
+        (ValueError("a matrix\nis singular"), RuntimeError, "^cases 64 to 127, on a worker: ValueError: a matrix$"),
+        (ModuleNotFoundError("No module named 'x'"), ClusterError, "on a worker: ModuleNotFoundError: No module"),
+        (UnlikeWorkerError(("tcp://c:1", "9.9")), ClusterError, "worker tcp://c:1 has bisar-budget 9.9; accepted: "),
+        (UnlikeWorkerError("worker w cannot use"), ClusterError, "^cases 64 to 127: worker w cannot use$"),
+    ],
+)
+def test_what_a_worker_raises_is_said_once(error: BaseException, kind: type[Exception], said: str) -> None:
+    client = Client(error)
+    workers = Workers(client, "tcp://a:0", pytest.fail)
+    assert workers.threads == 3
+    asked: Any = SimpleNamespace(question=None, sent=lambda chunks, start: (start, start + 64, {}))
+    with pytest.raises(kind, match=said):
+        list(workers.shared_out(asked, Chunks(64, 1000, 64, True), [64], "mark"))
+    assert client.is_cancelled
+
+
+def test_what_ended_every_worker_that_had_it_is_said() -> None:
+    from distributed.scheduler import KilledWorker
+
+    error = KilledWorker("chunk", SimpleNamespace(address="tcp://b:1"), 3)
+    workers = Workers(Client(error), "tcp://a:0", pytest.fail)
+    asked: Any = SimpleNamespace(question=None, sent=lambda chunks, start: (start, start + 64, {}))
+    with pytest.raises(ClusterError, match=r"^cases 64 to 99 ended 4 workers, the last of them tcp://b:1, as when"):
+        list(workers.shared_out(asked, Chunks(64, 100, 64, True), [64], "mark"))
+
+
+def test_that_nobody_works_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    client = Client(ValueError())
+    monkeypatch.setattr(client, "nthreads", dict)
+    told: list[str] = []
+    workers = Workers(client, "tcp://a:0", told.append)
+    assert workers._look() == workers._look() == scheduler._LEAST_AHEAD
+    assert told == ["tcp://a:0 has no worker; waiting for one."]
