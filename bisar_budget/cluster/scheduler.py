@@ -67,7 +67,8 @@ def connected(address: str, tell: Callable[[str], None]) -> "Iterator[Workers]":
     check_address(address)
     from distributed import Client, LocalCluster
 
-    logging.getLogger("distributed").setLevel(logging.CRITICAL + 1)  # what matters of it is said here
+    for name in ("distributed", "tornado"):  # what matters of it is said here
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     cluster = None
     try:
         if not _LOCAL.fullmatch(address):

@@ -1,0 +1,181 @@
+"""Parts that are kept: what is read is what was written, and parts of two sweeps are never mixed."""
+
+import json
+import math
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("pyarrow")
+
+from bisar_budget.cluster.parts_folder import PartsError, PartsFolder
+from bisar_budget.design.sweep import Asked
+from bisar_budget.design.swept import Part
+from tests.conftest import ROOT
+
+SECTION_V = str(ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml")
+TIME = "collection.aperture_time"
+# 64 cases, then 8192, 8192 and the rest: the arrays hold them.
+ASKED = ("--vary", f"{TIME}=1:2s:17000", "--date", "2026-01-01")
+
+
+def test_a_part_is_read_as_it_was_written(tmp_path: Path) -> None:
+    """NaN, infinities, the sign of zero, texts that are empty or not ASCII."""
+    values: dict[str, Any] = {
+        "a": np.array([math.nan, math.inf, -math.inf, -0.0, 5e-324]),
+        "b": np.array(["", "µ", "", 'a "b",\n', "µ"], object),
+        "c": np.array([""] * 5, object),
+    }
+    folder = PartsFolder(str(tmp_path / "p"), {"a": 1}, is_resumed=False)
+    folder.put(Part(10, 15, values, 3))
+    (part,) = folder.parts([10])
+    assert (part.start, part.stop, part.by_case, list(part.values)) == (10, 15, 3, ["a", "b", "c"])
+    assert np.asarray(part.values["a"], float).tobytes() == values["a"].tobytes()
+    assert part.values["b"].dtype == part.values["c"].dtype == object
+    assert part.values["b"].tolist() == values["b"].tolist()
+    assert part.values["c"].tolist() == values["c"].tolist()
+
+
+def test_only_whole_parts_of_the_sweep_are_there(tmp_path: Path) -> None:
+    def part(start: int, stop: int) -> Part:
+        return Part(start, stop, {"a": np.zeros(stop - start)}, 0)
+
+    folder = PartsFolder(str(tmp_path), {"a": 1}, is_resumed=False)
+    for start in (0, 10, 20, 30):
+        folder.put(part(start, start + 10))
+    files = sorted(tmp_path.glob("part-*"))
+    files[1].write_bytes(files[1].read_bytes()[:-9])  # a machine stopped
+    folder.put(part(20, 25))  # not to where it should
+    other = PartsFolder(str(tmp_path / "other"), {"a": 2}, is_resumed=False)
+    other.put(part(30, 40))
+    os.replace(tmp_path / "other" / files[3].name, files[3])
+    again = PartsFolder(str(tmp_path), {"a": 1}, is_resumed=True)
+    again.find(range(0, 60, 10), lambda start: start + 10)
+    assert again.done == {0}
+    with pytest.raises(PartsError, match=r"part-000000000010.parquet cannot be read"):
+        list(again.parts([0, 10]))
+
+
+def test_what_somebody_else_put_there_stays(tmp_path: Path) -> None:
+    folder = PartsFolder(str(tmp_path / "p"), {"a": 1}, is_resumed=False)
+    (tmp_path / "p" / "notes.txt").write_text("mine")
+    folder.remove()
+    assert [file.name for file in (tmp_path / "p").iterdir()] == ["notes.txt"]
+    (tmp_path / "p" / "notes.txt").unlink()
+    folder.remove()
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.fixture
+def ended(run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Path]]:
+    """Start a sweep, with these arguments, that is interrupted after two of four parts."""
+    shared_out = Asked.shared_out
+
+    def broken(self: Asked, *arguments: Any) -> Iterator[Part]:
+        yield next(shared_out(self, *arguments))
+        raise KeyboardInterrupt
+
+    def end(*arguments: str, mission: str = SECTION_V, dated: str = "") -> Path:
+        output = tmp_path / "t.csv"
+        with monkeypatch.context() as patched:
+            patched.setattr(Asked, "shared_out", broken)
+            found = run("sweep", mission, *ASKED, *arguments, "-o", str(output), "--resume")
+        assert found.exit_code == 130
+        assert (
+            f"{output}.parts keeps 2 of 4 parts; the same command with --resume{dated} goes on from there."
+            in found.stderr
+        )
+        assert not output.exists()
+        return output
+
+    return end
+
+
+def test_a_sweep_goes_on_with_what_is_not_done(run, ended, monkeypatch: pytest.MonkeyPatch) -> None:
+    output = ended()
+    shared_out = Asked.shared_out
+    left: list[int] = []
+
+    def watched(self: Asked, chunks: Any, starts: Any, jobs: int) -> Iterator[Part]:
+        left.extend(starts)
+        return shared_out(self, chunks, starts, jobs)
+
+    monkeypatch.setattr(Asked, "shared_out", watched)
+    found = run("sweep", SECTION_V, *ASKED, "-o", str(output), "--resume")
+    assert found.exit_code == 0
+    assert found.stderr.splitlines()[0] == f"{output}.parts has 2 of 4 parts."
+    assert left == [64 + 8192, 64 + 2 * 8192]
+    assert run("sweep", SECTION_V, *ASKED, "-o", f"{output}.plain.csv").exit_code == 0
+    assert output.read_bytes() == Path(f"{output}.plain.csv").read_bytes()
+    assert not os.path.exists(f"{output}.parts")
+
+
+def test_parts_are_not_lost_by_starting_anew(run, ended) -> None:
+    output = ended()
+    before = sorted(os.listdir(f"{output}.parts"))
+    found = run("sweep", SECTION_V, *ASKED, "-o", str(output), "--scheduler", "local:1")
+    assert found.exit_code == 2
+    assert "has parts of a sweep that was not finished; accepted: --resume" in found.stderr
+    assert sorted(os.listdir(f"{output}.parts")) == before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--set", "radar.bandwidth=150MHz"), "--set was not there, and now --set radar.bandwidth=150MHz"),
+        (("--model", "full"), "the model that decides was published, and now full"),
+        (("--column", "receiver.velocity.x.margin"), "the columns were collection.aperture_time, range_resolution"),
+        (("--vary", f"{TIME}=1:3s:17000"), "the cases are others of the same names"),
+        (("--vary", "radar.bandwidth=100,200 MHz"), f"was 17000 of {TIME}, and now 34000 of {TIME}, radar.bandwidth"),
+    ],
+)
+def test_parts_of_another_sweep_are_refused(run, ended, arguments: tuple[str, ...], said: str) -> None:
+    output = ended()
+    asked = ASKED[2:] if TIME in str(arguments) else ASKED
+    found = run("sweep", SECTION_V, *asked, *arguments, "-o", str(output), "--resume")
+    assert found.exit_code == 2
+    assert found.stderr.startswith(f"Error: {output}.parts is of another sweep: ")
+    assert said.replace("was 17000", "the cases were 17000") in found.stderr
+    assert not output.exists()
+
+
+def test_parts_of_another_mission_version_or_form_are_refused(run, ended, tmp_path: Path) -> None:
+    mission = tmp_path / "m.yaml"
+    text = Path(SECTION_V).read_text(encoding="utf-8")
+    mission.write_text(text, encoding="utf-8")
+    output = ended(mission=str(mission))
+    again = ("sweep", str(mission), *ASKED, "-o", str(output), "--resume")
+    mission.write_text(text.replace("300 MHz", "150 MHz"), encoding="utf-8")
+    assert "another sweep: the hash of the mission file was " in run(*again).stderr
+    mission.write_text(text, encoding="utf-8")
+    file = tmp_path / "t.csv.parts" / "manifest.json"
+    manifest = json.loads(file.read_text())
+    file.write_text(json.dumps({**manifest, "version": "0.0.1"}))
+    assert "another sweep: the version of bisar-budget was 0.0.1, and now " in run(*again).stderr
+    for broken in ("", "[1]", "{"):
+        file.write_text(broken)
+        assert "is no manifest of parts" in run(*again).stderr
+    file.write_text(json.dumps(manifest))
+    assert run(*again).exit_code == 0
+
+
+def test_the_day_matters_where_there_are_waivers(run, ended, tmp_path: Path) -> None:
+    """Whoever goes on tomorrow is told which day the parts are of."""
+    mission = tmp_path / "m.yaml"
+    text = Path(SECTION_V).read_text(encoding="utf-8")
+    waiver = "waivers:\n  - {id: 'transmitter.*', until: 2026-06-30, reason: tested}\n"
+    mission.write_text(f"{text}\n{waiver}", encoding="utf-8")
+    output = ended(mission=str(mission), dated=" --date 2026-01-01")
+    found = run("sweep", str(mission), *ASKED[:2], "--date", "2026-01-02", "-o", str(output), "--resume")
+    assert "another sweep: --date was 2026-01-01, and now 2026-01-02" in found.stderr
+    assert run("sweep", str(mission), *ASKED, "-o", str(output), "--resume").exit_code == 0
+
+
+def test_a_day_without_waivers_does_not_matter(run, ended) -> None:
+    output = ended()
+    found = run("sweep", SECTION_V, *ASKED[:2], "--date", "2026-01-02", "-o", str(output), "--resume")
+    assert found.exit_code == 0

@@ -1,0 +1,61 @@
+"""What a mission names travels with it: a worker elsewhere reads the same mission without any of its files."""
+
+import shutil
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bisar_budget.design.cases import grid
+from bisar_budget.design.quantities import tree_of
+from bisar_budget.design.sweep import Asked, Question, part_of
+from bisar_budget.mission.load import load_mission
+from bisar_budget.mission.named import named_by
+from tests.conftest import ROOT
+
+MISSIONS = ROOT / "specs" / "missions"
+
+
+@pytest.fixture
+def missions(tmp_path: Path) -> Path:
+    shutil.copytree(MISSIONS, tmp_path / "missions")
+    return tmp_path / "missions"
+
+
+@pytest.mark.parametrize(
+    ("name", "paths", "parts"),
+    [
+        ("sentinel1_aircraft_log", 2, 0),
+        ("uav_stim300", 0, 2),
+        ("rigling_moses_section_v", 0, 0),
+    ],
+)
+def test_cases_are_checked_without_the_files(missions: Path, name: str, paths: int, parts: int) -> None:
+    text = (missions / f"{name}.yaml").read_text(encoding="utf-8")
+    if parts:  # a part of the project's own
+        shutil.copy(ROOT / "specs" / "sensors" / "stim300.yaml", missions / "own.yaml")
+        text = text.replace("sensor: [stim300,", "sensor: [own.yaml,")
+        assert "own.yaml" in text
+        (missions / f"{name}.yaml").write_text(text, encoding="utf-8")
+    mission, named = named_by(load_mission(str(missions / f"{name}.yaml")))
+    assert (len(named.paths), len({of for of, _, _ in named.parts})) == (paths, parts)
+    assert bool(named.sha256) == bool(paths or parts)
+    cases = grid(tree_of(mission), ["radar.bandwidth=50,100 MHz"])
+    asked = Asked(mission, cases, today=date(2026, 1, 1), named=named)
+    here = asked.probe()
+    shutil.rmtree(missions)
+    # As another process has it: equal, but nothing that this one has read is kept for it.
+    there = part_of(Question(*asked.question[:-1], named._replace()), 0, 2, cases.values(0, 2))
+    assert "error" not in here.values["status"]
+    for column, values in here.values.items():
+        np.testing.assert_array_equal(there.values[column], values)
+
+
+def test_the_hash_is_of_every_name_and_content(missions: Path) -> None:
+    file = missions / "sentinel1_aircraft_log.yaml"
+    before = named_by(load_mission(str(file)))[1]
+    assert named_by(load_mission(str(file)))[1].sha256 == before.sha256
+    log = next(missions.glob("paths/*.csv"))
+    log.write_bytes(log.read_bytes() + b"\n")
+    assert named_by(load_mission(str(file)))[1].sha256 != before.sha256
