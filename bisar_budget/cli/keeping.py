@@ -58,7 +58,8 @@ class Keeping(NamedTuple):
         try:
             if self.is_resumed:
                 folder.find(starts, chunks.stop)
-                complain(f"{folder.path} has {len(folder.done)} of {len(starts)} parts.")
+                if folder.done:
+                    complain(f"{folder.path} has {len(folder.done)} of {len(starts)} parts.")
             with progress_bar(cases.count, "Checking cases") as bar:
                 bar.update(sum(chunks.stop(start) - start for start in folder.done))
                 if 0 not in folder.done:

@@ -11,7 +11,7 @@ import pydoc
 import re
 import socket
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from queue import Empty, SimpleQueue
 from time import monotonic
 from typing import Any
@@ -65,37 +65,52 @@ def connected(address: str, tell: Callable[[str], None]) -> "Iterator[Workers]":
         The scheduler cannot be reached, or a worker has another version of bisar-budget.
     """
     check_address(address)
-    from distributed import Client, LocalCluster
-
-    for name in ("distributed", "tornado"):  # what matters of it is said here
-        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
-    cluster = None
-    try:
-        if not _LOCAL.fullmatch(address):
-            _greet(address)
-        if match := _LOCAL.fullmatch(address):
-            cluster = LocalCluster(
-                n_workers=int(match[1]),
-                threads_per_worker=1,
-                dashboard_address=None,
-                silence_logs=logging.CRITICAL + 1,
-            )
-        client = Client(cluster or address, timeout=_PATIENCE, set_as_default=False)
-    except Exception as error:
-        if cluster is not None:
-            cluster.close()
-        said = f"no answer within {_PATIENCE:g} s" if isinstance(error, TimeoutError) else _first_line(error)
-        raise ClusterError(f"--scheduler {address}: cannot be reached: {said}") from None
-    try:
+    with _silence(), ExitStack() as ends:
+        try:
+            client = _client(address, ends)
+        except Exception as error:
+            said = f"no answer within {_PATIENCE:g} s" if isinstance(error, TimeoutError) else _first_line(error)
+            raise ClusterError(f"--scheduler {address}: cannot be reached: {said}") from None
         workers = Workers(client, address, tell)
         workers.check_versions()
         yield workers
+
+
+def _client(address: str, ends: ExitStack) -> Any:
+    """Connect; `ends` closes what is opened here."""
+    from distributed import Client, LocalCluster
+
+    cluster = None
+    if match := _LOCAL.fullmatch(address):
+        cluster = LocalCluster(
+            n_workers=int(match[1]),
+            threads_per_worker=1,
+            dashboard_address=None,
+            silence_logs=logging.CRITICAL + 1,
+            preload=["bisar_budget.cluster.local_worker"],
+        )
+        ends.callback(_close, cluster, 10)
+    else:
+        _greet(address)
+    client = Client(cluster or address, timeout=_PATIENCE, set_as_default=False)
+    ends.callback(_close, client, 2)
+    return client
+
+
+def _close(opened: Any, seconds: float) -> None:
+    with suppress(Exception):  # what is left of it ends with this process
+        opened.close(timeout=seconds)
+
+
+@contextmanager
+def _silence() -> Iterator[None]:
+    """Keep what Dask logs to oneself: what matters of it is said here."""
+    before = logging.root.manager.disable
+    logging.disable(logging.CRITICAL)
+    try:
+        yield
     finally:
-        with suppress(Exception):
-            client.close(timeout=2)
-        if cluster is not None:
-            with suppress(Exception):
-                cluster.close(timeout=10)
+        logging.disable(before)
 
 
 def _greet(address: str) -> None:

@@ -23,7 +23,6 @@ from bisar_budget.cluster.scheduler import ClusterError, UnlikeWorkerError, Work
 from bisar_budget.design.sweep import Chunks
 from tests.conftest import ROOT, heed_signals
 
-SECTION_V = str(ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml")
 SPOTLIGHT = str(ROOT / "specs" / "missions" / "one_stationary_spotlight.yaml")
 AZIMUTH, TIME = "platforms.receiver.azimuth", "collection.aperture_time"
 # Each case is checked by itself, so that a part takes a third of a second.
@@ -170,12 +169,22 @@ def test_what_is_done_when_a_sweep_is_ended_is_not_done_again(
 
 
 def test_processes_of_its_own(run, tmp_path: Path) -> None:
-    """Of a grid in NetCDF, whose parts are not whole rows of it."""
-    few = ("sweep", SECTION_V, "--vary", f"{AZIMUTH}=40:50deg:10", "--vary", f"{TIME}=1:2s:9")
+    """Of a grid in NetCDF, whose parts are not whole rows of it. Ctrl-C, which they get too, is not their affair."""
+    few = ("sweep", SPOTLIGHT, "--vary", f"{AZIMUTH}=100:128deg:10", "--vary", f"{TIME}=1:2s:20")
     assert run(*few, "-o", str(tmp_path / "a.nc")).exit_code == 0
     line = [sys.executable, "-m", "bisar_budget", *few, "-o", str(tmp_path / "b.nc"), "--scheduler", "local:1"]
-    done = subprocess.run(line, cwd=ROOT, capture_output=True, check=True)
-    assert len(done.stderr.splitlines()) == 1
+    options: dict[str, Any] = {"cwd": ROOT, "stderr": subprocess.PIPE, "preexec_fn": heed_signals}
+    with subprocess.Popen(line, start_new_session=True, **options) as process:
+        wait_until(lambda: kept(tmp_path / "b.nc") >= 2)
+        os.killpg(process.pid, signal.SIGINT)
+        code, said = ended(process)
+    assert code == 130
+    assert len(said.strip().splitlines()) == 1
+    assert "parts; the same command with --resume goes on from there." in said
+    with subprocess.Popen([*line, "--resume"], **options) as process:
+        code, said = ended(process)
+    assert code == 0
+    assert len(said.splitlines()) == 2
     assert (tmp_path / "a.nc").read_bytes() == (tmp_path / "b.nc").read_bytes()
 
 
