@@ -44,6 +44,4 @@ class Grid(NamedTuple):
     def values(self, start: int, stop: int) -> Mapping[str, Floats]:
         """Value of each key, in SI, of some cases: (stop - start,) by the key."""
         places = np.unravel_index(np.arange(start, stop), self.shape)
-        return {
-            number.key: axis[place] for number, axis, place in zip(self.numbers, self.axes, places, strict=True)
-        }
+        return {number.key: axis[place] for number, axis, place in zip(self.numbers, self.axes, places, strict=True)}
