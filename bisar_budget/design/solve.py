@@ -14,10 +14,9 @@ from bisar_budget.budget.check import check_mission
 from bisar_budget.design.quantities import FACTOR, Number, QuestionError, Range, number_of, range_of
 from bisar_budget.design.scaled import scaled
 from bisar_budget.design.solution import Crossing, Solution, State
-from bisar_budget.design.variation import Variation, deciding_row, hold_to_decisions
+from bisar_budget.design.variation import Variation, breaking, hold_to_decisions, standing
 from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.findings.mission import MissionFindings
-from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.model import Mission
 
 PLACES = 65  # of a range
@@ -100,7 +99,7 @@ def solve(
         is_constant=len({(state.row, state.utilization) for state in missions}) == 1,
         skipped=sum(bool(state.reason) for state in scanned),
         changes=mission.changes,
-        **question.texts(crossings, nearest),
+        texts=question.texts(crossings, nearest),
     )
 
 
@@ -126,7 +125,7 @@ class _Question:
         today: date,
     ) -> None:
         self.variation, self.key, self.row, self.today = Variation(mission, model), key, row, today
-        self.breaks = {name for name, one in STATUS.items() if (one.fails if target == "fail" else one.fails_strict)}
+        self.breaks = breaking(target)
         self.is_scale = is_scale
         self.base = self.variation.read()
         if is_scale:
@@ -167,20 +166,8 @@ class _Question:
             return State(value, complies=False, status="error", reason=f"{fault.key}: {fault.problem}")
 
     def _state(self, value: float, found: MissionFindings) -> State:
-        rows = [row for row in found.rows if self.row is None or row.id == self.row]
-        status = found.status if self.row is None else rows[0].status if rows else "not_evaluated"
-        complies = status not in self.breaks
-        worst = deciding_row(rows, self.breaks, complies)
-        return State(
-            value,
-            complies,
-            status,
-            None if worst is None else worst.id,
-            None if worst is None else worst.binding_requirement or worst.metric,
-            None if worst is None else worst.utilization,
-            found.resolution.range,
-            found.resolution.cross_range,
-        )
+        resolution = found.resolution
+        return State(value, *standing(found, self.row, self.breaks), resolution.range, resolution.cross_range)
 
     def crossing(self, low: State, high: State) -> Crossing:
         """Bracket the border between two places, write both sides with few digits, check them as they are written."""
@@ -211,12 +198,12 @@ class _Question:
             fault = error.faults[0]
             return State(value, complies=False, status="error", reason=f"{fault.key}: {fault.problem}")
 
-    def texts(self, crossings: Sequence[Crossing], nearest: State) -> dict[str, dict[float, str]]:
+    def texts(self, crossings: Sequence[Crossing], nearest: State) -> dict[float, str]:
         """Every value that is said, as the file would have it."""
         values = [self.range.low, self.range.high, nearest.value]
         values += [state.value for crossing in crossings for state in (crossing.inside, crossing.outside)]
         values += [] if self.number.value is None else [self.number.value]
-        return {"texts": {value: self.number.text(value) for value in values}}
+        return {value: self.number.text(value) for value in values}
 
 
 def _scan(evaluate: Evaluate, places: Sequence[float]) -> list[State]:

@@ -1,7 +1,7 @@
 """The mission of a file with other values, and the row that decides how it stands."""
 
 from collections.abc import Container, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from bisar_budget.design.quantities import Number, QuestionError
 from bisar_budget.faults import SetValue
@@ -53,6 +53,32 @@ class Variation:
         return self.read(
             [SetValue(one.key, f"{value!r} {one.dimension.si}".rstrip()) for one, value in values.items()]
         )
+
+
+class Standing(NamedTuple):
+    """How a mission stands: whether it complies, its status, and the row that binds; see `State` of `solution`."""
+
+    complies: bool
+    status: str
+    row: str | None = None
+    requirement: str | None = None
+    utilization: float | None = None
+
+
+def breaking(target: str) -> frozenset[str]:
+    """Statuses that do not comply: what `check` breaks on (fail), or what `check --strict` does (warn)."""
+    return frozenset(name for name, one in STATUS.items() if (one.fails if target == "fail" else one.fails_strict))
+
+
+def standing(found: MissionFindings, row_id: str | None, breaks: Container[str]) -> Standing:
+    """Say how a mission stands, or the row that was asked for."""
+    rows = [row for row in found.rows if row_id is None or row.id == row_id]
+    status = found.status if row_id is None else rows[0].status if rows else "not_evaluated"
+    complies = status not in breaks
+    worst = deciding_row(rows, breaks, complies)
+    if worst is None:
+        return Standing(complies, status)
+    return Standing(complies, status, worst.id, worst.binding_requirement or worst.metric, worst.utilization)
 
 
 def deciding_row(rows: Sequence[Row], breaks: Container[str], complies: bool) -> Row | None:
