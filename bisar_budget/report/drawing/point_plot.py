@@ -1,14 +1,14 @@
 """Figures 3 to 7 of Rigling & Moses for a mission of one's own: drawn, saved, and said in a few lines."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from io import BytesIO
 from typing import Any
 
 import numpy as np
 
 from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.faults import changes_words, printable
+from bisar_budget.faults import SetValue, changes_words, printable
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
 from bisar_budget.report.drawing.figure import BETTER, GRID, WORSE, figure_file, new_figure
 from bisar_budget.report.drawing.point_figures import FLOOR_DB, ImagePanel, Limits, Sheet, rotated_back, sheet
@@ -69,8 +69,11 @@ def drawn_panel(name: str, drawn: Sheet) -> bytes:
     return figure_file(page, "png", dpi=80)
 
 
-def archive(images: PointImages) -> bytes:
-    """Give the images, complex, and what explains them, as an NPZ file."""
+def archive(images: PointImages, changes: Sequence[SetValue] = ()) -> bytes:
+    """Give the images, complex, and what explains them, as an NPZ file.
+
+    `changes` are the options that changed the mission; the file has them as texts `KEY=VALUE` (n,).
+    """
     file = BytesIO()
     np.savez_compressed(
         file,
@@ -92,6 +95,7 @@ def archive(images: PointImages) -> bytes:
         targets_m=[[one.east, one.north] for one in images.targets.points],
         targets_db=[one.level_db for one in images.targets.points],
         shown_m=[one.shown for one in images.responses],
+        set=np.array([f"{change.key}={change.text}" for change in changes], dtype=str),
     )
     return file.getvalue()
 

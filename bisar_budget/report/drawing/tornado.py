@@ -3,7 +3,7 @@
 from typing import Any
 
 from bisar_budget.design.slopes import Sensitivity, Slope
-from bisar_budget.faults import printable
+from bisar_budget.faults import changes_words, printable
 from bisar_budget.report.drawing.figure import (
     BETTER,
     GRID,
@@ -53,7 +53,8 @@ def figure(found: Sensitivity) -> Any:
     named = [Patch(color=grey, label=f"the number is {size}") for grey, size in zip(_GREYS, _SIZES, strict=True)]
     panel.legend(handles=named, loc="lower right", fontsize=9, frameon=False)
     what = f"row {found.row}" if found.row else f"worst utilization: {found.worst_row}"
-    page.suptitle(f"{printable(found.name)}\n{printable(what)}", fontsize=11, parse_math=False)
+    name = f"{found.name} {changes_words(found.changes)}".rstrip()
+    page.suptitle(f"{printable(name)}\n{printable(what)}", fontsize=11, parse_math=False)
     return page
 
 
