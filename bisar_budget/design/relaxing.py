@@ -1,5 +1,6 @@
 """What an error that is relaxed costs the others, where the shares of a budget follow what is declared."""
 
+import math
 from collections.abc import Iterator, Sequence
 from datetime import date
 from typing import Any
@@ -85,11 +86,12 @@ def _of_others(owner: str, before: Sequence[Row], after: Sequence[Row]) -> tuple
         for row in before
         if row.owner in (owner, "clock" if owner == "receiver" else owner)
         and row.utilization is not None
+        and math.isfinite(row.utilization)
         and STATUS[row.status].is_judged
         and row.id in now
         and abs((now[row.id].declared or 0.0) - (row.declared or 0.0)) <= _SAME * abs(row.declared or 0.0)
     ]
-    if not kept:
+    use, row_id, _ = max(kept, default=(math.inf, "", 0.0))
+    if not math.isfinite(use):
         return None
-    use, row_id, _ = max(kept)
     return row_id, max(before for _, _, before in kept), use

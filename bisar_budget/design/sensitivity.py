@@ -54,7 +54,7 @@ def sensitivity(mission: Mission, *, row: str | None = None, model: str | None =
     hold_to_decisions([found], row)
     at_file = _uses(found.rows, row)
     if at_file is None:
-        raise QuestionError("no row that is judged has a utilization: nothing to follow")
+        raise QuestionError("no utilization that is judged has a value: there is nothing to follow")
     geometry = found.geometry
     nearest = min(geometry.transmitter.slant_range, geometry.receiver.slant_range)
     numbers, skipped = stated_numbers(variation.tree(), nearest)

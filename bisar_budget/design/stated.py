@@ -73,7 +73,7 @@ def stated_numbers(tree: dict[str, Any], nearest_m: float) -> tuple[list[Stated]
             found = _stated(as_number(key, reader, value), value, nearest_m, above)
             (numbers if isinstance(found, Stated) else skipped).append(found)  # type: ignore[arg-type]
         elif reason := _no_number(key, reader, value):
-            skipped.append(Skipped(key, value if isinstance(value, str) else "", reason))
+            skipped.append(Skipped(key, ", ".join(map(str, value if isinstance(value, list) else [value])), reason))
     return numbers, skipped
 
 

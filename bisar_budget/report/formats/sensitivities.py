@@ -10,7 +10,7 @@ from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report.words.layout import table, wrapped
-from bisar_budget.report.words.sentences import percent
+from bisar_budget.report.words.sentences import BINDING_WORDS, percent
 
 FORMAT = "bisar-budget/sensitivity/1"
 
@@ -78,7 +78,7 @@ def as_text(found: Sequence[Sensitivity], style: Style) -> str:
 
 def _lines(found: Sensitivity, style: Style) -> Iterator[str]:
     status = STATUS[found.status]
-    requirement = found.requirement.replace("_", " ")
+    requirement = BINDING_WORDS.get(found.requirement, found.requirement.replace("_", " "))
     said = f"worst utilization {percent(found.utilization)}: {printable(found.worst_row)} ({requirement})"
     first, *rest = wrapped(said, "  ")
     yield f"\x1b[{status.sgr}m{first}\x1b[0m" if style.color else first
