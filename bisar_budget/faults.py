@@ -95,13 +95,14 @@ def changes_words(changes: Sequence[SetValue]) -> str:
 class Problem(NamedTuple):
     """Something wrong with a value, before anybody knows which file it stands in.
 
-    `at` is the path of the culprit below the value that was checked.
+    `at` is the path of the culprit below the value that was checked. `names_value`: it says the value itself.
     """
 
     problem: str
     accepted: str = ""
     hint: str = ""
     at: KeyPath = ()
+    names_value: bool = False
 
 
 class InvalidValueError(ValueError):

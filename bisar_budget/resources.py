@@ -1,6 +1,7 @@
-"""What there is to work with: files that travel with the package, `specs/` and `templates/`, and processors."""
+"""What there is to work with: files that travel with the package and those of a user, and processors."""
 
 import os
+import stat
 import sys
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,44 @@ def resource(*parts: str) -> "Path":
     package = Path(__file__).resolve().parent
     installed = package.joinpath(*parts)
     return installed if installed.exists() else package.parent.joinpath(*parts)
+
+
+class UnreadableError(Exception):
+    """A file that cannot be read. The message begins with its name; `is_missing` where there is none of it."""
+
+    def __init__(self, message: str, *, is_missing: bool = False) -> None:
+        super().__init__(message)
+        self.is_missing = is_missing
+
+
+def content(file: str, most: int, called: str | None = None) -> bytes:
+    """Content of a regular file; of a larger one than `most` bytes so many and one more.
+
+    Parameters
+    ----------
+    file : str
+        Where it is.
+    most : int
+        Bytes. What is larger is for the caller to refuse.
+    called : str, optional
+        What messages call it, instead of `file`.
+
+    Raises
+    ------
+    UnreadableError
+        It cannot be read, or is no regular file: a pipe would be waited for, and a device never ends.
+    """
+    called = file if called is None else called
+    try:
+        if not stat.S_ISREG(os.stat(file).st_mode):
+            raise UnreadableError(f"{called} is no regular file")
+        with open(file, "rb") as stream:
+            return stream.read(most + 1)
+    except OSError as error:
+        is_missing = isinstance(error, FileNotFoundError | NotADirectoryError)
+        raise UnreadableError(f"{called} cannot be read: {error.strerror}", is_missing=is_missing) from None
+    except ValueError:  # a NUL in the name
+        raise UnreadableError("is no name of a file") from None
 
 
 def cores() -> int:

@@ -2,11 +2,11 @@
 
 import os
 import re
-import stat
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from bisar_budget.faults import shown
+from bisar_budget.resources import UnreadableError, content
 
 TABLE = "tool.bisar-budget"
 KEYS = {
@@ -93,17 +93,13 @@ def _read(file: str) -> Settings | None:
 
 
 def _bytes_of(file: str) -> bytes | None:
-    """Content of a file, None where there is none; a pipe would wait for ever, and a device never end."""
-
+    """Content of a file, None where there is none."""
     try:
-        if not stat.S_ISREG(os.stat(file).st_mode):
-            raise SettingsError(f"{file}: is no regular file")
-        with open(file, "rb") as stream:
-            data = stream.read(_LARGEST + 1)
-    except (FileNotFoundError, NotADirectoryError):
-        return None
-    except OSError as error:
-        raise SettingsError(f"{file}: cannot be read: {error.strerror}") from None
+        data = content(file, _LARGEST, f"{file}:")
+    except UnreadableError as error:
+        if error.is_missing:
+            return None
+        raise SettingsError(str(error)) from None
     if len(data) > _LARGEST:
         raise SettingsError(f"{file}: is larger than {_LARGEST >> 20} MiB")
     return data

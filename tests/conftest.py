@@ -54,7 +54,7 @@ def approx(expected: Any, rel: float | None = None, abs: float | None = None, na
 pytest.approx = approx
 
 # Standard error apart from standard output: Click before 8.2 has to be asked.
-_APART: Any = {"mix_stderr": False} if "mix_stderr" in signature(CliRunner).parameters else {}
+APART: Any = {"mix_stderr": False} if "mix_stderr" in signature(CliRunner).parameters else {}
 
 ROOT = Path(__file__).resolve().parent.parent
 TODAY = date(2026, 11, 21)
@@ -112,7 +112,7 @@ def run() -> Callable[..., Result]:
     """Run the command line in this process."""
 
     def invoke(*args: str, **options: Any) -> Result:
-        return CliRunner(**_APART).invoke(cli, [str(arg) for arg in args], **options)
+        return CliRunner(**APART).invoke(cli, [str(arg) for arg in args], **options)
 
     return invoke
 

@@ -7,8 +7,11 @@ __all__ = [
     "collection_notes",
     "error_rows",
     "fleet",
+    "orbit",
     "pull_in",
     "random_rows",
+    "required",
     "verdicts",
     "vibration_rows",
+    "waivers",
 ]

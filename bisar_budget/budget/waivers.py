@@ -38,7 +38,7 @@ def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> tuple[l
     over: list[tuple[AppliedWaiver, set[int]]] = []
     for index, waiver in enumerate(mission.waivers):
         line = mission.line(("waivers", index, "id"))
-        named = _named(waiver.id, ids)
+        named = named_by(waiver.id, ids)
         failing = broken.intersection(named)
         applied = AppliedWaiver(line, waiver.until, waiver.reason, is_expired=today > waiver.until)
         if applied.is_expired:
@@ -67,7 +67,7 @@ def _waived(row: Row, holding: AppliedWaiver | None, last: AppliedWaiver | None)
     return row._replace(status=status, waivers=(*row.waivers, *applied)) if applied else row
 
 
-def _named(pattern: str, ids: Sequence[str]) -> list[int]:
+def named_by(pattern: str, ids: Sequence[str]) -> list[int]:
     """Places of the ids that a waiver names; an id may hold a bracket of its own."""
     if not any(char in pattern for char in "*?["):
         return [place for place, row_id in enumerate(ids) if row_id == pattern]

@@ -12,6 +12,7 @@ from bisar_budget.cli.streams import (
     EXIT_BROKEN,
     EXIT_USAGE,
     FILE,
+    OUTPUT,
     ParamType,
     complain,
     day_of_run,
@@ -66,7 +67,7 @@ class _Part(ParamType[float]):
     help="Format of the comparison.",
 )
 @click.option("--all", "all_rows", is_flag=True, help="Also show rows that moved by less than 1 %.")
-@click.option("-o", "--output", type=FILE, metavar="FILE", help="Write to FILE instead of standard output.")
+@OUTPUT
 @click.option(
     "--date",
     "today",

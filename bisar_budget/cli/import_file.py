@@ -4,14 +4,14 @@ import os
 
 import click
 
-from bisar_budget.cli.streams import FILE, complain, deliver, fail
+from bisar_budget.cli.streams import FILE, OUTPUT, complain, deliver, fail
 
 _SEEN = 20  # of a wavelength: what a place is off the path turns the phase by 0.3 rad
 
 
 @click.command("import")
 @click.argument("file", type=FILE)
-@click.option("-o", "--output", type=FILE, metavar="FILE", help="Write to FILE instead of standard output.")
+@OUTPUT
 @click.option("--channel", metavar="ID", help="Channel of CPHD or CRSD; without it the file's reference channel.")
 @click.option("--force", is_flag=True, help="Replace an existing file.")
 def import_file(file: str, output: str | None, channel: str | None, force: bool) -> None:
@@ -44,13 +44,16 @@ def import_file(file: str, output: str | None, channel: str | None, force: bool)
         parse_mission(text, "the mission")
     except MissionError as error:
         fail(f"{file}: no mission can be made of it: {error.faults[0]}")
-    for name, track in (("transmitter", found.transmitter), ("receiver", found.receiver)):
+    tracks = {"transmitter": found.transmitter, "receiver": found.receiver}
+    away = {name: format_quantity(track.farthest, "m") for name, track in tracks.items()}
+    for name, track in tracks.items():
         if track.farthest > track.state.slant_range / 100:
-            away = format_quantity(track.farthest, "m")
-            fail(f"{file}: a place of the {name} is {away} from its path, more than a hundredth of its range")
-        if track.farthest > SPEED_OF_LIGHT / found.center_frequency / _SEEN:
-            away = format_quantity(track.farthest, "m")
-            complain(f"warning: places of the {name} are up to {away} from its path; the comments say more")
+            fail(f"{file}: a place of the {name} is {away[name]} from its path, more than a hundredth of its range")
+    farthest = max(track.farthest for track in tracks.values())
+    if found.unused or farthest > SPEED_OF_LIGHT / found.center_frequency / _SEEN:
+        doubts = [found.unused] if found.unused else []
+        doubts += [f"places of the {name} are up to {length} from its path" for name, length in away.items()]
+        complain(f"warning: {'; '.join(doubts)}; the comments say more")
     deliver(text, output, "yaml")
     if output not in (None, "-"):
         complain(f"Wrote {output}. Next: bisar-budget check {output}")

@@ -4,7 +4,7 @@ import os
 
 import click
 
-from bisar_budget.cli.streams import FILE, complain, deliver, fail
+from bisar_budget.cli.streams import FILE, OUTPUT, complain, deliver, fail
 
 
 @click.command()
@@ -42,7 +42,7 @@ def init(file: str, name: str, force: bool) -> None:
 
 
 @click.command()
-@click.option("-o", "--output", type=FILE, metavar="FILE", help="Write to FILE instead of standard output.")
+@OUTPUT
 def schema(output: str | None) -> None:
     """Print the JSON Schema of the mission file, for editors."""
     import json

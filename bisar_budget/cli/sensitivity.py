@@ -10,7 +10,9 @@ import click
 from bisar_budget import __version__
 from bisar_budget.cli.streams import (
     FILE,
+    OUTPUT,
     SET,
+    TEXT_OR_JSON,
     day_of_run,
     deliver,
     expand,
@@ -40,15 +42,8 @@ if TYPE_CHECKING:
     type=click.DateTime(["%Y-%m-%d"]),
     help="Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC).",
 )
-@click.option(
-    "--format",
-    "format_name",
-    type=click.Choice(["text", "json"]),
-    default="text",
-    show_default=True,
-    help="Format of the answer.",
-)
-@click.option("-o", "--output", type=FILE, metavar="FILE", help="Write to FILE instead of standard output.")
+@TEXT_OR_JSON
+@OUTPUT
 @click.option("--plot", type=FILE, metavar="FILE", help="Draw the effects of a mission as bars: .svg, .png, .pdf.")
 def sensitivity(
     missions: Sequence[str],

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bisar_budget.cli.streams import EXIT_USAGE, complain, deliver
+from bisar_budget.cli.streams import EXIT_USAGE, TEXT_OR_JSON, complain, deliver
 from bisar_budget.faults import printable
 
 if TYPE_CHECKING:
@@ -21,14 +21,7 @@ _TITLES = {
 @click.command()
 @click.argument("pattern", default="*")
 @click.option("--kind", type=click.Choice(list(_TITLES)), help="Only parts of this kind.")
-@click.option(
-    "--format",
-    "format_name",
-    type=click.Choice(["text", "json"]),
-    default="text",
-    show_default=True,
-    help="How to write it.",
-)
+@TEXT_OR_JSON
 def sensors(pattern: str, kind: str | None, format_name: str) -> None:
     """List parts of the catalogue, their figures and where these stand.
 

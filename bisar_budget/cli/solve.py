@@ -11,7 +11,9 @@ from bisar_budget import __version__
 from bisar_budget.cli.streams import (
     EXIT_BROKEN,
     FILE,
+    OUTPUT,
     SET,
+    TEXT_OR_JSON,
     day_of_run,
     deliver,
     expand,
@@ -68,16 +70,9 @@ if TYPE_CHECKING:
     type=click.DateTime(["%Y-%m-%d"]),
     help="Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC).",
 )
-@click.option(
-    "--format",
-    "format_name",
-    type=click.Choice(["text", "json"]),
-    default="text",
-    show_default=True,
-    help="Format of the answer.",
-)
 @click.option("--verify", "is_imaged", is_flag=True, help="Form images of the row that binds at the solution.")
-@click.option("-o", "--output", type=FILE, metavar="FILE", help="Write to FILE instead of standard output.")
+@TEXT_OR_JSON
+@OUTPUT
 def solve(
     missions: Sequence[str],
     key: str,

@@ -48,6 +48,7 @@ class FileName(ParamType[str]):
 
 
 FILE = FileName()
+OUTPUT = click.option("-o", "--output", type=FILE, metavar="FILE", help="Write to FILE instead of standard output.")
 
 
 def _read_changes(ctx: click.Context, param: click.Parameter, texts: tuple[str, ...]) -> "tuple[SetValue, ...]":
@@ -79,6 +80,15 @@ def set_option(what: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
 
 
 SET = set_option("Put a value in place of the mission's own, or beside it")
+
+TEXT_OR_JSON = click.option(
+    "--format",
+    "format_name",
+    type=click.Choice(["text", "json"]),
+    default="text",
+    show_default=True,
+    help="Format of the output.",
+)
 
 
 def expand(patterns: Iterable[str]) -> list[str]:

@@ -12,7 +12,9 @@ from bisar_budget.cli.streams import (
     EXIT_BROKEN,
     EXIT_USAGE,
     FILE,
+    OUTPUT,
     SET,
+    TEXT_OR_JSON,
     complain,
     deliver,
     expand,
@@ -36,15 +38,8 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("missions", type=FILE, nargs=-1, required=True, metavar="MISSION...")
 @click.option("--only", default="*", metavar="GLOB", help="Verify only the rows whose id matches.")
-@click.option(
-    "--format",
-    "format_name",
-    type=click.Choice(["text", "json"]),
-    default="text",
-    show_default=True,
-    help="Format of the verdicts.",
-)
-@click.option("-o", "--output", type=FILE, metavar="FILE", help="Write to FILE instead of standard output.")
+@TEXT_OR_JSON
+@OUTPUT
 @SET
 @click.option(
     "--jobs",

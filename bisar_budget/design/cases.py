@@ -1,7 +1,8 @@
 """The cases of a sweep: which keys of a mission vary, and their values in each case."""
 
 from collections.abc import Mapping
-from typing import NamedTuple, Protocol
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,8 @@ class Cases(Protocol):
         """Value of each key, in SI, of some cases: (stop - start,) by the key."""
 
 
-class Grid(NamedTuple):
+@dataclass(frozen=True)
+class Grid:
     """Every combination of the values of each key; the last key is the fastest."""
 
     numbers: tuple[Number, ...]

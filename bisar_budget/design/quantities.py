@@ -189,7 +189,7 @@ def _end(number: Number, between: str, text: str) -> float:
     try:
         return number.reader.leaf(text)
     except InvalidValueError as error:
-        said, accepted, hint, _ = error.problem
+        said, accepted, hint = error.problem[:3]
         parts = [f"--between {shown(between)}: {shown(text)!r} {said}", accepted, hint]
         raise QuestionError("; ".join(filter(None, parts))) from None
 

@@ -1,6 +1,7 @@
 """What a sweep finds, as columns of arrays: one value a case."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -32,7 +33,8 @@ class Part(NamedTuple):
     by_case: int
 
 
-class Swept(NamedTuple):
+@dataclass(frozen=True)
+class Swept:
     """A sweep: what its columns are, and its parts as they are found.
 
     `shape` is that of the grid of cases, one axis for each key that varies, the last the fastest; None where the

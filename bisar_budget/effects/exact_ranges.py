@@ -26,15 +26,15 @@ from bisar_budget.phrases import NOTHING
 
 # Way of a platform in half an aperture, over its slant range, up to which so many nodes change phases by less than
 # 1e-6 of themselves; beyond the last, 16 nodes are right to 1e-3 at 1.25.
-_NODES = ((0.1, 6), (0.5, 10), (math.inf, 16))
-_ITERATIONS = 40
-_NEAR = 0.003  # of the nearest slant range; a point so near to the centre has slopes that differ by no more
-_SKEWED = 0.01  # the same over the sine between the gradients, where they are near to parallel
-_BENT = 0.05  # of what Doppler turns by at the centre: velocity errors turn it by less, or its slopes are others
-_FEW = 4
-_SHRINKS = 0.5  # square of each step of the search over that of the one before; else it does not settle
-_EPSILON = 2e-15  # of a range sum: what rounding of a few operations leaves
-_UNSEEN_RAD = 3e-5  # what the last step of the search may change a phase by beyond the part counted linearly
+NODES = ((0.1, 6), (0.5, 10), (math.inf, 16))
+ITERATIONS = 40
+NEAR = 0.003  # of the nearest slant range; a point so near to the centre has slopes that differ by no more
+SKEWED = 0.01  # the same over the sine between the gradients, where they are near to parallel
+BENT = 0.05  # of what Doppler turns by at the centre: velocity errors turn it by less, or its slopes are others
+FEW = 4
+SHRINKS = 0.5  # square of each step of the search over that of the one before; else it does not settle
+EPSILON = 2e-15  # of a range sum: what rounding of a few operations leaves
+UNSEEN_RAD = 3e-5  # what the last step of the search may change a phase by beyond the part counted linearly
 
 _CLOCK_POWERS = {unit: power for power, unit in enumerate(CLOCK_UNITS.values())}
 
@@ -59,7 +59,7 @@ def nodes_for(geometry: BistaticGeometry, aperture_time_s: float, *, has_direct_
     half = aperture_time_s / 2
     turning = (geometry.transmitter, geometry.receiver, *((geometry.apart,) if has_direct_path else ()))
     way = max(state.travelled(half) / state.slant_range for state in turning)
-    return next(count for limit, count in _NODES if way <= limit)
+    return next(count for limit, count in NODES if way <= limit)
 
 
 class ExactRanges:
@@ -99,7 +99,7 @@ class ExactRanges:
         self.baselines = list(map(math.dist, *self.tracks.values())) if has_direct_path else []
 
         # Ranges in double precision hold no phase that is smaller.
-        self.rounding = _EPSILON * self.k * (max(self.recorded) + max(self.baselines, default=0.0))
+        self.rounding = EPSILON * self.k * (max(self.recorded) + max(self.baselines, default=0.0))
 
     @property
     def has_direct_path(self) -> bool:
@@ -344,12 +344,12 @@ class ExactRanges:
     @cached_property
     def _reach(self) -> float:
         """Distance from the centre up to which its slopes find a point. [m]"""
-        return min(_NEAR, _SKEWED * abs(self.gradient_sine)) * self.nearest
+        return min(NEAR, SKEWED * abs(self.gradient_sine)) * self.nearest
 
     @cached_property
     def _bend(self) -> float:
         """Way of both platforms by velocity errors within half an aperture up to which they do. [m]"""
-        return _BENT * abs(self.plane.determinant) * self.half / self.range_gradient * self.nearest
+        return BENT * abs(self.plane.determinant) * self.half / self.range_gradient * self.nearest
 
     def left_over(self, source: ErrorSource, size: float, place: GroundVector) -> list[float]:
         """Range error at the nodes that an error leaves at a ground point. [m]"""
@@ -449,7 +449,7 @@ class ExactRanges:
                 return found
         value, slope, quadratic, cubic = self.fit
         before = math.inf
-        for _ in range(_ITERATIONS):
+        for _ in range(ITERATIONS):
             left, by_east, by_north, nearest = [], [], [], math.inf
             for whole, (x, y, z), (u, v, w) in zip(recorded, transmitter, receiver, strict=True):
                 x, y, u, v = x - east, y - north, u - east, v - north
@@ -474,7 +474,7 @@ class ExactRanges:
             step_north = (c * constant - a * linear) / determinant
             east, north = east + step_east, north + step_north
             step = step_east * step_east + step_north * step_north
-            if self.k * step < _UNSEEN_RAD * nearest:
+            if self.k * step < UNSEEN_RAD * nearest:
                 if determinant * self.orientation <= 0:
                     return None
                 phases = (
@@ -489,7 +489,7 @@ class ExactRanges:
                 left_quadratic, left_cubic = (phase if abs(phase) > self.rounding else 0.0 for phase in phases)
                 turn = determinant / (self.plane.determinant * self.half)
                 return ExactPhases((east, north), left_quadratic, left_cubic, turn)
-            if not step < _SHRINKS * before:
+            if not step < SHRINKS * before:
                 return None
             before = step
         return None
@@ -501,7 +501,7 @@ class ExactRanges:
         (a, c, quadratic_east, cubic_east), (b, d, quadratic_north, cubic_north) = self._gradient
         value, slope, quadratic, cubic = self.fit
         determinant = a * d - b * c
-        for _ in range(_FEW):
+        for _ in range(FEW):
             left = []
             for whole, (x, y, z), (u, v, w) in zip(recorded, transmitter, receiver, strict=True):
                 x, y, u, v = x - east, y - north, u - east, v - north
@@ -510,7 +510,7 @@ class ExactRanges:
             step_east = (b * linear - d * constant) / determinant
             step_north = (c * constant - a * linear) / determinant
             east, north = east + step_east, north + step_north
-            if self.k * (abs(step_east) + abs(step_north)) < _UNSEEN_RAD / _NEAR:
+            if self.k * (abs(step_east) + abs(step_north)) < UNSEEN_RAD / NEAR:
                 left_quadratic, left_cubic = (
                     phase if abs(phase := self.k * of_range) > self.rounding else 0.0
                     for of_range in (

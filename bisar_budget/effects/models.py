@@ -19,8 +19,8 @@ QUADRATIC, CUBIC, LOCATION = "quadratic_phase_error", "cubic_phase_error", "loca
 
 # No navigation error: it takes the platform, within the aperture, farther than this part of its slant range.
 FARTHEST = 0.1
-_SHARE = 0.004  # what the second order may add, of a phase, a displacement or a limit; the aim is 1 %
-_FLOOR_RAD, _FLOOR_M = 1e-3, 2e-3  # and whatever the size
+SHARE = 0.004  # what the second order may add, of a phase, a displacement or a limit; the aim is 1 %
+FLOOR_RAD, FLOOR_M = 1e-3, 2e-3  # and whatever the size
 
 _VALUES: dict[str, Value] = {
     QUADRATIC: lambda phases: phases.quadratic,
@@ -168,7 +168,7 @@ class FullModel:
             return linear
         farthest = min(upto, max(self.farthest(source), abs(source.declared or 0.0)))
         first = farthest if linear is None else min(linear, farthest)
-        if self._adds(source, first, requirement) <= _SHARE * limit:
+        if self._adds(source, first, requirement) <= SHARE * limit:
             return None if linear is None or linear > farthest else linear
         signed = {QUADRATIC: source.full.qpe, CUBIC: source.full.cubic}.get(requirement)
         return self._smallest(source, requirement, limit, per_unit if signed is None else signed, first, farthest)
@@ -179,7 +179,7 @@ class FullModel:
             return True
         linear, farthest = _size(limit, _per_unit(source.full, self.plane, requirement)), self.farthest(source)
         first = farthest if linear is None else min(linear, farthest)
-        return self._adds(source, first, requirement) <= _SHARE * limit
+        return self._adds(source, first, requirement) <= SHARE * limit
 
     def farthest(self, source: ErrorSource) -> float:
         """Size beyond which an error is none of navigation; infinite: it has no effect whatever its size. [unit]"""
@@ -196,9 +196,9 @@ class FullModel:
 
     def is_small(self, source: ErrorSource, size: float) -> bool:
         """Whether effects of an error are proportional to its size, as far as anybody can see."""
-        for requirement, floor in ((QUADRATIC, _FLOOR_RAD), (CUBIC, _FLOOR_RAD), (LOCATION, _FLOOR_M)):
+        for requirement, floor in ((QUADRATIC, FLOOR_RAD), (CUBIC, FLOOR_RAD), (LOCATION, FLOOR_M)):
             of_it = _per_unit(source.full, self.plane, requirement) * size
-            if self._adds(source, size, requirement) > max(floor, _SHARE * of_it):
+            if self._adds(source, size, requirement) > max(floor, SHARE * of_it):
                 return False
         return True
 

@@ -16,9 +16,9 @@ from bisar_budget.geometry import GroundVector
 
 # Of what range and Doppler gradients span at the centre: with less a point has no image, they are parallel there.
 PARALLEL = 0.02
-_STRAY = 0.15  # of a step; farther from where it led, a point is not the one that was followed
+STRAY = 0.15  # of a step; farther from where it led, a point is not the one that was followed
 _STRAIGHT = 0.1  # of a displacement, by which it may be off a straight way
-_FLOOR_M = 1e-3
+FLOOR_M = 1e-3
 _LEAST_STEP = 1e-3  # of the size: allowables are right to 1 %
 _FINEST_STEP = 1e-6  # where the gradients stay apart, the way only turns
 _OF_FOLD = 0.8  # of the way to where the gradients seem to become parallel, that one step makes
@@ -287,4 +287,4 @@ def _parallel_between(before: _Known, beyond: _Known) -> float:
 
 
 def _is_on_the_way(last: GroundVector, found: GroundVector, near: GroundVector) -> bool:
-    return math.dist(found, near) <= _STRAY * max(math.dist(found, last), math.dist(near, last)) + _FLOOR_M
+    return math.dist(found, near) <= STRAY * max(math.dist(found, last), math.dist(near, last)) + FLOOR_M

@@ -8,8 +8,9 @@ a slow time is then that of the pulse.
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
-from bisar_budget.geometry import STRAIGHT, PlatformState, Vector, cross, dot, norm, unit
-from bisar_budget.paths.earth import Geodetic, SceneAxes
+from bisar_budget.geometry import PlatformState, Vector, cross, dot, norm, unit
+from bisar_budget.paths.earth import Geodetic
+from bisar_budget.paths.polynomials import least_squares, path_of, powers_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -40,7 +41,7 @@ class Track(NamedTuple):
     samples: int = 0
 
 
-class Declared(NamedTuple):
+class DeclaredMotionError(NamedTuple):
     """Errors of the measured path of one platform, one sigma, along the axes of a frame of the mission.
 
     `sigmas` (6,) of position [m] and velocity [m/s], None where a kind is not declared; `correlation` (6, 6).
@@ -75,7 +76,8 @@ class Imported(NamedTuple):
     """A collection as a file has it.
 
     `is_monostatic`: transmitter and receiver are one platform, whose errors are the same on both ways; `common` says
-    then that they are those of both. `remarks` are for the reader of the mission file; each is one fact.
+    then that they are those of both. `remarks` are for the reader of the mission file; each is one fact. `unused` is
+    that of vectors that are not used, empty where there are none.
     """
 
     file: str
@@ -92,13 +94,14 @@ class Imported(NamedTuple):
     receiver: Track
     is_monostatic: bool
     reference: Reference | None
-    transmitter_error: Declared | None = None
-    receiver_error: Declared | None = None
-    common_error: Declared | None = None
+    transmitter_error: DeclaredMotionError | None = None
+    receiver_error: DeclaredMotionError | None = None
+    common_error: DeclaredMotionError | None = None
     timing_constant: float | None = None
     timing_linear: float | None = None
     errors_at: str = ""
     remarks: tuple[str, ...] = ()
+    unused: str = ""
 
 
 def reference_of(transmitter: PlatformState, receiver: PlatformState, slow_time: float) -> Reference:
@@ -144,9 +147,8 @@ def fitted(times: "Floats", places: "Floats", aperture_time_s: float, wavelength
     middle = wanted.mean(axis=0)  # what is large is taken away, so that rounding is that of what is small
     found = []
     for order in range(1, min(_HIGHEST, count - 2) + 1):
-        legendre = np.polynomial.legendre.legvander(at, order)
-        coefficients = np.linalg.lstsq(legendre, wanted - middle, rcond=None)[0]
-        away = np.linalg.norm(wanted - middle - legendre @ coefficients, axis=1)
+        coefficients, left = least_squares(at, wanted - middle, order)
+        away = np.linalg.norm(left, axis=1)
         found.append((coefficients, float(away.max()), float(np.sqrt(np.mean(away**2)))))
         if found[-1][1] <= _UNSEEN * wavelength_m:
             break
@@ -155,34 +157,8 @@ def fitted(times: "Floats", places: "Floats", aperture_time_s: float, wavelength
         best = next(one for one in found if one[2] * _BETTER <= best[2])
     coefficients, farthest, rms = best
     order = len(coefficients) - 1
-    powers = np.zeros((_HIGHEST + 1, 3))
-    for axis in range(3):
-        powers[: order + 1, axis] = _padded(np.polynomial.legendre.leg2poly(coefficients[:, axis]), order + 1)
-    powers /= half ** np.arange(_HIGHEST + 1)[:, None]
-    powers[1:][np.abs(powers[1:]) * half ** np.arange(1, _HIGHEST + 1)[:, None] < _ROUNDING_M] = 0.0
+    powers = powers_of(coefficients, half)
+    powers[1:][np.abs(powers[1:]) * half ** np.arange(1, order + 1)[:, None] < _ROUNDING_M] = 0.0
     powers[0] += middle
     powers[0][np.abs(powers[0]) < _ROUNDING_M] = 0.0
-    return Track(_state(powers[: order + 1]), order, farthest, rms, count)
-
-
-def _padded(values: "Floats", count: int) -> "Floats":
-    import numpy as np
-
-    return np.pad(values, (0, count - values.size))
-
-
-def _state(powers: "Floats") -> PlatformState:
-    """A path from its coefficients of τ⁰, τ¹, …, (order + 1, 3)."""
-    vectors: list[Vector] = [(float(x), float(y), float(z)) for x, y, z in powers]
-    (x, y, z) = vectors[2] if len(vectors) > 2 else STRAIGHT
-    return PlatformState(
-        position=vectors[0], velocity=vectors[1], acceleration=(2 * x, 2 * y, 2 * z), bends=tuple(vectors[3:])
-    )
-
-
-def in_scene(axes: SceneAxes, earth_fixed: "Floats") -> "Floats":
-    """Earth-fixed places (n, 3) in the scene's axes. [m]"""
-    import numpy as np
-
-    turned: Floats = (earth_fixed - np.array(axes.origin)) @ np.array(axes.axes).T
-    return turned
+    return Track(path_of(powers), order, farthest, rms, count)

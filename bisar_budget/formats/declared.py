@@ -10,7 +10,7 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.formats.collected import Declared
+from bisar_budget.formats.collected import DeclaredMotionError
 from bisar_budget.formats.document import Element
 from bisar_budget.geometry import Axes, PlatformState, cross, unit
 from bisar_budget.paths.earth import SceneAxes
@@ -28,12 +28,12 @@ _UNCORRELATED = 1e-6  # of a correlation: rounding of a turned covariance
 _NEGATIVE = 2.5e-6  # of an eigenvalue of correlations that are written with six decimals
 
 
-class Errors(NamedTuple):
+class DeclaredErrors(NamedTuple):
     """Of both platforms, or common to them; clock terms of a mission; and what no key of a mission says."""
 
-    transmitter: Declared | None = None
-    receiver: Declared | None = None
-    common: Declared | None = None
+    transmitter: DeclaredMotionError | None = None
+    receiver: DeclaredMotionError | None = None
+    common: DeclaredMotionError | None = None
     timing_constant: float | None = None
     timing_linear: float | None = None
     at: str = ""
@@ -70,7 +70,7 @@ def sigmas_and_correlations(element: Element) -> "Floats":
 
 def declared(
     covariance: "Floats", frame: Element, state: PlatformState, axes: SceneAxes, whose: str
-) -> tuple[Declared, list[str]]:
+) -> tuple[DeclaredMotionError, list[str]]:
     """Turn a covariance (6, 6) of a file's frame into the frame of a mission, and say what was done.
 
     ECF becomes the scene's axes, RIC_ECI is `ric`, RIC_ECF is turned into it about the radial axis. The
@@ -103,7 +103,7 @@ def declared(
     is_correlated = bool((np.abs(correlation - np.eye(6)) > _UNCORRELATED).any())
     x, y, z, u, v, w = (float(sigma) for sigma in sigmas)
     rows = tuple(tuple(float(value) for value in row) for row in correlation) if is_correlated else ()
-    return Declared(FRAMES[name], (x, y, z), (u, v, w), rows), remarks
+    return DeclaredMotionError(FRAMES[name], (x, y, z), (u, v, w), rows), remarks
 
 
 def _axes_of(name: str, state: PlatformState, axes: SceneAxes) -> Axes:
@@ -118,22 +118,22 @@ def _axes_of(name: str, state: PlatformState, axes: SceneAxes) -> Axes:
     return radial, cross(across, radial), across
 
 
-def of_sigmas(parameters: Element | None, seen: Seen, *, is_monostatic: bool) -> Errors:
+def of_sigmas(parameters: Element | None, seen: Seen, *, is_monostatic: bool) -> DeclaredErrors:
     """Errors of CPHD's `ErrorParameters`, or of SICD's `ErrorStatistics` with components."""
     if parameters is None:
-        return Errors(remarks=("The file declares no errors (ErrorParameters).",))
+        return DeclaredErrors(remarks=("The file declares no errors (ErrorParameters).",))
     mono = parameters.maybe("Monostatic") or (parameters.maybe("Components") if is_monostatic else None)
     if mono is not None and mono.maybe("PosVelErr") is not None:
         return _of_one(mono, seen)
     both = parameters.maybe("Bistatic")
     if both is not None:
         return _of_two(both, seen)
-    return Errors(
+    return DeclaredErrors(
         at=parameters.path, remarks=(f"{parameters.path} declares no component that a mission has a key for.",)
     )
 
 
-def _of_one(mono: Element, seen: Seen) -> Errors:
+def _of_one(mono: Element, seen: Seen) -> DeclaredErrors:
     error = mono.one("PosVelErr")
     whole, remarks = declared(
         sigmas_and_correlations(error), error.one("Frame"), seen.transmitter, seen.axes, "platform"
@@ -151,23 +151,23 @@ def _of_one(mono: Element, seen: Seen) -> Errors:
     return _common(whole, remarks)._replace(timing_constant=constant, at=mono.path)
 
 
-def _common(whole: Declared, remarks: list[str]) -> Errors:
+def _common(whole: DeclaredMotionError, remarks: list[str]) -> DeclaredErrors:
     """Errors of one platform that transmits and receives."""
     if whole.is_isotropic:
         remarks.append(
             "One platform transmits and receives, with the same error: it is that of common_motion_error. Its frame "
             "does not matter, since it is alike along each axis."
         )
-        return Errors(common=whole._replace(frame="scene"), remarks=tuple(remarks))
+        return DeclaredErrors(common=whole._replace(frame="scene"), remarks=tuple(remarks))
     remarks.append(
         "One platform transmits and receives: the errors below are the same on both ways, and add. `combine: sum` "
         "judges them together; `rss` would take them for independent."
     )
-    return Errors(transmitter=whole, receiver=whole, remarks=tuple(remarks))
+    return DeclaredErrors(transmitter=whole, receiver=whole, remarks=tuple(remarks))
 
 
-def _of_two(both: Element, seen: Seen) -> Errors:
-    found: dict[str, Declared | None] = {"transmitter": None, "receiver": None}
+def _of_two(both: Element, seen: Seen) -> DeclaredErrors:
+    found: dict[str, DeclaredMotionError | None] = {"transmitter": None, "receiver": None}
     remarks: list[str] = []
     clocks: list[float] = []
     delays: list[float] = []
@@ -194,7 +194,7 @@ def _of_two(both: Element, seen: Seen) -> Errors:
         )
     if delays:
         remarks.append("timing_error.constant is the root sum square of DelayBias of both platforms.")
-    return Errors(
+    return DeclaredErrors(
         transmitter=found["transmitter"],
         receiver=found["receiver"],
         timing_constant=math.hypot(*delays) if delays else None,
@@ -204,7 +204,9 @@ def _of_two(both: Element, seen: Seen) -> Errors:
     )
 
 
-def _with_added(both: Element, found: dict[str, Declared | None]) -> tuple[dict[str, Declared | None], list[str]]:
+def _with_added(
+    both: Element, found: dict[str, DeclaredMotionError | None]
+) -> tuple[dict[str, DeclaredMotionError | None], list[str]]:
     """What a file of our own says beside the sigmas: kinds that are not declared, accelerations, distributions."""
     remarks = []
     for parameter in both.all("AddedParameters/Parameter"):
@@ -230,7 +232,9 @@ def _with_added(both: Element, found: dict[str, Declared | None]) -> tuple[dict[
     return found, remarks
 
 
-def of_matrices(parameters: Element | None, seen: Seen, names: tuple[str, str], clocks: tuple[int, int]) -> Errors:
+def of_matrices(
+    parameters: Element | None, seen: Seen, names: tuple[str, str], clocks: tuple[int, int]
+) -> DeclaredErrors:
     """Errors of CRSD's `ErrorParameters/SARImage`, or of SICD's `ErrorStatistics` with bistatic components.
 
     Parameters
@@ -245,7 +249,7 @@ def of_matrices(parameters: Element | None, seen: Seen, names: tuple[str, str], 
         Rows of both clocks' frequencies in the matrix of times and frequencies.
     """
     if parameters is None:
-        return Errors(remarks=("The file declares no errors (ErrorParameters).",))
+        return DeclaredErrors(remarks=("The file declares no errors (ErrorParameters).",))
     mono = parameters.maybe("Monostatic")
     if mono is not None:
         error = mono.one(names[0])
@@ -277,7 +281,7 @@ def of_matrices(parameters: Element | None, seen: Seen, names: tuple[str, str], 
             linear = math.sqrt(variance)
             remarks.append("timing_error.linear is one sigma of the difference of both clocks' frequency scales.")
         remarks.append(f"{times.path}: errors of the times of transmission and reception are not taken over.")
-    return Errors(found[0], found[1], None, None, linear, both.path, tuple(remarks))
+    return DeclaredErrors(found[0], found[1], None, None, linear, both.path, tuple(remarks))
 
 
 def _decorrelation(element: Element, what: str) -> list[str]:

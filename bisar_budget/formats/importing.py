@@ -17,11 +17,10 @@ from bisar_budget.formats.collected import (
     Reference,
     Track,
     fitted,
-    in_scene,
     reference_of,
 )
 from bisar_budget.formats.containers import Container, open_container
-from bisar_budget.formats.declared import Errors, Seen, of_matrices, of_sigmas
+from bisar_budget.formats.declared import DeclaredErrors, Seen, of_matrices, of_sigmas
 from bisar_budget.formats.document import Element, FormatError, MissingExtraError
 from bisar_budget.geometry import PlatformState, Vector
 from bisar_budget.paths.earth import Geodetic, SceneAxes, axes_at, geodetic
@@ -46,6 +45,15 @@ class _Pulses(NamedTuple):
     received: "Floats"
     receiver: "Floats"
     reference: int  # index of the reference vector among them
+    unused: int = 0  # further vectors, which lack a pulse, a time or a place
+
+    @property
+    def unused_words(self) -> str:
+        """What is said of vectors that are not used, empty where there are none."""
+        if not self.unused:
+            return ""
+        count = self.sent.size + self.unused
+        return f"without a pulse, a time or a place, and not used: {self.unused} of {count} vectors"
 
 
 class _Aperture(NamedTuple):
@@ -94,7 +102,7 @@ def _cphd(container: Container, channel: str | None) -> Imported:
     center, bandwidth = parameters.number("FxC"), parameters.number("FxBW")
     is_monostatic = xml.text("CollectionID/CollectType") == "MONOSTATIC"
     start = xml.one("Global/Timeline/CollectionStart")
-    remarks = []
+    remarks, unused = [], ""
     if container.has_vectors:
         data = xml.with_child("Data/Channel", "Identifier", channel)
         if data is None:
@@ -107,7 +115,7 @@ def _cphd(container: Container, channel: str | None) -> Imported:
         axes = axes_at(geodetic(point))
         tracks = _tracks(container, pulses, axes, aperture, center)
         remarks += _coverage(pulses, axes, aperture)
-        reference = _at_reference(pulses, axes, aperture, tracks)
+        reference, unused = _at_reference(pulses, axes, aperture, tracks), pulses.unused_words
     else:
         point = xml.vector("ReferenceGeometry/SRP/ECF")
         dwell = xml.number("ReferenceGeometry/SRPDwellTime")
@@ -127,7 +135,7 @@ def _cphd(container: Container, channel: str | None) -> Imported:
     remarks = [*collectors, *remarks]
     return _imported(
         container, channel, name, point, (center, bandwidth), aperture, start, tracks, is_monostatic, reference,
-        errors, remarks,
+        errors, remarks, unused,
     )  # fmt: skip
 
 
@@ -173,7 +181,12 @@ def _pulses_of_cphd(container: Container, vectors: "NDArray[Any]", parameters: E
         raise parameters.fault("is a vector without times or places", "RefVectorIndex")
     x, y, z = (float(value) for value in points[reference])
     kept = _Pulses(
-        sent[usable], transmitter[usable], received[usable], receiver[usable], int(usable[:reference].sum())
+        sent[usable],
+        transmitter[usable],
+        received[usable],
+        receiver[usable],
+        int(usable[:reference].sum()),
+        int((~usable).sum()),
     )
     return kept, (x, y, z)
 
@@ -287,7 +300,7 @@ def _crsd(container: Container, channel: str | None) -> Imported:
     return _imported(
         container, channel, name.text() if name is not None else "", point, (center, bandwidth), aperture,
         xml.one("Global/CollectionRefTime"), tracks, is_monostatic, _at_reference(pulses, axes, aperture, tracks),
-        errors, remarks,
+        errors, remarks, pulses.unused_words,
     )  # fmt: skip
 
 
@@ -305,6 +318,8 @@ def _pulses_of_crsd(
     begun, places, velocities, index = _fields(xml, vectors, "PVP", "RcvStart", "RcvPos", "RcvVel", "TxPulseIndex")
     sent, transmitter = _fields(xml, sends, "PPP", "TxTime", "TxPos")
     known = np.isfinite(index) & (index >= 0) & (index < len(sends)) & np.isfinite(begun)
+    known &= np.isfinite(places).all(axis=1) & np.isfinite(velocities).all(axis=1)
+    known[known] = (np.isfinite(sent) & np.isfinite(transmitter).all(axis=1))[index[known].astype(int)]
     reference = parameters.whole("RefVectorIndex")
     if reference >= len(vectors) or not known[reference]:
         raise parameters.fault("is no vector with a pulse", "RefVectorIndex")
@@ -316,7 +331,7 @@ def _pulses_of_crsd(
     for _ in range(_SETTLING):
         received = sent + (out + np.linalg.norm(receiver - point, axis=1)) / SPEED_OF_LIGHT
         receiver = places + velocities * (received - begun)[:, None]
-    return _Pulses(sent, transmitter, received, receiver, int(known[:reference].sum()))
+    return _Pulses(sent, transmitter, received, receiver, int(known[:reference].sum()), int((~known).sum()))
 
 
 # ---------------------------------------------------------------------- SICD
@@ -353,7 +368,7 @@ def _sicd(container: Container, channel: str | None) -> Imported:
     pulses = pulses_at(times)
     try:
         transmitter, receiver = (
-            fitted(times - middle, in_scene(axes, places), aperture.length, 2 * SPEED_OF_LIGHT / (low + high))
+            fitted(times - middle, axes.places(places), aperture.length, 2 * SPEED_OF_LIGHT / (low + high))
             for places in (pulses.transmitter, pulses.receiver)
         )
     except NoPathError as error:
@@ -465,7 +480,7 @@ def _tracks(
     times = _scene_time(pulses, np.array(axes.origin)) - aperture.middle
     try:
         transmitter, receiver = (
-            fitted(times, in_scene(axes, places), aperture.length, SPEED_OF_LIGHT / center)
+            fitted(times, axes.places(places), aperture.length, SPEED_OF_LIGHT / center)
             for places in (pulses.transmitter, pulses.receiver)
         )
     except NoPathError as error:
@@ -483,7 +498,7 @@ def _coverage(pulses: _Pulses, axes: SceneAxes, aperture: _Aperture) -> list[str
         return []
     return [
         f"Pulses cover the aperture from {inside.min():.6g} s to {inside.max():.6g} s of slow time; its ends are "
-        "the polynomials' own."
+        "the polynomials' own.",
     ]
 
 
@@ -518,8 +533,9 @@ def _imported(
     tracks: tuple[Track, Track],
     is_monostatic: bool,
     reference: Reference | None,
-    errors: Errors,
+    errors: DeclaredErrors,
     remarks: list[str],
+    unused: str = "",
 ) -> Imported:
     if not (0 < aperture.length <= LONGEST and abs(aperture.middle) <= LONGEST):
         raise FormatError(
@@ -556,7 +572,8 @@ def _imported(
         timing_constant=errors.timing_constant,
         timing_linear=errors.timing_linear,
         errors_at=errors.at,
-        remarks=(*remarks, *errors.remarks),
+        remarks=(*([f"{unused.capitalize()}."] if unused else []), *remarks, *errors.remarks),
+        unused=unused,
     )
 
 

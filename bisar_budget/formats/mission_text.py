@@ -5,7 +5,7 @@ import math
 from typing import Any
 
 from bisar_budget.faults import printable
-from bisar_budget.formats.collected import Declared, Imported, Track
+from bisar_budget.formats.collected import DeclaredMotionError, Imported, Track
 from bisar_budget.geometry import FRAME_AXES, STRAIGHT, Vector
 
 _WIDTH = 110
@@ -101,7 +101,7 @@ def _small(length: float) -> str:
     return f"{length * 1e3:.3g} mm" if length < 1 else f"{length:.4g} m"
 
 
-def _platform(imported: Imported, track: Track, error: Declared | None) -> dict[str, Any]:
+def _platform(imported: Imported, track: Track, error: DeclaredMotionError | None) -> dict[str, Any]:
     state = track.state
     platform: dict[str, Any] = {
         "position": _triple(state.position, "m", 6),
@@ -117,7 +117,7 @@ def _platform(imported: Imported, track: Track, error: Declared | None) -> dict[
     return platform
 
 
-def _error(imported: Imported, error: Declared) -> dict[str, Any]:
+def _error(imported: Imported, error: DeclaredMotionError) -> dict[str, Any]:
     units = {"position": "m", "velocity": "m/s"}
     stated: dict[str, Any] = {"frame": error.frame}
     sigmas = {kind: _triple(value, units[kind]) for kind in _KINDS if (value := getattr(error, kind)) is not None}

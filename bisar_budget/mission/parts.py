@@ -5,7 +5,6 @@ mission names parts, and what the mission says itself overrides single figures.
 """
 
 import os
-import stat
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from typing import Annotated, Any, NamedTuple
@@ -45,7 +44,7 @@ from bisar_budget.mission.readers import (
     did_you_mean,
 )
 from bisar_budget.mission.tree import MAX_BYTES, UnusableError, read_tree
-from bisar_budget.resources import resource
+from bisar_budget.resources import UnreadableError, content, resource
 from bisar_budget.settings import SettingsError, project_settings
 
 _NAME = Text()
@@ -162,15 +161,9 @@ def read_part(file: str) -> Part:
 
 def _read(file: str) -> tuple[Part, Mapping[str, Any]]:
     try:
-        if not stat.S_ISREG(os.stat(file).st_mode):  # a pipe would wait for ever
-            raise PartError(f"{file} is no regular file")
-        with open(file, "rb") as stream:
-            data = stream.read(MAX_BYTES + 1)
-        tree = read_tree(data, file)
-    except OSError as error:
-        raise PartError(f"{file} cannot be read: {error.strerror}") from None
-    except ValueError:  # a NUL in the name
-        raise PartError("is no name of a file") from None
+        tree = read_tree(content(file, MAX_BYTES), file)
+    except UnreadableError as error:
+        raise PartError(str(error)) from None
     except MissionError as error:
         raise PartError(f"{file}: {error.faults[0]}") from None
     kind = tree.root.get("kind")
@@ -292,7 +285,9 @@ def _parts_of(
             if part.kind not in kinds:
                 raise PartError(f"is an {part.kind}" if part.kind != "gnss" else "is a GNSS receiver")
         except PartError as error:
-            report(here, Problem(str(error), f"accepted: parts of the kind {' or '.join(kinds)}"))
+            accepted = f"accepted: parts of the kind {' or '.join(kinds)}"
+            names_file = str(error).startswith(os.path.join(beside, name))
+            report(here, Problem(str(error), accepted, names_value=names_file))
             is_valid = False
             continue
         if any(part.kind == other.kind for other in found):

@@ -3,7 +3,6 @@
 import hashlib
 import math
 import os
-import stat
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -17,10 +16,13 @@ from bisar_budget.mission.readers import INVALID, Report
 from bisar_budget.paths import earth
 from bisar_budget.paths.flight import Fitted, Log, Orbit, PathFileError, interpolated, slow_times, smoothed
 from bisar_budget.paths.instant import Instant
+from bisar_budget.resources import UnreadableError, content
 
 Beside = Callable[[str], bytes]  # content of a file that a mission names
 
 _MOST_BYTES = 500_000_000
+_LOGS_KEPT = 2  # of a mission that is read again and again, such as by `solve`
+_logs: dict[tuple[object, ...], Log] = {}  # by what they were read from; the bytes themselves are let go
 _FARTHEST_M = 4.1e8  # of a satellite from the Earth's centre
 _PLACE = "accepted: scene.latitude, scene.longitude and scene.height"
 
@@ -40,16 +42,10 @@ def reader_of(folder: str) -> Beside:
     """
 
     def read(name: str) -> bytes:
-        file = os.path.join(folder, name)
         try:
-            if not stat.S_ISREG(os.stat(file).st_mode):  # a pipe would wait for ever
-                raise PathFileError(f"{name} is no regular file")
-            with open(file, "rb") as stream:
-                data = stream.read(_MOST_BYTES + 1)
-        except OSError as error:
-            raise PathFileError(f"{name} cannot be read: {error.strerror}") from None
-        except ValueError:  # a NUL in the name
-            raise PathFileError("is no name of a file") from None
+            data = content(os.path.join(folder, name), _MOST_BYTES, name)
+        except UnreadableError as error:
+            raise PathFileError(str(error)) from None
         if len(data) > _MOST_BYTES:
             raise PathFileError(f"{name} is larger than {_MOST_BYTES // 10**6} MB")
         return data
@@ -114,6 +110,13 @@ def _with_path(mission: Mission, platform: Platform, axes: earth.SceneAxes | Non
     return found
 
 
+def _of_file(file: str | None, error: PathFileError) -> Problem:
+    """What is wrong with a file, which is the value of a key and is named once."""
+    said = str(error)
+    said = f"{file} {said}" if file is not None and said.startswith("has ") else said
+    return Problem(said, names_value=file is not None and said.startswith(file))
+
+
 def _known(axes: earth.SceneAxes | None, key: str) -> earth.SceneAxes:
     if axes is None:
         raise _UnusablePathError((key,), Problem("needs the scene's place on the Earth", _PLACE))
@@ -156,11 +159,11 @@ def _of_orbit(mission: Mission, route: routes.OrbitSource, axes: earth.SceneAxes
         fitted = interpolated(lambda tau: axes.place(orbit.place(center.after(tau))), 2 * half, widest)
         # An interpolation is worst between the places of a file.
         of_orbit = max((orbit.doubts(center.after(part * half)) for part in (0.0, -0.5, 0.5, -1.0, 1.0)), key=len)
-        doubts = (*of_orbit, *fitted.doubts)
     except PathFileError as error:
-        raise _UnusablePathError(("orbit", form), Problem(str(error))) from None
+        raise _UnusablePathError(("orbit", form), _of_file(file, error)) from None
     age = None if orbit.epoch is None else center.since(orbit.epoch)
-    return _flown(fitted, orbit.words, file, data)._replace(age=age, doubts=doubts)
+    path = _flown(fitted, orbit.words, file, hashlib.sha256(data).hexdigest())
+    return path._replace(age=age, doubts=(*of_orbit, *fitted.doubts))
 
 
 def _read_orbit(form: str, data: bytes, name: str, wanted: str | None, center: Instant) -> Orbit:
@@ -183,22 +186,32 @@ def _of_log(
     aperture_time = mission.collection.aperture_time
     try:
         data = read(route.file)
-        log = _log(route, data)
+        digest = hashlib.sha256(data).hexdigest()
+        log = _log(route, data, digest)
         if log.is_earth_fixed:
-            log = _in_scene(log, _known(axes, "trajectory"))
+            known = _known(axes, "trajectory")
+            log = log._replace(places=known.places(log.places), is_earth_fixed=False)
         times = slow_times(log, mission.collection.center_time, route.center, aperture_time, route.file)
         fitted = smoothed(times, log.places, aperture_time)
     except PathFileError as error:
-        said = str(error)
-        said = f"{route.file} {said}" if said.startswith("has ") else said
-        raise _UnusablePathError(("trajectory", "file"), Problem(said)) from None
+        raise _UnusablePathError(("trajectory", "file"), _of_file(route.file, error)) from None
     words = log.words
     if log.start is None:
         words += f", {route.center or 0.0:.12g} s of it at mid-aperture"
-    return _flown(fitted, words, route.file, data)._replace(doubts=fitted.doubts)
+    return _flown(fitted, words, route.file, digest)
 
 
-def _log(route: routes.TrajectorySource, data: bytes) -> Log:
+def _log(route: routes.TrajectorySource, data: bytes, digest: str) -> Log:
+    """Read a log, or take it as it was read before."""
+    key = (route.file, route.format, route.week, digest)
+    log = _logs.pop(key, None) or _read_log(route, data)
+    _logs[key] = log  # the last one
+    for old in list(_logs)[:-_LOGS_KEPT]:
+        _logs.pop(old, None)
+    return log
+
+
+def _read_log(route: routes.TrajectorySource, data: bytes) -> Log:
     """Read a log; its format is stated, or that of its name."""
     is_sbet = route.format == "sbet" or (route.format is None and route.file.lower().endswith((".out", ".sbet")))
     if is_sbet:
@@ -210,12 +223,6 @@ def _log(route: routes.TrajectorySource, data: bytes) -> Log:
     from bisar_budget.paths import flight_log
 
     return flight_log.read_csv(data, route.file)
-
-
-def _in_scene(log: Log, axes: earth.SceneAxes) -> Log:
-    import numpy as np
-
-    return log._replace(places=(log.places - np.array(axes.origin)) @ np.array(axes.axes).T, is_earth_fixed=False)
 
 
 def _by_accuracy(
@@ -239,7 +246,7 @@ def _by_accuracy(
             mission.collection.aperture_time,
         )
     except PathFileError as unusable:
-        raise _UnusablePathError(key, Problem(str(unusable))) from None
+        raise _UnusablePathError(key, _of_file(file, unusable)) from None
     if error.covariance is None:
         source = f"accuracy file {file}"
         if error.position is None:
@@ -258,17 +265,18 @@ def _of_place(platform: Platform, axes: earth.SceneAxes, aperture_time_s: float)
             PlatformState(position=axes.place(earth.earth_fixed(place)), velocity=STRAIGHT), "geodetic place"
         )
     fitted = interpolated(lambda tau: axes.place(earth.flown(place, heading, speed, climb, tau)), aperture_time_s)
-    return FlownPath(fitted.state, "geodetic place, flight along the geodesic")
+    return _flown(fitted, "geodetic place, flight along the geodesic")
 
 
-def _flown(fitted: Fitted, words: str, file: str | None, data: bytes) -> FlownPath:
+def _flown(fitted: Fitted, words: str, file: str | None = None, digest: str | None = None) -> FlownPath:
     return FlownPath(
         fitted.state,
         source=words,
         file=file,
-        sha256=hashlib.sha256(data).hexdigest(),
+        sha256=digest,
         order=fitted.order,
         farthest=fitted.farthest,
         rms=fitted.rms,
         samples=fitted.samples or None,
+        doubts=fitted.doubts,
     )

@@ -175,34 +175,28 @@ class CommonMotionError(NamedTuple):
 
 
 class Way(NamedTuple):
-    """A way to state the path of a platform: keys that it needs, others that it may have, and those of it alone.
+    """A way to state the path of a platform: keys that it needs, and others that it may have.
 
     `direction` is the key that a platform which does not move has no use for.
     """
 
     keys: tuple[str, ...]
-    optional: tuple[str, ...]
-    own: tuple[str, ...]
+    optional: tuple[str, ...] = ()
     direction: str = ""
+
+    @property
+    def own(self) -> tuple[str, ...]:
+        """Keys that it needs and no other way has."""
+        return tuple(key for key in self.keys if key != "speed")
 
 
 _CURVES = ("acceleration", "jerk", "snap")
 WAYS = (
-    Way(("position", "velocity"), _CURVES, ("position", "velocity")),
-    Way(("orbit",), (), ("orbit",)),
-    Way(("trajectory",), (), ("trajectory",)),
-    Way(
-        ("latitude", "longitude", "altitude", "speed", "heading"),
-        ("climb",),
-        ("latitude", "longitude", "altitude", "heading"),
-        "heading",
-    ),
-    Way(
-        ("slant_range", "azimuth", "elevation", "speed", "motion_azimuth"),
-        ("climb", *_CURVES),
-        ("slant_range", "azimuth", "elevation", "motion_azimuth"),
-        "motion_azimuth",
-    ),
+    Way(("position", "velocity"), _CURVES),
+    Way(("orbit",)),
+    Way(("trajectory",)),
+    Way(("latitude", "longitude", "altitude", "speed", "heading"), ("climb",), "heading"),
+    Way(("slant_range", "azimuth", "elevation", "speed", "motion_azimuth"), ("climb", *_CURVES), "motion_azimuth"),
 )
 _PATH_KEYS = tuple(dict.fromkeys(key for way in WAYS for key in (*way.keys, *way.optional)))
 ACCEPTED_WAYS = (

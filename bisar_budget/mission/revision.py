@@ -14,12 +14,13 @@ class RevisionError(Exception):
 
 
 def file_at(path: str, revision: str) -> bytes:
-    """Content of a file as committed in `revision`: a branch, tag or commit.
+    """Content of a file as committed in `revision`: a branch, tag or commit. Links are followed within that revision.
 
     Raises
     ------
     RevisionError
-        Git is not there, the file is in no repository, the revision is unknown or has no such file.
+        Git is not there, the file is in no repository, the revision is unknown or has no such file, or has a link
+        that leads nowhere or out of the repository.
     """
     folder, name = os.path.split(os.path.abspath(path))
     if not os.path.isdir(folder):
@@ -34,10 +35,27 @@ def file_at(path: str, revision: str) -> bytes:
     )
     if not is_known:
         raise RevisionError(f"the repository of {path} has no revision {printable(revision)}")
-    is_there, content = _git(folder, "cat-file", "blob", f"{commit.decode().strip()}:./{name}")
-    if not is_there:
-        raise RevisionError(f"{path} is not in revision {printable(revision)}")
-    return content
+    asked = os.fsencode(f"{commit.decode().strip()}:./{name}")
+    is_read, answer = (
+        (False, b"")  # git reads one name from each line
+        if b"\n" in asked
+        else _git(folder, "cat-file", "--batch", "--follow-symlinks", given=asked + b"\n")
+    )
+    head, _, rest = answer.partition(b"\n")
+    words = head.split()
+    if is_read and words[1:2] == [b"blob"]:
+        return rest[: int(words[2])]
+    raise RevisionError(f"{path} {_why_not(words, rest)} revision {printable(revision)}")
+
+
+def _why_not(words: list[bytes], rest: bytes) -> str:
+    """What git says instead of a file: `symlink` with the way out of the tree, or why a link has no end."""
+    if words[:1] == [b"symlink"]:
+        outside = printable(os.fsdecode(rest.removesuffix(b"\n")))
+        return f"is a link out of the repository, to {outside}, in"
+    if words[:1] in ([b"dangling"], [b"loop"], [b"notdir"]):
+        return "is a link that leads nowhere in"
+    return "is not in"
 
 
 def mission_at(path: str, revision: str) -> Mission:
@@ -60,9 +78,9 @@ def mission_at(path: str, revision: str) -> Mission:
     return parse_mission(file_at(path, revision), f"{revision}:{path}", beside=beside)
 
 
-def _git(folder: str, *arguments: str) -> tuple[bool, bytes]:
+def _git(folder: str, *arguments: str, given: bytes = b"") -> tuple[bool, bytes]:
     try:
-        done = run(["git", "-C", folder, *arguments], stdin=DEVNULL, stdout=PIPE, stderr=DEVNULL, check=False)
+        done = run(["git", "-C", folder, *arguments], input=given, stdout=PIPE, stderr=DEVNULL, check=False)
     except OSError:
         raise RevisionError("git cannot be run; --base needs it") from None
     except ValueError:  # a NUL in the name

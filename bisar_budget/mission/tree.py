@@ -105,7 +105,7 @@ class Tree:
                 break
             place = self.keys.get(path[:length]) or self.values.get(path[:length])
         mark = None if place is None else place.start_mark
-        given = shown(value) if isinstance(value, str) and not is_key else ""
+        given = shown(value) if isinstance(value, str) and not is_key and not problem.names_value else ""
         self.fault(mark, path, problem.problem, given=given, accepted=problem.accepted, hint=problem.hint)
 
     def read_document(self, next_event: Callable[[], Any]) -> None:

@@ -9,6 +9,7 @@ __all__ = [
     "flight_log",
     "instant",
     "mean_elements",
+    "polynomials",
     "sbet",
     "two_lines",
 ]

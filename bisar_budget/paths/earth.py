@@ -1,12 +1,16 @@
-"""The Earth as WGS-84 has it: geodetic places, and the axes of a scene on it. No array library.
+"""The Earth as WGS-84 has it: geodetic places, and the axes of a scene on it. Single places need no array library.
 
 Earth-fixed axes: x through Greenwich on the equator, z through the north pole. [m]
 """
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from bisar_budget.geometry import Axes, Vector, cross, dot, unit
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 # NGA.STND.0036, table 3.1
 EQUATORIAL_RADIUS = 6378137.0  # m
@@ -35,6 +39,13 @@ class SceneAxes(NamedTuple):
     def place(self, earth_fixed: Vector) -> Vector:
         """A place in the scene's axes. [m]"""
         return self.turned(_minus(earth_fixed, self.origin))
+
+    def places(self, earth_fixed: "NDArray[np.float64]") -> "NDArray[np.float64]":
+        """Places (n, 3) in the scene's axes. [m]"""
+        import numpy as np
+
+        turned: NDArray[np.float64] = (earth_fixed - np.array(self.origin)) @ np.array(self.axes).T
+        return turned
 
     def turned(self, earth_fixed: Vector) -> Vector:
         """A direction or velocity in the scene's axes."""

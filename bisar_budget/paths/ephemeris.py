@@ -17,7 +17,7 @@ from bisar_budget.paths.flight import Orbit, PathFileError
 from bisar_budget.paths.instant import DAY, Instant
 from bisar_budget.paths.interpolation import Sample, interpolate
 from bisar_budget.paths.leap_seconds import FIRST_DAY, TAI_LESS, has_leap_second, tai, tai_less_utc, utc
-from bisar_budget.paths.markup import Element, parse_markup
+from bisar_budget.paths.markup import MessageElement, parse_markup
 from bisar_budget.paths.turning import Turn, celestial_turn, from_teme, unknown_rotation
 
 _EARTH_FIXED = re.compile(r"ITRF[- ]?(\d\d|\d{4})?|WGS[- ]?84")
@@ -265,8 +265,17 @@ def _segment(block: _Block, name: str) -> _Segment:
         is_hermite=is_hermite,
         degree=degree,
         line=block.line,
-        words=f"OEM of {object_name}, {frame}, {'Hermite' if is_hermite else 'Lagrange'} degree {degree}",
+        words=f"OEM of {object_name}, {frame}, {'Hermite' if is_hermite else 'Lagrange'} degree {degree}"
+        + _not_stated(metadata),
     )
+
+
+def _not_stated(metadata: Mapping[str, tuple[int, str]]) -> str:
+    """What of the interpolation is our choice, since the message does not say it."""
+    kind, degree = (metadata.get(key, (0, ""))[1].upper() for key in ("INTERPOLATION", "INTERPOLATION_DEGREE"))
+    if not kind:
+        return " (the file states no interpolation)"
+    return "" if degree or kind == "LINEAR" else " (the file states no degree)"
 
 
 _LIMITS = ("START_TIME", "STOP_TIME", "USEABLE_START_TIME", "USEABLE_STOP_TIME")
@@ -369,6 +378,7 @@ def _has_leap_second(minute: Instant) -> bool:
 
 def _from_keywords(text: str, name: str) -> Iterator[_Block]:
     """Segments of a message that has a keyword and a value in each line."""
+    text = text.rstrip()
     lines = ((at, line.strip()) for at, line in enumerate(text.split("\n"), 1))
     rows: list[tuple[int, str, Sequence[str]]] = []
     metadata: dict[str, tuple[int, str]] | None = None
@@ -408,7 +418,8 @@ def _from_keywords(text: str, name: str) -> Iterator[_Block]:
         elif state == "metadata" or (state == "header" and not equals):
             raise PathFileError(f"{where}: must be a keyword, = and its value (got {shown(line)})")
     if state in ("metadata", "covariance"):
-        raise PathFileError(f"{name}: ends within {'metadata' if state == 'metadata' else 'a covariance'}")
+        last = text.count("\n") + 1
+        raise PathFileError(f"{name}:{last}: ends within {'metadata' if state == 'metadata' else 'a covariance'}")
     if metadata is not None:
         yield _Block(began, metadata, rows)
 
@@ -427,7 +438,7 @@ def _from_markup(data: bytes, name: str) -> Iterator[_Block]:
             yield _Block(segment.line, metadata, rows)
 
 
-def _state(state: Element, name: str) -> tuple[int, str, Sequence[str]]:
+def _state(state: MessageElement, name: str) -> tuple[int, str, Sequence[str]]:
     where = f"{name}:{state.line}"
     parts = {one.name: one for one in state.children}
     for key in ("EPOCH", *_VECTOR):

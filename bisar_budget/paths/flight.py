@@ -7,11 +7,11 @@ say how far the polynomial is from what the file has.
 
 import math
 from collections.abc import Callable, Sequence
-from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
 from bisar_budget.geometry import PlatformState, Vector
 from bisar_budget.paths.instant import Instant
+from bisar_budget.paths.polynomials import least_squares, path_of, powers_of, powers_of_chebyshev
 
 if TYPE_CHECKING:
     import numpy as np
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _NODES = 15  # Chebyshev points of an interpolation, so many coefficients
 _LEAST_WINDOW = 10.0  # s; in a shorter one rounding of an Earth-fixed place, 1e-9 m, is an acceleration
 _UNSEEN_M = 1e-7  # a coefficient that moves the path by less is rounding
-_ROUGH_M = 5e-3  # an orbit that is farther from its polynomial is not smooth; messages have places to 1 mm
+_ROUGH_M = 5e-3  # a path that is farther from its polynomial is not smooth; messages have places to 1 mm
 _TRIFLE_M = 1e-3
 _STRAY = 8  # times the usual residual; noise of thousands of places reaches 4
 _HIGHEST = 8  # order of a smoothed path
@@ -89,7 +89,7 @@ def interpolated(place: Callable[[float], Vector], aperture_time_s: float, wides
     half = min(max(aperture_time_s, _LEAST_WINDOW), widest_s) / 2
     nodes = [math.cos(math.pi * (n + 0.5) / _NODES) for n in range(_NODES)]
     places = [place(half * node) for node in nodes]
-    monomials = _monomials(_NODES)
+    monomials = powers_of_chebyshev(_NODES)
     coefficients = []
     for axis in range(3):
         chebyshev = [
@@ -106,7 +106,7 @@ def interpolated(place: Callable[[float], Vector], aperture_time_s: float, wides
                 for power in range(_NODES)
             ]
         )
-    state = _state([tuple(axis[power] for axis in coefficients) for power in range(_NODES)])  # type: ignore[misc]
+    state = path_of([[axis[power] for axis in coefficients] for power in range(_NODES)])
     apart = []
     for n in range(_NODES + 1):
         tau = aperture_time_s / 2 * math.cos(math.pi * n / _NODES)
@@ -114,7 +114,7 @@ def interpolated(place: Callable[[float], Vector], aperture_time_s: float, wides
     rms = math.sqrt(math.fsum(one * one for one in apart) / len(apart))
     doubts: tuple[str, ...] = ()
     if max(apart) > _ROUGH_M:
-        doubts = (f"its places are up to {max(apart):.3g} m from a smooth path: interpolate more finely",)
+        doubts = (f"the polynomial that is flown is up to {max(apart):.3g} m from the path",)
     return Fitted(state, len(state.bends) + 2, max(apart), rms, doubts=doubts)
 
 
@@ -149,11 +149,7 @@ def smoothed(times: "NDArray[np.float64]", places: "NDArray[np.float64]", apertu
             f"has {count} places in the aperture of {aperture_time_s:g} s, at least 5 are needed; sample faster"
         )
     at, wanted = times[inside] / half, places[inside]
-    fits = []
-    for order in range(2, min(_HIGHEST, (count - 1) // 2) + 1):
-        legendre = np.polynomial.legendre.legvander(at, order)
-        found = np.linalg.lstsq(legendre, wanted, rcond=None)[0]
-        fits.append((found, wanted - legendre @ found))
+    fits = [least_squares(at, wanted, order) for order in range(2, min(_HIGHEST, (count - 1) // 2) + 1)]
     independent = _independent(fits[-1][1])
 
     def information(left: "NDArray[np.float64]", order: int) -> float:
@@ -174,9 +170,7 @@ def smoothed(times: "NDArray[np.float64]", places: "NDArray[np.float64]", apertu
             f"a place of the log, {when:+.4g} s from mid-aperture, is {farthest:.3g} m from the smooth path; half of "
             f"the places are within {usual:.2g} m",
         )
-    powers = np.stack([_padded(np.polynomial.legendre.leg2poly(found[:, axis]), len(found)) for axis in range(3)])
-    state = _state([tuple(float(p) for p in powers[:, n] / half**n) for n in range(len(found))])  # type: ignore[misc]
-    return Fitted(state, len(found) - 1, farthest, rms, count, doubts)
+    return Fitted(path_of(powers_of(found, half)), len(found) - 1, farthest, rms, count, doubts)
 
 
 def slow_times(
@@ -258,28 +252,3 @@ def _independent(left: "NDArray[np.float64]") -> float:
     correlation = (correlation / np.maximum(correlation[0], _UNSEEN_M**2)).mean(axis=1)
     ends = int(np.argmax(correlation <= 0)) or count
     return max(2.0, count / float(1 + 2 * correlation[1:ends].sum()))
-
-
-def _padded(values: "NDArray[np.float64]", count: int) -> "NDArray[np.float64]":
-    import numpy as np
-
-    return np.pad(values, (0, count - values.size))
-
-
-def _state(powers: Sequence[Vector]) -> PlatformState:
-    """A path from its coefficients of τ⁰, τ¹, …; the highest that are zero are left out."""
-    position, velocity, (x, y, z), *bends = powers
-    while bends and bends[-1] == (0.0, 0.0, 0.0):
-        bends.pop()
-    return PlatformState(position=position, velocity=velocity, acceleration=(2 * x, 2 * y, 2 * z), bends=tuple(bends))
-
-
-@cache
-def _monomials(count: int) -> tuple[tuple[float, ...], ...]:
-    """Coefficients of powers in Chebyshev's polynomials T₀ …, row by row."""
-    rows = [[1.0], [0.0, 1.0]]
-    while len(rows) < count:
-        last, before = rows[-1], rows[-2]
-        doubled = [0.0, *(2 * one for one in last)]
-        rows.append([a - b for a, b in zip(doubled, [*before, 0.0, 0.0], strict=True)])
-    return tuple(tuple(row + [0.0] * (count - len(row))) for row in rows[:count])

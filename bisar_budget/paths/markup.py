@@ -14,16 +14,16 @@ _LONGEST = 10_000  # characters of an element's own text
 
 
 @dataclass(eq=False, slots=True)
-class Element:
-    """An element: its name without namespace, the line where it begins, its units, text and children."""
+class MessageElement:
+    """An element of a message: its name without namespace, the line where it begins, its units, text and children."""
 
     name: str
     line: int
     units: str = ""
     text: str = ""
-    children: list["Element"] = field(default_factory=list)
+    children: list["MessageElement"] = field(default_factory=list)
 
-    def all(self, name: str) -> Iterator["Element"]:
+    def all(self, name: str) -> Iterator["MessageElement"]:
         """Elements of a name anywhere below, in the order of the file."""
         for child in self.children:
             if child.name == name:
@@ -32,7 +32,7 @@ class Element:
                 yield from child.all(name)
 
 
-def parse_markup(data: bytes, name: str) -> Element:
+def parse_markup(data: bytes, name: str) -> MessageElement:
     """Read XML.
 
     Raises
@@ -42,7 +42,7 @@ def parse_markup(data: bytes, name: str) -> Element:
     """
     parser = expat.ParserCreate()
     parser.buffer_text = True
-    top = Element("", 1)
+    top = MessageElement("", 1)
     open_ones = [top]
     count = 0
 
@@ -54,7 +54,9 @@ def parse_markup(data: bytes, name: str) -> Element:
         count += 1
         if count > _MOST or len(open_ones) > _DEEPEST:
             raise here(f"has more than {_MOST} elements, or {_DEEPEST} in each other")
-        one = Element(intern(tag.rpartition(":")[2]), parser.CurrentLineNumber, intern(attributes.get("units", "")))
+        one = MessageElement(
+            intern(tag.rpartition(":")[2]), parser.CurrentLineNumber, intern(attributes.get("units", ""))
+        )
         open_ones[-1].children.append(one)
         open_ones.append(one)
 

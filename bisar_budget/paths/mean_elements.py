@@ -57,10 +57,9 @@ def _from_json(text: str, name: str) -> _Records:
         raise PathFileError(f"{name}:{error.lineno}: is not JSON: {error.msg}") from None
     except (RecursionError, ValueError):  # brackets without end, digits without end
         raise PathFileError(f"{name}: is not JSON of orbit mean-elements messages") from None
-    if not isinstance(found, list):
-        raise PathFileError(f"{name}: must be a list of orbit mean-elements messages")
-    for count, record in enumerate(found, 1):
-        where = f"{name}: record {count}"
+    records = found if isinstance(found, list) else [found]
+    for count, record in enumerate(records, 1):
+        where = f"{name}: record {count}" if records is found else name
         if not isinstance(record, dict):
             raise PathFileError(f"{where}: must have keywords and values")
         # A list or a mapping is no value of any keyword.

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from bisar_budget import units
 from bisar_budget.faults import InvalidValueError
+from bisar_budget.resources import UnreadableError, content
 from bisar_budget.units import parse_quantity
 
 _MOST_POINTS = 100
@@ -106,17 +107,21 @@ def read_list(file: str) -> list[Target]:
         The file and line of what is no list of points.
     """
     try:
-        with open(file, encoding="utf-8", newline="") as stream:
-            text = stream.read(_MOST_BYTES + 1)
-    except (OSError, UnicodeDecodeError) as error:
-        raise ValueError(f"{file} cannot be read: {getattr(error, 'strerror', None) or 'it is no text'}") from None
-    if len(text) > _MOST_BYTES:
-        raise ValueError(f"{file} is longer than {_MOST_BYTES} characters")
-    rows = csv.reader(text.splitlines())
-    head = [name.strip() for name in next(rows, [])]
+        data = content(file, _MOST_BYTES)
+    except UnreadableError as error:
+        raise ValueError(str(error)) from None
+    if len(data) > _MOST_BYTES:
+        raise ValueError(f"{file} is longer than {_MOST_BYTES} bytes")
+    try:
+        rows = list(csv.reader(data.decode("utf-8-sig").splitlines()))
+    except UnicodeDecodeError:
+        raise ValueError(f"{file} cannot be read: it is no text") from None
+    except csv.Error as error:
+        raise ValueError(f"{file} is not CSV: {error}") from None
+    head = [name.strip() for name in (rows or [[]])[0]]
     if tuple(head) != _COLUMNS:
         raise ValueError(f"{file}:1: the columns must be {', '.join(_COLUMNS)} (got {', '.join(head)[:60]})")
-    return [_listed(f"{file}:{line}", row) for line, row in enumerate(rows, 2) if row]
+    return [_listed(f"{file}:{line}", row) for line, row in enumerate(rows[1:], 2) if row]
 
 
 def _listed(place: str, row: list[str]) -> Target:

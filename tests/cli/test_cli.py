@@ -268,11 +268,29 @@ class TestInit:
         """Uncomment each optional block: what the starter suggests must load."""
         text = run("init", "-").stdout
         text, count = re.subn(r"(?m)^(\s*)# (\s*(?:- \{)?[a-z_]+: .*)$", r"\1\2", text)
-        assert count == 21
+        assert count == 22
         path = tmp_path / "m.yaml"
         path.write_text(text)
         result = run("check", path)
         assert result.exit_code == 0, result.output
+
+    def test_the_other_ways_to_state_a_path_are_those_of_a_mission(self, run, tmp_path) -> None:
+        """It did not mention orbits, logs and places. Files are asked for: all keys are known."""
+        text = run("init", "-").stdout
+        (instant,) = re.findall(r"# center_time: (\S+)", text)
+        (place,) = re.findall(r"WGS-84\): (\{.*\})", text)
+        ways = [yaml.safe_load(way) for way in re.findall(r"(?m)^ +#   or (.*)$", text)]
+        said = [{"satellite.tle cannot be read"}, {"flight.csv cannot be read"}, set()]
+        assert len(ways) == len(said)
+        for way, faults in zip(ways, said, strict=True):
+            tree = yaml.safe_load(text)
+            tree["collection"]["center_time"] = instant
+            tree["scene"] = yaml.safe_load(place)
+            tree["platforms"]["receiver"] = way
+            (tmp_path / "m.yaml").write_text(yaml.safe_dump(tree))
+            result = run("check", tmp_path / "m.yaml")
+            assert result.exit_code == (2 if faults else 0), result.output
+            assert all(fault in result.stderr for fault in faults)
 
 
 def test_schema_is_printed(run, tmp_path) -> None:

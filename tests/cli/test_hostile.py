@@ -1,6 +1,11 @@
-"""What other people's machines, files and terminals do to a command that runs on every commit."""
+"""What other people's machines, files and terminals do to a command that runs on every commit.
+
+`run` is the command in this process, which takes a tenth of the time. `spawn` is one of its own, for what only that
+shows: signals, descriptors, what Python reads of its environment when it starts.
+"""
 
 import codecs
+import contextlib
 import json
 import os
 import re
@@ -8,12 +13,16 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 from click.testing import CliRunner
 
 from bisar_budget.budget.check import check_mission
+from bisar_budget.cli import _end as end
 from bisar_budget.cli import cli
 from bisar_budget.cli.streams import harmless
 from bisar_budget.faults import MissionError
@@ -21,10 +30,11 @@ from bisar_budget.findings.mission import Report
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.tree import MAX_FAULTS
 from bisar_budget.report import FORMATS, Style, render
-from tests.conftest import ROOT, TODAY, findings, heed_signals, mission_text
+from tests.conftest import APART, ROOT, TODAY, findings, heed_signals, mission_text
 from tests.fuzz import RAW, RUN, case
 
 COMMAND = [sys.executable, "-m", "bisar_budget"]
+SMALL = {"collection__aperture_time": "1 s", "radar__bandwidth": "20 MHz"}  # an image of few pixels
 SECTION_V = ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml"
 needs_proc = pytest.mark.skipif(not os.path.isdir("/proc/self/task"), reason="asks /proc for processes")
 
@@ -36,8 +46,28 @@ def mission(tmp_path) -> Path:
     return path
 
 
-def run(*arguments, cwd=ROOT, **options) -> subprocess.CompletedProcess:
-    return subprocess.run([*COMMAND, *map(str, arguments)], capture_output=True, cwd=cwd, **options)
+class Done(NamedTuple):
+    """A command that ended, as bytes."""
+
+    returncode: int
+    stdout: bytes
+    stderr: bytes
+
+
+def run(*arguments, cwd=ROOT, env: Mapping[str, str] | None = None, encoding: str = "utf-8") -> Done:
+    """Run the command in this process, with more variables, on streams of an encoding."""
+    runner = CliRunner(charset=encoding, **APART)
+    with contextlib.chdir(cwd):
+        # A process of its own leaves two columns of 80, as Click does.
+        result = runner.invoke(cli, [*map(str, arguments)], env=env, terminal_width=78)
+    return Done(result.exit_code, result.stdout_bytes, result.stderr_bytes or b"")
+
+
+def spawn(*arguments, cwd=ROOT, env: Mapping[str, str] | None = None, **options) -> Done:
+    """Run the command in a process of its own, with more variables."""
+    command = [*COMMAND, *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, cwd=cwd, env={**os.environ, **(env or {})}, **options)
+    return Done(done.returncode, done.stdout, done.stderr)
 
 
 def children(pid: int) -> set[int]:
@@ -114,26 +144,47 @@ class TestWorkers:
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGTERM") or sys.platform == "win32", reason="needs POSIX signals")
-@pytest.mark.parametrize(
-    ("command", "option", "name"),
-    [("check", "-o", "report.html"), ("simulate", "-o", "images.npz"), ("simulate", "--plot", "sheet.png")],
-)
-def test_a_report_that_is_interrupted_leaves_the_old_one_and_nothing_else(tmp_path, command, option, name) -> None:
-    """The signal comes while the temporary file is written, wherever that is."""
-    script = (
-        "import os, signal, sys\n"
-        "from bisar_budget.cli import main\n"
-        "import bisar_budget.cli.streams\n"
-        "chmod = os.chmod\n"
-        "os.chmod = lambda *a: (os.kill(os.getpid(), signal.SIGTERM), chmod(*a))\n"
-        "main()\n"
-    )
-    report = tmp_path / name
-    report.write_text("old")
-    done = subprocess.run([sys.executable, "-c", script, command, str(SECTION_V), option, str(report)], cwd=ROOT)
-    assert done.returncode == 143
-    assert [path.name for path in tmp_path.iterdir()] == [name]
-    assert report.read_text() == "old"
+class TestInterrupted:
+    """A signal comes while the temporary file is written, wherever that is."""
+
+    @pytest.fixture
+    def folder(self, tmp_path) -> Path:
+        (tmp_path / "m.yaml").write_text(mission_text(**SMALL))
+        (tmp_path / "reports").mkdir()
+        return tmp_path
+
+    def assert_only_the_old_one_is_left(self, report: Path) -> None:
+        assert [path.name for path in report.parent.iterdir()] == [report.name]
+        assert report.read_text() == "old"
+
+    def test_a_report_of_a_process_of_its_own(self, folder) -> None:
+        script = (
+            "import os, signal, sys\n"
+            "from bisar_budget.cli import main\n"
+            "import bisar_budget.cli.streams\n"
+            "chmod = os.chmod\n"
+            "os.chmod = lambda *a: (os.kill(os.getpid(), signal.SIGTERM), chmod(*a))\n"
+            "main()\n"
+        )
+        report = folder / "reports" / "r.html"
+        report.write_text("old")
+        arguments = ["check", str(folder / "m.yaml"), "-o", str(report)]
+        assert subprocess.run([sys.executable, "-c", script, *arguments], cwd=ROOT).returncode == 143
+        self.assert_only_the_old_one_is_left(report)
+
+    @pytest.mark.parametrize(("option", "name"), [("-o", "images.npz"), ("--plot", "sheet.png")])
+    def test_images(self, folder, monkeypatch, option: str, name: str) -> None:
+        report = folder / "reports" / name
+        report.write_text("old")
+        chmod = os.chmod
+        monkeypatch.setattr(os, "chmod", lambda *given: (os.kill(os.getpid(), signal.SIGTERM), chmod(*given)))
+        before = signal.signal(signal.SIGTERM, end)
+        try:
+            done = run("simulate", folder / "m.yaml", option, report)
+        finally:
+            signal.signal(signal.SIGTERM, before)
+        assert done.returncode == 143
+        self.assert_only_the_old_one_is_left(report)
 
 
 class TestSettings:
@@ -178,7 +229,7 @@ class TestSettings:
     @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
     def test_a_pipe_is_refused_at_once(self, mission) -> None:
         os.mkfifo(mission.parent / "pyproject.toml")
-        done = run("check", mission.name, cwd=mission.parent, timeout=60)
+        done = spawn("check", mission.name, cwd=mission.parent, timeout=60)
         assert done.returncode == 2
         assert b"pyproject.toml: is no regular file" in done.stderr
 
@@ -200,19 +251,24 @@ class TestEncodings:
     @pytest.mark.parametrize("format_name", ["json", "csv", "junit", "sarif", "github", "html", "markdown"])
     def test_what_programs_read_is_utf_8_whatever_the_terminal(self, tmp_path, format_name: str) -> None:
         path = tmp_path / "m.yaml"
-        path.write_text(mission_text(name="Höhe φ 雷達"), encoding="utf-8")
+        name = "Höhe φ 雷達"
+        broken = {"other_errors": [{"name": name, "quadratic_phase_error": "90 deg"}]}  # what some formats name alone
+        path.write_text(mission_text(name=name, **broken), encoding="utf-8")
         outputs = {
-            encoding: run("check", path, "--format", format_name, env={**os.environ, "PYTHONIOENCODING": encoding})
+            encoding: run("check", path, "--format", format_name, encoding=encoding)
             for encoding in ("utf-8", "latin-1", "ascii")
         }
         assert len({done.stdout for done in outputs.values()}) == 1
-        assert outputs["ascii"].stdout.decode("utf-8")
+        assert "Höhe" in outputs["ascii"].stdout.decode("utf-8").replace(r"\u00f6", "ö")
 
     def test_text_follows_the_terminal_and_escapes_what_it_lacks(self, tmp_path) -> None:
         path = tmp_path / "m.yaml"
         path.write_text(mission_text(name="Höhe φ"), encoding="utf-8")
-        done = run("check", path, env={**os.environ, "PYTHONIOENCODING": "latin-1"})
+        done = spawn("check", path, env={"PYTHONIOENCODING": "latin-1"})
         assert "Höhe \\u03c6" in done.stdout.decode("latin-1")
+        assert run("check", path, encoding="latin-1") == done
+        machine = ("check", path, "--format", "junit")
+        assert run(*machine, encoding="ascii") == spawn(*machine, env={"PYTHONIOENCODING": "ascii"})
 
 
 class TestOutputs:
@@ -250,7 +306,7 @@ class TestOutputs:
 
 @pytest.mark.parametrize("epoch", ["\uff11\uff12", "1_000", "-5", "+5", " 5", "1e9", "9" * 30])
 def test_only_ascii_digits_are_a_source_date(mission, epoch: str) -> None:
-    done = run("check", mission, env={**os.environ, "SOURCE_DATE_EPOCH": epoch, "PYTHONUTF8": "1"})
+    done = run("check", mission, env={"SOURCE_DATE_EPOCH": epoch})
     assert done.returncode == 2
     assert b"SOURCE_DATE_EPOCH must be seconds since 1970" in done.stderr
 
@@ -275,7 +331,7 @@ class TestTargets:
     def test_the_file_of_standard_input_is_no_target(self, mission) -> None:
         before = mission.read_bytes()
         with mission.open("rb") as file:
-            done = run("check", "-", "-o", mission, stdin=file)
+            done = spawn("check", "-", "-o", mission, stdin=file)
         assert done.returncode == 2
         assert b"is a mission file; a report would replace it" in done.stderr
         assert mission.read_bytes() == before
@@ -311,8 +367,8 @@ class TestTargets:
             done = subprocess.run([*COMMAND, "check", mission], stdout=file, stderr=subprocess.PIPE, cwd=ROOT)
         assert done.returncode == 2
         assert b"standard output goes to it" in done.stderr
-        environment = {**os.environ, "GITHUB_STEP_SUMMARY": str(mission)}
-        assert run("check", mission, "--format", "github", env=environment).returncode == 2
+        summary = {"GITHUB_STEP_SUMMARY": str(mission)}
+        assert run("check", mission, "--format", "github", env=summary).returncode == 2
         assert mission.read_bytes() == before
 
     def test_diff_with_a_pattern_spares_what_it_matches(self, mission, tmp_path) -> None:
@@ -337,27 +393,27 @@ class TestPlots:
     @pytest.fixture
     def folder(self, tmp_path) -> Path:
         folder = tmp_path
-        short = {"collection__aperture_time": "1 s", "radar__bandwidth": "20 MHz"}  # an image of few pixels
-        (folder / "m.yaml").write_text(mission_text(name="A $\\frac$ of $x_", **short))
+        (folder / "m.yaml").write_text(mission_text(name="A $\\frac$ of $x_", **SMALL))
         (folder / "matplotlibrc").write_text("backend: nonsense\nfigure.figsize: 1, 1\nfont.size: 40\n")
         return folder
 
-    def plot(self, folder: Path, name: str, **environment: str) -> bytes:
-        done = run("simulate", "m.yaml", "--plot", name, cwd=folder, env={**os.environ, **environment})
-        assert done.returncode == 0, done.stderr
-        return (folder / name).read_bytes()
-
     def test_a_name_is_text_and_settings_of_matplotlib_do_not_matter(self, folder) -> None:
-        """A name with a dollar ended in exit 3. Of the same input a plot has the same bytes."""
-        plain = self.plot(folder, "a.svg", MATPLOTLIBRC=os.devnull)
-        theirs = self.plot(folder, "b.svg", MPLBACKEND="nonsense")
-        assert theirs == plain
-        assert b"<dc:date>" not in plain
+        """A name with a dollar ended in exit 3. Of the same input a plot has the same bytes.
 
-    def test_an_archive_has_the_name_that_was_asked_for(self, folder, monkeypatch) -> None:
-        monkeypatch.chdir(folder)
-        done = CliRunner().invoke(cli, ["simulate", "m.yaml", "-o", "X.NPZ"])
-        assert done.exit_code == 0, done.output
+        Matplotlib reads settings when it is imported: theirs in a process of its own, ours here from elsewhere.
+        """
+        import matplotlib as mpl
+
+        plain = run("simulate", folder / "m.yaml", "--plot", folder / "a.svg")
+        assert mpl.rcParams["font.size"] != 40  # not theirs
+        theirs = spawn("simulate", "m.yaml", "--plot", "b.svg", cwd=folder, env={"MPLBACKEND": "nonsense"})
+        assert (plain.returncode, theirs.returncode) == (0, 0), plain.stderr + theirs.stderr
+        assert (folder / "b.svg").read_bytes() == (folder / "a.svg").read_bytes()
+        assert b"<dc:date>" not in (folder / "a.svg").read_bytes()
+
+    def test_an_archive_has_the_name_that_was_asked_for(self, folder) -> None:
+        done = run("simulate", "m.yaml", "-o", "X.NPZ", cwd=folder)
+        assert done.returncode == 0, done.stderr
         assert (folder / "X.NPZ").exists()
         assert not (folder / "X.NPZ.npz").exists()
 
@@ -367,7 +423,7 @@ ACTIVE = "\x1b[2J\x07\x9b31m\u061c\u200b\u200e\u200f\u202a\u202e\u2066\u2069"
 COMMANDS = "::error::x ##[group]y ##vso[task.complete]z"
 
 
-def is_harmless(done: subprocess.CompletedProcess) -> bool:
+def is_harmless(done: Done) -> bool:
     streams = [stream.decode("utf-8") for stream in (done.stdout, done.stderr)]
     return not any(RAW.search(stream) or RUN.search(stream) for stream in streams)
 
@@ -406,16 +462,28 @@ class TestTerminal:
         ids=lambda arguments: " ".join(arguments[:1] + arguments[-2:-1]).encode("ascii", "ignore").decode()[:40],
     )
     def test_arguments(self, mission, arguments) -> None:
-        done = run(*arguments, cwd=mission.parent, env={**os.environ, "PYTHONUTF8": "1"})
+        done = run(*arguments, cwd=mission.parent)
         assert done.returncode == 2
         assert is_harmless(done)
+
+    def test_a_process_of_its_own_says_the_same(self, mission) -> None:
+        """Its arguments and variables are bytes, and its streams are the system's."""
+        (mission.parent / f"{self.HOSTILE}.yaml").write_text("x", encoding="utf-8")
+        for arguments in (["check", "*.yaml", "--format", "github"], ["check", "--report", self.HOSTILE, "m.yaml"]):
+            done = spawn(*arguments, cwd=mission.parent, env={"PYTHONUTF8": "1"})
+            assert done.returncode == 2
+            assert run(*arguments, cwd=mission.parent) == done
+        there = {"BISAR_BUDGET_FORMAT": self.HOSTILE}
+        done = spawn("check", mission, env={"PYTHONUTF8": "1", **there})
+        assert is_harmless(done)
+        assert run("check", mission, env=there) == done
 
     @pytest.mark.parametrize(
         "name", ["BISAR_BUDGET_FORMAT", "BISAR_BUDGET_REPORT", "SOURCE_DATE_EPOCH", "BISAR_BUDGET_"]
     )
     def test_variables(self, mission, name: str) -> None:
         name += self.HOSTILE if name.endswith("_") else ""
-        done = run("check", mission, env={**os.environ, "PYTHONUTF8": "1", name: self.HOSTILE})
+        done = run("check", mission, env={name: self.HOSTILE})
         assert done.returncode == 2
         assert is_harmless(done)
 
@@ -563,6 +631,20 @@ class TestBounds:
         assert 2000 * sum(sizes) / len(sizes) < 40e6
 
 
+def at_most(count: int) -> None:
+    """Let this process open so many files."""
+    import resource
+
+    resource.setrlimit(resource.RLIMIT_NOFILE, (count, count))
+
+
+@cache
+def starts_with(count: int) -> bool:
+    """Whether the interpreter itself starts with so few descriptors."""
+    bare = subprocess.run([sys.executable, "-c", "pass"], preexec_fn=lambda: at_most(count), capture_output=True)
+    return not (bare.returncode or bare.stderr)
+
+
 class TestSystem:
     @pytest.mark.skipif(sys.platform == "win32", reason="no such limit there")
     @pytest.mark.parametrize("count", [4, 5, 6, 9, 12])
@@ -576,15 +658,9 @@ class TestSystem:
         ids=["check", "verify", "diff"],
     )
     def test_few_descriptors(self, arguments, count: int) -> None:
-        import resource
-
-        def limit() -> None:
-            resource.setrlimit(resource.RLIMIT_NOFILE, (count, count))
-
-        bare = subprocess.run([sys.executable, "-c", "pass"], preexec_fn=limit, capture_output=True)
-        if bare.returncode or bare.stderr:
+        if not starts_with(count):
             pytest.skip("the interpreter itself does not start with so few")
-        done = run(*arguments, preexec_fn=limit, stdin=subprocess.DEVNULL)
+        done = spawn(*arguments, preexec_fn=lambda: at_most(count), stdin=subprocess.DEVNULL)
         assert done.returncode in (0, 1, 2), done.stderr
         assert b"Traceback" not in done.stderr
 
@@ -625,7 +701,7 @@ class TestSystem:
     def test_the_same_without_docstrings_and_asserts(self, arguments) -> None:
         """Help was empty, and the schema described its sections by their signatures."""
         plain = run(*arguments)
-        optimized = run(*arguments, env={**os.environ, "PYTHONOPTIMIZE": "2"})
+        optimized = spawn(*arguments, env={"PYTHONOPTIMIZE": "2"})
         assert (optimized.returncode, optimized.stdout) == (plain.returncode, plain.stdout)
 
     def while_checking(self, mission, statement: str, **variables: str) -> subprocess.CompletedProcess:

@@ -177,8 +177,15 @@ def test_an_oscillator_does_what_whole_time_series_do(interval: float | None) ->
     phase = phase_at(t, drawn)
     if interval is not None:
         knots = np.arange(-3 - interval, 3 + 2 * interval, interval)
-        for one, start in zip(range(draws), rng.random(draws) * interval, strict=True):
-            phase[one] -= np.interp(t, knots + start, phase_at(knots + start, drawn[one]))
+        starts = rng.random(draws) * interval
+        turn = 2 * math.pi * np.multiply.outer(starts, f)
+        cosine, sine = np.cos(turn), np.sin(turn)
+        # Tones from each start on: their phases turn, and knots are the same for all draws.
+        later = np.stack(
+            (drawn[:, 0] * cosine + drawn[:, 1] * sine, drawn[:, 1] * cosine - drawn[:, 0] * sine), axis=1
+        )
+        for one, start, at_knots in zip(range(draws), starts, phase_at(knots, later), strict=True):
+            phase[one] -= np.interp(t, knots + start, at_knots)
     coefficients = np.polynomial.legendre.legfit(t / 3, phase.T, 3)
     left = phase - np.polynomial.legendre.legval(t / 3, coefficients)
     tolerance = 4 / math.sqrt(2 * draws)  # four standard errors of a sigma

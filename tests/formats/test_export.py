@@ -5,6 +5,7 @@ model, and nothing of this package.
 """
 
 import math
+import os
 import warnings
 
 import numpy as np
@@ -272,6 +273,7 @@ class TestCommand:
             ("east [m],north [m],amplitude\n1,2,0\n", ":2: the amplitude must be"),
             ("east [m],north [m],amplitude\nnan,2,1\n", ":2: a point is beyond"),
             ("", ":1: the columns"),
+            (f"east [m],north [m],amplitude\n{'1' * 140_000},2,1\n", " is not CSV: field larger than"),
         ],
     )
     def test_a_list_that_is_none(self, run, tmp_path, text, said) -> None:
@@ -282,6 +284,13 @@ class TestCommand:
         assert result.exit_code == 2
         assert said in result.stderr
         assert not (tmp_path / "m.cphd").exists()
+
+    @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+    def test_a_pipe_is_no_list_of_points(self, tmp_path) -> None:
+        """It was waited for without end."""
+        os.mkfifo(tmp_path / "points.csv")
+        with pytest.raises(ValueError, match=r"points\.csv is no regular file"):
+            parse_targets(str(tmp_path / "points.csv"))
 
     @pytest.mark.parametrize("grid", ["grid:3:5", "grid:0x3:5", "grid:100x100:5", "grid:3x3:x", "grid:3x3:1e9"])
     def test_a_grid_that_is_none(self, grid) -> None:

@@ -152,7 +152,7 @@ def test_one_platform_agrees_with_the_reference_geometry_of_sarkit(tmp_path) -> 
         assert value == pytest.approx(float(theirs.findtext(f"{{*}}{key}")), rel=1e-6), key
 
 
-def test_another_channel_and_vectors_without_a_pulse(tmp_path) -> None:
+def test_another_channel_and_vectors_without_a_pulse(run, tmp_path) -> None:
     """The second channel has a band and pulses of its own; a vector that was not sent has no place."""
     import sarkit.cphd as skcphd
 
@@ -186,6 +186,15 @@ def test_another_channel_and_vectors_without_a_pulse(tmp_path) -> None:
     assert (other.transmitter.samples, first.transmitter.samples) == (120, 140)
     for tau in (-0.3, 0.0, 0.3):
         assert math.dist(first.transmitter.state.at(tau)[0], other.transmitter.state.at(tau)[0]) < 30e-6
+    # How many are not used was not said.
+    unused = f"ithout a pulse, a time or a place, and not used: {len(pvps[::7])} of {len(pvps)} vectors"
+    assert "vectors" not in run("import", path).stderr
+    said = run("import", path, "--channel", "2")
+    assert said.exit_code == 0
+    assert f"# W{unused}." in said.stdout
+    (line,) = said.stderr.splitlines()
+    assert line.startswith(f"warning: w{unused}; places of the transmitter are up to ")
+    assert "; places of the receiver are up to " in line
 
 
 def test_a_moving_reference_surface_of_constant_height(tmp_path) -> None:
@@ -384,6 +393,16 @@ def test_crsd(tmp_path) -> None:
         writer.write_pvp("the channel", pvps)
         writer.write_ppp("the sequence", ppps)
     found = import_collection(str(path))
+    assert found.unused == ""
+    pvps["RcvPos"][3], ppps["TxTime"]["Frac"][4], pvps["TxPulseIndex"][90] = math.nan, math.nan, -1
+    with path.open("wb") as file, skcrsd.Writer(file, skcrsd.Metadata(xmltree=tree)) as writer:
+        writer.write_signal("the channel", np.zeros((count, 2), dtype=[("real", "i1"), ("imag", "i1")]))
+        writer.write_pvp("the channel", pvps)
+        writer.write_ppp("the sequence", ppps)
+    lacking = import_collection(str(path))
+    assert lacking.unused == f"without a pulse, a time or a place, and not used: 3 of {count} vectors"
+    assert lacking.transmitter.state.position == pytest.approx(found.transmitter.state.position, abs=1e-4)
+    assert lacking.reference.receiver_range == pytest.approx(found.reference.receiver_range, abs=1e-4)
     assert found.channel == "the channel"
     for side, length in (("Tx", found.reference.transmitter_range), ("Rcv", found.reference.receiver_range)):
         assert length == pytest.approx(

@@ -103,6 +103,16 @@ def test_ci_runs_the_readmes_commands() -> None:
     assert command in script
 
 
+def test_ci_repeats_every_test_of_the_extras() -> None:
+    """It collects two folders for them, not all."""
+    script = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+    (named,) = re.findall(r"(?m)-m extras (.+)$", script)
+    folders = [ROOT / folder for folder in named.split()]
+    marked = [file for file in (ROOT / "tests").rglob("test_*.py") if "pytest.mark.extras" in file.read_text("utf-8")]
+    elsewhere = [file for file in marked if file.name != Path(__file__).name and file.parent not in folders]
+    assert (len(marked) > 5, elsewhere) == (True, [])
+
+
 def test_the_formats_of_the_command_are_those_of_the_registry() -> None:
     (choice,) = [option.type for option in check.params if option.name == "format_name"]
     assert set(choice.choices) == FORMATS.keys()

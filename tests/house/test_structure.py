@@ -22,6 +22,7 @@ FLOORS = [
     {"findings"},
     {"monte_carlo"},
     {"budget"},
+    {"arrays"},
     {"simulate"},
     {"verify"},
     {"formats"},

@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 
 from bisar_budget.geometry import Vector
+from bisar_budget.mission import paths
 from bisar_budget.mission.load import load_mission
-from bisar_budget.paths import earth, two_lines
+from bisar_budget.paths import earth, flight_log, two_lines
 from bisar_budget.paths.instant import Instant
 from tests.conftest import mission_text
 from tests.paths.flown import flight, geodetic_csv, sbet, smrmsg
@@ -23,6 +24,7 @@ from tests.paths.orbit_files import CENTER, EPOCH, LINE_1, LINE_2, TLE, oem, omm
 from tests.report.test_report_diff import git
 
 BELOW_FLIGHT = {"latitude": "48.1 deg", "longitude": "11.3 deg", "height": "600 m"}  # beside `flown.flight`
+needs_links = pytest.mark.skipif(sys.platform == "win32", reason="needs links without rights to make them")
 FLIGHT = {"latitude": "48.2 deg", "longitude": "11.1 deg", "altitude": "3 km", "heading": "60 deg", "speed": "120 kn"}
 
 
@@ -112,6 +114,22 @@ class TestEveryKindOfPath:
             assert path.state.position == pytest.approx(axes.place(tuple(middle)), abs=1e-3)
             assert path.samples == 101
             assert path.farthest < 1e-6
+
+    def test_a_log_that_has_not_changed_is_read_once(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        """`solve` reads its mission some hundred times."""
+        monkeypatch.setattr(paths, "_logs", {})
+        read, reads = flight_log.read_csv, []
+        monkeypatch.setattr(flight_log, "read_csv", lambda *given: reads.append(given) or read(*given))
+        (folder / "m.yaml").write_text(aircraft())
+        first, again = (load_mission(str(folder / "m.yaml")).platforms.receiver.path for _ in range(2))
+        assert again == first
+        assert len(reads) == 1
+        higher = flight()
+        (folder / "flight.csv").write_bytes(geodetic_csv(higher._replace(height=higher.height + 100)))
+        other = load_mission(str(folder / "m.yaml")).platforms.receiver.path
+        assert len(reads) == 2
+        assert other.state.position[2] == pytest.approx(first.state.position[2] + 100, abs=0.1)
+        assert other.sha256 != first.sha256
 
     def test_an_accuracy_file_fills_what_the_mission_leaves_open(self, folder: Path) -> None:
         route = {"file": "sbet.out", "week": 2421, "accuracy": "smrmsg.out"}
@@ -205,6 +223,37 @@ class TestWhatIsSaid:
         (folder / "m.yaml").write_text(satellite())
         changed = run("diff", folder / "m.yaml", "--base", "HEAD")
         assert "content of a.tle" in changed.stdout
+
+    @needs_links
+    @pytest.mark.parametrize(
+        ("target", "said"),
+        [
+            ("store/orbits/a.tle", ""),
+            ("../outside.tle", "a.tle is a link out of the repository, to ../outside.tle, in revision HEAD"),
+            ("none.tle", "a.tle is a link that leads nowhere in revision HEAD"),
+        ],
+    )
+    def test_diff_follows_links_within_the_revision(
+        self, run: Callable[..., Any], folder: Path, target: str, said: str
+    ) -> None:
+        """The text of the link was taken for the file. Here a file and a folder above it are links."""
+        repository = folder / "repository"
+        (repository / "real").mkdir(parents=True)
+        (repository / "real" / "a.tle").write_text(TLE)
+        (repository / "store").mkdir()
+        (repository / "store" / "orbits").symlink_to("../real")
+        (repository / "a.tle").symlink_to(target)
+        (repository / "real.yaml").write_text(satellite())
+        (repository / "m.yaml").symlink_to("real.yaml")
+        git(repository, "init", "-q")
+        git(repository, "add", ".")
+        git(repository, "-c", "user.name=t", "-c", "user.email=t@example.org", "commit", "-q", "-m", "x")
+        (repository / "a.tle").unlink()
+        (repository / "a.tle").write_text(TLE.replace("SENTINEL-1A", "SENTINEL"))
+        found = run("diff", repository / "m.yaml", "--base", "HEAD")
+        assert found.exit_code == (2 if said else 0), found.stderr
+        assert said in found.stderr
+        assert ("content of a.tle" in found.stdout) is (not said)
 
 
 def rows(keep: Callable[[list[bytes]], list[bytes]]) -> bytes:
@@ -353,6 +402,7 @@ def test_a_path_that_cannot_be_read_is_one_line_and_no_report(
     faults = [line for line in result.stderr.splitlines() if "m.yaml:" in line]
     assert len(faults) == 1, result.stderr
     assert said in faults[0]
+    assert all(faults[0].count(name) <= 1 for name in ("a.tle", "flight.csv", "sbet.out")), faults[0]
     assert "Traceback" not in result.stderr
     assert all(one.isprintable() for one in result.stderr.splitlines())
 

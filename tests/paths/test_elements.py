@@ -8,10 +8,11 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
-from skyfield.api import EarthSatellite, load
+from skyfield.api import EarthSatellite, load, wgs84
 from skyfield.framelib import itrs
 
 from bisar_budget.geometry import Vector
+from bisar_budget.mission.load import load_mission
 from bisar_budget.paths import elements, mean_elements, two_lines
 from bisar_budget.paths.earth import Geodetic, axes_at
 from bisar_budget.paths.flight import Orbit, PathFileError, interpolated
@@ -96,6 +97,31 @@ def test_skyfield_has_the_satellite_at_the_same_place(hours: float) -> None:
     assert np.linalg.norm(theirs - place) <= 518 * abs(time.dut1) + 1e-5
 
 
+@pytest.mark.parametrize("tau", [-0.25, 0.0, 0.25])
+def test_skyfield_sees_the_satellite_of_the_example_in_the_same_direction(tau: float) -> None:
+    """From the scene of the Besançon example: elevation, azimuth and distance, the axes of the scene included.
+
+    Skyfield has UT1 of its own tables, the mission takes UT1 = UTC: its place is turned by that difference.
+    """
+    mission = load_mission(str(ROOT / "specs" / "missions" / "sentinel1_elements_besancon.yaml"))
+    lines = (ROOT / "specs" / "missions" / "paths" / "sentinel1a_2021079.tle").read_text().splitlines()
+    one, two = (next(line for line in lines if line.startswith(f"{n} ")) for n in (1, 2))
+    scene = mission.scene
+    time = skyfield_time(mission.collection.center_time.after(tau))
+    place = wgs84.latlon(math.degrees(scene.latitude), math.degrees(scene.longitude), scene.height)
+    altitude, azimuth, distance = (EarthSatellite(one, two, None, TIMESCALE) - place).at(time).altaz()
+    state = mission.platforms.transmitter.state
+    turned = turned_by_ut1(scene.axes.earth_fixed(state.at(tau)[0]), time.dut1)
+    east, north, up = scene.axes.place(tuple(turned))
+    away = math.hypot(east, north, up)
+    # 1e-5 m as above; that is 1.2e-11 rad from there.
+    assert away == pytest.approx(distance.m, abs=1e-5)
+    assert math.asin(up / away) == pytest.approx(altitude.radians, abs=1.2e-11)
+    assert math.remainder(math.atan2(east, north) - azimuth.radians, 2 * math.pi) == pytest.approx(0, abs=1.2e-11)
+    # As flown, UT1 = UTC: 0.52 m for each millisecond.
+    assert state.at(tau)[0] == pytest.approx((east, north, up), abs=518 * abs(time.dut1))
+
+
 @pytest.mark.parametrize("days", [0, 6, 20, 100])
 def test_an_aperture_of_a_second_is_smooth_to_a_micrometre(days: int) -> None:
     """The polynomial of a budget against places that it does not go through; old elements too."""
@@ -128,6 +154,7 @@ def test_smoothing_stays_within_the_rounding_of_sgp4() -> None:
 MESSAGES = {
     "xml": omm_xml(),
     "json": omm_json(),
+    "json, one message": json.dumps(MESSAGE).encode(),
     "json of texts": json.dumps([{key: str(value) for key, value in {**MESSAGE, **CONSTANTS}.items()}]).encode(),
     "csv": omm_csv(),
     "csv with a mark of its encoding": b"\xef\xbb\xbf" + omm_csv(),

@@ -104,9 +104,12 @@ def test_without_interpolation_it_is_hermite_where_velocities_are_those_of_the_p
         (x, y, z), (u, v, w) = on_circle(time)
         return (x, y, z), (u - 7.292115e-5 * y, v + 7.292115e-5 * x, w)
 
-    assert read(oem()).words == "OEM of CIRCLE, ITRF2014, Hermite degree 7"
+    assert read(oem()).words == "OEM of CIRCLE, ITRF2014, Hermite degree 7 (the file states no interpolation)"
     orbit = read(oem(path=against_stars))
-    assert orbit.words == "OEM of CIRCLE, ITRF2014, Lagrange degree 7"
+    assert orbit.words == "OEM of CIRCLE, ITRF2014, Lagrange degree 7 (the file states no interpolation)"
+    kind_alone = read(oem(interpolation=["INTERPOLATION = LAGRANGE"]))
+    assert kind_alone.words == "OEM of CIRCLE, ITRF2014, Lagrange degree 7 (the file states no degree)"
+    assert read(oem(interpolation=["INTERPOLATION = LINEAR"])).words.endswith("Lagrange degree 1")
     assert math.dist(orbit.place(START.after(615)), on_circle(615)[0]) < 1e-4
     with pytest.raises(PathFileError) as error:
         read(oem(path=against_stars, interpolation=interpolation("HERMITE", 7)))
@@ -115,7 +118,7 @@ def test_without_interpolation_it_is_hermite_where_velocities_are_those_of_the_p
         " what the places do"
     )
     # A step of a twelfth of the orbit is long, and its velocities are still known for what they are.
-    assert read(oem(step=490.0)).words.endswith("Hermite degree 7")
+    assert read(oem(step=490.0)).words.endswith("Hermite degree 7 (the file states no interpolation)")
 
 
 SYSTEMS = {"UTC": 0.0, "TAI": 37.0, "TT": 69.184, "GPS": 18.0}

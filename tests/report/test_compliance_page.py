@@ -220,15 +220,21 @@ def test_prints_to_a4_in_light_colours(show, name: str, scheme: str) -> None:
 EXAMPLES = sorted((ROOT / "specs" / "missions").glob("*.yaml"))
 
 
-@pytest.mark.parametrize("model", ["published", "full", "strictest"])
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
-def test_the_summary_of_a_mission_prints_to_four_pages(browser, path: Path, model: str) -> None:
-    found = found_in(path, model)
-    page = browser.new_page()
-    page.set_content(render("html", Report("1.2.3", (found,)), Style()))
-    pdf = page.pdf(prefer_css_page_size=True)
-    page.close()
-    assert 1 <= pages_of(pdf) <= 4
+def test_the_summary_of_a_mission_prints_to_four_pages(browser, path: Path) -> None:
+    """By every model: the longest is printed; if it takes all four, the others too, which may break otherwise."""
+    summaries = [
+        render("html", Report("1.2.3", (found_in(path, model),)), Style())
+        for model in ("published", "full", "strictest")
+    ]
+    for summary in sorted(summaries, key=len, reverse=True):
+        page = browser.new_page()
+        page.set_content(summary)
+        pages = pages_of(page.pdf(prefer_css_page_size=True))
+        page.close()
+        assert 1 <= pages <= 4
+        if pages < 4:
+            break
 
 
 def test_pages_carry_mission_document_hash_and_number(browser, tmp_path: Path) -> None:

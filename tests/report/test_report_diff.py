@@ -3,11 +3,13 @@
 import json
 import os
 import subprocess
+from functools import cache
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bisar_budget.findings.row import Row
 from bisar_budget.report.change.comparison import Change, compare
 from tests.conftest import findings, mission_text, row
 
@@ -15,15 +17,17 @@ LIMIT = findings().allocation.qpe_limit("mission")
 BASE = {"timing_error__quadratic": 3e-13, "other_errors": [{"name": "a", "quadratic_phase_error": 0.1}]}
 
 
+@cache
+def of_use(use: float | None) -> Row | None:
+    """The row of one phase error, given as a part of its limit."""
+    errors = [] if use is None else [{"name": "a", "quadratic_phase_error": use * LIMIT}]
+    found = findings(other_errors=errors)
+    return next((r for r in found.rows if r.id == "other.a"), None)
+
+
 def change(before: float | None, after: float | None) -> Change:
     """A change of one declared phase error, given as parts of its limit."""
-
-    def one(use: float | None):
-        errors = [] if use is None else [{"name": "a", "quadratic_phase_error": use * LIMIT}]
-        found = findings(other_errors=errors)
-        return next((r for r in found.rows if r.id == "other.a"), None)
-
-    return Change("other.a", one(before), one(after))
+    return Change("other.a", of_use(before), of_use(after))
 
 
 class TestErosion:

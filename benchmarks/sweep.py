@@ -1,0 +1,138 @@
+"""A sweep of a million cases of the paper's example: against its formulas by hand, and a loop of check.
+
+By hand stands what the sweep finds too: geometry, the published phase and limit, the same by the full model to first
+order at six or ten nodes, exact ranges of both signs, and the verdict. All in one process and one thread.
+
+    OMP_NUM_THREADS=1 python benchmarks/sweep.py [--cases 1000000] [--runs 3]
+"""
+
+import argparse
+import math
+import resource
+import statistics
+import time
+from collections.abc import Callable
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+
+from bisar_budget.budget.check import check_mission
+from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.design.cases import Grid
+from bisar_budget.design.quantities import number_of
+from bisar_budget.design.sweep import sweep
+from bisar_budget.evaluators import LEGENDRE_FITS
+from bisar_budget.faults import SetValue
+from bisar_budget.mission.load import load_mission, parse_mission
+from bisar_budget.mission.tree import read_tree
+
+MISSION = Path(__file__).parent.parent / "specs" / "missions" / "rigling_moses_section_v.yaml"
+DAY = date(2026, 1, 1)
+ACCELERATION, TOTAL, CARRIER, BANDWIDTH = 0.005, math.pi / 4, 10e9, 300e6
+
+
+def by_hand(azimuth: np.ndarray, T: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Utilization, phase by exact ranges [rad] and status of Section V for azimuths of the receiver and apertures."""
+    wavelength = SPEED_OF_LIGHT / CARRIER
+    k, elevation, R = 2 * np.pi / wavelength, math.radians(13.609), 8500.0
+    p, v = (30414.0, 0.0, 6000.0), (0.0, 150.0, 0.0)
+    q = (
+        R * np.cos(azimuth) * math.cos(elevation),
+        R * np.sin(azimuth) * math.cos(elevation),
+        np.full_like(T, R * math.sin(elevation)),
+    )
+    w = (60 * math.cos(math.radians(135)), 60 * math.sin(math.radians(135)), 0.0)
+    S = math.hypot(*p)
+    allowable = TOTAL / 2 / np.abs(np.pi / wavelength * T**2 / 4 * p[0] / S)
+    use = ACCELERATION / allowable
+    t_look, r_look = [x / S for x in p], [x / R for x in q]
+    gradient = [t_look[axis] + r_look[axis] for axis in (0, 1)]
+    t_radial = sum(x * y for x, y in zip(t_look, v, strict=True))
+    r_radial = sum(x * y for x, y in zip(r_look, w, strict=True))
+    rate = [(v[axis] - t_look[axis] * t_radial) / S + (w[axis] - r_look[axis] * r_radial) / R for axis in (0, 1)]
+    skew = np.arctan2(
+        np.abs(gradient[0] * rate[1] - gradient[1] * rate[0]), np.abs(gradient[0] * rate[0] + gradient[1] * rate[1])
+    )
+    resolution = SPEED_OF_LIGHT / (BANDWIDTH * np.hypot(*gradient)), wavelength / (T * np.hypot(*rate) * np.sin(skew))
+    angle = np.arccos(sum(x * y for x, y in zip(t_look, r_look, strict=True)))
+    nodes, *fits = LEGENDRE_FITS[6]
+    fit, t = np.array(fits), np.array(nodes)[:, None] * T / 2
+    X, Y = [p[i] + t * v[i] for i in range(3)], [q[i] + t * w[i] for i in range(3)]
+    RX, RY = (np.sqrt(Z[0] ** 2 + Z[1] ** 2 + Z[2] ** 2) for Z in (X, Y))
+    g, h = fit @ (X[0] / RX + Y[0] / RY), fit @ (X[1] / RX + Y[1] / RY)
+    turn = g[0] * h[1] - h[0] * g[1]
+    e = ACCELERATION * (fit @ (-X[0] / RX * t**2 / 2))
+    east, north = (h[0] * e[1] - h[1] * e[0]) / turn, (g[1] * e[0] - g[0] * e[1]) / turn
+    worst = np.zeros_like(T)
+    for sign in (1.0, -1.0):
+        x, y = sign * east, sign * north
+        for _ in range(2):
+            left = RX + RY
+            left = left - np.sqrt((X[0] + sign * ACCELERATION * t**2 / 2 - x) ** 2 + (X[1] - y) ** 2 + X[2] ** 2)
+            left = left - np.sqrt((Y[0] - x) ** 2 + (Y[1] - y) ** 2 + Y[2] ** 2)
+            rest = fit @ left
+            step = (h[0] * rest[1] - h[1] * rest[0]) / turn, (g[1] * rest[0] - g[0] * rest[1]) / turn
+            x, y = x + step[0], y + step[1]
+        worst = np.maximum(worst, k * np.abs(rest[2] + g[2] * step[0] + h[2] * step[1]))
+    status = np.where(use > 1 + 1e-9, 3, np.where(worst > TOTAL / 2, 2, np.where(use > 0.8, 2, 1)))
+    assert angle.shape == resolution[0].shape == status.shape
+    return use, worst, status
+
+
+def timed(task: Callable[[], object]) -> tuple[float, float]:
+    """Seconds by the clock and of CPU."""
+    clock, cpu = time.perf_counter(), time.process_time()
+    task()
+    return time.perf_counter() - clock, time.process_time() - cpu
+
+
+def main() -> None:
+    """Measure in turn, after one round of warm-up."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--cases", type=int, default=1_000_000)
+    parser.add_argument("--runs", type=int, default=3)
+    chosen = parser.parse_args()
+    mission = load_mission(str(MISSION))
+    tree = read_tree(mission.data, mission.file).root
+    side = math.isqrt(chosen.cases)
+    axes = (np.radians(np.linspace(10, 170, side)), np.linspace(1, 10, side))
+    keys = ("platforms.receiver.azimuth", "collection.aperture_time")
+    cases = Grid(tuple(number_of(tree, key) for key in keys), axes)
+    azimuth, T = (axis.ravel() for axis in np.meshgrid(*axes, indexing="ij"))
+
+    def swept() -> None:
+        for part in sweep(mission, cases, today=DAY).parts:
+            assert not part.by_case
+
+    def looped(count: int = 200) -> None:
+        for place in range(count):
+            values = zip(keys, (f"{float(azimuth[place])!r} rad", f"{float(T[place])!r} s"), strict=True)
+            check_mission(
+                parse_mission(mission.data, mission.file, changes=[SetValue(*one) for one in values]),
+                DAY,
+                is_brief=True,
+            )
+
+    # Memory first: by hand, whole arrays take gigabytes.
+    swept()
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    rounds = [(timed(lambda: by_hand(azimuth, T)), timed(swept), timed(looped)) for _ in range(chosen.runs)]
+    print(f"sweep of {cases.count} cases of Section V ÷ its formulas by hand over whole arrays (at most 3)")
+    for label, place in (("clock", 0), ("CPU", 1)):
+        hand, ours = (statistics.median(one[task][place] for one in rounds) for task in (0, 1))
+        loop = statistics.median(one[2][place] for one in rounds) / 200 * cases.count
+        ratio = statistics.median(one[1][place] / one[0][place] for one in rounds)
+        print(
+            f"  {label:5} {ours:6.2f} s ÷ {hand:6.2f} s = {ratio:.2f}    a loop of check ÷ sweep = {loop / ours:.0f}"
+        )
+    few = Grid(cases.numbers, tuple(axis[:: side // 50] for axis in axes))
+    found = sweep(mission, few, today=DAY)
+    whole = np.concatenate([part.values["utilization"] for part in found.parts])
+    use, *_ = by_hand(*(axis.ravel() for axis in np.meshgrid(*few.axes, indexing="ij")))
+    print(f"  largest difference of the utilization {np.abs(whole / use - 1).max():.0e} of itself")
+    print(f"  peak memory of the sweep {peak:.0f} MB (at most 1000)")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,434 @@
+"""Rows of many cases, judged at once: the arrays beside `budget`.
+
+A case is judged as `check_mission` judges it, by the same formulas and searches. Where that is not certain (exact
+ranges do not find a response at once, only a search finds a limit), the case is left out and says so.
+"""
+
+import math
+from collections.abc import Callable, Container, Iterator, Sequence
+from datetime import date
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bisar_budget import evaluators
+from bisar_budget.analysis.allocation import BALANCED_RANGE, EQUAL, Split
+from bisar_budget.arrays.collections import Floats, Geometries, norm
+from bisar_budget.arrays.declared import DeclaredErrors, ManyErrors
+from bisar_budget.budget.orbit import FASTEST_FLIGHT
+from bisar_budget.budget.required import missing_declarations
+from bisar_budget.budget.waivers import named_by
+from bisar_budget.constants import UTILIZATION_TOLERANCE
+from bisar_budget.effects import models
+from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
+from bisar_budget.effects.subject import Subject, subject
+from bisar_budget.findings.status import RANK, STATUS
+from bisar_budget.mission.model import MetricSplits, Mission, Shares
+
+REQUIREMENTS = (QUADRATIC, CUBIC, LOCATION)
+_BOUND = 1 + UTILIZATION_TOLERANCE
+_STATUSES = tuple(STATUS)
+_CODE = {name: np.int8(rank) for name, rank in RANK.items()}
+
+
+class Judged(NamedTuple):
+    """One row of many cases: codes of statuses, by the place of each in `STATUS`, and numbers; NaN where none is."""
+
+    subject: Subject
+    status: NDArray[np.int8]
+    declared: Floats
+    allowable: Floats
+    utilization: Floats
+    binding: NDArray[np.int8]  # place in REQUIREMENTS, or -1: the metric of the row
+    qpe_published_rad: Floats
+    cubic_rad: Floats
+    never_fails: bool = False
+
+    def where(self, is_other: Any, other: "Judged") -> "Judged":
+        """This row, but in some cases the other."""
+        return Judged(
+            self.subject,
+            np.where(is_other, other.status, self.status),
+            np.where(is_other, other.declared, self.declared),
+            np.where(is_other, other.allowable, self.allowable),
+            np.where(is_other, other.utilization, self.utilization),
+            np.where(is_other, other.binding, self.binding),
+            np.where(is_other, other.qpe_published_rad, self.qpe_published_rad),
+            np.where(is_other, other.cubic_rad, self.cubic_rad),
+            self.never_fails,
+        )
+
+    @property
+    def margin(self) -> Floats:
+        """Allowable over declared less one."""
+        with np.errstate(all="ignore"):
+            margin = self.allowable / self.declared - 1
+        margin[~np.isfinite(margin)] = math.nan
+        return margin
+
+
+class Checked(NamedTuple):
+    """Rows of many cases, and which of the cases are not certain; `floor` is the best status that a case can have."""
+
+    rows: tuple[Judged, ...]
+    is_left_out: NDArray[np.bool_]
+    floor: NDArray[np.int8]
+    geometries: Geometries
+
+
+def check_arrays(
+    mission: Mission, cases: int, today: date, nodes: int, geometries: Geometries, shown: Container[str]
+) -> Checked:
+    """Check cases that need the same number of nodes.
+
+    Parameters
+    ----------
+    mission : Mission
+        Some of its numbers are arrays (cases,).
+    cases : int
+        How many.
+    today : date
+        Day on which waivers are judged, UTC.
+    nodes : int
+        Of the aperture, that all of them need.
+    geometries : Geometries
+        Of the mission.
+    shown : container of str
+        Ids of rows of which the allowable is asked though nothing is declared.
+    """
+    return _Check(DeclaredErrors(mission, cases, nodes, geometries, shown), today).checked()
+
+
+class _Check:
+    def __init__(self, errors: DeclaredErrors, today: date) -> None:
+        self.errors, self.mission, self.cases, self.today = errors, errors.mission, errors.cases, today
+        self.array, self.does, self.combine = errors.array, errors.does, errors.mission.allocation.combine
+
+    # ---------------------------------------------------------------- limits
+    def _allowed(self, model: str, error: ManyErrors, limit: Floats) -> tuple[Floats, NDArray[np.int8]]:
+        """How large an error may be by a model, and the requirement that sets it: smallest size, NaN where none."""
+        needs = self.mission.requirements
+        held = [(QUADRATIC, limit)]
+        if error.is_motion:
+            others = ((CUBIC, needs.cubic_phase_error), (LOCATION, needs.location_error))
+            held += [(name, self.array(required)) for name, required in others if required is not None]
+        smalls = []
+        for name, required in held:
+            per_unit = self.array(self.errors.per_unit(model, error, name))
+            with np.errstate(all="ignore"):
+                smalls.append(np.where(per_unit > 0, required / per_unit, math.inf))
+        order = np.argsort(smalls, axis=0, kind="stable")
+        smallest, binding = np.full(self.cases, math.inf), np.full(self.cases, -1, dtype=np.int8)
+        is_linear = model == "published" or not error.is_motion
+        for turn in range(len(held)):
+            for place, (name, required) in enumerate(held):
+                mine = order[turn] == place
+                if not mine.any():
+                    continue
+                small, upto = smalls[place], smallest
+                sized = small
+                if not is_linear:
+                    farthest = np.minimum(upto, np.maximum(self.errors.farthest(error), self._size(error)))
+                    first = np.minimum(small, farthest)
+                    with np.errstate(invalid="ignore"):
+                        is_sure = self.errors.adds(error, first, name) <= models.SHARE * required
+                    self.errors.is_left_out |= mine & ~is_sure
+                    sized = np.where(small > farthest, math.inf, small)
+                is_less = mine & (sized < smallest)
+                smallest = np.where(is_less, sized, smallest)
+                binding[is_less] = REQUIREMENTS.index(name)
+        smallest[~np.isfinite(smallest)] = math.nan
+        return smallest, binding
+
+    def _size(self, error: ManyErrors) -> Any:
+        return 0.0 if error.declared is None else np.abs(error.declared)
+
+    def _split(self, gating: str) -> Split:
+        """Shares of the phase; `balanced` are arrays."""
+        split = self.mission.allocation.split
+        if isinstance(split, MetricSplits):
+            split = split.quadratic_phase_error
+        if isinstance(split, Shares):
+            return Split(split.transmitter, split.receiver, split.clock, split.reserve)
+        if split != "balanced":
+            return EQUAL
+        by = [model for model in ("published", "full") if gating in (model, "strictest")]
+        weight = []
+        for owner in PLATFORMS:
+            members = []
+            for error in self.errors.stated:
+                if EQUAL.includes(error.subject.owner, owner):
+                    phases = np.array([self.does(model, error).qpe for model in by])
+                    largest = np.abs(phases).argmax(axis=0)
+                    members.append(np.take_along_axis(phases, largest[None], axis=0)[0])
+            weight.append(np.minimum(self._combined(members), 1e300))
+        with np.errstate(all="ignore"):
+            share: Any = np.where(sum(weight) == 0, 0.5, np.clip(weight[0] / sum(weight), *BALANCED_RANGE))
+        return Split(transmitter=share, receiver=1 - share)
+
+    def _combined(self, phases: Sequence[Floats], rule: str = "") -> Floats:
+        """Combine phases by the mission's rule, or another."""
+        if not phases:
+            return np.zeros(self.cases)
+        sizes, rule = np.abs(np.array(phases)), rule or self.combine
+        if rule == "each":
+            return np.asarray(sizes.max(axis=0))
+        return np.asarray(sizes.sum(axis=0) if rule == "sum" else np.sqrt((sizes**2).sum(axis=0)))
+
+    # ---------------------------------------------------------------- rows
+    def checked(self) -> Checked:
+        """Judge every row by the model that gates."""
+        gating = self.mission.gating_model
+        self.split = self._split(gating)
+        total = self.array(self.mission.requirements.quadratic_phase_error)
+        n_pull = self.mission.autofocus.n_pull
+        self.gain = np.ones(self.cases)
+        if n_pull is not None:
+            self.gain = np.maximum(1.0, self.array(evaluators.autofocus_gain(n_pull, total)))  # type: ignore[arg-type]
+        self.total = total
+        by_model = [self._rows(model) for model in ("published", "full") if gating in (model, "strictest")]
+        rows = _stricter(*by_model) if len(by_model) > 1 else by_model[0]
+        return Checked(tuple(map(self._waived, rows)), self.errors.is_left_out, self._floor(), self.errors.geometries)
+
+    def _rows(self, gating: str) -> list[Judged]:
+        other = "published" if gating == "full" else "full"
+        rows = [self._row(gating, other, error) for error in self.errors.listed]
+        if self.combine != "each":
+            rows += self._sums(gating, other)
+        else:
+            rows += self._all_together(gating)
+        rows += [self._cubic(gating, other), self._location(gating, other)]
+        if self.mission.autofocus.n_pull is not None:
+            rows.append(self._pull_in(gating, other))
+        return rows
+
+    def _limit(self, owner: str) -> Floats:
+        return self.array(self.split.of(owner) * self.total)
+
+    def _row(self, gating: str, other: str, error: ManyErrors) -> Judged:
+        limit = self._limit(error.subject.owner) * self.gain
+        allowable, binding = self._allowed(gating, error, limit)
+        none = np.full(self.cases, math.nan)
+        if error.declared is None:
+            return self._judged(error.subject, None, allowable)._replace(binding=binding)
+        mine, theirs = self.does(gating, error), self.does(other, error)
+        published = mine if gating == "published" else theirs
+        needs = self.mission.requirements
+        held = [(np.abs(theirs.qpe), limit)]
+        if error.is_motion:
+            moved = np.hypot(*theirs.farthest)
+            others = ((np.abs(theirs.cubic), needs.cubic_phase_error), (moved, needs.location_error))
+            held += [(size, self.array(required)) for size, required in others if required is not None]
+        doubt = np.any([size / required > _BOUND for size, required in held], axis=0)
+        judged = self._judged(
+            error.subject,
+            np.abs(self.array(error.declared)),
+            allowable,
+            doubt=doubt,
+            without_autofocus=np.where(self.gain > 1, np.abs(mine.qpe) / (limit / self.gain), 0.0),
+            is_info=self.combine != "each" or error.is_shown_again,
+        )
+        cubic = np.abs(mine.cubic) if error.is_motion else none
+        return judged._replace(binding=binding, qpe_published_rad=np.abs(published.qpe), cubic_rad=cubic)
+
+    def _judged(
+        self,
+        what: Subject,
+        declared: Floats | None,
+        allowable: Floats | None,
+        *,
+        doubt: Any = False,
+        without_autofocus: Any = 0.0,
+        is_info: bool = False,
+        never_fails: bool = False,
+    ) -> Judged:
+        """Judge a row, as `judgement` does: the first status that applies."""
+        none = np.full(self.cases, math.nan)
+        allowed = none if allowable is None else allowable
+        unknown = np.full(self.cases, -1, dtype=np.int8)
+        if declared is None:
+            status = np.full(self.cases, _CODE["not_declared"])
+            return Judged(what, status, none, allowed, none, unknown, none, none, never_fails)
+        with np.errstate(all="ignore"):
+            use = np.where(np.isnan(allowed), 0.0, declared / allowed)
+        if is_info:
+            status = np.full(self.cases, _CODE["info"])
+        else:
+            status = np.select(
+                [
+                    use > _BOUND,
+                    np.broadcast_to(doubt, (self.cases,)),
+                    np.broadcast_to(without_autofocus > _BOUND, (self.cases,)),
+                    use > self.mission.allocation.warn_above,
+                ],
+                [
+                    _CODE["warn" if never_fails else "fail"],
+                    _CODE["warn"],
+                    _CODE["pass_with_autofocus"],
+                    _CODE["warn"],
+                ],
+                _CODE["pass"],
+            ).astype(np.int8)
+        return Judged(what, status, declared, allowed, use, unknown, none, none, never_fails)
+
+    def _members(self, owner: str) -> list[ManyErrors]:
+        return [
+            error
+            for error in self.errors.stated
+            if owner == "mission" or self.split.includes(error.subject.owner, owner)
+        ]
+
+    def _phases(self, model: str, errors: Sequence[ManyErrors], *, is_cubic: bool = False) -> list[Floats]:
+        return [self.does(model, error).cubic if is_cubic else self.does(model, error).qpe for error in errors]
+
+    def _sums(self, gating: str, other: str) -> Iterator[Judged]:
+        owners = ["transmitter", "receiver", *(["clock"] if self.split.clock is not None else []), "mission"]
+        for owner in owners:
+            members, what = self._members(owner), subject(owner, QUADRATIC)
+            limit = self._limit(owner) * self.gain
+            if not members:
+                yield self._judged(what, None, limit)
+                continue
+            qpe, by_other = (self._combined(self._phases(model, members)) for model in (gating, other))
+            yield self._judged(
+                what, qpe, limit, doubt=by_other > limit * _BOUND, without_autofocus=qpe / limit * self.gain
+            )
+
+    def _all_together(self, gating: str) -> Iterator[Judged]:
+        """A warning where each error stands alone and all together exceed the total; else there is no row."""
+        if not self.errors.stated:
+            return
+        phases = self._phases(gating, self.errors.stated)
+        limit = self.total * self.gain
+        largest = self._combined(phases, "each")
+        is_there = (self._combined(phases, "rss") > limit * _BOUND) & (largest <= limit * _BOUND)
+        what = subject("mission", QUADRATIC)
+        judged, nothing = self._judged(what, largest, limit, doubt=True), self._judged(what, None, None)
+        yield judged.where(~is_there, nothing)
+
+    def _cubic(self, gating: str, other: str) -> Judged:
+        motion, what = [error for error in self.errors.stated if error.is_motion], subject("mission", CUBIC)
+        limit = self.mission.requirements.cubic_phase_error
+        if not motion:
+            return self._judged(what, None, None if limit is None else self.array(limit))
+        phases = self._phases(gating, motion, is_cubic=True)
+        size = self._combined(phases)
+        if limit is None:
+            return self._judged(what, size, None, is_info=True)._replace(cubic_rad=size)
+        doubt = self._combined(self._phases(other, motion, is_cubic=True)) > limit * _BOUND
+        if self.combine == "each":
+            doubt = doubt | (self._combined(phases, "rss") > limit * _BOUND)
+        return self._judged(what, size, self.array(limit), doubt=doubt)._replace(cubic_rad=size)
+
+    def _location(self, gating: str, other: str) -> Judged:
+        motion, what = [error for error in self.errors.stated if error.is_motion], subject("mission", LOCATION)
+        limit = self.mission.requirements.location_error
+        if not motion:
+            return self._judged(what, None, None if limit is None else self.array(limit))
+        moved = self._moved(gating, motion, self.combine)
+        if limit is None:
+            return self._judged(what, moved, None, is_info=True)
+        doubt = self._moved(other, motion, self.combine) > limit * _BOUND
+        if self.combine == "each":
+            doubt = doubt | (self._moved(gating, motion, "rss") > limit * _BOUND)
+        return self._judged(what, moved, self.array(limit), doubt=doubt)
+
+    def _moved(self, model: str, motion: Sequence[ManyErrors], rule: str) -> Floats:
+        """Displacements combined by a rule. [m]"""
+        found = [self.does(model, error) for error in motion]
+        if rule != "sum":
+            lengths = np.array([np.hypot(*one.farthest) for one in found])
+            return np.asarray(lengths.max(axis=0) if rule == "each" else np.sqrt((lengths**2).sum(axis=0)))
+        parts = np.array(
+            [
+                [(ahead - back) / 2 for ahead, back in zip(one.displacement, one.opposite, strict=True)]
+                for one in found
+            ]
+        )
+        rest = sum(
+            np.array([(ahead + back) / 2 for ahead, back in zip(one.displacement, one.opposite, strict=True)])
+            for one in found
+        )
+        return _largest_signed_sum(np.concatenate((parts, np.asarray(rest)[None])))
+
+    def _pull_in(self, gating: str, other: str) -> Judged:
+        what, pull_in = subject("mission", "autofocus_pull_in"), math.pi * self.array(self.mission.autofocus.n_pull)
+        if not self.errors.stated:
+            return self._judged(what, None, pull_in, never_fails=True)
+        total, by_other = (
+            self._combined(self._phases(model, self.errors.stated), "sum") for model in (gating, other)
+        )
+        return self._judged(what, total, pull_in, doubt=by_other > pull_in * _BOUND, never_fails=True)
+
+    def _waived(self, row: Judged) -> Judged:
+        """Waive a row where it fails and a waiver that holds names it."""
+        names = [row.subject.id]
+        if not any(self.today <= one.until and named_by(one.id, names) for one in self.mission.waivers):
+            return row
+        return row._replace(status=np.where(row.status == _CODE["fail"], _CODE["waived"], row.status))
+
+    def _floor(self) -> NDArray[np.int8]:
+        """Best status that each case can have: paths may be in doubt, and errors missing that must be declared."""
+        floor = np.full(self.cases, _CODE["pass"])
+        for name, path in zip(
+            PLATFORMS, (self.errors.geometries.transmitter, self.errors.geometries.receiver), strict=True
+        ):
+            platform = getattr(self.mission.platforms, name)
+            if platform.path is not None and platform.path.doubts:
+                floor[:] = _CODE["warn"]
+            if platform.acceleration is None and not platform.is_of_the_earth:
+                floor[np.broadcast_to(norm(path.velocity) > FASTEST_FLIGHT, floor.shape)] = _CODE["warn"]
+        if not self.errors.stated or any(missing_declarations(self.mission)):
+            floor[:] = _CODE["not_evaluated"]
+        return floor
+
+
+def _largest_signed_sum(vectors: Floats) -> Floats:
+    """Length of the longest of the sums ±v₁ ± v₂ …, (cases,), of vectors (n, 2, cases); see `largest_signed_sum`."""
+    x, y = vectors[:, 0], vectors[:, 1]
+    is_upper = (y > 0) | ((y == 0) & (x > 0))
+    x, y = np.where(is_upper, x, -x), np.where(is_upper, y, -y)
+    order = np.argsort(np.arctan2(y, x), axis=0)
+    x, y = np.take_along_axis(x, order, axis=0), np.take_along_axis(y, order, axis=0)
+    corners_x, corners_y = (part.sum(axis=0) - 2 * np.cumsum(part, axis=0) for part in (x, y))
+    whole = np.hypot(x.sum(axis=0), y.sum(axis=0))
+    return np.asarray(np.maximum(whole, np.hypot(corners_x, corners_y).max(axis=0)))
+
+
+def _stricter(published: Sequence[Judged], full: Sequence[Judged]) -> list[Judged]:
+    """Of two complete checks each row of the stricter verdict, then of the higher utilization."""
+    found = []
+    for one, other in zip(published, full, strict=True):
+        use = [np.nan_to_num(row.utilization, nan=0.0) for row in (one, other)]
+        size = [np.where(np.isnan(row.allowable), math.inf, row.allowable) for row in (one, other)]
+        is_other = other.status < one.status
+        tie = other.status == one.status
+        is_other |= tie & (use[1] > use[0])
+        is_other |= tie & (use[1] == use[0]) & (size[1] <= size[0])
+        found.append(one.where(is_other, other))
+    return found
+
+
+def statuses(codes: NDArray[np.int8]) -> NDArray[np.object_]:
+    """Names of statuses by their codes."""
+    return np.array(_STATUSES, dtype=object)[codes]
+
+
+Read = Callable[[Judged], Any]
+_FIELDS: dict[str, Read] = {
+    "status": lambda row: statuses(row.status),
+    "declared": lambda row: row.declared,
+    "allowable": lambda row: row.allowable,
+    "utilization": lambda row: row.utilization,
+    "margin": lambda row: row.margin,
+    "qpe_published_rad": lambda row: row.qpe_published_rad,
+    "cubic_rad": lambda row: row.cubic_rad,
+}
+FIELDS = tuple(_FIELDS)
+
+
+def field(row: Judged, name: str) -> Any:
+    """One field of a row, (cases,)."""
+    return _FIELDS[name](row)

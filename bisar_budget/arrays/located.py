@@ -1,0 +1,242 @@
+"""Exact ranges of many collections at once: the arrays beside `effects.exact_ranges`.
+
+What is sampled over the aperture is (nodes, cases). The algorithms are those of the floats, step by step, so that a
+case has the same numbers here as there.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bisar_budget.arrays.collections import Floats, Geometries, Vectors, dot, norm
+from bisar_budget.constants import ROUNDING
+from bisar_budget.effects import exact_ranges as scalar
+from bisar_budget.evaluators import LEGENDRE_FITS, full_ground_inverse
+
+
+class Effects(NamedTuple):
+    """What a unit of an error does in each case, as `Effect`."""
+
+    constant: Any
+    linear: Any
+    qpe: Any
+    cubic: Any
+
+
+class Found(NamedTuple):
+    """What errors of some cases do by exact ranges; `is_found` where that is certain at once."""
+
+    is_found: NDArray[np.bool_]
+    east: Floats
+    north: Floats
+    quadratic: Floats
+    cubic: Floats
+    turn: Floats
+
+
+class ManyExactRanges:
+    """`ExactRanges` of cases (n,) that need the same number of nodes and have no direct path."""
+
+    def __init__(self, geometries: Geometries, wavelength: Any, aperture_time: Any, count: int, cases: int) -> None:
+        self.half = np.broadcast_to(np.asarray(aperture_time, dtype=float) / 2, (cases,))
+        self.k = np.broadcast_to(2 * math.pi / np.asarray(wavelength, dtype=float), (cases,))
+        nodes, *fit = LEGENDRE_FITS[count]
+        self.nodes = np.array(nodes)
+        self.fit: Floats = np.array(fit)  # (4, nodes)
+        self.times = self.nodes[:, None] * self.half
+        paths = (geometries.transmitter, geometries.receiver)
+        self.tracks = [path.at(self.times) for path in paths]
+        self.ranges = [norm(track) for track in self.tracks]
+        middle = np.minimum(*(np.broadcast_to(path.slant_range, (cases,)) for path in paths))
+        self.recorded = self.ranges[0] + self.ranges[1]
+        self.nearest_node = np.minimum(*(ranges.min(axis=0) for ranges in self.ranges))
+        self.nearest = np.minimum(middle, self.nearest_node)
+        self.rounding = scalar.EPSILON * self.k * self.recorded.max(axis=0)
+        self.gradient = [
+            self._fitted(self.tracks[0][axis] / self.ranges[0] + self.tracks[1][axis] / self.ranges[1])
+            for axis in (0, 1)
+        ]
+        (s_x, rate_x, *_), (s_y, rate_y, *_) = self.gradient
+        self.determinant: Any
+        first, second, (self.determinant,) = full_ground_inverse(s_x, s_y, rate_x / self.half, rate_y / self.half)
+        self.adjugate = (first, second)
+        (_, _, q_x, c_x), (_, _, q_y, c_y) = self.gradient
+        (a, b), (c, d) = self.adjugate
+        scale = self.k / self.determinant
+        self.phases_per_term = (
+            ((q_x * a + q_y * c) * scale, (q_x * b + q_y * d) * scale),
+            ((c_x * a + c_y * c) * scale, (c_x * b + c_y * d) * scale),
+        )
+        sine = (s_x * rate_y - s_y * rate_x) / (np.hypot(s_x, s_y) * np.hypot(rate_x, rate_y))
+        self.reach = np.minimum(scalar.NEAR, scalar.SKEWED * np.abs(sine)) * self.nearest
+        self.bend = scalar.BENT * np.abs(self.determinant) * self.half / np.hypot(s_x, s_y) * self.nearest
+
+    def _fitted(self, samples: Floats) -> Floats:
+        """Value, slope over the half aperture, quadratic and cubic at its edge, (4, cases)."""
+        fitted: Floats = self.fit @ samples
+        return fitted
+
+    def powers(self, unit: str) -> Any:
+        """Position error at each node of a unit of an error."""
+        return {"m": np.ones_like(self.times), "m/s": self.times, "m/s^2": self.times**2 / 2}[unit]
+
+    def along(self, platform: int, direction: Vectors) -> Floats:
+        """What a metre along a direction does to the range of a platform at the nodes."""
+        found: Floats = -dot(self.tracks[platform], direction) / self.ranges[platform]
+        return found
+
+    def effect(self, range_error: Floats) -> Effects:
+        """Effect of a range error at the nodes, that of the displacement included; as `ExactRanges.effect`."""
+        constant, linear, own, own_cubic = self._fitted(range_error)
+        linear = linear / self.half
+        own, own_cubic = own * self.k, own_cubic * self.k
+        size = np.abs(range_error).max(axis=0) * self.k
+        (q_0, q_1), (c_0, c_1) = self.phases_per_term
+        qpe, cubic = own + q_0 * constant + q_1 * linear, own_cubic + c_0 * constant + c_1 * linear
+        seen = size + np.abs(q_0 * constant) + np.abs(q_1 * linear)
+        seen_cubic = size + np.abs(c_0 * constant) + np.abs(c_1 * linear)
+        return Effects(
+            constant,
+            np.where(np.abs(linear) * self.half <= ROUNDING * size / self.k, 0.0, linear),
+            np.where(np.abs(qpe) <= ROUNDING * seen, 0.0, qpe),
+            np.where(np.abs(cubic) <= ROUNDING * seen_cubic, 0.0, cubic),
+        )
+
+    def displacement(self, effect: Effects, size: Any) -> tuple[Any, Any]:
+        """Displacement on the ground by so many units. [m]"""
+        scale = size / self.determinant
+        (a, b), (c, d) = self.adjugate
+        return (
+            (a * effect.constant + b * effect.linear) * scale,
+            (c * effect.constant + d * effect.linear) * scale,
+        )
+
+    def moved(
+        self, error: tuple[tuple[int, ...], str, Vectors], size: Floats, near: tuple[Any, Any], some: NDArray[Any]
+    ) -> Found:
+        """Find where a position error of some cases moves a point at the centre, and what defocuses there.
+
+        `error` says which platforms it moves, its unit and direction; `size` (some,), signed, and `near`, where it
+        leads to first order, are those of the cases `some`.
+        """
+        platforms, unit, direction = error
+        tracks = [tuple(part[:, some] for part in track) for track in self.tracks]
+        power = self.powers(unit)[:, some] * size
+        bend = np.zeros(size.shape)
+        for platform in platforms:
+            parts = (part[some] if np.ndim(part) else part for part in direction)
+            tracks[platform] = tuple(
+                track + power * part for track, part in zip(tracks[platform], parts, strict=True)
+            )
+            bend = bend + (np.abs(size) if unit == "m/s" else 0.0)
+        return self._settled(self.recorded[:, some], tracks, near, bend, some)
+
+    def timed(self, shape: Floats, size: Floats, near: tuple[Any, Any], some: NDArray[Any]) -> Found:
+        """The same of a clock error, of so many metres a unit at the nodes."""
+        tracks = [tuple(part[:, some] for part in track) for track in self.tracks]
+        return self._settled(self.recorded[:, some] + shape[:, some] * size, tracks, near, np.zeros(size.shape), some)
+
+    def _settled(
+        self, recorded: Floats, tracks: list[Any], near: tuple[Any, Any], bend: Floats, some: NDArray[Any]
+    ) -> Found:
+        """Newton's method for the point, as `ExactRanges` has it: with the slopes of the centre where that does."""
+        cases = recorded.shape[1]
+        start = [np.array(np.broadcast_to(one, (cases,)), dtype=float) for one in near]
+        found = Found(np.zeros(cases, dtype=bool), *(np.full(cases, math.nan) for _ in range(5)))
+        with np.errstate(all="ignore"):
+            reach = np.where(bend * self.half[some] < self.bend[some], self.reach[some], 0.0)
+            close = np.flatnonzero(np.hypot(*start) < reach)
+            if close.size:
+                self._settle_near(found, recorded, tracks, start, close, some)
+            rest = np.flatnonzero(~found.is_found)
+            if rest.size:
+                self._settle(found, recorded, tracks, start, rest, some)
+        return found
+
+    def _settle_near(
+        self, found: Found, recorded: Floats, tracks: list[Any], start: list[Floats], alive: NDArray[Any], some: Any
+    ) -> None:
+        of = some[alive]
+        gradient = [one[:, of] for one in self.gradient]
+        whole, held = recorded[:, alive], [tuple(part[:, alive] for part in track) for track in tracks]
+        east, north = start[0][alive], start[1][alive]
+        for _ in range(scalar.FEW):
+            (a, c, quadratic_east, cubic_east), (b, d, quadratic_north, cubic_north) = gradient
+            determinant = a * d - b * c
+            left = whole - sum(np.sqrt((x - east) ** 2 + (y - north) ** 2 + z**2) for x, y, z in held)
+            constant, linear, quadratic, cubic = self.fit @ left
+            step_east = (b * linear - d * constant) / determinant
+            step_north = (c * constant - a * linear) / determinant
+            east, north = east + step_east, north + step_north
+            k = self.k[of]
+            is_done = k * (np.abs(step_east) + np.abs(step_north)) < scalar.UNSEEN_RAD / scalar.NEAR
+            phases = (
+                k * (quadratic + quadratic_east * step_east + quadratic_north * step_north),
+                k * (cubic + cubic_east * step_east + cubic_north * step_north),
+            )
+            self._keep(found, alive, of, is_done, east, north, phases, np.ones(alive.size))
+            going = ~is_done
+            if not going.any():
+                return
+            alive, of, east, north, whole = alive[going], of[going], east[going], north[going], whole[:, going]
+            gradient = [one[:, going] for one in gradient]
+            held = [tuple(part[:, going] for part in track) for track in held]
+
+    def _settle(
+        self, found: Found, recorded: Floats, tracks: list[Any], start: list[Floats], alive: NDArray[Any], some: Any
+    ) -> None:
+        of = some[alive]
+        whole, held = recorded[:, alive], [tuple(part[:, alive] for part in track) for track in tracks]
+        east, north, before = start[0][alive], start[1][alive], np.full(alive.size, math.inf)
+        for _ in range(scalar.ITERATIONS):
+            left, by_east, by_north = whole, np.zeros_like(whole), np.zeros_like(whole)
+            nearest = np.full(alive.size, math.inf)
+            for x, y, z in held:
+                u, v = x - east, y - north
+                distance = np.sqrt(u * u + v * v + z * z)
+                nearest = np.minimum(nearest, distance.min(axis=0))
+                left, by_east, by_north = left - distance, by_east + u / distance, by_north + v / distance
+            a, c, quadratic_east, cubic_east = self.fit @ by_east
+            b, d, quadratic_north, cubic_north = self.fit @ by_north
+            constant, linear, quadratic, cubic = self.fit @ left
+            determinant = a * d - b * c
+            step_east = (b * linear - d * constant) / determinant
+            step_north = (c * constant - a * linear) / determinant
+            east, north = east + step_east, north + step_north
+            step, k = step_east * step_east + step_north * step_north, self.k[of]
+            is_done = k * step < scalar.UNSEEN_RAD * nearest
+            phases = (
+                k * (quadratic + quadratic_east * step_east + quadratic_north * step_north),
+                k * (cubic + cubic_east * step_east + cubic_north * step_north),
+            )
+            is_right = is_done & (determinant * self.determinant[of] > 0)
+            turn = determinant / (self.determinant[of] * self.half[of])
+            self._keep(found, alive, of, is_right, east, north, phases, turn)
+            going = ~is_done & (step < scalar.SHRINKS * before) & (nearest > 0)
+            if not going.any():
+                return
+            alive, of, east, north, whole, before = (
+                alive[going], of[going], east[going], north[going], whole[:, going], step[going],
+            )  # fmt: skip
+            held = [tuple(part[:, going] for part in track) for track in held]
+
+    def _keep(
+        self,
+        found: Found,
+        alive: NDArray[Any],
+        of: NDArray[Any],
+        is_done: NDArray[np.bool_],
+        east: Floats,
+        north: Floats,
+        phases: tuple[Floats, Floats],
+        turn: Floats,
+    ) -> None:
+        """Note the cases that have settled; what is less than rounding leaves is none."""
+        places = alive[is_done]
+        found.is_found[places] = True
+        found.east[places], found.north[places], found.turn[places] = east[is_done], north[is_done], turn[is_done]
+        for kept, phase in zip((found.quadratic, found.cubic), phases, strict=True):
+            one = phase[is_done]
+            kept[places] = np.where(np.abs(one) > self.rounding[of[is_done]], one, 0.0)

@@ -1,0 +1,414 @@
+"""Check a mission in many cases: arrays of numbers in, columns of what `check` finds out.
+
+Cases that arrays hold are checked together (`arrays`), the others one by one as `check` does; the numbers are
+the same, and how many took the long way is said. Memory does not grow with the number of cases.
+"""
+
+import math
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
+from datetime import date
+from functools import lru_cache
+from hashlib import sha256
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bisar_budget.arrays import judged
+from bisar_budget.arrays.collections import Geometries, paths_of
+from bisar_budget.arrays.held import is_image, not_held
+from bisar_budget.arrays.judged import REQUIREMENTS, Judged, check_arrays, statuses
+from bisar_budget.budget.check import check_mission
+from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.design.cases import Cases
+from bisar_budget.design.quantities import Number, QuestionError, number_of
+from bisar_budget.design.swept import Column, Part, Swept, Values
+from bisar_budget.faults import MissionError, SetValue
+from bisar_budget.findings.row import Row
+from bisar_budget.findings.status import RANK, STATUS
+from bisar_budget.mission.changes import apply_changes, parts_of
+from bisar_budget.mission.load import parse_mission
+from bisar_budget.mission.model import Mission
+from bisar_budget.mission.readers import did_you_mean
+from bisar_budget.mission.tree import read_tree
+from bisar_budget.workers import worker_pool
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future
+
+_MANY = 8  # parts, from which processes of their own are worth their start
+_TOGETHER = 8192  # cases of a part: their arrays stay in a processor's cache
+_ALIKE = 1e-9  # of a utilization: a common error along x and along y may bind alike, but for rounding
+_FEW = 64  # cases of a part where each is checked by itself
+
+GEOMETRY = (
+    Column("range_resolution", "m", "Peak to first null along the bistatic look direction, on the ground."),
+    Column("cross_range_resolution", "m", "Peak to first null across it, on the ground."),
+    Column("bistatic_angle", "rad", "Angle between the lines of sight, seen from the scene centre."),
+    Column("gradient_angle", "rad", "Angle between range and Doppler gradient on the ground."),
+)
+VERDICT = (
+    Column("status", "", "Status of the mission.", is_text=True),
+    Column("worst_row", "", "Row of the highest utilization among those that decide.", is_text=True),
+    Column("utilization", "", "Its declared value over its allowable."),
+    Column("binding_requirement", "", "The requirement that sets its allowable.", is_text=True),
+)
+REASON = Column("reason", "", "Why there is no mission in this case.", is_text=True)
+
+# Fields of a row that a column may have, and what they hold.
+_FIELDS = {
+    "status": "Status of {0}.",
+    "declared": "Declared value of {0}.",
+    "allowable": "Largest value that {0} may have.",
+    "allowable_published": "The same by the published model.",
+    "allowable_full": "The same by the full model.",
+    "utilization": "Declared value of {0} over its allowable.",
+    "margin": "Allowable of {0} over its declared value, less one.",
+    "qpe_published_rad": "Quadratic phase of {0} by the published model.",
+    "qpe_full_rad": "Quadratic phase of {0} by the full model.",
+    "qpe_exact_rad": "Quadratic phase of {0} by exact ranges.",
+    "cubic_rad": "Cubic phase of {0}.",
+    "islr_db": "ISLR that {0} adds.",
+}
+_UNITS = {
+    "qpe_published_rad": "rad",
+    "qpe_full_rad": "rad",
+    "qpe_exact_rad": "rad",
+    "cubic_rad": "rad",
+    "islr_db": "dB",
+}
+_IN_UNIT = ("declared", "allowable", "allowable_published", "allowable_full")
+
+
+class _Asked(NamedTuple):
+    """A column that was asked for: a field of a row."""
+
+    name: str
+    row: str
+    field: str
+
+
+def sweep(
+    mission: Mission,
+    cases: Cases,
+    *,
+    columns: Sequence[str] = (),
+    model: str | None = None,
+    today: date,
+    jobs: int = 1,
+) -> Swept:
+    """Check a mission in many cases.
+
+    Parameters
+    ----------
+    mission : Mission
+        As loaded.
+    cases : Cases
+        Which keys vary, and their values.
+    columns : sequence of str
+        Further columns, `ROW.FIELD`, such as `receiver.acceleration.x.allowable`.
+    model : str, optional
+        Gating model in place of the mission's own.
+    today : date
+        Day on which waivers are judged, UTC.
+    jobs : int
+        Processes to share the cases out to.
+
+    Returns
+    -------
+    Swept
+        Its parts are found as they are asked for.
+
+    Raises
+    ------
+    QuestionError
+        A column is of no row, or of no field.
+    """
+    question = _Question(
+        mission.data,
+        mission.file,
+        mission.changes,
+        tuple(number.key for number in cases.numbers),
+        tuple(columns),
+        model,
+        today,
+    )
+    engine = Engine(question, mission)
+    varied = [Column(number.key, number.dimension.si, "Varies.") for number in cases.numbers]
+    return Swept(
+        mission_name=mission.name,
+        mission_sha256=sha256(mission.data).hexdigest(),
+        varied=tuple(column.name for column in varied),
+        shape=cases.shape,
+        count=cases.count,
+        columns=(*varied, *GEOMETRY, *VERDICT, *engine.columns, REASON),
+        parts=_parts(engine, cases, jobs),
+    )
+
+
+def _parts(engine: "Engine", cases: Cases, jobs: int) -> Iterator[Part]:
+    """Find the parts in their order. Few cases show whether arrays hold them; else processes share them out.
+
+    What arrays hold takes less time than to send it from one process to another.
+    """
+    probe = engine.part(0, min(_FEW, cases.count), cases.values(0, min(_FEW, cases.count)))
+    yield probe
+    is_slow = probe.by_case > _FEW // 8
+    size = _FEW if is_slow else _TOGETHER
+    starts = range(probe.stop, cases.count, size)
+    if not is_slow or jobs == 1 or len(starts) < _MANY:
+        for start in starts:
+            stop = min(start + size, cases.count)
+            yield engine.part(start, stop, cases.values(start, stop))
+        return
+    with worker_pool(jobs, "spawn") as pool:
+        waiting: deque[Future[Part]] = deque()
+        for start in starts:
+            stop = min(start + size, cases.count)
+            waiting.append(pool.submit(_part, engine.question, start, stop, cases.values(start, stop)))
+            if len(waiting) > 3 * jobs:  # none is far ahead of what has been asked for
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()
+
+
+class _Question(NamedTuple):
+    """What a process needs to check cases of a mission."""
+
+    data: bytes
+    file: str
+    changes: tuple[SetValue, ...]
+    keys: tuple[str, ...]
+    columns: tuple[str, ...]
+    model: str | None
+    today: date
+
+
+@lru_cache(maxsize=1)
+def _engine(question: _Question) -> "Engine":
+    return Engine(question, parse_mission(question.data, question.file, changes=question.changes))
+
+
+def _part(question: _Question, start: int, stop: int, values: Mapping[str, Any]) -> Part:
+    return _engine(question).part(start, stop, values)
+
+
+class Engine:
+    """Checks cases of one mission; a process of its own can have one."""
+
+    def __init__(self, question: _Question, mission: Mission) -> None:
+        self.question, model = question, question.model
+        self.mission = mission if model is None else _gated(mission, model)
+        tree = read_tree(mission.data, mission.file)
+        apply_changes(tree, mission.changes)
+        self.numbers = tuple(number_of(tree.root, key) for key in question.keys)
+        rows = {row.id: row for row in check_mission(self.mission, question.today).rows}
+        self.asked = [_asked(name, rows) for name in question.columns]
+        self.columns = tuple(
+            Column(
+                one.name,
+                rows[one.row].unit if one.field in _IN_UNIT else _UNITS.get(one.field, ""),
+                _FIELDS[one.field].format(one.row),
+                is_text=one.field == "status",
+            )
+            for one in self.asked
+        )
+        self.not_held = not_held(self.mission, question.keys)
+        # A brief check leaves out allowables of what is not declared, and those of the model that does not gate.
+        self.is_brief = not any(
+            one.field in ("allowable_published", "allowable_full")
+            or (one.field in _IN_UNIT and rows[one.row].declared is None)
+            or not rows[one.row].is_independent
+            for one in self.asked
+        )
+        strange = [one.name for one in self.asked if one.field not in judged.FIELDS]
+        self.not_held = self.not_held or next(iter(strange), "")
+
+    def part(self, start: int, stop: int, values: Mapping[str, Any]) -> Part:
+        """Check cases `start` to `stop`, whose values are (stop - start,)."""
+        cases = stop - start
+        found: dict[str, Values] = {
+            number.key: np.asarray(values[number.key], dtype=float) for number in self.numbers
+        }
+        for column in (*GEOMETRY, *VERDICT, *self.columns, REASON):
+            found[column.name] = np.full(cases, "", dtype=object) if column.is_text else np.full(cases, math.nan)
+        alone = np.ones(cases, dtype=bool)
+        if not self.not_held:
+            alone[:] = ~self._together(found)
+        for place in np.flatnonzero(alone):
+            self._by_itself(found, int(place))
+        return Part(start, stop, found, int(alone.sum()))
+
+    # ---------------------------------------------------------------- together
+    def _together(self, found: dict[str, Values]) -> NDArray[np.bool_]:
+        """Check what arrays hold; says which cases that were."""
+        held = np.ones(found["utilization"].size, dtype=bool)
+        for number in self.numbers:
+            held &= _within(number, found[number.key])
+        some = np.flatnonzero(held)
+        if not some.size:
+            return held
+        mission, geometries = self._arrays(found, some)
+        held[some] &= is_image(mission, geometries, some.size)
+        counts = np.zeros(held.size, dtype=int)
+        counts[some] = geometries.nodes(np.broadcast_to(mission.collection.aperture_time, (some.size,)))
+        for count in np.unique(counts[held]):
+            same = np.flatnonzero(held & (counts == count))
+            held[same] = self._of_same_nodes(found, same, int(count))
+        return held
+
+    def _arrays(self, found: Mapping[str, Values], some: NDArray[Any]) -> tuple[Mission, Geometries]:
+        mission = self.mission
+        for number in self.numbers:
+            mission = with_value(mission, parts_of(number.key), found[number.key][some])
+        platforms = mission.platforms
+        return mission, Geometries(paths_of(platforms.transmitter), paths_of(platforms.receiver))
+
+    def _of_same_nodes(self, found: dict[str, Values], some: NDArray[Any], nodes: int) -> NDArray[np.bool_]:
+        mission, geometries = self._arrays(found, some)
+        shown = {one.row for one in self.asked}
+        with np.errstate(all="ignore"):
+            checked = check_arrays(mission, some.size, self.question.today, nodes, geometries, shown)
+        sure = ~checked.is_left_out
+        to, rows = some[sure], {row.subject.id: row for row in checked.rows}
+        geometry = (
+            geometries.range_resolution(mission.radar.bandwidth, SPEED_OF_LIGHT),
+            geometries.cross_range_resolution(mission.radar.wavelength, mission.collection.aperture_time),
+            geometries.bistatic_angle,
+            geometries.gradient_angle,
+        )
+        for column, number in zip(GEOMETRY, geometry, strict=True):
+            found[column.name][to] = np.broadcast_to(number, some.shape)[sure]
+        for name, of_verdict in _verdict(checked).items():
+            found[name][to] = of_verdict[sure]
+        for one in self.asked:
+            if one.row in rows:
+                found[one.name][to] = judged.field(rows[one.row], one.field)[sure]
+            elif one.field == "status":
+                found[one.name][to] = "not_declared"
+        return sure
+
+    # ---------------------------------------------------------------- one by one
+    def _by_itself(self, found: dict[str, Values], place: int) -> None:
+        """Check one case as `check` does."""
+        try:
+            case = self._mission([float(found[number.key][place]) for number in self.numbers])
+        except MissionError as error:
+            fault = error.faults[0]
+            found["status"][place], found["reason"][place] = "error", f"{fault.key}: {fault.problem}"
+            return
+        checked = check_mission(case, self.question.today, is_brief=self.is_brief)
+        geometry = checked.geometry
+        numbers_found = (
+            checked.resolution.range,
+            checked.resolution.cross_range,
+            geometry.bistatic_angle,
+            geometry.gradient_angle,
+        )
+        for column, number in zip(GEOMETRY, numbers_found, strict=True):
+            found[column.name][place] = number
+        worst = worst_row(checked.rows)
+        found["status"][place] = checked.status
+        if worst is not None:
+            found["worst_row"][place] = worst.id
+            found["utilization"][place] = math.nan if worst.utilization is None else worst.utilization
+            found["binding_requirement"][place] = worst.binding_requirement or worst.metric
+        rows = {row.id: row for row in checked.rows}
+        for one in self.asked:
+            row = rows.get(one.row)
+            value = "not_declared" if one.field == "status" else None
+            if row is not None:
+                value = getattr(row, one.field)
+            found[one.name][place] = math.nan if value is None else value
+
+    def _mission(self, values: Sequence[float]) -> Mission:
+        changes = [
+            SetValue(number.key, f"{value!r} {number.dimension.si}".rstrip())
+            for number, value in zip(self.numbers, values, strict=True)
+        ]
+        anew = {parts_of(change.key) for change in changes}
+        given = [change for change in self.mission.changes if parts_of(change.key) not in anew]
+        return parse_mission(self.mission.data, self.mission.file, self.question.model, changes=(*given, *changes))
+
+
+def worst_row(rows: Sequence[Row]) -> Row | None:
+    """Row of the highest utilization: of those that fail, else of all that decide; None where nothing is judged.
+
+    Of rows as high to within rounding the first.
+    """
+    decisive = [row for row in rows if STATUS[row.status].is_judged and row.status != "waived"]
+    decisive = [row for row in decisive if row.subject.kind != "autofocus_pull_in"]  # only ever warns
+    failing = [row for row in decisive if STATUS[row.status].fails]
+    rows = failing or decisive
+    uses = [-1.0 if row.utilization is None else row.utilization for row in rows]
+    highest = max(uses, default=0.0)
+    return next((row for row, use in zip(rows, uses, strict=True) if use >= highest - _ALIKE * abs(highest)), None)
+
+
+def _verdict(checked: judged.Checked) -> dict[str, Any]:
+    """Status, worst row, utilization and requirement of each case; as `worst_row`."""
+    names = list(STATUS)
+    gates = np.array([STATUS[name].gates for name in names])
+    judged = np.array([STATUS[name].is_judged and name != "waived" for name in names])
+    fails = np.array([STATUS[name].fails for name in names])
+    best = RANK["pass"]
+    codes = np.array([row.status for row in checked.rows])
+    status = np.minimum(np.where(gates[codes], codes, best).min(axis=0), checked.floor)
+    rows = [row for row in checked.rows if not row.never_fails]
+    codes = np.array([row.status for row in rows])
+    use = np.array([np.nan_to_num(row.utilization, nan=-1.0, posinf=math.inf) for row in rows])
+    decides = np.where(fails[codes].any(axis=0), fails[codes], judged[codes])
+    use = np.where(decides, use, -2.0)
+    highest = use.max(axis=0)
+    worst = (use >= highest - _ALIKE * np.abs(highest)).argmax(axis=0)
+    has_one = decides.any(axis=0)
+    ids = np.array([row.subject.id for row in rows], dtype=object)
+    metrics = np.array([_metric(row) for row in rows], dtype=object)
+    binding = np.take_along_axis(np.array([row.binding for row in rows]), worst[None], axis=0)[0]
+    requirement = np.where(binding >= 0, np.array(REQUIREMENTS, dtype=object)[binding], metrics[worst])
+    utilization = np.take_along_axis(np.array([row.utilization for row in rows]), worst[None], axis=0)[0]
+    return {
+        "status": statuses(status),
+        "worst_row": np.where(has_one, ids[worst], ""),
+        "utilization": np.where(has_one, utilization, math.nan),
+        "binding_requirement": np.where(has_one, requirement, ""),
+    }
+
+
+def _metric(row: Judged) -> str:
+    return row.subject.kind if row.subject.kind in REQUIREMENTS else REQUIREMENTS[0]
+
+
+def _within(number: Number, values: Any) -> NDArray[np.bool_]:
+    """Whether each value is one that the file may have."""
+    gt, ge, lt, le = number.reader.bounds
+    return cast("NDArray[np.bool_]", (values > gt) & (values >= ge) & (values < lt) & (values <= le))
+
+
+def with_value(value: Any, parts: Sequence[str], number: Any) -> Any:
+    """Put a number, or an array of numbers, into a mission in the place of a key; a scalar for each axis into all."""
+    if not parts:
+        return (number, number, number) if isinstance(value, tuple) else number
+    part, *rest = parts
+    if part.isdigit():
+        place = int(part)
+        return (*value[:place], with_value(value[place], rest, number), *value[place + 1 :])
+    if part in ("position", "velocity", "acceleration") and getattr(value, part) is None and not rest:
+        return value._replace(**{part: (number, number, number)})
+    return value._replace(**{part: with_value(getattr(value, part), rest, number)})
+
+
+def _gated(mission: Mission, model: str) -> Mission:
+    return mission._replace(allocation=mission.allocation._replace(model=model))
+
+
+def _asked(name: str, rows: Mapping[str, Row]) -> _Asked:
+    row, _, field = name.rpartition(".")
+    if field not in _FIELDS:
+        raise QuestionError(f"--column {name}: {field!r} is no field of a row; accepted: {', '.join(_FIELDS)}")
+    if row not in rows:
+        raise QuestionError(
+            f"--column {name}: no row has the id {row!r}. {did_you_mean(row, tuple(rows)) or 'A check lists them.'}"
+        )
+    return _Asked(name, row, field)

@@ -1,0 +1,243 @@
+"""A sweep has the numbers of `check`, case by case, whatever arrays hold and whatever they leave to it."""
+
+import math
+from datetime import date
+
+import numpy as np
+import pytest
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
+
+from bisar_budget.budget.check import check_mission
+from bisar_budget.design.cases import Grid
+from bisar_budget.design.quantities import QuestionError, number_of
+from bisar_budget.design.sweep import sweep, worst_row
+from bisar_budget.faults import MissionError, SetValue
+from bisar_budget.mission.changes import apply_changes
+from bisar_budget.mission.load import load_mission, parse_mission
+from bisar_budget.mission.tree import read_tree
+from tests.conftest import ROOT, mission_text
+from tests.families import FAMILIES
+from tests.families import mission_text as of_family
+
+MISSIONS = ROOT / "specs" / "missions"
+DAY = date(2026, 1, 1)
+# Two ways to one number differ by the rounding of sums of some hundred terms.
+NEAR = 1e-9
+
+
+def grid(mission, **axes) -> Grid:
+    """Cases of a mission; dots of keys are written as two underscores."""
+    tree = read_tree(mission.data, mission.file)
+    apply_changes(tree, mission.changes)
+    numbers = tuple(number_of(tree.root, key.replace("__", ".")) for key in axes)
+    return Grid(numbers, tuple(np.asarray(values, dtype=float) for values in axes.values()))
+
+
+def swept(mission, cases, columns=(), model=None, jobs=1):
+    """Every column of a sweep, whole, and how many cases were checked one by one."""
+    found = sweep(mission, cases, columns=columns, model=model, today=DAY, jobs=jobs)
+    parts = list(found.parts)
+    assert [part.start for part in parts] == [0, *(part.stop for part in parts[:-1])]
+    assert parts[-1].stop == found.count == cases.count
+    whole = {one.name: np.concatenate([part.values[one.name] for part in parts]) for one in found.columns}
+    return whole, sum(part.by_case for part in parts)
+
+
+def assert_as_checked(mission, cases, whole, columns=(), model=None) -> None:
+    """Hold each case to `check_mission` of a mission that has its values."""
+    for place in range(cases.count):
+        values = {key: float(one[0]) for key, one in cases.values(place, place + 1).items()}
+        changes = [
+            SetValue(number.key, f"{values[number.key]!r} {number.dimension.si}".rstrip()) for number in cases.numbers
+        ]
+        got = {name: column[place] for name, column in whole.items()}
+        try:
+            case = parse_mission(mission.data, mission.file, model, changes=(*mission.changes, *changes))
+            found = check_mission(case, DAY, is_brief=not columns)
+        except MissionError as error:
+            assert got["status"] == "error", values
+            assert got["reason"].endswith(error.faults[0].problem.partition(" (")[0]) or got["reason"]
+            assert math.isnan(got["utilization"])
+            continue
+        assert got["status"] == found.status, values
+        assert got["reason"] == ""
+        worst = worst_row(found.rows)
+        assert got["worst_row"] == ("" if worst is None else worst.id), values
+        if worst is not None:
+            use = math.nan if worst.utilization is None else worst.utilization
+            assert got["utilization"] == pytest.approx(use, rel=NEAR, nan_ok=True), values
+            assert got["binding_requirement"] == (worst.binding_requirement or worst.metric)
+        assert got["range_resolution"] == pytest.approx(found.resolution.range, rel=NEAR)
+        assert got["cross_range_resolution"] == pytest.approx(found.resolution.cross_range, rel=NEAR)
+        assert got["bistatic_angle"] == pytest.approx(found.geometry.bistatic_angle, rel=NEAR)
+        rows = {row.id: row for row in found.rows}
+        for name in columns:
+            row_id, _, field = name.rpartition(".")
+            want = getattr(rows[row_id], field) if row_id in rows else ("not_declared" if field == "status" else None)
+            if field == "status":
+                assert got[name] == want, (values, name)
+            else:
+                want = math.nan if want is None else want
+                assert got[name] == pytest.approx(want, rel=NEAR, nan_ok=True), (values, name)
+
+
+COLUMNS = (
+    "receiver.acceleration.x.allowable",
+    "transmitter.velocity.y.allowable",
+    "mission.cubic_phase_error.declared",
+    "mission.location_error.status",
+    "mission.location_error.margin",
+    "timing.quadratic.utilization",
+)
+_FACTORS = st.lists(st.floats(0.3, 3.0), min_size=2, max_size=2)
+_KEYS = {
+    "collection__aperture_time": _FACTORS,
+    "radar__center_frequency": _FACTORS,
+    "platforms__transmitter__motion_error__acceleration": _FACTORS,
+    "platforms__receiver__motion_error__position": _FACTORS,
+    "platforms__receiver__slant_range": _FACTORS,
+    "platforms__receiver__azimuth": _FACTORS,
+    "platforms__transmitter__position__2": _FACTORS,
+    "timing_error__quadratic": _FACTORS,
+    "requirements__quadratic_phase_error": _FACTORS,
+    "allocation__coverage_factor": _FACTORS,
+}
+_RULES = {
+    "allocation.combine": ("each", "sum", "rss"),
+    "allocation.split": ("equal", "balanced"),
+    "allocation.model": ("published", "full", "strictest"),
+    "autofocus.n_pull": ("1", "3"),
+    "requirements.cubic_phase_error": ("0.2 rad",),
+    "requirements.location_error": ("0.5 m", "20 m"),
+    "common_motion_error.position": ("2 m",),
+    "scene.height_error": ("3 m",),
+    "timing_error.quadratic": ("1e-12 /s",),
+}
+
+
+@settings(max_examples=12, deadline=None, phases=[Phase.explicit, Phase.reuse, Phase.generate])  # a case takes long
+@given(data=st.data(), family=st.sampled_from(FAMILIES), seed=st.integers(0, 300))
+def test_every_case_is_that_of_check(data, family, seed) -> None:
+    """Random missions, rules and keys: arrays, exact ranges among them, and what they leave to `check`."""
+    chosen = data.draw(st.lists(st.sampled_from(sorted(_RULES)), unique=True, max_size=5), label="rules")
+    changes = [SetValue(key, data.draw(st.sampled_from(_RULES[key]), label=key)) for key in chosen]
+    try:
+        mission = parse_mission(of_family(family, seed), "m.yaml", changes=changes)
+    except MissionError:
+        return
+    axes = {}
+    for key in data.draw(st.lists(st.sampled_from(sorted(_KEYS)), unique=True, min_size=1, max_size=2), label="keys"):
+        try:
+            (number,) = grid(mission, **{key: [1.0]}).numbers
+        except QuestionError:
+            continue
+        if number.value:
+            axes[key] = [number.value * factor for factor in data.draw(_KEYS[key], label=key)]
+    if not axes:
+        return
+    cases = grid(mission, **axes)
+    whole, _ = swept(mission, cases)
+    assert_as_checked(mission, cases, whole)
+
+
+EXAMPLES = [
+    "rigling_moses_section_v.yaml",
+    "rigling_moses_section_v_autofocus.yaml",
+    "sentinel1_fixed_receiver.yaml",
+    "tandem_l.yaml",
+    "uav_pair_l_band.yaml",
+]
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_examples_are_held_whole(name) -> None:
+    """No case of an example that the published model gates is left to the slow way, and columns are those of rows."""
+    mission = load_mission(str(MISSIONS / name))
+    T = mission.collection.aperture_time
+    cases = grid(mission, collection__aperture_time=[0.5 * T, T, 2 * T], radar__bandwidth=[20e6, 100e6])
+    whole, by_case = swept(mission, cases, COLUMNS)
+    assert by_case == 0
+    assert_as_checked(mission, cases, whole, COLUMNS)
+
+
+@pytest.mark.parametrize("model", ["full", "strictest"])
+def test_a_model_may_stand_in(model) -> None:
+    mission = load_mission(str(MISSIONS / "rigling_moses_section_v.yaml"))
+    cases = grid(mission, collection__aperture_time=[1.0, 6.0], platforms__receiver__azimuth=[0.5, 2.5])
+    whole, _ = swept(mission, cases, model=model)
+    assert_as_checked(mission, cases, whole, model=model)
+
+
+def test_what_arrays_do_not_hold_is_checked_one_by_one() -> None:
+    mission = load_mission(str(MISSIONS / "uav_stim300.yaml"))
+    cases = grid(mission, collection__aperture_time=[1.0, 3.0])
+    whole, by_case = swept(mission, cases)
+    assert by_case == 2
+    assert_as_checked(mission, cases, whole)
+
+
+def test_cases_that_are_no_mission_are_rows_that_say_why() -> None:
+    """Range and Doppler gradients nearly parallel, a place below the ground, a band below 0 Hz."""
+    mission = load_mission(str(MISSIONS / "rigling_moses_section_v.yaml"))
+    cases = grid(
+        mission,
+        radar__bandwidth=[100e6, 21e9],
+        platforms__transmitter__position__2=[6000.0, -1.0],
+        platforms__receiver__azimuth=[math.radians(179.9), 0.7],
+    )
+    whole, by_case = swept(mission, cases)
+    assert_as_checked(mission, cases, whole)
+    assert list(whole["status"]).count("error") == by_case >= 6
+    assert any("below the ground" in reason for reason in whole["reason"])
+    assert any("twice the centre frequency" in reason for reason in whole["reason"])
+
+
+def test_both_sides_of_the_limit() -> None:
+    """An error set a part in 10⁸ below its allowable passes (with a warning: it is near), one above fails."""
+    mission = parse_mission(mission_text(timing_error__quadratic="1e-12 /s"), "m.yaml")
+    allowable = next(row.allowable for row in check_mission(mission, DAY).rows if row.id == "timing.quadratic")
+    cases = grid(mission, timing_error__quadratic=[allowable * (1 - 1e-8), allowable, allowable * (1 + 1e-8)])
+    whole, by_case = swept(mission, cases, ["timing.quadratic.status"])
+    assert by_case == 0
+    assert list(whole["timing.quadratic.status"]) == ["warn", "warn", "fail"]
+
+
+def test_waivers_and_what_must_be_declared(tmp_path) -> None:
+    text = mission_text(timing_error__quadratic="1e-9 /s")
+    waived = text + "waivers:\n  - {id: 'timing.*', until: 2026-12-31, reason: known}\n"
+    asked = (
+        text.replace("requirements:", "requirements:\n  declare: [acceleration]") if "requirements:" in text else text
+    )
+    for one in (waived, asked):
+        mission = parse_mission(one, "m.yaml")
+        cases = grid(mission, collection__aperture_time=[1.0, 4.0])
+        whole, by_case = swept(mission, cases, ["timing.quadratic.status"])
+        assert by_case == 0
+        assert_as_checked(mission, cases, whole, ["timing.quadratic.status"])
+
+
+def test_processes_find_the_same() -> None:
+    """Where cases are checked one by one they are shared out, and come back in their order."""
+    mission = load_mission(str(MISSIONS / "rigling_moses_section_v.yaml"))
+    cases = grid(mission, collection__aperture_time=np.linspace(1, 9, 640))
+    alone, by_case = swept(mission, cases, model="full")
+    shared, _ = swept(mission, cases, model="full", jobs=2)
+    assert by_case > 500
+    for name, column in alone.items():
+        assert np.array_equal(column, shared[name], equal_nan=column.dtype != object)
+
+
+@pytest.mark.parametrize(
+    ("column", "says"),
+    [
+        ("receiver.acceleration.x.size", "'size' is no field of a row; accepted: status, declared"),
+        ("reciever.acceleration.x.allowable", "no row has the id 'reciever.acceleration.x'. Did you mean"),
+        ("nothing", "'nothing' is no field"),
+    ],
+)
+def test_columns_that_are_not_there(column, says) -> None:
+    mission = load_mission(str(MISSIONS / "rigling_moses_section_v.yaml"))
+    with pytest.raises(QuestionError, match="--column") as error:
+        sweep(mission, grid(mission, collection__aperture_time=[1.0]), columns=[column], today=DAY)
+    assert says in str(error.value)
