@@ -1,4 +1,4 @@
-"""Design questions of one mission: which values of a key comply, and where that changes."""
+"""Design questions of one mission: which values of a key comply, where that changes, what each number does."""
 
 # What other rooms may use.
-__all__ = ["quantities", "solution", "solve"]
+__all__ = ["compare", "compared", "imaged", "quantities", "sensitivity", "slopes", "solution", "solve"]

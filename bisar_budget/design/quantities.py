@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from bisar_budget import units
 from bisar_budget.faults import InvalidValueError, shown
 from bisar_budget.mission.bounds import DIRECTION, ELEVATION, LATITUDE
-from bisar_budget.mission.changes import parts_of
+from bisar_budget.mission.changes import next_name, parts_of
 from bisar_budget.mission.keys import nearest_keys
 from bisar_budget.mission.model import MISSION
 from bisar_budget.mission.readers import INVALID, Late, ListOf, OneOf, Quantity, Reader, Section, Triple
@@ -81,6 +81,11 @@ def number_of(tree: dict[str, Any], key: str) -> Number:
         raise QuestionError(f"{key}: is a section; accepted: one of its keys, {', '.join(reader.keys)}")
     if not isinstance(reader, Quantity):
         raise QuestionError(f"{key}: is no number with a unit, and cannot be solved for")
+    return as_number(key, reader, value)
+
+
+def as_number(key: str, reader: Quantity, value: Any) -> Number:
+    """Put together a number and the unit that it is said in; `value` is what the file says, None if nothing."""
     dimension = reader.dimension
     number = parse_quantity(value, dimension) if isinstance(value, str) else None
     unit = _UNIT.sub("", value).strip() if isinstance(value, str) else ""
@@ -93,29 +98,31 @@ def reader_of(tree: dict[str, Any], key: str) -> tuple[Reader, Any]:
     """Go down to a key: its reader, and what the file says there, None if nothing."""
     reader: Reader = MISSION
     value: Any = tree
-    for part in parts_of(key):
-        reader = _form(reader, value)
-        inner: Reader | None = None
-        if isinstance(reader, Section) and part in reader.keys:
-            inner = reader.keys[part].reader
-            value = value.get(part) if isinstance(value, dict) else None
-        elif isinstance(reader, ListOf | Triple) and part.isascii() and part.isdigit() and len(part) < 9:
-            inner = reader.section if isinstance(reader, ListOf) else reader.component
-            listed = value if isinstance(value, list) else []
-            if int(part) >= len(listed):
-                raise QuestionError(f"{key}: the list has {len(listed)} entries, and none has the number {part}")
-            value = listed[int(part)]
+    parts = parts_of(key)
+    while parts:
+        reader = form_of(reader, value)
+        name, rest = next_name(value, parts)
+        part, parts = (parts[0], parts[1:]) if name is None else (str(name), rest)
+        inner = reader.below(part)
         if inner is None:
             known = f"; accepted: {', '.join(reader.keys)}" if isinstance(reader, Section) else ""
             hint = nearest_keys(key)
             raise QuestionError(
                 f"{shown(key)}: {shown(part)!r} is not a known key{known}{f'. {hint}' if hint else ''}"
             )
+        if isinstance(reader, ListOf | Triple):
+            listed = value if isinstance(value, list) else []
+            if int(part) >= len(listed):
+                raise QuestionError(f"{key}: the list has {len(listed)} entries, and none has the number {part}")
+            value = listed[int(part)]
+        else:
+            value = value.get(part) if isinstance(value, dict) else None
         reader, value = inner, None if value is INVALID else value
-    return _form(reader, value), value
+    return form_of(reader, value), value
 
 
-def _form(reader: Reader, value: Any) -> Reader:
+def form_of(reader: Reader, value: Any) -> Reader:
+    """Find the form of a reader that reads a value."""
     while isinstance(reader, Late | OneOf):
         reader = reader.load() if isinstance(reader, Late) else reader.pick(value)
     return reader

@@ -217,7 +217,14 @@ def catalogue(places: Sequence[str]) -> dict[str, str]:
     return found
 
 
-def _find(name: str, beside: str) -> Part:
+def find_part(name: str, beside: str) -> Part:
+    """Read the part that a mission names: one of the catalogue, or a file beside the mission's folder.
+
+    Raises
+    ------
+    PartError
+        There is none, or it is no part.
+    """
     if name.endswith((".yaml", ".yml")):
         return read_part(os.path.join(beside, name))
     places = folders(beside)
@@ -274,7 +281,7 @@ def _parts_of(
     for index, name in enumerate(names if isinstance(names, tuple) else [names] if names else []):
         here = (*path, index) if is_list else path
         try:
-            part = _find(name, beside)
+            part = find_part(name, beside)
             if part.kind not in kinds:
                 raise PartError(f"is an {part.kind}" if part.kind != "gnss" else "is a GNSS receiver")
         except PartError as error:

@@ -1,16 +1,16 @@
 """Figures 3 to 7 of Rigling & Moses for a mission of one's own: drawn, saved, and said in a few lines."""
 
 import math
-import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from io import BytesIO
 from typing import Any
 
 import numpy as np
 
 from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.faults import changes_words, printable
+from bisar_budget.faults import SetValue, changes_words, printable
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
+from bisar_budget.report.drawing.figure import BETTER, GRID, WORSE, figure_file, new_figure
 from bisar_budget.report.drawing.point_figures import FLOOR_DB, ImagePanel, Limits, Sheet, rotated_back, sheet
 from bisar_budget.report.words.layout import wrapped
 from bisar_budget.simulate.impulse_response import ImpulseResponse
@@ -20,22 +20,22 @@ from bisar_budget.simulate.point import PointImages
 _RESTORED_DB = 1.0  # below the error-free peak; a focused response is within a fraction of it
 _EQUAL = 8.0  # an image that is not longer for its width than this has equal scales
 _NOT_FORMED = "#3a3a3a"  # beside a patch that is narrower than the panel
-_ERROR, _TRUE, _AT = "#c1502e", "#5fd3f3", "#7CFC9A"
+_TRUE, _AT = "#5fd3f3", "#7CFC9A"
 _CUT_STYLES: tuple[Mapping[str, Any], ...] = (
     {"color": "#888888", "lw": 3},
-    {"color": _ERROR},
-    {"color": "#1f5fa8", "ls": "--"},
+    {"color": WORSE},
+    {"color": BETTER, "ls": "--"},
 )
 
 
 def drawn(images: PointImages, title: str, kind: str) -> bytes:
     """Draw the figures on one sheet, as a `png`, `svg` or `pdf` file."""
-    return _file(figure(sheet(images), title), kind)
+    return figure_file(figure(sheet(images), title), kind)
 
 
 def figure(drawn: Sheet, title: str) -> Any:
     """Lay all panels on one Matplotlib figure."""
-    page = _page(figsize=(16.5, 8))
+    page = new_figure(figsize=(16.5, 8))
     panels = page.subplots(2, 4)
     for name, panel in zip(("fig3", "fig4", "fig5", "cuts", "fig6", "fig7", "fig7_back"), panels.flat, strict=False):
         artist = PANELS[name](panel, drawn)
@@ -48,7 +48,7 @@ def figure(drawn: Sheet, title: str) -> Any:
         for style, label in (
             (_stands(_TRUE), "where the target stands"),
             (_put(_AT), "where (25) puts it"),
-            ({"ls": "none", "marker": "o", "color": _ERROR, "ms": 5}, "points of (29)"),
+            ({"ls": "none", "marker": "o", "color": WORSE, "ms": 5}, "points of (29)"),
         )
     ]
     key.add_artist(key.legend(handles=panels[0, 3].lines, loc="upper center", fontsize=10, frameon=False))
@@ -59,40 +59,21 @@ def figure(drawn: Sheet, title: str) -> Any:
 
 def drawn_panel(name: str, drawn: Sheet) -> bytes:
     """Draw a single panel, small, for a page, as a PNG file; `name` is one of `PANELS`."""
-    page = _page(figsize=(4.4, 3.6))
+    page = new_figure(figsize=(4.4, 3.6))
     panel = page.subplots()
     artist = PANELS[name](panel, drawn)
     if name == "cuts":
         panel.legend(fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.06), frameon=False)  # above the data
     if artist is not None:
         page.colorbar(artist, ax=panel, pad=0.02).set_label("dB to the error-free peak")
-    return _file(page, "png", dpi=80)
+    return figure_file(page, "png", dpi=80)
 
 
-def _page(**settings: Any) -> Any:
-    """Give a Matplotlib figure that looks the same whatever a user's matplotlibrc and MPLBACKEND say."""
-    os.environ.pop("MPLBACKEND", None)  # a name that Matplotlib does not know would end its import
-    import logging
+def archive(images: PointImages, changes: Sequence[SetValue] = ()) -> bytes:
+    """Give the images, complex, and what explains them, as an NPZ file.
 
-    logging.getLogger("matplotlib").setLevel(logging.CRITICAL)  # of fonts and folders that it lacks
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    matplotlib.rcdefaults()
-    matplotlib.rcParams["svg.hashsalt"] = "bisar-budget"
-    return Figure(**settings, layout="constrained")
-
-
-def _file(page: Any, kind: str, dpi: int = 110) -> bytes:
-    """Give the file of a figure: of the same input the same bytes."""
-    undated = {"png": {"Software": None}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
-    file = BytesIO()
-    page.savefig(file, format=kind, dpi=dpi, metadata=undated[kind])
-    return file.getvalue()
-
-
-def archive(images: PointImages) -> bytes:
-    """Give the images, complex, and what explains them, as an NPZ file."""
+    `changes` are the options that changed the mission; the file has them as texts `KEY=VALUE` (n,).
+    """
     file = BytesIO()
     np.savez_compressed(
         file,
@@ -114,6 +95,7 @@ def archive(images: PointImages) -> bytes:
         targets_m=[[one.east, one.north] for one in images.targets.points],
         targets_db=[one.level_db for one in images.targets.points],
         shown_m=[one.shown for one in images.responses],
+        set=np.array([f"{change.key}={change.text}" for change in changes], dtype=str),
     )
     return file.getvalue()
 
@@ -214,13 +196,13 @@ def _peak_and_width(response: ImpulseResponse | None, clean: ImpulseResponse | N
 def _range_error(panel: Any, drawn: Sheet) -> None:
     panel.plot(drawn.slow_time, drawn.range_error_mm, color="black")
     for segment in drawn.segments:
-        panel.plot(*segment.T, "--", color=_ERROR)
+        panel.plot(*segment.T, "--", color=WORSE)
     panel.set(title="Fig. 3: range error, three segments", xlabel="slow time [s]", ylabel="range error [mm]")
-    panel.grid(color="#dddddd", lw=0.5)
+    panel.grid(color=GRID, lw=0.5)
 
 
 def _points(panel: Any, drawn: Sheet) -> None:
-    panel.plot(*drawn.points.T, "o-", color=_ERROR, zorder=3)
+    panel.plot(*drawn.points.T, "o-", color=WORSE, zorder=3)
     panel.plot(0, 0, **_stands("#1b7fa3"))
     panel.plot(*drawn.points[1], **_put("#2a8f4f"))
     panel.set(title=f"Fig. 4: points of the segments, (29)\nby {drawn.points_by}", xlabel="x [m]", ylabel="y [m]")
@@ -233,7 +215,7 @@ def _points(panel: Any, drawn: Sheet) -> None:
     half = 0.65 * max(float((high - low).max()), span)
     (x, y) = (low + high) / 2
     panel.set(xlim=(x - half, x + half), ylim=(y - half, y + half), aspect="equal")
-    panel.grid(color="#dddddd", lw=0.5)
+    panel.grid(color=GRID, lw=0.5)
 
 
 def _image(panel: Any, picture: ImagePanel, *, with_points: bool = False) -> Any:
@@ -257,7 +239,7 @@ def _image(panel: Any, picture: ImagePanel, *, with_points: bool = False) -> Any
     panel.set(xlim=(left, right), ylim=(bottom, top), facecolor=_NOT_FORMED)
     if with_points:
         for three in picture.points:
-            panel.plot(*three.T, "o-", color=_ERROR, ms=4, lw=0.8)
+            panel.plot(*three.T, "o-", color=WORSE, ms=4, lw=0.8)
     panel.plot(*picture.shown_places.T, **_put(_AT))
     panel.plot(*picture.true_places.T, **_stands(_TRUE))
     for true in picture.true_places:
@@ -303,7 +285,7 @@ def _cuts(panel: Any, drawn: Sheet) -> None:
     places = [cut.place for cut in drawn.cuts]
     panel.set(xlabel="y′ [m]", ylabel="dB to the error-free peak", ylim=(-40, 2))
     panel.set(xlim=(min(float(one.min()) for one in places), max(float(one.max()) for one in places)))
-    panel.grid(color="#dddddd", lw=0.5)
+    panel.grid(color=GRID, lw=0.5)
     panel.set_title("Cross-range cuts")
 
 
