@@ -24,22 +24,22 @@ from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.design.cases import Cases
 from bisar_budget.design.quantities import Number, QuestionError, number_of
 from bisar_budget.design.swept import Column, Part, Swept, Values
+from bisar_budget.design.variation import ALIKE, Variation, breaking, standing
 from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import RANK, STATUS
-from bisar_budget.mission.changes import apply_changes, parts_of
+from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.readers import did_you_mean
-from bisar_budget.mission.tree import read_tree
 from bisar_budget.workers import worker_pool
 
 if TYPE_CHECKING:
     from concurrent.futures import Future
 
+_BREAKS = breaking("fail")
 _MANY = 8  # parts, from which processes of their own are worth their start
 _TOGETHER = 8192  # cases of a part: their arrays stay in a processor's cache
-_ALIKE = 1e-9  # of a utilization: a common error along x and along y may bind alike, but for rounding
 _FEW = 64  # cases of a part where each is checked by itself
 
 GEOMETRY = (
@@ -200,9 +200,9 @@ class Engine:
     def __init__(self, question: _Question, mission: Mission) -> None:
         self.question, model = question, question.model
         self.mission = mission if model is None else _gated(mission, model)
-        tree = read_tree(mission.data, mission.file)
-        apply_changes(tree, mission.changes)
-        self.numbers = tuple(number_of(tree.root, key) for key in question.keys)
+        self.variation = Variation(mission, model)
+        tree = self.variation.tree()
+        self.numbers = tuple(number_of(tree, key) for key in question.keys)
         rows = {row.id: row for row in check_mission(self.mission, question.today).rows}
         self.asked = [_asked(name, rows) for name in question.columns]
         self.columns = tuple(
@@ -293,7 +293,7 @@ class Engine:
     def _by_itself(self, found: dict[str, Values], place: int) -> None:
         """Check one case as `check` does."""
         try:
-            case = self._mission([float(found[number.key][place]) for number in self.numbers])
+            case = self.variation.at({number: float(found[number.key][place]) for number in self.numbers})
         except MissionError as error:
             fault = error.faults[0]
             found["status"][place], found["reason"][place] = "error", f"{fault.key}: {fault.problem}"
@@ -308,12 +308,11 @@ class Engine:
         )
         for column, number in zip(GEOMETRY, numbers_found, strict=True):
             found[column.name][place] = number
-        worst = worst_row(checked.rows)
-        found["status"][place] = checked.status
-        if worst is not None:
-            found["worst_row"][place] = worst.id
-            found["utilization"][place] = math.nan if worst.utilization is None else worst.utilization
-            found["binding_requirement"][place] = worst.binding_requirement or worst.metric
+        stands = standing(checked, None, _BREAKS)
+        found["status"][place] = stands.status
+        if stands.row is not None:
+            found["worst_row"][place], found["binding_requirement"][place] = stands.row, stands.requirement
+            found["utilization"][place] = math.nan if stands.utilization is None else stands.utilization
         rows = {row.id: row for row in checked.rows}
         for one in self.asked:
             row = rows.get(one.row)
@@ -322,32 +321,9 @@ class Engine:
                 value = getattr(row, one.field)
             found[one.name][place] = math.nan if value is None else value
 
-    def _mission(self, values: Sequence[float]) -> Mission:
-        changes = [
-            SetValue(number.key, f"{value!r} {number.dimension.si}".rstrip())
-            for number, value in zip(self.numbers, values, strict=True)
-        ]
-        anew = {parts_of(change.key) for change in changes}
-        given = [change for change in self.mission.changes if parts_of(change.key) not in anew]
-        return parse_mission(self.mission.data, self.mission.file, self.question.model, changes=(*given, *changes))
-
-
-def worst_row(rows: Sequence[Row]) -> Row | None:
-    """Row of the highest utilization: of those that fail, else of all that decide; None where nothing is judged.
-
-    Of rows as high to within rounding the first.
-    """
-    decisive = [row for row in rows if STATUS[row.status].is_judged and row.status != "waived"]
-    decisive = [row for row in decisive if row.subject.kind != "autofocus_pull_in"]  # only ever warns
-    failing = [row for row in decisive if STATUS[row.status].fails]
-    rows = failing or decisive
-    uses = [-1.0 if row.utilization is None else row.utilization for row in rows]
-    highest = max(uses, default=0.0)
-    return next((row for row, use in zip(rows, uses, strict=True) if use >= highest - _ALIKE * abs(highest)), None)
-
 
 def _verdict(checked: judged.Checked) -> dict[str, Any]:
-    """Status, worst row, utilization and requirement of each case; as `worst_row`."""
+    """Status, worst row, utilization and requirement of each case; as `standing`."""
     names = list(STATUS)
     gates = np.array([STATUS[name].gates for name in names])
     judged = np.array([STATUS[name].is_judged and name != "waived" for name in names])
@@ -361,7 +337,7 @@ def _verdict(checked: judged.Checked) -> dict[str, Any]:
     decides = np.where(fails[codes].any(axis=0), fails[codes], judged[codes])
     use = np.where(decides, use, -2.0)
     highest = use.max(axis=0)
-    worst = (use >= highest - _ALIKE * np.abs(highest)).argmax(axis=0)
+    worst = (use >= highest - ALIKE * np.abs(highest)).argmax(axis=0)
     has_one = decides.any(axis=0)
     ids = np.array([row.subject.id for row in rows], dtype=object)
     metrics = np.array([_metric(row) for row in rows], dtype=object)

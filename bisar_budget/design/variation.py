@@ -14,6 +14,8 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.mission.readers import did_you_mean
 from bisar_budget.mission.tree import read_tree
 
+ALIKE = 1e-9  # of a utilization: a common error along x and along y may bind alike, but for rounding
+
 
 class Variation:
     """A mission whose file is read anew with other values: each is held to everything that a file is.
@@ -84,6 +86,8 @@ def standing(found: MissionFindings, row_id: str | None, breaks: Container[str])
 def deciding_row(rows: Sequence[Row], breaks: Container[str], complies: bool) -> Row | None:
     """Find the row that binds: of the rows that are judged the one that uses most of its limit.
 
+    Of rows that use as much of it, but for rounding, the first.
+
     Parameters
     ----------
     rows : sequence of Row
@@ -98,11 +102,9 @@ def deciding_row(rows: Sequence[Row], breaks: Container[str], complies: bool) ->
         judged = [row for row in judged if row.subject.kind != "autofocus_pull_in"]
     if not complies:
         judged = [row for row in judged if row.status in breaks]
-    return max(judged, key=_use, default=None)
-
-
-def _use(row: Row) -> float:
-    return -1.0 if row.utilization is None else row.utilization
+    uses = [-1.0 if row.utilization is None else row.utilization for row in judged]
+    highest = max(uses, default=0.0)
+    return next((row for row, use in zip(judged, uses, strict=True) if use >= highest - ALIKE * abs(highest)), None)
 
 
 def hold_to_decisions(findings: Sequence[MissionFindings], row_id: str | None) -> None:

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from bisar_budget.budget.check import check_mission
 from bisar_budget.design.cases import Grid
 from bisar_budget.design.quantities import QuestionError, number_of
-from bisar_budget.design.sweep import sweep, worst_row
+from bisar_budget.design.sweep import sweep
+from bisar_budget.design.variation import breaking, standing
 from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.mission.changes import apply_changes
 from bisar_budget.mission.load import load_mission, parse_mission
@@ -62,12 +63,11 @@ def assert_as_checked(mission, cases, whole, columns=(), model=None) -> None:
             continue
         assert got["status"] == found.status, values
         assert got["reason"] == ""
-        worst = worst_row(found.rows)
-        assert got["worst_row"] == ("" if worst is None else worst.id), values
-        if worst is not None:
-            use = math.nan if worst.utilization is None else worst.utilization
-            assert got["utilization"] == pytest.approx(use, rel=NEAR, nan_ok=True), values
-            assert got["binding_requirement"] == (worst.binding_requirement or worst.metric)
+        stands = standing(found, None, breaking("fail"))
+        assert got["worst_row"] == (stands.row or ""), values
+        use = math.nan if stands.utilization is None else stands.utilization
+        assert got["utilization"] == pytest.approx(use, rel=NEAR, nan_ok=True), values
+        assert got["binding_requirement"] == (stands.requirement or "")
         assert got["range_resolution"] == pytest.approx(found.resolution.range, rel=NEAR)
         assert got["cross_range_resolution"] == pytest.approx(found.resolution.cross_range, rel=NEAR)
         assert got["bistatic_angle"] == pytest.approx(found.geometry.bistatic_angle, rel=NEAR)
