@@ -207,7 +207,7 @@ def _parse_closely(value: object, dimension: Dimension) -> float:
     if not unit:
         return _bare(_finite(number, dimension), text, dimension)
     if scale is None:
-        unit = _normal(unit)
+        unit = normal_unit(unit)
         scale = dimension.scales.get(unit)
     if scale is None:
         raise _wrong_unit(unit, dimension)
@@ -300,7 +300,8 @@ def _finite(number: float, dimension: Dimension) -> float:
     return number
 
 
-def _normal(unit: str) -> str:
+def normal_unit(unit: str) -> str:
+    """Write a unit as the tables of units do: `µrad` is `urad`, `m/s²` is `m/s^2`."""
     unit = unit.strip().replace("µ", "u").replace("μ", "u").replace("²", "^2").replace("³", "^3").replace("⁴", "^4")
     unit = re.sub(r"\s*([/^])\s*", r"\1", unit.replace("**", "^"))
     unit = re.sub(r"√\(?(s|h|Hz)\)?", r"sqrt(\1)", unit)

@@ -30,6 +30,7 @@ _MODULES = {
     "sensors": "sensors",
     "simulate": "simulate",
     "solve": "solve",
+    "sweep": "sweep",
     "verify": "verify",
 }
 

@@ -4,8 +4,8 @@ import io
 import os
 import re
 import sys
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from datetime import UTC, date, datetime
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -226,8 +226,8 @@ def harmless(text: str, format_name: str = "") -> str:
     return text
 
 
-def _print(text: str, format_name: str) -> None:
-    """Write to standard output; a reader that went away changes no exit code.
+def _print(texts: Iterable[str], format_name: str) -> None:
+    """Write to standard output as texts come; a reader that went away changes no exit code, and ends it.
 
     A person reads the format `text`, characters that the terminal's encoding lacks escaped. Programs read the others:
     those are UTF-8, whatever a terminal would take.
@@ -238,13 +238,15 @@ def _print(text: str, format_name: str) -> None:
         sys.stdout.reconfigure(errors="backslashreplace")
         if format_name != "text":
             sys.stdout.reconfigure(encoding="utf-8", errors="backslashreplace", newline="\n")
-    try:
-        sys.stdout.write(text)
-        sys.stdout.flush()
-    except OSError as error:
-        drop_output()
-        if not isinstance(error, BrokenPipeError):
-            fail(f"cannot write standard output: {error.strerror}")
+    for text in texts:
+        try:
+            sys.stdout.write(harmless(text, format_name))
+            sys.stdout.flush()
+        except OSError as error:
+            drop_output()
+            if not isinstance(error, BrokenPipeError):
+                fail(f"cannot write standard output: {error.strerror}")
+            return
 
 
 def drop_output() -> None:
@@ -267,33 +269,44 @@ def fail(message: str) -> NoReturn:
 
 def deliver(text: str, output: str | None = None, format_name: str = "text") -> None:
     """Write to a file, else, or if that is `-`, to standard output."""
-    text = harmless(text, format_name)
     if output is None or output == "-":
-        _print(text, format_name)
+        _print([text], format_name)
     else:
-        write_file(output, text)
+        write_file(output, harmless(text, format_name))
+
+
+def deliver_parts(texts: Iterable[str], format_name: str) -> None:
+    """Write texts to standard output as they come, until nobody reads on."""
+    _print(texts, format_name)
 
 
 def write_file(path: str, content: str | bytes) -> None:
-    """Replace a file whole: written beside it under another name, then renamed.
+    """Replace a file whole, as `replacing` does."""
+    data = content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
+    with replacing(path) as name, open(name, "wb") as file:
+        file.write(data)
 
-    A link keeps pointing where it does; what is no file, a device or a pipe, is written to as it is.
+
+@contextmanager
+def replacing(path: str) -> Iterator[str]:
+    """Give the name of a file to write, which replaces `path` at the end: it is beside it, and is then renamed.
+
+    A link keeps pointing where it does; what is no file, a device or a pipe, is written to as it is. An error, or an
+    interrupt, leaves what was there.
     """
     import tempfile
 
-    data = content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
     temporary = None
     try:
         target = os.path.realpath(path)
-        folder = os.path.dirname(target)
         if os.path.exists(target) and not os.path.isfile(target):
-            with open(target, "wb") as special:
-                special.write(data)
+            yield target
             return
+        folder = os.path.dirname(target)
         os.makedirs(folder, exist_ok=True)
         with tempfile.NamedTemporaryFile(dir=folder, prefix=".bisar-budget.", delete=False) as file:
             temporary = file.name
-            file.write(data)
+        yield temporary
         mask = os.umask(0)
         os.umask(mask)
         os.chmod(temporary, 0o666 & ~mask)  # a temporary file is private, a report is not
@@ -302,6 +315,6 @@ def write_file(path: str, content: str | bytes) -> None:
         if temporary is not None:
             with suppress(OSError):
                 os.unlink(temporary)
-        if not isinstance(error, (OSError, ValueError)):  # ValueError: a NUL in the name
+        if not isinstance(error, OSError) and not (isinstance(error, ValueError) and temporary is None):  # a NUL
             raise
         fail(f"cannot write {path}: {getattr(error, 'strerror', None) or error}")

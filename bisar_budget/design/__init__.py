@@ -1,4 +1,17 @@
 """Design questions of one mission: which values of a key comply, where that changes, what each number does."""
 
 # What other rooms may use.
-__all__ = ["compare", "compared", "imaged", "quantities", "sensitivity", "slopes", "solution", "solve"]
+__all__ = [
+    "cases",
+    "compare",
+    "compared",
+    "imaged",
+    "quantities",
+    "sensitivity",
+    "slopes",
+    "solution",
+    "solve",
+    "sweep",
+    "swept",
+    "variation",
+]

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.design.compared import Comparison, PartState
-from bisar_budget.design.quantities import QuestionError
+from bisar_budget.design.quantities import QuestionError, tree_of
 from bisar_budget.design.variation import Standing, Variation, breaking, hold_to_decisions, standing
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.faults import MissionError, SetValue
@@ -146,7 +146,7 @@ class _Search:
         _, self.platform, self.section, _ = parts_of(key)
         file = variation.mission.file
         beside = os.path.dirname(file) if file != "-" else ""
-        self.given = {name: find_part(name, beside) for name in _names(variation.tree(), parts_of(key))}
+        self.given = {name: find_part(name, beside) for name in _names(tree_of(variation.mission), parts_of(key))}
         of_given = {part.kind for part in self.given.values()}
         self.kinds = tuple(kind for kind in _KINDS[self.section] if not of_given or kind in of_given)
         listed = {entry.id: _Candidate(entry.id, entry.file, entry.part) for entry in entries(folders(beside))}

@@ -8,10 +8,11 @@ from typing import Any, NamedTuple
 from bisar_budget import units
 from bisar_budget.faults import InvalidValueError, shown
 from bisar_budget.mission.bounds import DIRECTION, ELEVATION, LATITUDE
-from bisar_budget.mission.changes import next_name, parts_of
+from bisar_budget.mission.changes import apply_changes, next_name, parts_of
 from bisar_budget.mission.keys import nearest_keys
-from bisar_budget.mission.model import MISSION
+from bisar_budget.mission.model import MISSION, Mission
 from bisar_budget.mission.readers import INVALID, Late, ListOf, OneOf, Quantity, Reader, Section, Triple
+from bisar_budget.mission.tree import read_tree
 from bisar_budget.units import Dimension, parse_quantity
 
 DIGITS = 8  # of values that are said: both sides of a crossing stay within 1e-6
@@ -54,6 +55,14 @@ class Number(NamedTuple):
     def read(self, text: str) -> float:
         """Read what `text` wrote; within a rounding of what the file's reader makes of it, which is the same."""
         return parse_quantity(text, self.dimension)
+
+
+def tree_of(mission: Mission) -> dict[str, Any]:
+    """What the file of a mission says with the options that changed it, as text."""
+    tree = read_tree(mission.data or b"", mission.file)
+    apply_changes(tree, mission.changes)
+    root: dict[str, Any] = tree.root
+    return root
 
 
 def number_of(tree: dict[str, Any], key: str) -> Number:

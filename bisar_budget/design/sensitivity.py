@@ -6,7 +6,7 @@ from datetime import date
 from typing import NamedTuple
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.design.quantities import QuestionError
+from bisar_budget.design.quantities import QuestionError, tree_of
 from bisar_budget.design.relaxing import is_balanced, relaxed_errors
 from bisar_budget.design.scaled import scaled
 from bisar_budget.design.slopes import Sensitivity, Slope
@@ -57,7 +57,7 @@ def sensitivity(mission: Mission, *, row: str | None = None, model: str | None =
         raise QuestionError("no utilization that is judged has a value: there is nothing to follow")
     geometry = found.geometry
     nearest = min(geometry.transmitter.slant_range, geometry.receiver.slant_range)
-    numbers, skipped = stated_numbers(variation.tree(), nearest)
+    numbers, skipped = stated_numbers(tree_of(variation.mission), nearest)
     slopes, unchanging = [], []
     for number in numbers:
         slope = _Differences(variation, base, number, row, today).slope(at_file)

@@ -11,7 +11,7 @@ from datetime import date
 from itertools import pairwise
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.design.quantities import FACTOR, Number, QuestionError, Range, number_of, range_of
+from bisar_budget.design.quantities import FACTOR, Number, QuestionError, Range, number_of, range_of, tree_of
 from bisar_budget.design.scaled import scaled
 from bisar_budget.design.solution import Crossing, Solution, State
 from bisar_budget.design.variation import Variation, breaking, hold_to_decisions, standing
@@ -132,7 +132,7 @@ class _Question:
             self.number = Number("the factor", FACTOR, 1.0, "")
             scaled(self.base, key, 1.0)  # says what is wrong with the key
         else:
-            self.number = number_of(self.variation.tree(), key).said_like(between)
+            self.number = number_of(tree_of(self.variation.mission), key).said_like(between)
         self.range: Range = range_of(self.number, between)
         found = check_mission(self.base, today)
         hold_to_decisions([found, *self._at_the_end()], row)

@@ -22,7 +22,7 @@ from bisar_budget.arrays.judged import REQUIREMENTS, Judged, check_arrays, statu
 from bisar_budget.budget.check import check_mission
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.design.cases import Cases
-from bisar_budget.design.quantities import Number, QuestionError, number_of
+from bisar_budget.design.quantities import Number, QuestionError, number_of, tree_of
 from bisar_budget.design.swept import Column, Part, Swept, Values
 from bisar_budget.design.variation import ALIKE, Variation, breaking, standing
 from bisar_budget.faults import MissionError, SetValue
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Future
 
 _BREAKS = breaking("fail")
+_SLOW = 1 / 8  # of cases that are checked one by one, from which processes share them out
 _MANY = 8  # parts, from which processes of their own are worth their start
 _TOGETHER = 8192  # cases of a part: their arrays stay in a processor's cache
 _FEW = 64  # cases of a part where each is checked by itself
@@ -123,7 +124,7 @@ def sweep(
     Raises
     ------
     QuestionError
-        A column is of no row, or of no field.
+        A column is of no row, or of no field; a key makes no mission whatever its value.
     """
     question = _Question(
         mission.data,
@@ -135,6 +136,9 @@ def sweep(
         today,
     )
     engine = Engine(question, mission)
+    for number in cases.numbers:
+        if number.value is None:  # the file may state its path in another way
+            engine.hold_to_a_mission(number, cases)
     varied = [Column(number.key, number.dimension.si, "Varies.") for number in cases.numbers]
     return Swept(
         mission_name=mission.name,
@@ -148,15 +152,13 @@ def sweep(
 
 
 def _parts(engine: "Engine", cases: Cases, jobs: int) -> Iterator[Part]:
-    """Find the parts in their order. Few cases show whether arrays hold them; else processes share them out.
+    """Find the parts in their order; processes share out what is checked case by case.
 
     What arrays hold takes less time than to send it from one process to another.
     """
-    probe = engine.part(0, min(_FEW, cases.count), cases.values(0, min(_FEW, cases.count)))
-    yield probe
-    is_slow = probe.by_case > _FEW // 8
+    is_slow = bool(engine.not_held) or (cases.count > _FEW and _share_by_case(engine, cases) > _SLOW)
     size = _FEW if is_slow else _TOGETHER
-    starts = range(probe.stop, cases.count, size)
+    starts = range(0, cases.count, size)
     if not is_slow or jobs == 1 or len(starts) < _MANY:
         for start in starts:
             stop = min(start + size, cases.count)
@@ -171,6 +173,14 @@ def _parts(engine: "Engine", cases: Cases, jobs: int) -> Iterator[Part]:
                 yield waiting.popleft().result()
         while waiting:
             yield waiting.popleft().result()
+
+
+def _share_by_case(engine: "Engine", cases: Cases) -> float:
+    """Share of cases that are checked one by one, by a few of them that are spread over all."""
+    places = np.linspace(0, cases.count - 1, _FEW).astype(int)
+    some = [cases.values(place, place + 1) for place in places.tolist()]
+    values = {number.key: np.concatenate([one[number.key] for one in some]) for number in cases.numbers}
+    return engine.part(0, _FEW, values).by_case / _FEW
 
 
 class _Question(NamedTuple):
@@ -201,7 +211,7 @@ class Engine:
         self.question, model = question, question.model
         self.mission = mission if model is None else _gated(mission, model)
         self.variation = Variation(mission, model)
-        tree = self.variation.tree()
+        tree = tree_of(mission)
         self.numbers = tuple(number_of(tree, key) for key in question.keys)
         rows = {row.id: row for row in check_mission(self.mission, question.today).rows}
         self.asked = [_asked(name, rows) for name in question.columns]
@@ -224,6 +234,20 @@ class Engine:
         )
         strange = [one.name for one in self.asked if one.field not in judged.FIELDS]
         self.not_held = self.not_held or next(iter(strange), "")
+
+    def hold_to_a_mission(self, number: Number, cases: Cases) -> None:
+        """Refuse a key that makes no mission at its first, middle and last value, for one reason."""
+        places = (0, cases.count // 2, cases.count - 1)
+        problems = set()
+        for value in {float(cases.values(place, place + 1)[number.key][0]) for place in places}:
+            try:
+                self.variation.at({number: value})
+            except MissionError as error:
+                problems.add(f"{error.faults[0].key} {error.faults[0].problem}; {error.faults[0].accepted}")
+            else:
+                return
+        if len(problems) == 1:
+            raise QuestionError(f"{number.key}: no value of it makes a mission: {problems.pop()}")
 
     def part(self, start: int, stop: int, values: Mapping[str, Any]) -> Part:
         """Check cases `start` to `stop`, whose values are (stop - start,)."""

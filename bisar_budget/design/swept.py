@@ -18,6 +18,11 @@ class Column(NamedTuple):
     words: str
     is_text: bool = False
 
+    @property
+    def heading(self) -> str:
+        """Name and unit, as a table and an axis have them."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
+
 
 class Part(NamedTuple):
     """Cases `start` to `stop` of a sweep, in their order.
@@ -33,7 +38,7 @@ class Part(NamedTuple):
     by_case: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Swept:
     """A sweep: what its columns are, and its parts as they are found.
 

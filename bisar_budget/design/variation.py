@@ -1,18 +1,17 @@
 """The mission of a file with other values, and the row that decides how it stands."""
 
 from collections.abc import Container, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from bisar_budget.design.quantities import Number, QuestionError
 from bisar_budget.faults import SetValue
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
-from bisar_budget.mission.changes import apply_changes, parts_of
+from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.readers import did_you_mean
-from bisar_budget.mission.tree import read_tree
 
 ALIKE = 1e-9  # of a utilization: a common error along x and along y may bind alike, but for rounding
 
@@ -30,13 +29,6 @@ class Variation:
 
     def __init__(self, mission: Mission, model: str | None) -> None:
         self.mission, self.model = mission, model
-
-    def tree(self) -> dict[str, Any]:
-        """What the file says with the options that changed it, as text."""
-        tree = read_tree(self.mission.data, self.mission.file)
-        apply_changes(tree, self.mission.changes)
-        root: dict[str, Any] = tree.root
-        return root
 
     def read(self, changes: Sequence[SetValue] = ()) -> Mission:
         """Read the mission with values in place of its own.

@@ -108,7 +108,7 @@ def test_only_the_command_prints(path: Path) -> None:
         assert not (isinstance(node, ast.Call) and getattr(node.func, "id", "") == "print")
 
 
-HEAVY = ("sympy", "numpy", "numba", "matplotlib", "jinja2", "mpmath", "sarkit", "lxml")
+HEAVY = ("sympy", "numpy", "numba", "matplotlib", "jinja2", "mpmath", "sarkit", "lxml", "pyarrow", "netCDF4")
 
 
 def loaded_after(code: str) -> set[str]:

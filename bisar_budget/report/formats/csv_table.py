@@ -4,9 +4,10 @@ import csv
 import io
 from collections.abc import Iterable, Iterator, Sequence
 
-from bisar_budget.faults import changes_words, printable
+from bisar_budget.faults import changes_words
 from bisar_budget.findings.mission import MissionFindings, UnusableMission
 from bisar_budget.report import Piece, Style
+from bisar_budget.report.words.escapes import spreadsheet_text
 
 COLUMNS = (
     "file",
@@ -60,25 +61,25 @@ def _written(rows: Iterable[Sequence[object]]) -> str:
 def _faults(mission: UnusableMission) -> Iterator[list[object]]:
     for fault in mission.faults:
         cells: dict[str, object] = {
-            "file": _text(mission.file),
-            "id": _text(fault.key),
+            "file": spreadsheet_text(mission.file),
+            "id": spreadsheet_text(fault.key),
             "status": mission.status,
             "line": fault.line,
-            "reason": _text(str(fault)),
+            "reason": spreadsheet_text(str(fault)),
         }
         yield [cells.get(column) for column in COLUMNS]
 
 
 def _rows(mission: MissionFindings) -> Iterator[list[object]]:
-    file, name = _text(mission.file), _text(mission.name)
-    changed = _text(changes_words(mission.changes)) or None
+    file, name = spreadsheet_text(mission.file), spreadsheet_text(mission.name)
+    changed = spreadsheet_text(changes_words(mission.changes)) or None
     verdicts = {verdict.id: verdict.verdict for verdict in mission.verdicts or ()}
     for row in mission.rows:
         x, y = row.displacement_m or (None, None)
         yield [
             file,
             name,
-            _text(row.id),
+            spreadsheet_text(row.id),
             row.status,
             row.metric,
             row.unit,
@@ -94,10 +95,10 @@ def _rows(mission: MissionFindings) -> Iterator[list[object]]:
             y,
             row.line,
             row.equation,
-            _text(row.requirement_id),
+            spreadsheet_text(row.requirement_id),
             row.reason,
             "; ".join(row.notes),
-            _text(row.evidence),
+            spreadsheet_text(row.evidence),
             verdicts.get(row.id),
             row.qpe_exact_rad,
             row.published_margin_db,
@@ -106,9 +107,3 @@ def _rows(mission: MissionFindings) -> Iterator[list[object]]:
             row.islr_db,
             changed,
         ]
-
-
-def _text(value: str | None) -> str | None:
-    """Keep text of the user's own from being run: a spreadsheet takes what starts like a formula for one."""
-    value = printable(value) if value else value
-    return f"'{value}" if value and value != "-" and value[0] in "=+-@" else value

@@ -79,3 +79,9 @@ def source_path(file: str, root: str) -> str:
         if file.startswith(below):
             file = file[len(below) :]
     return file.replace(os.sep, "/")
+
+
+def spreadsheet_text(value: str | None) -> str | None:
+    """Keep text of the user's own from being run: a spreadsheet takes what starts like a formula for one."""
+    value = printable(value) if value else value
+    return f"'{value}" if value and value != "-" and value[0] in "=+-@" else value

@@ -1,0 +1,320 @@
+"""`bisar-budget sweep`: a mission checked for many values of its numbers."""
+
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from datetime import date, datetime
+from io import StringIO
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+import click
+
+from bisar_budget import __version__
+from bisar_budget.cli.streams import (
+    FILE,
+    SET,
+    complain,
+    day_of_run,
+    deliver_parts,
+    fail,
+    load_all,
+    replacing,
+    spare,
+    write_file,
+)
+from bisar_budget.faults import printable
+from bisar_budget.resources import cores
+
+if TYPE_CHECKING:
+    from click._termui_impl import ProgressBar
+
+    from bisar_budget.design.cases import Cases
+    from bisar_budget.design.swept import Part, Swept
+    from bisar_budget.faults import SetValue
+    from bisar_budget.mission.model import Mission
+    from bisar_budget.report.drawing.trades import Gathered
+
+MAX_CASES = 100_000_000  # that are started without being asked twice: tens of gigabytes
+_MANY = 20_000  # cases from which on it is measured how long they will take
+_LONG = 60.0  # s; what takes longer is announced
+_TRIAL = 0.3  # s; a shorter one is too short to measure
+_PLOTS, _TABLES = (".svg", ".png", ".pdf"), (".csv", ".parquet", ".nc")
+
+
+@click.command()
+@click.argument("mission", type=FILE)
+@click.option(
+    "--vary",
+    "varied",
+    multiple=True,
+    metavar="KEY=FROM:TO UNIT:COUNT",
+    help="Values of a key, such as platforms.receiver.azimuth=0:180deg:181; with :log behind it in equal ratios. Or "
+    "a list, KEY=1,2,5 s. Repeatable: every combination is a case.",
+)
+@click.option(
+    "--cases",
+    "cases_file",
+    type=FILE,
+    metavar="FILE",
+    help="Cases of a CSV file instead: a header KEY [unit] for each column, one line for each case.",
+)
+@click.option(
+    "--sample",
+    metavar="latin:COUNT:SEED",
+    help="Draw a Latin hypercube over the ranges of --vary instead of every combination.",
+)
+@click.option(
+    "--column",
+    "columns",
+    multiple=True,
+    metavar="ROW.FIELD",
+    help="A column more, such as receiver.velocity.x.allowable. Repeatable.",
+)
+@click.option("-o", "--output", type=FILE, metavar="FILE", help="Write to FILE: .csv, .parquet or .nc (NetCDF).")
+@click.option(
+    "--plot",
+    type=FILE,
+    metavar="FILE",
+    help="Draw one key as curves of utilization, two as a map: .svg, .png or .pdf.",
+)
+@click.option("--plot-column", metavar="NAME", help="Draw this column instead of utilization and status.")
+@click.option("--polar", "is_polar", is_flag=True, help="Draw the map over an azimuth as seen from above.")
+@click.option(
+    "--model",
+    type=click.Choice(["published", "full", "strictest"]),
+    help="Model that decides, instead of the mission file's.",
+)
+@SET
+@click.option(
+    "--date",
+    "today",
+    type=click.DateTime(["%Y-%m-%d"]),
+    help="Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC).",
+)
+@click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Processes to use (default: number of cores).")
+@click.option("--force", is_flag=True, help=f"Start also with more than {MAX_CASES} cases.")
+def sweep(
+    mission: str,
+    varied: Sequence[str],
+    cases_file: str | None,
+    sample: str | None,
+    columns: Sequence[str],
+    output: str | None,
+    plot: str | None,
+    plot_column: str | None,
+    is_polar: bool,
+    model: str | None,
+    changes: "tuple[SetValue, ...]",
+    today: datetime | None,
+    jobs: int | None,
+    force: bool,
+) -> None:
+    """Check a mission for many values of its numbers: a table with one line for each case.
+
+    It has what varied, resolutions, angles, the status, the worst row, its utilization, and the requirement that
+    binds. Cases for which there is no mission, such as a platform below the ground, have the status error and a
+    reason. CSV goes to standard output without -o and --plot. Statuses do not change the exit code: 0, or 2 for
+    wrong usage or an unusable mission file.
+    """
+    _usable(output, plot, plot_column, is_polar)
+    if (cases_file is None) == (not varied):
+        raise click.UsageError("say which cases there are: either --vary or --cases.")
+    if cases_file is not None and sample is not None:
+        raise click.UsageError("--sample draws from the ranges of --vary; --cases has cases of its own.")
+    spare([mission, *([cases_file] if cases_file else [])], [output, plot])
+    from bisar_budget.design.cases import TableError
+    from bisar_budget.design.quantities import QuestionError
+    from bisar_budget.report.drawing.trades import check_plot
+    from bisar_budget.report.tables import MissingTablesError
+
+    (loaded,) = load_all([mission], model, changes)
+    try:
+        cases = _cases(loaded, varied, cases_file, sample)
+        if plot is not None:
+            check_plot(cases, is_polar=is_polar)
+        run = _Run(loaded, cases, columns, model, today.date() if today else day_of_run(), jobs or cores())
+        run.foresee(force)
+        run.write(output, plot, plot_column, is_polar)
+    except TableError as error:
+        for line in error.lines:
+            complain(line)
+        sys.exit(2)
+    except (QuestionError, MissingTablesError) as error:
+        fail(f"{mission}: {error}")
+
+
+def _usable(output: str | None, plot: str | None, plot_column: str | None, is_polar: bool) -> None:
+    """Refuse names of files that no format has, and options of a plot without one."""
+    for name, suffixes in ((output, _TABLES), (plot, _PLOTS)):
+        if name not in (None, "-") and os.path.splitext(str(name))[1].lower() not in suffixes:
+            raise click.UsageError(f"{name}: the suffix must be one of {', '.join(suffixes)}")
+    if plot == "-":
+        raise click.UsageError("--plot needs the name of a file.")
+    if plot is None and (plot_column is not None or is_polar):
+        raise click.UsageError("--plot-column and --polar say how to draw; --plot says to which file.")
+
+
+def _cases(mission: "Mission", varied: Sequence[str], cases_file: str | None, sample: str | None) -> "Cases":
+    """Read the cases that the options ask for."""
+    from bisar_budget.design import cases
+    from bisar_budget.design.quantities import tree_of
+
+    tree = tree_of(mission)
+    if cases_file is None:
+        return cases.grid(tree, varied) if sample is None else cases.sample(tree, varied, sample)
+    try:
+        with open(cases_file, encoding="utf-8", newline="") as file:
+            text = file.read()
+    except (OSError, ValueError) as error:  # ValueError: not UTF-8, a NUL in the name
+        fail(f"{cases_file}: cannot be read: {getattr(error, 'strerror', None) or error}")
+    return cases.table(tree, text, cases_file)
+
+
+class _Run:
+    """One sweep on its way to a table and a plot; counts what it finds."""
+
+    def __init__(
+        self, mission: "Mission", cases: "Cases", columns: Sequence[str], model: str | None, day: date, jobs: int
+    ) -> None:
+        self.mission, self.cases, self.columns, self.model = mission, cases, columns, model
+        self.day, self.jobs = day, jobs
+        self.done = self.by_case = self.complying = self.missing = 0
+
+    def swept(self, cases: "Cases", columns: Sequence[str]) -> "Swept":
+        """Ask the engine."""
+        from bisar_budget.design.sweep import sweep
+
+        return sweep(self.mission, cases, columns=columns, model=self.model, today=self.day, jobs=self.jobs)
+
+    def foresee(self, force: bool) -> None:
+        """Say how many cases there are if they take long, and begin too many only by force."""
+        count = self.cases.count
+        if count <= _MANY:
+            return
+        seconds = self._seconds()
+        if count > MAX_CASES and not force:
+            fail(
+                f"{self.mission.file}: {count} cases will take about {_lasting(seconds)}; "
+                f"accepted: up to {MAX_CASES}, or more with --force"
+            )
+        if seconds > _LONG:
+            complain(f"{count} cases will take about {_lasting(seconds)}.")
+
+    def _seconds(self) -> float:
+        """Measure how long all cases will take, by some of them."""
+        from bisar_budget.design.cases import some_of
+
+        tried, is_warm = 100, False
+        while True:
+            parts = self.swept(some_of(self.cases, tried), self.columns).parts
+            began = perf_counter()
+            alone = sum(part.by_case for part in parts)
+            seconds = perf_counter() - began
+            if is_warm and (seconds > _TRIAL or 10 * tried > self.cases.count):
+                sharing = min(self.jobs, cores()) if alone > tried / 2 else 1  # processes: arrays are faster alone
+                return seconds * self.cases.count / tried / sharing
+            tried, is_warm = tried * (10 if is_warm else 1), True  # the first one imports what it needs
+
+    def write(self, output: str | None, plot: str | None, plot_column: str | None, is_polar: bool) -> None:
+        """Check the cases, write the table as they come, then the plot, and say what was found."""
+        from bisar_budget.report.tables import writer_of
+        from bisar_budget.report.tables.cases_csv import texts
+        from bisar_budget.report.tables.described import Described
+
+        writer = writer_of(os.path.splitext(output)[1].lower()) if output not in (None, "-") else None
+        columns = self.columns
+        if plot_column is not None and "." in plot_column and plot_column not in columns:
+            columns = (*columns, plot_column)
+        swept = self.swept(self.cases, columns)
+        described = Described(swept, self.cases, self.mission, __version__)
+        gathered = None
+        if plot is not None:
+            from bisar_budget.report.drawing.trades import Gathered
+
+            gathered = Gathered(described, column=plot_column)
+        with _progress_bar(self.cases.count) as bar:
+            parts = self._counted(swept.parts, bar, gathered)
+            if writer is not None:
+                with replacing(str(output)) as name:
+                    writer.write(described, parts, name)
+            elif output is None and plot is not None:
+                for _ in parts:
+                    pass
+            else:
+                deliver_parts(texts(described, parts), "csv")
+        if plot is not None and gathered is not None:
+            self._draw(plot, gathered, is_polar)
+        complain(self._summary())
+
+    def _counted(
+        self, parts: "Iterator[Part]", bar: "ProgressBar[int]", gathered: "Gathered | None"
+    ) -> "Iterator[Part]":
+        """Hand the parts on, and take what is counted or drawn."""
+        from bisar_budget.findings.status import STATUS
+
+        for part in parts:
+            statuses = part.values["status"].tolist()
+            for name in set(statuses):
+                times = statuses.count(name)
+                self.missing += times * (name == "error")
+                self.complying += times * (name != "error" and not STATUS[name].fails)
+            self.done += part.stop - part.start
+            self.by_case += part.by_case
+            if gathered is not None:
+                gathered.add(part)
+            yield part
+            bar.update(part.stop - part.start)
+
+    def _draw(self, plot: str, gathered: "Gathered", is_polar: bool) -> None:
+        """Draw what was gathered; over one key also the rows that are the worst somewhere."""
+        from bisar_budget.report.drawing import trade_plot
+        from bisar_budget.report.drawing.trades import Gathered, rows_that_matter
+        from bisar_budget.report.tables.described import Described
+
+        trade = gathered.trade(is_polar=is_polar)
+        uses = {}
+        if len(trade.axes) == 1 and trade.column is None:
+            names = {f"{row}.utilization": row for row in rows_that_matter(trade)}
+            swept = self.swept(self.cases, tuple(names))
+            again = Gathered(Described(swept, self.cases, self.mission, __version__), tuple(names))
+            for part in swept.parts:
+                again.add(part)
+            found = again.trade().values
+            uses = {row: found[name] for name, row in names.items()}
+        kind = os.path.splitext(plot)[1][1:].lower()
+        write_file(plot, trade_plot.drawn(trade, uses, self.mission, kind, is_polar=is_polar))
+
+    def _summary(self) -> str:
+        """One line: how many cases, how many comply, how they were checked."""
+        if not self.done:
+            return f"{printable(self.mission.name)}: no case was checked"
+        said = [f"{self.done} case{'' if self.done == 1 else 's'}"]
+        if self.done < self.cases.count:
+            said[0] += f" of {self.cases.count}"
+        said.append(f"{self.complying} comply ({_part(self.complying, self.done)})")
+        if self.missing:
+            said.append(f"{self.missing} without a mission")
+        said.append(f"{_part(self.by_case, self.done)} checked one by one")
+        return f"{printable(self.mission.name)}: {', '.join(said)}"
+
+
+def _part(some: int, of: int) -> str:
+    """Say a part of a whole; all and none are said only where it is so."""
+    if some in (0, of):
+        return "100 %" if some else "0 %"
+    return f"{min(max(100 * some / of, 0.1), 99.9):.3g} %"
+
+
+def _lasting(seconds: float) -> str:
+    """Say how long something takes."""
+    for unit, size in (("years", 365.25 * 86400), ("days", 86400), ("hours", 3600), ("minutes", 60)):
+        if seconds >= 2 * size:
+            return f"{seconds / size:.0f} {unit}"
+    return f"{max(seconds, 1):.0f} s"
+
+
+def _progress_bar(total: int) -> "ProgressBar[int]":
+    """Bar with the time left on standard error, where somebody watches."""
+    watched = sys.stderr is not None and sys.stderr.isatty()
+    return click.progressbar(length=total, label="Checking cases", file=sys.stderr if watched else StringIO())

@@ -1,0 +1,244 @@
+"""What a plot of a sweep shows, as arrays: no more than Matplotlib is given to draw."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bisar_budget.design.cases import Cases, Floats, Grid
+from bisar_budget.design.quantities import Number, QuestionError
+from bisar_budget.design.swept import Column, Part
+from bisar_budget.findings.status import RANK
+from bisar_budget.mission.bounds import DIRECTION
+from bisar_budget.report.tables.described import Described
+
+MAX_CASES = 4_000_000  # of a plot: more than a screen has pixels
+ROWS = 7  # curves, at most
+_LABELLED = 0.02  # of a map: a smaller region has no name
+_FINEST = 300  # cells along a map, for the place of a name
+_WIDE = 8.0  # a span of values above this is drawn in equal ratios
+_NEEDED = ("status", "worst_row", "utilization")
+
+
+class Axis(NamedTuple):
+    """A key that varies: its values, rising, in the unit that they were asked for in."""
+
+    number: Number
+    values: Floats
+    is_log: bool
+
+    @property
+    def label(self) -> str:
+        """Name and unit."""
+        return f"{self.number.key} [{self.number.unit}]" if self.number.unit else self.number.key
+
+    @property
+    def edges(self) -> Floats:
+        """Ends of the cells around the values, half way to the next: (n + 1,)."""
+        values = np.log(self.values) if self.is_log else self.values
+        middle = (values[1:] + values[:-1]) / 2
+        edges = np.concatenate(([2 * values[0] - middle[0]], middle, [2 * values[-1] - middle[-1]]))
+        return np.exp(edges) if self.is_log else edges
+
+
+class Trade(NamedTuple):
+    """A sweep over one or two keys: arrays with one axis for each, in the order of `axes`.
+
+    `column` is what a heat map shows; None where the status is shown. `fixed` are the keys with a single value.
+    """
+
+    axes: tuple[Axis, ...]
+    values: Mapping[str, NDArray[Any]]
+    column: Column | None
+    fixed: tuple[str, ...]
+
+    @property
+    def statuses(self) -> list[str]:
+        """Statuses that occur, worst first."""
+        return sorted(set(self.values["status"].ravel().tolist()), key=RANK.__getitem__)
+
+
+def check_plot(cases: Cases, *, is_polar: bool) -> None:
+    """Say why a sweep cannot be drawn.
+
+    Raises
+    ------
+    QuestionError
+        No grid, more than two keys that vary, or none, too many cases, or no azimuth where a polar map is asked for.
+    """
+    accepted = "accepted: --vary of one key, or of two"
+    if not isinstance(cases, Grid):
+        raise QuestionError(f"--plot draws a grid; {accepted}. The cases of a table or a sample have no axes")
+    varying = [number for number, size in zip(cases.numbers, cases.shape, strict=True) if size > 1]
+    if not 1 <= len(varying) <= 2:
+        raise QuestionError(f"--plot draws one axis or two, and {len(varying)} keys vary; {accepted}")
+    if cases.count > MAX_CASES:
+        raise QuestionError(f"--plot draws up to {MAX_CASES} cases, and there are {cases.count}")
+    if not is_polar:
+        return
+    if len(varying) != 2 or not any(number.reader is DIRECTION for number in varying):
+        raise QuestionError("--polar draws a key over an azimuth; accepted: --vary of an azimuth and of another key")
+    other = next(number for number in varying if number is not _azimuth(varying))
+    if cases.axes[cases.numbers.index(other)].min() < 0:
+        raise QuestionError(f"--polar draws {other.key} as a radius; accepted: values from 0")
+
+
+def _azimuth(numbers: Sequence[Number]) -> Number:
+    return next(number for number in numbers if number.reader is DIRECTION)
+
+
+class Gathered:
+    """Collects the columns that a plot needs, as the parts of a sweep come."""
+
+    def __init__(self, described: Described, names: Sequence[str] = (), column: str | None = None) -> None:
+        assert isinstance(described.cases, Grid)  # seen by `check_plot`
+        self.described, self.cases = described, described.cases
+        columns = {one.name: one for one in described.columns}
+        if column is not None and (column not in columns or columns[column].is_text):
+            known = [name for name, one in columns.items() if not one.is_text and name not in described.numbers]
+            raise QuestionError(f"--plot-column {column}: is no column of numbers; accepted: {', '.join(known)}")
+        self.column = columns[column] if column is not None else None
+        self.names = dict.fromkeys((*_NEEDED, *names, *((column,) if column is not None else ())))
+        self.found: dict[str, list[NDArray[Any]]] = {name: [] for name in self.names}
+
+    def add(self, part: Part) -> None:
+        """Take what is needed of a part."""
+        for name, pieces in self.found.items():
+            pieces.append(self.described.said(name, part.values[name]))
+
+    def trade(self, *, is_polar: bool = False) -> Trade:
+        """Lay it out; the azimuth first in a polar map."""
+        axes = []
+        varying, fixed, orders = [], [], []
+        for place, (number, values) in enumerate(zip(self.cases.numbers, self.cases.axes, strict=True)):
+            said = np.asarray(self.described.said(number.key, values), float)
+            order = np.argsort(said)
+            orders.append(order)
+            if values.size == 1:
+                fixed.append(f"{number.key} {said[0]:.6g} {number.unit}".rstrip())
+            else:
+                varying.append(place)
+                axes.append(Axis(number, said[order], _is_log(said[order])))
+        sizes = [self.cases.shape[place] for place in varying]
+        laid = {
+            name: np.concatenate(pieces).reshape(self.cases.shape)[np.ix_(*orders)].reshape(sizes)
+            for name, pieces in self.found.items()
+        }
+        if is_polar and _azimuth([axis.number for axis in axes]) is not axes[0].number:
+            axes.reverse()
+            laid = {name: values.T for name, values in laid.items()}
+        return Trade(tuple(axes), laid, self.column, tuple(fixed))
+
+
+def _is_log(values: Floats) -> bool:
+    """Whether values are better seen in equal ratios: they have equal ones, and a wide span."""
+    if values[0] <= 0 or values[-1] / values[0] < _WIDE or values.size < 3:
+        return False
+    steps, ratios = np.diff(values), np.diff(np.log(values))
+    return bool(ratios.std() / ratios.mean() < steps.std() / steps.mean())
+
+
+def rows_that_matter(trade: Trade) -> tuple[str, ...]:
+    """Rows that are the worst anywhere, the one that is most often first; not more than `ROWS`."""
+    rows, counts = np.unique(trade.values["worst_row"][trade.values["worst_row"] != ""], return_counts=True)
+    return tuple(str(row) for row in rows[np.argsort(-counts, kind="stable")][:ROWS])
+
+
+class Run(NamedTuple):
+    """Neighbouring values with one status, from edge to edge."""
+
+    status: str
+    low: float
+    high: float
+
+
+def runs(axis: Axis, statuses: NDArray[Any]) -> Iterator[Run]:
+    """Stretches of one axis with one status each; the first and the last end at the values themselves."""
+    edges = axis.edges
+    edges[0], edges[-1] = axis.values[0], axis.values[-1]
+    starts = [0, *(np.flatnonzero(statuses[1:] != statuses[:-1]) + 1).tolist(), statuses.size]
+    for start, stop in pairwise(starts):
+        yield Run(str(statuses[start]), float(edges[start]), float(edges[stop]))
+
+
+class Region(NamedTuple):
+    """Neighbouring cells of a map with one worst row: where its name stands, and how many cells it has around."""
+
+    row: str
+    place: tuple[int, int]
+    size: tuple[int, int]
+
+
+def regions(rows: NDArray[Any]) -> list[Region]:
+    """Find the regions of a map that are large enough for a name, which stands where it is farthest from others.
+
+    `rows` is (n, m); places are indices of it.
+    """
+    strides = [max(1, -(-size // _FINEST)) for size in rows.shape]
+    thin = rows[:: strides[0], :: strides[1]]
+    seen = thin == ""
+    found = []
+    for first, second in np.argwhere(~seen).tolist():
+        if seen[first, second]:
+            continue
+        one = _connected(thin == thin[first, second], (first, second))
+        seen |= one
+        if one.mean() >= _LABELLED:
+            place = _innermost(one)
+            along = (_run(one[:, place[1]], place[0]), _run(one[place[0]], place[1]))
+            found.append(
+                Region(
+                    str(thin[first, second]),
+                    (place[0] * strides[0], place[1] * strides[1]),
+                    (along[0] * strides[0], along[1] * strides[1]),
+                )
+            )
+    return found
+
+
+def _connected(mask: NDArray[np.bool_], start: tuple[int, int]) -> NDArray[np.bool_]:
+    """Cells of a mask that hang together with one of them, side by side."""
+    found = np.zeros_like(mask)
+    found[start] = True
+    front = [start]
+    while front:
+        first, second = front.pop()
+        for cell in ((first - 1, second), (first + 1, second), (first, second - 1), (first, second + 1)):
+            if 0 <= cell[0] < mask.shape[0] and 0 <= cell[1] < mask.shape[1] and mask[cell] and not found[cell]:
+                found[cell] = True
+                front.append(cell)
+    return found
+
+
+def _innermost(mask: NDArray[np.bool_]) -> tuple[int, int]:
+    """The cell that is left last when the rim is taken off again and again."""
+    inner = mask
+    while True:
+        padded = np.pad(inner, 1)
+        smaller = inner & padded[:-2, 1:-1] & padded[2:, 1:-1] & padded[1:-1, :-2] & padded[1:-1, 2:]
+        if not smaller.any():
+            cells = np.argwhere(inner)
+            middle = cells.mean(axis=0)
+            first, second = cells[((cells - middle) ** 2).sum(axis=1).argmin()].tolist()
+            return first, second
+        inner = smaller
+
+
+def _run(line: NDArray[np.bool_], place: int) -> int:
+    """Number of cells in one piece around a place of a line."""
+    ends = np.flatnonzero(~line)
+    low = ends[ends < place].max(initial=-1)
+    high = ends[ends > place].min(initial=line.size)
+    return int(high - low - 1)
+
+
+def borders(rows: NDArray[Any], first: Floats, second: Floats) -> Floats:
+    """Lines between cells of a map with different rows: (count, 2, 2), from edges (n + 1,) and (m + 1,)."""
+    lines = []
+    i, j = np.nonzero(rows[1:] != rows[:-1])
+    lines.append(np.stack([np.stack([first[i + 1], second[j]], -1), np.stack([first[i + 1], second[j + 1]], -1)], 1))
+    i, j = np.nonzero(rows[:, 1:] != rows[:, :-1])
+    lines.append(np.stack([np.stack([first[i], second[j + 1]], -1), np.stack([first[i + 1], second[j + 1]], -1)], 1))
+    return np.concatenate(lines)

@@ -1,0 +1,45 @@
+"""What a file of cases says of itself: mission, hash, tool, and what each column holds, in which unit."""
+
+from collections.abc import Mapping
+from functools import cached_property
+
+import numpy as np
+
+from bisar_budget.design.cases import Cases, in_unit
+from bisar_budget.design.swept import Column, Part, Swept, Values
+from bisar_budget.faults import changes_words, printable
+from bisar_budget.mission.model import Mission
+
+
+class Described:
+    """A sweep as a table: keys that vary stand in the unit that they were asked for in, all else in SI."""
+
+    def __init__(self, swept: Swept, cases: Cases, mission: Mission, version: str) -> None:
+        self.swept, self.cases = swept, cases
+        self.numbers = {number.key: number for number in cases.numbers}
+        changed = changes_words(mission.changes)
+        self.facts = {
+            "mission": printable(swept.mission_name),
+            "mission_sha256": swept.mission_sha256,
+            **({"set": changed} if changed else {}),
+            "model": mission.gating_model,
+            "source": f"bisar-budget {version}",
+        }
+
+    @cached_property
+    def columns(self) -> tuple[Column, ...]:
+        """Columns in their order."""
+        return tuple(
+            column._replace(unit=self.numbers[column.name].unit) if column.name in self.numbers else column
+            for column in self.swept.columns
+        )
+
+    def values(self, part: Part) -> Mapping[str, Values]:
+        """Values of a part by the name of their column."""
+        return {name: self.said(name, values) for name, values in part.values.items()}
+
+    def said(self, name: str, values: Values) -> Values:
+        """Values of a column, of one that varies in its unit."""
+        if name not in self.numbers:
+            return values
+        return in_unit(self.numbers[name], np.asarray(values, float))

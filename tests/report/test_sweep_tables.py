@@ -1,0 +1,178 @@
+"""Files of cases, read with other people's readers: pandas' and Python's CSV, pyarrow, xarray."""
+
+import csv
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bisar_budget.design.cases import Cases, grid, table
+from bisar_budget.design.swept import Column, Part, Swept, Values
+from bisar_budget.faults import SetValue
+from bisar_budget.mission.load import load_mission
+from bisar_budget.mission.tree import read_tree
+from bisar_budget.report import tables
+from bisar_budget.report.tables import TABLES, MissingTablesError, writer_of
+from bisar_budget.report.tables.described import Described
+from bisar_budget.report.tables.netcdf import slabs
+from tests.conftest import ROOT
+
+FILE = ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml"
+MISSION = load_mission(str(FILE), changes=[SetValue("radar.bandwidth", "150MHz")])
+TREE: dict[str, Any] = read_tree(FILE.read_bytes(), "m.yaml").root
+TIME, AZIMUTH = "collection.aperture_time", "platforms.receiver.azimuth"
+GRID = grid(TREE, [f"{TIME}=1:2s:3", f"{AZIMUTH}=-30,60,90,180deg", "radar.bandwidth=100,200MHz"])
+TABLE = table(TREE, f"{TIME} [ms],{AZIMUTH} [deg]\n" + "".join(f"{100 * i},{i}\n" for i in range(1, 25)), "c.csv")
+
+
+def swept(cases: Cases, size: int) -> Swept:
+    """24 cases of made-up values, in parts of a size."""
+    number = np.arange(24)
+    found: dict[str, Values] = {
+        **cases.values(0, 24),
+        "utilization": np.where(number % 5 == 4, np.nan, number / 7),
+        "status": np.array(["pass", "fail", "error"], object)[number % 3],
+        "worst_row": np.array(["", "receiver.velocity.x", "clock drift"], object)[number % 3],
+        "reason": np.array([f'case {n}, "bad"' if n % 3 == 2 else "" for n in number], object),
+    }
+    columns = (
+        *(Column(number.key, number.dimension.si, f"the key {number.key}") for number in cases.numbers),
+        Column("utilization", "", "what is declared over what is allowed"),
+        Column("status", "", "status of the mission", True),
+        Column("worst_row", "", "row of the highest utilization", True),
+        Column("reason", "", "why there is no mission", True),
+    )
+
+    def parts() -> Iterator[Part]:
+        for start in range(0, 24, size):
+            stop = min(start + size, 24)
+            yield Part(start, stop, {name: values[start:stop] for name, values in found.items()}, 0)
+
+    keys = tuple(number.key for number in cases.numbers)
+    return Swept("A =name", "ab" * 32, keys, cases.shape, 24, columns, parts())
+
+
+def written(suffix: str, cases: Cases, tmp_path: Path, size: int = 7) -> Path:
+    path = tmp_path / f"t{suffix}"
+    made = swept(cases, size)
+    writer_of(suffix).write(Described(made, cases, MISSION, "1.2.3"), made.parts, str(path))
+    return path
+
+
+FACTS = {
+    "mission": "A =name",
+    "mission_sha256": "ab" * 32,
+    "set": "--set radar.bandwidth=150MHz",
+    "model": "published",
+    "source": "bisar-budget 1.2.3",
+}
+
+
+@pytest.mark.parametrize("size", [1, 7, 24])
+def test_csv(tmp_path: Path, size: int) -> None:
+    text = written(".csv", GRID, tmp_path, size).read_text(encoding="utf-8")
+    lines = text.splitlines()
+    assert lines[:5] == [f"# {name}: {value}" for name, value in FACTS.items()]
+    rows = list(csv.DictReader(lines[5:]))
+    assert list(rows[0])[:4] == [f"{TIME} [s]", f"{AZIMUTH} [deg]", "radar.bandwidth [MHz]", "utilization"]
+    assert [row[f"{AZIMUTH} [deg]"] for row in rows[:4]] == ["-30.0", "-30.0", "60.0", "60.0"]
+    assert [row["utilization"] for row in rows] == ["" if n % 5 == 4 else repr(n / 7) for n in range(24)]
+    assert rows[2]["reason"] == 'case 2, "bad"'
+    assert (rows[1]["worst_row"], rows[1]["status"]) == ("receiver.velocity.x", "fail")
+
+
+def test_the_keys_of_a_csv_are_a_table_of_cases(tmp_path: Path) -> None:
+    """Values come back to the bit, in the units that they were asked for in."""
+    lines = written(".csv", GRID, tmp_path).read_text(encoding="utf-8").splitlines()
+    cut = "".join(",".join(line.split(",")[:3]) + "\n" for line in lines)
+    again = table(TREE, cut, "again.csv")
+    for key, values in GRID.values(0, 24).items():
+        assert again.values(0, 24)[key].tolist() == values.tolist()
+
+
+@pytest.mark.parametrize("size", [1, 7, 24])
+def test_parquet(tmp_path: Path, size: int) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    read = pq.read_table(written(".parquet", GRID, tmp_path, size))
+    metadata = {name.decode(): value.decode() for name, value in read.schema.metadata.items()}
+    assert {name: metadata[name] for name in FACTS} == FACTS
+    field = read.schema.field(AZIMUTH)
+    assert field.metadata == {b"unit": b"deg", b"description": f"the key {AZIMUTH}".encode()}
+    assert read.column(AZIMUTH).to_pylist()[:4] == [-30, -30, 60, 60]
+    assert read.column("utilization").to_pylist() == [None if n % 5 == 4 else n / 7 for n in range(24)]
+    assert pa.types.is_dictionary(read.schema.field("status").type)
+    assert read.column("status").to_pylist() == ["pass", "fail", "error"] * 8
+    assert read.column("worst_row").to_pylist()[:3] == [None, "receiver.velocity.x", "clock drift"]
+    assert read.column("reason").to_pylist()[2] == 'case 2, "bad"'
+
+
+def test_parquet_has_groups_of_many_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not one for each part, which would make a file of a million cases slow to read; nor one for all."""
+    import pyarrow.parquet as pq
+
+    from bisar_budget.report.tables import parquet
+
+    monkeypatch.setattr(parquet, "_ROWS", 10)
+    assert [part[-1].stop - part[0].start for part in parquet._groups(swept(TABLE, 4).parts)] == [12, 12]
+    file = pq.ParquetFile(written(".parquet", TABLE, tmp_path, 4))
+    assert [file.metadata.row_group(group).num_rows for group in range(file.metadata.num_row_groups)] == [12, 12]
+    assert file.read().column("utilization").to_pylist()[23] == 23 / 7
+
+
+@pytest.mark.parametrize("size", [1, 5, 7, 24])
+def test_netcdf_of_a_grid_keeps_its_axes(tmp_path: Path, size: int) -> None:
+    import xarray
+
+    with xarray.open_dataset(written(".nc", GRID, tmp_path, size)) as read:
+        assert dict(read.sizes) == {TIME: 3, AZIMUTH: 4, "radar.bandwidth": 2}
+        assert read[AZIMUTH].values.tolist() == [-30, 60, 90, 180]
+        assert read[AZIMUTH].attrs == {"long_name": f"the key {AZIMUTH}", "units": "degree"}
+        assert read["utilization"].attrs["units"] == "1"
+        expected = np.where(np.arange(24) % 5 == 4, np.nan, np.arange(24) / 7).reshape(3, 4, 2)
+        np.testing.assert_array_equal(read["utilization"].values, expected)
+        status = read["status"]
+        meanings = status.attrs["flag_meanings"].split()
+        assert status.attrs["flag_values"].tolist() == list(range(len(meanings)))
+        assert [meanings[code] for code in status.values.ravel()] == ["pass", "fail", "error"] * 8
+        assert read["worst_row"].attrs["flag_meanings"] == "none receiver.velocity.x clock_drift"
+        assert read["worst_row"].values.ravel().tolist() == [0, 1, 2] * 8
+        assert read["reason"].values.ravel()[:3].tolist() == ["", "", 'case 2, "bad"']
+        assert read.attrs["title"] == "A =name"
+        assert read.attrs["mission_sha256"] == "ab" * 32
+        assert float(read["utilization"].sel({TIME: 1.5, AZIMUTH: 60, "radar.bandwidth": 200})) == 11 / 7
+
+
+def test_netcdf_of_a_table_has_a_dimension_of_cases(tmp_path: Path) -> None:
+    import xarray
+
+    with xarray.open_dataset(written(".nc", TABLE, tmp_path)) as read:
+        assert dict(read.sizes) == {"case": 24}
+        assert read[TIME].values.tolist() == [100.0 * n for n in range(1, 25)]
+        assert read[TIME].attrs["units"] == "ms"
+
+
+@given(st.lists(st.integers(1, 5), min_size=1, max_size=4), st.data())
+def test_boxes_hold_the_elements_between_two(shape: list[int], data: st.DataObject) -> None:
+    size = int(np.prod(shape))
+    start = data.draw(st.integers(0, size))
+    stop = data.draw(st.integers(start, size))
+    elements = np.arange(size).reshape(shape)
+    found = [element for slab in slabs(start, stop, tuple(shape)) for element in elements[slab].ravel().tolist()]
+    assert found == list(range(start, stop))
+
+
+@pytest.mark.parametrize("suffix", [".parquet", ".nc"])
+def test_a_library_that_is_missing(suffix: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing(name: str) -> None:
+        raise ImportError(name)
+
+    monkeypatch.setattr(tables, "import_module", missing)
+    with pytest.raises(MissingTablesError, match=r"pip install 'bisar-budget\[tables\]'") as error:
+        writer_of(suffix)
+    assert TABLES[suffix].library in str(error.value)
