@@ -247,5 +247,5 @@ def test_a_key_that_makes_no_mission_whatever_its_value_is_refused() -> None:
     """A map of 16 471 errors came of an azimuth beside a position."""
     mission = load_mission(str(MISSIONS / "uav_pair_l_band.yaml"))
     cases = grid(mission, platforms__receiver__azimuth=np.linspace(0, 6, 7))
-    with pytest.raises(QuestionError, match="no value of it makes a mission: .* mixes position with azimuth"):
+    with pytest.raises(QuestionError, match=r"no value of it makes a mission: .* mixes position with azimuth"):
         sweep(mission, cases, today=DAY)
