@@ -65,7 +65,7 @@ def tree_of(mission: Mission) -> dict[str, Any]:
     return root
 
 
-def number_of(tree: dict[str, Any], key: str) -> Number:
+def number_of(tree: dict[str, Any], key: str, of_all: str = "") -> Number:
     """Find the number that a key names.
 
     Parameters
@@ -74,6 +74,8 @@ def number_of(tree: dict[str, Any], key: str) -> Number:
         What the file says, as text.
     key : str
         Path of the number; a scalar that stands for each axis is one number.
+    of_all : str
+        What else is accepted where a key has three numbers.
 
     Raises
     ------
@@ -83,13 +85,15 @@ def number_of(tree: dict[str, Any], key: str) -> Number:
     reader, value = reader_of(tree, key)
     if isinstance(reader, Triple):
         if isinstance(value, list) or not reader.or_scalar:
-            of_all = ", or --scale for all of them" if reader.or_scalar else ""
-            raise QuestionError(f"{key}: has three components; accepted: {key}.0, .1 or .2{of_all}")
+            more = of_all if reader.or_scalar else ""
+            raise QuestionError(f"{key}: has three components; accepted: {key}.0, .1 or .2{more}")
         reader = reader.component
     if isinstance(reader, Section):
         raise QuestionError(f"{key}: is a section; accepted: one of its keys, {', '.join(reader.keys)}")
     if not isinstance(reader, Quantity):
-        raise QuestionError(f"{key}: is no number with a unit, and cannot be solved for")
+        raise QuestionError(
+            f"{key}: is no number with a unit; accepted: one that is, such as collection.aperture_time"
+        )
     return as_number(key, reader, value)
 
 

@@ -19,6 +19,7 @@ from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.mission.model import Mission
 
+_OF_ALL = ", or --scale for all of them"
 PLACES = 65  # of a range
 PLACES_OF_CIRCLE = 181  # every 2 degrees: geometry changes fast where gradients are nearly parallel
 _NARROW = 2e-7  # of the value, between the two sides of a crossing before they are written
@@ -132,7 +133,7 @@ class _Question:
             self.number = Number("the factor", FACTOR, 1.0, "")
             scaled(self.base, key, 1.0)  # says what is wrong with the key
         else:
-            self.number = number_of(tree_of(self.variation.mission), key).said_like(between)
+            self.number = number_of(tree_of(self.variation.mission), key, _OF_ALL).said_like(between)
         self.range: Range = range_of(self.number, between)
         found = check_mission(self.base, today)
         hold_to_decisions([found, *self._at_the_end()], row)
