@@ -8,7 +8,7 @@ import math
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import date
-from functools import lru_cache
+from functools import lru_cache, partial
 from hashlib import sha256
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from bisar_budget.arrays import judged
 from bisar_budget.arrays.collections import Geometries, paths_of
 from bisar_budget.arrays.held import is_image, not_held
-from bisar_budget.arrays.judged import REQUIREMENTS, Judged, check_arrays, statuses
+from bisar_budget.arrays.judged import check_arrays, statuses
+from bisar_budget.arrays.rows import REQUIREMENTS
 from bisar_budget.budget.check import check_mission
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.design.cases import Cases
@@ -215,6 +216,7 @@ class Engine:
         self.numbers = tuple(number_of(tree, key) for key in question.keys)
         rows = {row.id: row for row in check_mission(self.mission, question.today).rows}
         self.asked = [_asked(name, rows) for name in question.columns]
+        self.subjects = {one.row: rows[one.row].subject for one in self.asked}
         self.columns = tuple(
             Column(
                 one.name,
@@ -291,9 +293,11 @@ class Engine:
 
     def _of_same_nodes(self, found: dict[str, Values], some: NDArray[Any], nodes: int) -> NDArray[np.bool_]:
         mission, geometries = self._arrays(found, some)
-        shown = {one.row for one in self.asked}
+        shown = {one.row: self.subjects[one.row] for one in self.asked}
         with np.errstate(all="ignore"):
-            checked = check_arrays(mission, some.size, self.question.today, nodes, geometries, shown)
+            checked = check_arrays(
+                mission, some.size, self.question.today, nodes, geometries, shown, partial(self._one, found, some)
+            )
         sure = ~checked.is_left_out
         to, rows = some[sure], {row.subject.id: row for row in checked.rows}
         geometry = (
@@ -312,6 +316,13 @@ class Engine:
             elif one.field == "status":
                 found[one.name][to] = "not_declared"
         return sure
+
+    def _one(self, found: Mapping[str, Values], some: NDArray[Any], place: int) -> Mission:
+        """The mission of one case of some, with its numbers."""
+        mission = self.mission
+        for number in self.numbers:
+            mission = with_value(mission, parts_of(number.key), float(found[number.key][some[place]]))
+        return mission
 
     # ---------------------------------------------------------------- one by one
     def _by_itself(self, found: dict[str, Values], place: int) -> None:
@@ -364,7 +375,7 @@ def _verdict(checked: judged.Checked) -> dict[str, Any]:
     worst = (use >= highest - ALIKE * np.abs(highest)).argmax(axis=0)
     has_one = decides.any(axis=0)
     ids = np.array([row.subject.id for row in rows], dtype=object)
-    metrics = np.array([_metric(row) for row in rows], dtype=object)
+    metrics = np.array([row.metric for row in rows], dtype=object)
     binding = np.take_along_axis(np.array([row.binding for row in rows]), worst[None], axis=0)[0]
     requirement = np.where(binding >= 0, np.array(REQUIREMENTS, dtype=object)[binding], metrics[worst])
     utilization = np.take_along_axis(np.array([row.utilization for row in rows]), worst[None], axis=0)[0]
@@ -374,10 +385,6 @@ def _verdict(checked: judged.Checked) -> dict[str, Any]:
         "utilization": np.where(has_one, utilization, math.nan),
         "binding_requirement": np.where(has_one, requirement, ""),
     }
-
-
-def _metric(row: Judged) -> str:
-    return row.subject.kind if row.subject.kind in REQUIREMENTS else REQUIREMENTS[0]
 
 
 def _within(number: Number, values: Any) -> NDArray[np.bool_]:

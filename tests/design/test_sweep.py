@@ -89,6 +89,7 @@ COLUMNS = (
     "mission.location_error.status",
     "mission.location_error.margin",
     "timing.quadratic.utilization",
+    "receiver.vibration.wideband.allowable",
 )
 _FACTORS = st.lists(st.floats(0.3, 3.0), min_size=2, max_size=2)
 _KEYS = {
@@ -147,6 +148,7 @@ EXAMPLES = [
     "sentinel1_fixed_receiver.yaml",
     "tandem_l.yaml",
     "uav_pair_l_band.yaml",
+    "one_stationary_spotlight.yaml",
 ]
 
 
@@ -167,6 +169,24 @@ def test_a_model_may_stand_in(model) -> None:
     cases = grid(mission, collection__aperture_time=[1.0, 6.0], platforms__receiver__azimuth=[0.5, 2.5])
     whole, _ = swept(mission, cases, model=model)
     assert_as_checked(mission, cases, whole, model=model)
+
+
+@pytest.mark.parametrize("rule", ["each", "sum", "rss"])
+def test_vibrations_may_be_slow(rule) -> None:
+    """Below one cycle per aperture a vibration is a phase that counts with the others."""
+    text = mission_text(timing_error__quadratic="1e-12 /s").replace(
+        "  receiver:",
+        "  receiver:\n    motion_error: {vibration: {sinusoidal: [{amplitude: 20 um, frequency: 2 Hz}]}}",
+        1,
+    )
+    mission = parse_mission(
+        text, "m.yaml", changes=[SetValue("allocation.combine", rule), SetValue("autofocus.n_pull", "1")]
+    )
+    cases = grid(mission, collection__aperture_time=[0.3, 0.49, 0.51, 3.0], radar__center_frequency=[3e9, 10e9])
+    columns = ["mission.cubic_phase_error.declared", "mission.autofocus_pull_in.declared"]
+    whole, by_case = swept(mission, cases, columns)
+    assert by_case == 0
+    assert_as_checked(mission, cases, whole, columns)
 
 
 def test_what_arrays_do_not_hold_is_checked_one_by_one() -> None:
