@@ -11,7 +11,7 @@ from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.subject import Subject
 from bisar_budget.findings.status import RANK
 
-REQUIREMENTS = (QUADRATIC, CUBIC, LOCATION)
+REQUIREMENTS = (QUADRATIC, CUBIC, LOCATION, "pslr", "islr")
 
 
 class Judged(NamedTuple):

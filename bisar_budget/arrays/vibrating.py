@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.arrays.collections import Floats
-from bisar_budget.arrays.rows import Judged
+from bisar_budget.arrays.rows import REQUIREMENTS, Judged
 from bisar_budget.budget.vibration_rows import vibration_rows
 from bisar_budget.effects.slow_vibration import slow_phases
 from bisar_budget.findings.status import RANK
@@ -50,9 +50,10 @@ def judged_vibrations(
     for place in cases.tolist():
         for row in vibration_rows(*one(place), model):
             if row.id not in found:
-                found[row.id] = Judged.of_none(row.subject, count)._replace(metric=row.metric)
+                found[row.id] = Judged.of_none(row.subject, count)
             judged = found[row.id]
             judged.status[place] = RANK[row.status]
+            judged.binding[place] = REQUIREMENTS.index(row.binding_requirement or row.metric)
             for array, value in (
                 (judged.declared, row.declared),
                 (judged.allowable, row.allowable),
