@@ -14,6 +14,7 @@ from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT, 
 Vector = tuple[float, float, float]
 GroundVector = tuple[float, float]
 
+_DIRECTED = 1e-300  # m/s; of what is smaller too few digits are left for a direction
 STRAIGHT: Vector = (0.0, 0.0, 0.0)  # acceleration of a platform whose path does not curve
 Axes = tuple[Vector, Vector, Vector]
 
@@ -160,7 +161,7 @@ class PlatformState:
         if name == "scene":
             return ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
         first = self.velocity if name == "track" else self.position
-        if norm(first) == 0:
+        if norm(first) < _DIRECTED:
             raise UndefinedFrameError("a still platform has no track frame")
         first = unit(first)
         horizontal = cross((0.0, 0.0, 1.0), first)

@@ -110,7 +110,7 @@ class Paths:
         along = self.velocity if name == "track" else self.position
         length = norm(along)
         with np.errstate(all="ignore"):
-            return (length > 0) & (norm(cross((0.0, 0.0, 1.0), along)) > 2 * ROUNDING * length)
+            return (length > 1e-299) & (norm(cross((0.0, 0.0, 1.0), along)) > 2 * ROUNDING * length)
 
 
 def paths_of(platform: Platform) -> Paths:

@@ -1,7 +1,7 @@
 """What the declared errors of many cases do, by both models: the arrays beside `sources` and `models`."""
 
 import math
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -69,7 +69,7 @@ class DeclaredErrors:
     """
 
     def __init__(
-        self, mission: Mission, cases: int, nodes: int, geometries: Geometries, shown: Container[str]
+        self, mission: Mission, cases: int, nodes: int, geometries: Geometries, shown: Mapping[str, Subject]
     ) -> None:
         self.mission, self.cases, self.geometries, self.shown = mission, cases, geometries, shown
         self.is_left_out = np.zeros(cases, dtype=bool)

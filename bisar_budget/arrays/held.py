@@ -25,7 +25,6 @@ def not_held(mission: Mission, keys: Sequence[str]) -> str:
     errors = [getattr(mission.platforms, name).motion_error for name in PLATFORMS]
     reasons = {
         "sensors and clocks": has_instruments(mission),
-        "vibration": any(error.vibration.sinusoidal or error.vibration.wideband for error in errors),
         "covariance": any(error.covariance is not None for error in errors),
         "scene.radius": mission.scene.radius is not None or "scene.radius" in keys,
         "allocation.split": any(key.startswith("allocation.split") for key in keys),

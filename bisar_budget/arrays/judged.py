@@ -5,7 +5,7 @@ ranges do not find a response at once, only a search finds a limit), the case is
 """
 
 import math
-from collections.abc import Callable, Container, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import date
 from typing import Any, NamedTuple
 
@@ -13,9 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import evaluators
-from bisar_budget.analysis.allocation import BALANCED_RANGE, EQUAL, Split
+from bisar_budget.analysis.allocation import BALANCED_RANGE, EQUAL, Allocation, Split, allocate
 from bisar_budget.arrays.collections import Floats, Geometries, norm
 from bisar_budget.arrays.declared import DeclaredErrors, ManyErrors
+from bisar_budget.arrays.rows import REQUIREMENTS, Judged
+from bisar_budget.arrays.vibrating import judged_vibrations, many_slow_phases
 from bisar_budget.budget.orbit import FASTEST_FLIGHT
 from bisar_budget.budget.required import missing_declarations
 from bisar_budget.budget.waivers import named_by
@@ -27,46 +29,9 @@ from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.findings.status import RANK, STATUS
 from bisar_budget.mission.model import MetricSplits, Mission, Shares
 
-REQUIREMENTS = (QUADRATIC, CUBIC, LOCATION)
 _BOUND = 1 + UTILIZATION_TOLERANCE
 _STATUSES = tuple(STATUS)
 _CODE = {name: np.int8(rank) for name, rank in RANK.items()}
-
-
-class Judged(NamedTuple):
-    """One row of many cases: codes of statuses, by the place of each in `STATUS`, and numbers; NaN where none is."""
-
-    subject: Subject
-    status: NDArray[np.int8]
-    declared: Floats
-    allowable: Floats
-    utilization: Floats
-    binding: NDArray[np.int8]  # place in REQUIREMENTS, or -1: the metric of the row
-    qpe_published_rad: Floats
-    cubic_rad: Floats
-    never_fails: bool = False
-
-    def where(self, is_other: Any, other: "Judged") -> "Judged":
-        """This row, but in some cases the other."""
-        return Judged(
-            self.subject,
-            np.where(is_other, other.status, self.status),
-            np.where(is_other, other.declared, self.declared),
-            np.where(is_other, other.allowable, self.allowable),
-            np.where(is_other, other.utilization, self.utilization),
-            np.where(is_other, other.binding, self.binding),
-            np.where(is_other, other.qpe_published_rad, self.qpe_published_rad),
-            np.where(is_other, other.cubic_rad, self.cubic_rad),
-            self.never_fails,
-        )
-
-    @property
-    def margin(self) -> Floats:
-        """Allowable over declared less one."""
-        with np.errstate(all="ignore"):
-            margin = self.allowable / self.declared - 1
-        margin[~np.isfinite(margin)] = math.nan
-        return margin
 
 
 class Checked(NamedTuple):
@@ -79,7 +44,13 @@ class Checked(NamedTuple):
 
 
 def check_arrays(
-    mission: Mission, cases: int, today: date, nodes: int, geometries: Geometries, shown: Container[str]
+    mission: Mission,
+    cases: int,
+    today: date,
+    nodes: int,
+    geometries: Geometries,
+    shown: Mapping[str, Subject],
+    one: Callable[[int], Mission],
 ) -> Checked:
     """Check cases that need the same number of nodes.
 
@@ -95,14 +66,20 @@ def check_arrays(
         Of the aperture, that all of them need.
     geometries : Geometries
         Of the mission.
-    shown : container of str
-        Ids of rows of which the allowable is asked though nothing is declared.
+    shown : mapping of str to Subject
+        Rows, by id, of which the allowable is asked though nothing is declared.
+    one : callable
+        Gives the mission of one case, with its numbers.
     """
-    return _Check(DeclaredErrors(mission, cases, nodes, geometries, shown), today).checked()
+    return _Check(DeclaredErrors(mission, cases, nodes, geometries, shown), today, one).checked()
 
 
 class _Check:
-    def __init__(self, errors: DeclaredErrors, today: date) -> None:
+    def __init__(self, errors: DeclaredErrors, today: date, one: Callable[[int], Mission]) -> None:
+        self.one = one
+        platforms = [getattr(errors.mission.platforms, name) for name in PLATFORMS]
+        self.vibrations = [platform.motion_error.vibration for platform in platforms]
+        self.slow = many_slow_phases(errors.cases, one) if any(one.sinusoidal for one in self.vibrations) else []
         self.errors, self.mission, self.cases, self.today = errors, errors.mission, errors.cases, today
         self.array, self.does, self.combine = errors.array, errors.does, errors.mission.allocation.combine
 
@@ -163,6 +140,7 @@ class _Check:
                     phases = np.array([self.does(model, error).qpe for model in by])
                     largest = np.abs(phases).argmax(axis=0)
                     members.append(np.take_along_axis(phases, largest[None], axis=0)[0])
+            members += [one.qpe for one in self.slow if one.owner == owner]
             weight.append(np.minimum(self._combined(members), 1e300))
         with np.errstate(all="ignore"):
             share: Any = np.where(sum(weight) == 0, 0.5, np.clip(weight[0] / sum(weight), *BALANCED_RANGE))
@@ -195,6 +173,7 @@ class _Check:
     def _rows(self, gating: str) -> list[Judged]:
         other = "published" if gating == "full" else "full"
         rows = [self._row(gating, other, error) for error in self.errors.listed]
+        rows += self._vibrations(gating)
         if self.combine != "each":
             rows += self._sums(gating, other)
         else:
@@ -203,6 +182,24 @@ class _Check:
         if self.mission.autofocus.n_pull is not None:
             rows.append(self._pull_in(gating, other))
         return rows
+
+    @property
+    def _vibrates(self) -> bool:
+        return any(one.sinusoidal or one.wideband for one in self.vibrations)
+
+    def _vibrations(self, gating: str) -> list[Judged]:
+        """Rows of vibrations, where one is declared or asked for."""
+        asked = any(what.kind == "vibration" for what in self.errors.shown.values())
+        if not self._vibrates and not asked:
+            return []
+        shares = [self.array(self.split.of(name)) for name in PLATFORMS]
+
+        def of_case(place: int) -> tuple[Mission, Allocation]:
+            mission = self.one(place)
+            split = self.split._replace(transmitter=float(shares[0][place]), receiver=float(shares[1][place]))
+            return mission, allocate(mission, (), {})._replace(qpe=split)
+
+        return judged_vibrations(np.flatnonzero(~self.errors.is_left_out), self.cases, of_case, gating)
 
     def _limit(self, owner: str) -> Floats:
         return self.array(self.split.of(owner) * self.total)
@@ -280,6 +277,12 @@ class _Check:
             if owner == "mission" or self.split.includes(error.subject.owner, owner)
         ]
 
+    def _counts(self, members: Sequence[ManyErrors], own: Sequence[Floats]) -> bool:
+        """Whether anything is declared that counts; cases in which vibrations alone may, or may not, are left out."""
+        if own and not members:
+            self.errors.is_left_out[:] = True
+        return bool(members)
+
     def _phases(self, model: str, errors: Sequence[ManyErrors], *, is_cubic: bool = False) -> list[Floats]:
         return [self.does(model, error).cubic if is_cubic else self.does(model, error).qpe for error in errors]
 
@@ -288,19 +291,21 @@ class _Check:
         for owner in owners:
             members, what = self._members(owner), subject(owner, QUADRATIC)
             limit = self._limit(owner) * self.gain
-            if not members:
+            own = [one.qpe for one in self.slow if owner == "mission" or self.split.includes(one.owner, owner)]
+            if not self._counts(members, own):
                 yield self._judged(what, None, limit)
                 continue
-            qpe, by_other = (self._combined(self._phases(model, members)) for model in (gating, other))
+            qpe, by_other = (self._combined([*self._phases(model, members), *own]) for model in (gating, other))
             yield self._judged(
                 what, qpe, limit, doubt=by_other > limit * _BOUND, without_autofocus=qpe / limit * self.gain
             )
 
     def _all_together(self, gating: str) -> Iterator[Judged]:
         """A warning where each error stands alone and all together exceed the total; else there is no row."""
-        if not self.errors.stated:
+        own = [one.qpe for one in self.slow]
+        if not self._counts(self.errors.stated, own):
             return
-        phases = self._phases(gating, self.errors.stated)
+        phases = [*self._phases(gating, self.errors.stated), *own]
         limit = self.total * self.gain
         largest = self._combined(phases, "each")
         is_there = (self._combined(phases, "rss") > limit * _BOUND) & (largest <= limit * _BOUND)
@@ -311,16 +316,17 @@ class _Check:
     def _cubic(self, gating: str, other: str) -> Judged:
         motion, what = [error for error in self.errors.stated if error.is_motion], subject("mission", CUBIC)
         limit = self.mission.requirements.cubic_phase_error
-        if not motion:
+        own = [one.cubic for one in self.slow]
+        if not self._counts(motion, own):
             return self._judged(what, None, None if limit is None else self.array(limit))
-        phases = self._phases(gating, motion, is_cubic=True)
+        phases = [*self._phases(gating, motion, is_cubic=True), *own]
         size = self._combined(phases)
         if limit is None:
             return self._judged(what, size, None, is_info=True)._replace(cubic_rad=size)
-        doubt = self._combined(self._phases(other, motion, is_cubic=True)) > limit * _BOUND
+        doubt = self._combined([*self._phases(other, motion, is_cubic=True), *own]) > limit * _BOUND
         if self.combine == "each":
             doubt = doubt | (self._combined(phases, "rss") > limit * _BOUND)
-        return self._judged(what, size, self.array(limit), doubt=doubt)._replace(cubic_rad=size)
+        return self._judged(what, size, self.array(limit), doubt=doubt)._replace(cubic_rad=size, metric=CUBIC)
 
     def _location(self, gating: str, other: str) -> Judged:
         motion, what = [error for error in self.errors.stated if error.is_motion], subject("mission", LOCATION)
@@ -333,7 +339,7 @@ class _Check:
         doubt = self._moved(other, motion, self.combine) > limit * _BOUND
         if self.combine == "each":
             doubt = doubt | (self._moved(gating, motion, "rss") > limit * _BOUND)
-        return self._judged(what, moved, self.array(limit), doubt=doubt)
+        return self._judged(what, moved, self.array(limit), doubt=doubt)._replace(metric=LOCATION)
 
     def _moved(self, model: str, motion: Sequence[ManyErrors], rule: str) -> Floats:
         """Displacements combined by a rule. [m]"""
@@ -355,11 +361,11 @@ class _Check:
 
     def _pull_in(self, gating: str, other: str) -> Judged:
         what, pull_in = subject("mission", "autofocus_pull_in"), math.pi * self.array(self.mission.autofocus.n_pull)
-        if not self.errors.stated:
+        own = [one.qpe for one in self.slow]
+        if not self._counts(self.errors.stated, own):
             return self._judged(what, None, pull_in, never_fails=True)
-        total, by_other = (
-            self._combined(self._phases(model, self.errors.stated), "sum") for model in (gating, other)
-        )
+        phases = ([*self._phases(model, self.errors.stated), *own] for model in (gating, other))
+        total, by_other = (self._combined(of, "sum") for of in phases)
         return self._judged(what, total, pull_in, doubt=by_other > pull_in * _BOUND, never_fails=True)
 
     def _waived(self, row: Judged) -> Judged:
@@ -380,7 +386,7 @@ class _Check:
                 floor[:] = _CODE["warn"]
             if platform.acceleration is None and not platform.is_of_the_earth:
                 floor[np.broadcast_to(norm(path.velocity) > FASTEST_FLIGHT, floor.shape)] = _CODE["warn"]
-        if not self.errors.stated or any(missing_declarations(self.mission)):
+        if not (self.errors.stated or self._vibrates) or any(missing_declarations(self.mission)):
             floor[:] = _CODE["not_evaluated"]
         return floor
 
@@ -399,8 +405,9 @@ def _largest_signed_sum(vectors: Floats) -> Floats:
 
 def _stricter(published: Sequence[Judged], full: Sequence[Judged]) -> list[Judged]:
     """Of two complete checks each row of the stricter verdict, then of the higher utilization."""
-    found = []
-    for one, other in zip(published, full, strict=True):
+    found, of_full = [], {row.subject.id: row for row in full}
+    for one in published:
+        other = of_full.pop(one.subject.id, None) or Judged.of_none(one.subject, one.status.size)
         use = [np.nan_to_num(row.utilization, nan=0.0) for row in (one, other)]
         size = [np.where(np.isnan(row.allowable), math.inf, row.allowable) for row in (one, other)]
         is_other = other.status < one.status
@@ -408,7 +415,7 @@ def _stricter(published: Sequence[Judged], full: Sequence[Judged]) -> list[Judge
         is_other |= tie & (use[1] > use[0])
         is_other |= tie & (use[1] == use[0]) & (size[1] <= size[0])
         found.append(one.where(is_other, other))
-    return found
+    return [*found, *of_full.values()]
 
 
 def statuses(codes: NDArray[np.int8]) -> NDArray[np.object_]:

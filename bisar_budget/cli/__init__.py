@@ -26,6 +26,7 @@ _MODULES = {
     "import": "import_file",
     "init": "mission_files",
     "schema": "mission_files",
+    "sensitivity": "sensitivity",
     "sensors": "sensors",
     "simulate": "simulate",
     "solve": "solve",

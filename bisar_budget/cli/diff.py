@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Sequence
 from datetime import datetime
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -19,9 +19,13 @@ from bisar_budget.cli.streams import (
     deliver,
     expand,
     fail,
+    set_option,
     spare,
 )
 from bisar_budget.faults import printable
+
+if TYPE_CHECKING:
+    from bisar_budget.faults import SetValue
 
 
 class _Part(ParamType[float]):
@@ -45,6 +49,7 @@ class _Part(ParamType[float]):
 @click.command()
 @click.argument("files", type=FILE, nargs=-1, required=True, metavar="OLD NEW | MISSION...")
 @click.option("--base", metavar="REV", help="Compare each MISSION with itself in this git revision.")
+@set_option("Compare each MISSION with itself with a value in place of its own, or beside it")
 @click.option(
     "--fail-on-erosion",
     "tolerated",
@@ -72,6 +77,7 @@ class _Part(ParamType[float]):
 def diff(
     files: Sequence[str],
     base: str | None,
+    changes: "tuple[SetValue, ...]",
     tolerated: float | None,
     format_name: str,
     all_rows: bool,
@@ -80,8 +86,8 @@ def diff(
 ) -> None:
     """Show what a change to a mission does to every margin.
 
-    Compares two mission files, or each with itself in a git revision. What changed in the file and in the geometry
-    stands first, then the rows.
+    Compares two mission files, each with itself in a git revision, or each with itself with other values (--set).
+    What changed in the file and in the geometry stands first, then the rows.
 
     Rows are sorted by erosion. Erosion is the part of what was left of a limit that the change uses up:
     (u2 - u1)/(1 - u1), u1 and u2 being declared over allowable before and after. A row that had nothing left has
@@ -94,29 +100,34 @@ def diff(
     from bisar_budget.report.change import difference
     from bisar_budget.report.change.comparison import compare
 
-    if base is None and len(files) != 2:
-        raise click.UsageError("give two mission files, OLD and NEW, or mission files and --base REV.")
-    files = files if base is None else expand(files)
+    if base is not None and changes:
+        raise click.UsageError("--base and --set each say what a mission is compared with; give one of them.")
+    is_with_itself = base is not None or bool(changes)
+    if not is_with_itself and len(files) != 2:
+        raise click.UsageError(
+            "give two mission files, OLD and NEW, or mission files and --base REV or --set KEY=VALUE."
+        )
+    files = expand(files) if is_with_itself else files
     spare(files, [output])
     day = today.date() if today else day_of_run()
-    pairs = [(files[0], files[1])] if base is None else [(file, file) for file in files]
-    changes = []
+    pairs = [(file, file) for file in files] if is_with_itself else [(files[0], files[1])]
+    compared = []
     for before, after in pairs:
         try:
             old = load_mission(before) if base is None else mission_at(before, base)
-            new = load_mission(after)
+            new = load_mission(after, changes=changes)
         except RevisionError as error:
             fail(str(error))
         except MissionError as error:
             for line in error.lines():
                 complain(line)
             sys.exit(EXIT_USAGE)
-        changes.append(compare(check_mission(old, day), check_mission(new, day)))
+        compared.append(compare(check_mission(old, day), check_mission(new, day)))
     if format_name == "json":
-        text = difference.as_json(__version__, changes, tolerated)
+        text = difference.as_json(__version__, compared, tolerated)
     else:
         write = difference.as_text if format_name == "text" else difference.as_markdown
-        text = write(changes, tolerated, all_rows)
+        text = write(compared, tolerated, all_rows)
     deliver(text, output, format_name)
-    is_refused = tolerated is not None and any(change.broken(tolerated) for change in changes)
+    is_refused = tolerated is not None and any(change.broken(tolerated) for change in compared)
     sys.exit(EXIT_BROKEN if is_refused else 0)

@@ -50,28 +50,23 @@ class Keeping(NamedTuple):
         mission, named = named_by(mission)
         sent = named if self.workers else None  # processes here read the files themselves
         asked = Asked(mission, cases, columns=columns, model=model, today=today, named=sent)
-        probe = asked.probe()
-        chunks = asked.chunks(probe)
+        chunks = asked.chunks()
         manifest = manifest_of(asked, chunks, named)
         folder = PartsFolder(f"{self.output}.parts", manifest, is_resumed=self.is_resumed)
-        starts = [0, *chunks.starts]
         try:
             if self.is_resumed:
-                folder.find(starts, chunks.stop)
+                folder.find(chunks.starts, chunks.stop)
                 if folder.done:
-                    complain(f"{folder.path} has {len(folder.done)} of {len(starts)} parts.")
+                    complain(f"{folder.path} has {len(folder.done)} of {len(chunks.starts)} parts.")
             with progress_bar(cases.count, "Checking cases") as bar:
                 bar.update(sum(chunks.stop(start) - start for start in folder.done))
-                if 0 not in folder.done:
-                    folder.put(probe)
-                    bar.update(probe.stop)
                 left = [start for start in chunks.starts if start not in folder.done]
                 self._find(asked, chunks, left, folder, bar.update)
-            yield asked.swept(folder.parts(starts))
+            yield asked.swept(folder.parts(chunks.starts))
         except BaseException:
             dated = f" --date {today}" if manifest["date"] else ""
             complain(
-                f"{folder.path} keeps {len(folder.done)} of {len(starts)} parts; the same command with "
+                f"{folder.path} keeps {len(folder.done)} of {len(chunks.starts)} parts; the same command with "
                 f"--resume{dated} goes on from there."
             )
             raise

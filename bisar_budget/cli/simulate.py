@@ -7,7 +7,7 @@ import click
 
 from bisar_budget.cli.streams import FILE, SET, complain, deliver, fail, load_all, spare, write_file
 from bisar_budget.cli.verify import announce, faster, progress_bar
-from bisar_budget.faults import printable
+from bisar_budget.faults import changes_words, printable
 
 if TYPE_CHECKING:
     from bisar_budget.faults import SetValue
@@ -100,9 +100,10 @@ def simulate(
     except (SimulationError, ValueError) as error:
         fail(f"{mission}: {error}")
     if output is not None:
-        write_file(output, point_plot.archive(images))
+        write_file(output, point_plot.archive(images, changes))
     if plot is not None:
-        write_file(plot, point_plot.drawn(images, loaded.name, os.path.splitext(plot)[1][1:].lower()))
+        title = f"{loaded.name} {changes_words(changes)}".rstrip()
+        write_file(plot, point_plot.drawn(images, title, os.path.splitext(plot)[1][1:].lower()))
     deliver(point_plot.summary(images, loaded))
 
 

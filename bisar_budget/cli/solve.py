@@ -24,7 +24,10 @@ from bisar_budget.cli.streams import (
 )
 
 if TYPE_CHECKING:
+    from bisar_budget.design.compared import Comparison
+    from bisar_budget.design.solution import Solution
     from bisar_budget.faults import SetValue
+    from bisar_budget.mission.model import Mission
 
 
 @click.command()
@@ -67,6 +70,7 @@ if TYPE_CHECKING:
     type=click.DateTime(["%Y-%m-%d"]),
     help="Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC).",
 )
+@click.option("--verify", "is_imaged", is_flag=True, help="Form images of the row that binds at the solution.")
 @TEXT_OR_JSON
 @OUTPUT
 def solve(
@@ -80,27 +84,38 @@ def solve(
     changes: "tuple[SetValue, ...]",
     today: datetime | None,
     format_name: str,
+    is_imaged: bool,
     output: str | None,
 ) -> None:
     """Find the values of a number at which a mission begins or ceases to comply.
 
     Every such value of the range is found, what binds on both sides of it is named, and both sides are checked as
     they are written. A pair of values closer than the places looked at is found only if the worst utilization turns
-    there. Exit code: 0, 1 if no value of the range complies, 2 for wrong usage or an unusable mission file.
+    there. Of platforms.receiver.motion_error.sensor and the like every part of the catalogue is tried. Exit code: 0,
+    1 if no value of the range or no part complies or if the image refutes the limit (--verify), 2 for wrong usage or
+    an unusable mission file.
     """
+    from bisar_budget.design import compare
     from bisar_budget.design import solve as solving
     from bisar_budget.design.quantities import QuestionError
     from bisar_budget.report import Style
     from bisar_budget.report.formats import solutions
 
+    is_of_parts = compare.is_of_parts(key)
+    if is_of_parts and (between is not None or is_scale):
+        option = "--scale" if is_scale else "--between"
+        raise click.UsageError(f"{option}: {key} names parts of the catalogue, which are compared one by one.")
     files = expand(missions)
     spare(files, [output])
     day = today.date() if today else day_of_run()
-    solved = []
+    solved: list[Solution | Comparison] = []
     for mission in load_all(files, model, changes):
         try:
-            solved.append(
-                solving.solve(
+            found: Solution | Comparison
+            if is_of_parts:
+                found = compare.compare_parts(mission, key, row=row, target=target, model=model, today=day)
+            else:
+                found = solving.solve(
                     mission,
                     key,
                     between=between,
@@ -110,12 +125,26 @@ def solve(
                     is_scale=is_scale,
                     today=day,
                 )
-            )
         except QuestionError as error:
             fail(f"{mission.file}: {error}")
+        solved.append(_imaged(mission, found, model) if is_imaged else found)
     if format_name == "json":
         text = solutions.as_json(__version__, solved)
     else:
         text = solutions.as_text(solved, Style(color=output is None and wants_color()))
     deliver(text, output, format_name)
-    sys.exit(EXIT_BROKEN if any(solution.status == "none" for solution in solved) else 0)
+    is_broken = any(one.status == "none" or (one.imaged and one.imaged.is_optimistic) for one in solved)
+    sys.exit(EXIT_BROKEN if is_broken else 0)
+
+
+def _imaged(mission: "Mission", found: "Solution | Comparison", model: str | None) -> "Solution | Comparison":
+    """Add what images say of the solution."""
+    from bisar_budget.cli.verify import announce, faster, progress_bar
+    from bisar_budget.design.imaged import imaged, to_image
+
+    asked = to_image(mission, found, model)
+    if asked is None:
+        return found
+    announce(asked.seconds, asked.row, "without --verify none is formed" + faster())
+    with progress_bar() as bar:
+        return found._replace(imaged=imaged(asked, lambda row_id: bar.update(1)))

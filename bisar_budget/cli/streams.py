@@ -4,7 +4,7 @@ import io
 import os
 import re
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from datetime import UTC, date, datetime
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -63,17 +63,23 @@ def _read_changes(ctx: click.Context, param: click.Parameter, texts: tuple[str, 
         raise click.UsageError(f"--set: {error.problem.problem}; {error.problem.accepted}.") from None
 
 
-# Not a setting of a project, nor of the environment: a gate judges the file that is in the repository.
-SET = click.option(
-    "--set",
-    "changes",
-    multiple=True,
-    metavar="KEY=VALUE",
-    callback=_read_changes,
-    help="Put a value in place of the mission's own, or beside it: KEY is its path in the file, such as "
-    "platforms.receiver.azimuth or other_errors.0.name, VALUE as the file would have it. Repeatable; every report "
-    "says it.",
-)
+def set_option(what: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Give the option `--set`; `what` says what it does with the value.
+
+    It is no setting of a project, nor of the environment: a gate judges the file that is in the repository.
+    """
+    return click.option(
+        "--set",
+        "changes",
+        multiple=True,
+        metavar="KEY=VALUE",
+        callback=_read_changes,
+        help=f"{what}: KEY is its path in the file, such as platforms.receiver.azimuth or other_errors.0.name, VALUE "
+        "as the file would have it. Repeatable; every report says it.",
+    )
+
+
+SET = set_option("Put a value in place of the mission's own, or beside it")
 
 TEXT_OR_JSON = click.option(
     "--format",

@@ -65,7 +65,7 @@ def manifest_of(asked: Asked, chunks: Chunks, named: Named) -> dict[str, Any]:
         "model": mission.gating_model,
         "date": question.today.isoformat() if mission.waivers else "",  # the day decides about waivers alone
         "cases": {"count": asked.cases.count, "keys": list(question.keys), "sha256": _hash_of(asked.cases)},
-        "chunks": {"first": chunks.first, "size": chunks.size},
+        "chunks": chunks.size,
         "columns": [
             {"name": column.name, "unit": column.unit, "description": column.words} for column in swept.columns
         ],

@@ -1,4 +1,16 @@
-"""Design questions of one mission: which values of a key comply, and where that changes."""
+"""Design questions of one mission: which values of a key comply, where that changes, what each number does."""
 
 # What other rooms may use.
-__all__ = ["cases", "quantities", "solution", "solve", "sweep", "swept"]
+__all__ = [
+    "cases",
+    "compare",
+    "compared",
+    "imaged",
+    "quantities",
+    "sensitivity",
+    "slopes",
+    "solution",
+    "solve",
+    "sweep",
+    "swept",
+]

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from bisar_budget import units
 from bisar_budget.faults import InvalidValueError, shown
 from bisar_budget.mission.bounds import DIRECTION, ELEVATION, LATITUDE
-from bisar_budget.mission.changes import apply_changes, parts_of
+from bisar_budget.mission.changes import apply_changes, next_name, parts_of
 from bisar_budget.mission.keys import nearest_keys
 from bisar_budget.mission.model import MISSION, Mission
 from bisar_budget.mission.readers import INVALID, Late, ListOf, OneOf, Quantity, Reader, Section, Triple
@@ -65,7 +65,7 @@ def tree_of(mission: Mission) -> dict[str, Any]:
     return root
 
 
-def number_of(tree: dict[str, Any], key: str) -> Number:
+def number_of(tree: dict[str, Any], key: str, of_all: str = "") -> Number:
     """Find the number that a key names.
 
     Parameters
@@ -74,6 +74,8 @@ def number_of(tree: dict[str, Any], key: str) -> Number:
         What the file says, as text.
     key : str
         Path of the number; a scalar that stands for each axis is one number.
+    of_all : str
+        What else is accepted where a key has three numbers.
 
     Raises
     ------
@@ -83,13 +85,20 @@ def number_of(tree: dict[str, Any], key: str) -> Number:
     reader, value = reader_of(tree, key)
     if isinstance(reader, Triple):
         if isinstance(value, list) or not reader.or_scalar:
-            of_all = ", or --scale for all of them" if reader.or_scalar else ""
-            raise QuestionError(f"{key}: has three components; accepted: {key}.0, .1 or .2{of_all}")
+            more = of_all if reader.or_scalar else ""
+            raise QuestionError(f"{key}: has three components; accepted: {key}.0, .1 or .2{more}")
         reader = reader.component
     if isinstance(reader, Section):
         raise QuestionError(f"{key}: is a section; accepted: one of its keys, {', '.join(reader.keys)}")
     if not isinstance(reader, Quantity):
-        raise QuestionError(f"{key}: is no number with a unit, and cannot be solved for")
+        raise QuestionError(
+            f"{key}: is no number with a unit; accepted: one that is, such as collection.aperture_time"
+        )
+    return as_number(key, reader, value)
+
+
+def as_number(key: str, reader: Quantity, value: Any) -> Number:
+    """Put together a number and the unit that it is said in; `value` is what the file says, None if nothing."""
     dimension = reader.dimension
     number = parse_quantity(value, dimension) if isinstance(value, str) else None
     unit = _UNIT.sub("", value).strip() if isinstance(value, str) else ""
@@ -102,29 +111,31 @@ def reader_of(tree: dict[str, Any], key: str) -> tuple[Reader, Any]:
     """Go down to a key: its reader, and what the file says there, None if nothing."""
     reader: Reader = MISSION
     value: Any = tree
-    for part in parts_of(key):
-        reader = _form(reader, value)
-        inner: Reader | None = None
-        if isinstance(reader, Section) and part in reader.keys:
-            inner = reader.keys[part].reader
-            value = value.get(part) if isinstance(value, dict) else None
-        elif isinstance(reader, ListOf | Triple) and part.isascii() and part.isdigit() and len(part) < 9:
-            inner = reader.section if isinstance(reader, ListOf) else reader.component
-            listed = value if isinstance(value, list) else []
-            if int(part) >= len(listed):
-                raise QuestionError(f"{key}: the list has {len(listed)} entries, and none has the number {part}")
-            value = listed[int(part)]
+    parts = parts_of(key)
+    while parts:
+        reader = form_of(reader, value)
+        name, rest = next_name(value, parts)
+        part, parts = (parts[0], parts[1:]) if name is None else (str(name), rest)
+        inner = reader.below(part)
         if inner is None:
             known = f"; accepted: {', '.join(reader.keys)}" if isinstance(reader, Section) else ""
             hint = nearest_keys(key)
             raise QuestionError(
                 f"{shown(key)}: {shown(part)!r} is not a known key{known}{f'. {hint}' if hint else ''}"
             )
+        if isinstance(reader, ListOf | Triple):
+            listed = value if isinstance(value, list) else []
+            if int(part) >= len(listed):
+                raise QuestionError(f"{key}: the list has {len(listed)} entries, and none has the number {part}")
+            value = listed[int(part)]
+        else:
+            value = value.get(part) if isinstance(value, dict) else None
         reader, value = inner, None if value is INVALID else value
-    return _form(reader, value), value
+    return form_of(reader, value), value
 
 
-def _form(reader: Reader, value: Any) -> Reader:
+def form_of(reader: Reader, value: Any) -> Reader:
+    """Find the form of a reader that reads a value."""
     while isinstance(reader, Late | OneOf):
         reader = reader.load() if isinstance(reader, Late) else reader.pick(value)
     return reader

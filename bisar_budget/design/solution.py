@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from bisar_budget.faults import SetValue
+from bisar_budget.findings.images import Verdict
 
 
 class State(NamedTuple):
@@ -38,6 +39,24 @@ class Crossing(NamedTuple):
     is_verified: bool
 
 
+class Imaged(NamedTuple):
+    """What the image says of the row that binds at a solution.
+
+    `at` is the solution as text; `verdict` is None where a row has no image. `reason` says why there is no verdict,
+    or what it rests on; empty where there is nothing to say.
+    """
+
+    row: str
+    at: str
+    verdict: Verdict | None
+    reason: str
+
+    @property
+    def is_optimistic(self) -> bool:
+        """Whether the image, with autofocus or without, shows more than the limit promises."""
+        return self.verdict is not None and "optimistic" in (self.verdict.verdict, self.verdict.verdict_autofocus)
+
+
 class Solution(NamedTuple):
     """The crossings of one mission in a range, in rising order.
 
@@ -46,6 +65,7 @@ class Solution(NamedTuple):
     is the nearest miss where nothing complies, or where everything does the value with the least left. `given` is
     the value of the file. `texts` has every value as the file would have it. `is_constant` is whether the number
     changes no utilization that decides. `skipped` counts the places of the range at which there is no mission.
+    `imaged` is what images say at the best crossing, if any were formed.
     """
 
     file: str
@@ -66,6 +86,7 @@ class Solution(NamedTuple):
     skipped: int
     texts: Mapping[float, str]
     changes: tuple[SetValue, ...] = ()
+    imaged: Imaged | None = None
 
     @property
     def value(self) -> float | None:

@@ -14,15 +14,12 @@ from bisar_budget.budget.check import check_mission
 from bisar_budget.design.quantities import FACTOR, Number, QuestionError, Range, number_of, range_of, tree_of
 from bisar_budget.design.scaled import scaled
 from bisar_budget.design.solution import Crossing, Solution, State
+from bisar_budget.design.variation import Variation, breaking, hold_to_decisions, standing
 from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.findings.mission import MissionFindings
-from bisar_budget.findings.row import Row
-from bisar_budget.findings.status import STATUS
-from bisar_budget.mission.changes import parts_of
-from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.readers import did_you_mean
 
+_OF_ALL = ", or --scale for all of them"
 PLACES = 65  # of a range
 PLACES_OF_CIRCLE = 181  # every 2 degrees: geometry changes fast where gradients are nearly parallel
 _NARROW = 2e-7  # of the value, between the two sides of a crossing before they are written
@@ -103,7 +100,7 @@ def solve(
         is_constant=len({(state.row, state.utilization) for state in missions}) == 1,
         skipped=sum(bool(state.reason) for state in scanned),
         changes=mission.changes,
-        **question.texts(crossings, nearest),
+        texts=question.texts(crossings, nearest),
     )
 
 
@@ -128,43 +125,24 @@ class _Question:
         is_scale: bool,
         today: date,
     ) -> None:
-        self.mission, self.key, self.row, self.model, self.today = mission, key, row, model, today
-        self.breaks = {name for name, one in STATUS.items() if (one.fails if target == "fail" else one.fails_strict)}
+        self.variation, self.key, self.row, self.today = Variation(mission, model), key, row, today
+        self.breaks = breaking(target)
         self.is_scale = is_scale
-        self.base = self._read(())
+        self.base = self.variation.read()
         if is_scale:
             self.number = Number("the factor", FACTOR, 1.0, "")
             scaled(self.base, key, 1.0)  # says what is wrong with the key
         else:
-            self.number = number_of(tree_of(mission), key).said_like(between)
+            self.number = number_of(tree_of(self.variation.mission), key, _OF_ALL).said_like(between)
         self.range: Range = range_of(self.number, between)
         found = check_mission(self.base, today)
-        self._decides([found, *self._at_the_end()])
+        hold_to_decisions([found, *self._at_the_end()], row)
         self.given = None if self.number.value is None else self._state(self.number.value, found)
 
     def _at_the_end(self) -> Iterator[MissionFindings]:
         """Findings at the end of the range: the number may be an error that the file does not declare."""
         with suppress(MissionError):
             yield check_mission(self.at(self.range.high), self.today)
-
-    def _decides(self, findings: Sequence[MissionFindings]) -> None:
-        """Refuse what nothing can decide: a mission without errors, a row that is not there or not judged."""
-        if all(found.is_empty for found in findings):
-            raise QuestionError("the mission declares no error: nothing decides whether it complies")
-        if self.row is None:
-            return
-        rows = [row for found in findings for row in found.rows]
-        statuses = [STATUS[row.status] for row in rows if row.id == self.row]
-        if not statuses:
-            hint = did_you_mean(self.row, tuple(row.id for row in rows))
-            raise QuestionError(f"--row {self.row}: no row has this id. {hint or 'A check lists them.'}")
-        if not any(status.gates for status in statuses):
-            raise QuestionError(f"--row {self.row}: is {statuses[0].words}: nothing is judged there")
-
-    def _read(self, changes: Sequence[SetValue]) -> Mission:
-        anew = {parts_of(change.key) for change in changes}
-        given = [change for change in self.mission.changes if parts_of(change.key) not in anew]
-        return parse_mission(self.mission.data, self.mission.file, self.model, changes=(*given, *changes))
 
     def places(self) -> list[float]:
         """Values that the scan looks at, in rising order; that of the file is among them."""
@@ -178,8 +156,7 @@ class _Question:
         """The mission with another value, or raises `MissionError`."""
         if self.is_scale:
             return scaled(self.base, self.key, value)
-        unit = self.number.dimension.si
-        return self._read([SetValue(self.key, f"{value!r} {unit}".rstrip())])
+        return self.variation.at({self.number: value})
 
     def evaluate(self, value: float, *, is_brief: bool = True) -> State:
         """Check the mission with another value."""
@@ -190,25 +167,8 @@ class _Question:
             return State(value, complies=False, status="error", reason=f"{fault.key}: {fault.problem}")
 
     def _state(self, value: float, found: MissionFindings) -> State:
-        rows = [row for row in found.rows if self.row is None or row.id == self.row]
-        status = found.status if self.row is None else rows[0].status if rows else "not_evaluated"
-        complies = status not in self.breaks
-        decisive = [row for row in rows if STATUS[row.status].is_judged and row.status != "waived"]
-        if "warn" not in self.breaks:  # what only ever warns decides nothing
-            decisive = [row for row in decisive if row.subject.kind != "autofocus_pull_in"]
-        if not complies:
-            decisive = [row for row in decisive if row.status in self.breaks]
-        worst = max(decisive, key=_use, default=None)
-        return State(
-            value,
-            complies,
-            status,
-            None if worst is None else worst.id,
-            None if worst is None else worst.binding_requirement or worst.metric,
-            None if worst is None else worst.utilization,
-            found.resolution.range,
-            found.resolution.cross_range,
-        )
+        resolution = found.resolution
+        return State(value, *standing(found, self.row, self.breaks), resolution.range, resolution.cross_range)
 
     def crossing(self, low: State, high: State) -> Crossing:
         """Bracket the border between two places, write both sides with few digits, check them as they are written."""
@@ -234,21 +194,17 @@ class _Question:
         if self.is_scale:
             return self.evaluate(value, is_brief=False)
         try:
-            return self._state(value, check_mission(self._read([SetValue(self.key, text)]), self.today))
+            return self._state(value, check_mission(self.variation.read([SetValue(self.key, text)]), self.today))
         except MissionError as error:
             fault = error.faults[0]
             return State(value, complies=False, status="error", reason=f"{fault.key}: {fault.problem}")
 
-    def texts(self, crossings: Sequence[Crossing], nearest: State) -> dict[str, dict[float, str]]:
+    def texts(self, crossings: Sequence[Crossing], nearest: State) -> dict[float, str]:
         """Every value that is said, as the file would have it."""
         values = [self.range.low, self.range.high, nearest.value]
         values += [state.value for crossing in crossings for state in (crossing.inside, crossing.outside)]
         values += [] if self.number.value is None else [self.number.value]
-        return {"texts": {value: self.number.text(value) for value in values}}
-
-
-def _use(row: Row) -> float:
-    return -1.0 if row.utilization is None else row.utilization
+        return {value: self.number.text(value) for value in values}
 
 
 def _scan(evaluate: Evaluate, places: Sequence[float]) -> list[State]:

@@ -8,7 +8,7 @@ import math
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import date
-from functools import lru_cache
+from functools import lru_cache, partial
 from hashlib import sha256
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
@@ -18,12 +18,14 @@ from numpy.typing import NDArray
 from bisar_budget.arrays import judged
 from bisar_budget.arrays.collections import Geometries, paths_of
 from bisar_budget.arrays.held import is_image, not_held
-from bisar_budget.arrays.judged import REQUIREMENTS, Judged, check_arrays, statuses
+from bisar_budget.arrays.judged import check_arrays, statuses
+from bisar_budget.arrays.rows import REQUIREMENTS
 from bisar_budget.budget.check import check_mission
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.design.cases import Cases
 from bisar_budget.design.quantities import Number, QuestionError, number_of, tree_of
 from bisar_budget.design.swept import Column, Part, Swept, Values
+from bisar_budget.design.variation import ALIKE, Variation, breaking, standing
 from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import RANK, STATUS
@@ -37,9 +39,10 @@ from bisar_budget.workers import worker_pool
 if TYPE_CHECKING:
     from concurrent.futures import Future
 
+_BREAKS = breaking("fail")
+_SLOW = 1 / 8  # of cases that are checked one by one, from which processes share them out
 _MANY = 8  # parts, from which processes of their own are worth their start
 _TOGETHER = 8192  # cases of a part: their arrays stay in a processor's cache
-_ALIKE = 1e-9  # of a utilization: a common error along x and along y may bind alike, but for rounding
 _FEW = 64  # cases of a part where each is checked by itself
 
 GEOMETRY = (
@@ -123,7 +126,7 @@ def sweep(
     Raises
     ------
     QuestionError
-        A column is of no row, or of no field.
+        A column is of no row, or of no field; a key makes no mission whatever its value.
     """
     asked = Asked(mission, cases, columns=columns, model=model, today=today)
     return asked.swept(_parts(asked, jobs))
@@ -150,6 +153,9 @@ class Asked:
             mission.data, mission.file, mission.changes, keys, tuple(columns), model, today, named
         )
         self.mission, self.cases, self.engine = mission, cases, Engine(self.question, mission)
+        for number in cases.numbers:
+            if number.value is None:  # the file may state its path in another way
+                self.engine.hold_to_a_mission(number, cases)
 
     def swept(self, parts: Iterator[Part]) -> Swept:
         """The sweep that has these parts."""
@@ -164,25 +170,28 @@ class Asked:
             parts=parts,
         )
 
-    def probe(self) -> Part:
-        """The first few cases; they show whether arrays hold what the mission needs."""
-        stop = min(_FEW, self.cases.count)
-        return self.engine.part(0, stop, self.cases.values(0, stop))
+    def chunks(self) -> "Chunks":
+        """How the cases are cut: into few where each is checked by itself, which some of them show."""
+        count = self.cases.count
+        is_slow = bool(self.engine.not_held) or (count > _FEW and self._share_by_case() > _SLOW)
+        return Chunks(count, _FEW if is_slow else _TOGETHER, is_slow)
 
-    def chunks(self, probe: Part) -> "Chunks":
-        """What is left behind the first few cases."""
-        is_slow = probe.by_case > _FEW // 8
-        return Chunks(probe.stop, self.cases.count, _FEW if is_slow else _TOGETHER, is_slow)
+    def _share_by_case(self) -> float:
+        """Share of cases that are checked one by one, by a few of them that are spread over all."""
+        cases = self.cases
+        places = np.linspace(0, cases.count - 1, _FEW).astype(int)
+        some = [cases.values(place, place + 1) for place in places.tolist()]
+        values = {number.key: np.concatenate([one[number.key] for one in some]) for number in cases.numbers}
+        return self.engine.part(0, _FEW, values).by_case / _FEW
 
     def shared_out(self, chunks: "Chunks", starts: Sequence[int], jobs: int) -> Iterator[Part]:
-        """Check the chunks that begin at `starts`, in their order; where each case takes long, in processes.
+        """Check the chunks that begin at `starts`, in their order; processes share out what is checked case by case.
 
         What arrays hold takes less time than to send it from one process to another.
         """
         if not chunks.is_slow or jobs == 1 or len(starts) < _MANY:
             for start in starts:
-                stop = chunks.stop(start)
-                yield self.engine.part(start, stop, self.cases.values(start, stop))
+                yield self.engine.part(*self.sent(chunks, start))
             return
         with worker_pool(jobs, "spawn") as pool:
             waiting: deque[Future[Part]] = deque()
@@ -200,9 +209,8 @@ class Asked:
 
 
 class Chunks(NamedTuple):
-    """How cases from `first` to `end` are cut; `is_slow` where each is checked by itself."""
+    """How cases up to `end` are cut; `is_slow` where each is checked by itself."""
 
-    first: int
     end: int
     size: int
     is_slow: bool
@@ -210,18 +218,16 @@ class Chunks(NamedTuple):
     @property
     def starts(self) -> range:
         """First case of each chunk."""
-        return range(self.first, self.end, self.size)
+        return range(0, self.end, self.size)
 
     def stop(self, start: int) -> int:
-        """End of the chunk that begins at a case; of the cases before all chunks too."""
-        return min(start + self.size, self.end) if start else self.first
+        """End of the chunk that begins at a case."""
+        return min(start + self.size, self.end)
 
 
 def _parts(asked: Asked, jobs: int) -> Iterator[Part]:
     """Find the parts in their order, as they are asked for."""
-    probe = asked.probe()
-    yield probe
-    chunks = asked.chunks(probe)
+    chunks = asked.chunks()
     yield from asked.shared_out(chunks, chunks.starts, jobs)
 
 
@@ -237,16 +243,11 @@ class Question(NamedTuple):
     today: date
     named: Named | None = None
 
-    def parse(self, changes: Sequence[SetValue], model: str | None = None) -> Mission:
-        """Read the mission with values in place of its own; raises `MissionError`."""
-        if self.named is None:
-            return parse_mission(self.data, self.file, model, changes=changes)
-        return self.named.parse(self.data, self.file, model, changes)
-
 
 @lru_cache(maxsize=1)
 def _engine(question: Question) -> "Engine":
-    return Engine(question, question.parse(question.changes))
+    parse = parse_mission if question.named is None else question.named.parse
+    return Engine(question, parse(question.data, question.file, changes=question.changes))
 
 
 def part_of(question: Question, start: int, stop: int, values: Mapping[str, Any]) -> Part:
@@ -260,10 +261,12 @@ class Engine:
     def __init__(self, question: Question, mission: Mission) -> None:
         self.question, model = question, question.model
         self.mission = mission if model is None else _gated(mission, model)
+        self.variation = Variation(mission, model, question.named)
         tree = tree_of(mission)
         self.numbers = tuple(number_of(tree, key) for key in question.keys)
         rows = {row.id: row for row in check_mission(self.mission, question.today).rows}
         self.asked = [_field(name, rows) for name in question.columns]
+        self.subjects = {one.row: rows[one.row].subject for one in self.asked}
         self.columns = tuple(
             Column(
                 one.name,
@@ -283,6 +286,20 @@ class Engine:
         )
         strange = [one.name for one in self.asked if one.field not in judged.FIELDS]
         self.not_held = self.not_held or next(iter(strange), "")
+
+    def hold_to_a_mission(self, number: Number, cases: Cases) -> None:
+        """Refuse a key that makes no mission at its first, middle and last value, for one reason."""
+        places = (0, cases.count // 2, cases.count - 1)
+        problems = set()
+        for value in {float(cases.values(place, place + 1)[number.key][0]) for place in places}:
+            try:
+                self.variation.at({number: value})
+            except MissionError as error:
+                problems.add(f"{error.faults[0].key} {error.faults[0].problem}; {error.faults[0].accepted}")
+            else:
+                return
+        if len(problems) == 1:
+            raise QuestionError(f"{number.key}: no value of it makes a mission: {problems.pop()}")
 
     def part(self, start: int, stop: int, values: Mapping[str, Any]) -> Part:
         """Check cases `start` to `stop`, whose values are (stop - start,)."""
@@ -326,9 +343,11 @@ class Engine:
 
     def _of_same_nodes(self, found: dict[str, Values], some: NDArray[Any], nodes: int) -> NDArray[np.bool_]:
         mission, geometries = self._arrays(found, some)
-        shown = {one.row for one in self.asked}
+        shown = {one.row: self.subjects[one.row] for one in self.asked}
         with np.errstate(all="ignore"):
-            checked = check_arrays(mission, some.size, self.question.today, nodes, geometries, shown)
+            checked = check_arrays(
+                mission, some.size, self.question.today, nodes, geometries, shown, partial(self._one, found, some)
+            )
         sure = ~checked.is_left_out
         to, rows = some[sure], {row.subject.id: row for row in checked.rows}
         geometry = (
@@ -348,11 +367,18 @@ class Engine:
                 found[one.name][to] = "not_declared"
         return sure
 
+    def _one(self, found: Mapping[str, Values], some: NDArray[Any], place: int) -> Mission:
+        """The mission of one case of some, with its numbers."""
+        mission = self.mission
+        for number in self.numbers:
+            mission = with_value(mission, parts_of(number.key), float(found[number.key][some[place]]))
+        return mission
+
     # ---------------------------------------------------------------- one by one
     def _by_itself(self, found: dict[str, Values], place: int) -> None:
         """Check one case as `check` does."""
         try:
-            case = self._mission([float(found[number.key][place]) for number in self.numbers])
+            case = self.variation.at({number: float(found[number.key][place]) for number in self.numbers})
         except MissionError as error:
             fault = error.faults[0]
             found["status"][place], found["reason"][place] = "error", f"{fault.key}: {fault.problem}"
@@ -367,12 +393,11 @@ class Engine:
         )
         for column, number in zip(GEOMETRY, numbers_found, strict=True):
             found[column.name][place] = number
-        worst = worst_row(checked.rows)
-        found["status"][place] = checked.status
-        if worst is not None:
-            found["worst_row"][place] = worst.id
-            found["utilization"][place] = math.nan if worst.utilization is None else worst.utilization
-            found["binding_requirement"][place] = worst.binding_requirement or worst.metric
+        stands = standing(checked, None, _BREAKS)
+        found["status"][place] = stands.status
+        if stands.row is not None:
+            found["worst_row"][place], found["binding_requirement"][place] = stands.row, stands.requirement
+            found["utilization"][place] = math.nan if stands.utilization is None else stands.utilization
         rows = {row.id: row for row in checked.rows}
         for one in self.asked:
             row = rows.get(one.row)
@@ -381,32 +406,9 @@ class Engine:
                 value = getattr(row, one.field)
             found[one.name][place] = math.nan if value is None else value
 
-    def _mission(self, values: Sequence[float]) -> Mission:
-        changes = [
-            SetValue(number.key, f"{value!r} {number.dimension.si}".rstrip())
-            for number, value in zip(self.numbers, values, strict=True)
-        ]
-        anew = {parts_of(change.key) for change in changes}
-        given = [change for change in self.mission.changes if parts_of(change.key) not in anew]
-        return self.question.parse((*given, *changes), self.question.model)
-
-
-def worst_row(rows: Sequence[Row]) -> Row | None:
-    """Row of the highest utilization: of those that fail, else of all that decide; None where nothing is judged.
-
-    Of rows as high to within rounding the first.
-    """
-    decisive = [row for row in rows if STATUS[row.status].is_judged and row.status != "waived"]
-    decisive = [row for row in decisive if row.subject.kind != "autofocus_pull_in"]  # only ever warns
-    failing = [row for row in decisive if STATUS[row.status].fails]
-    rows = failing or decisive
-    uses = [-1.0 if row.utilization is None else row.utilization for row in rows]
-    highest = max(uses, default=0.0)
-    return next((row for row, use in zip(rows, uses, strict=True) if use >= highest - _ALIKE * abs(highest)), None)
-
 
 def _verdict(checked: judged.Checked) -> dict[str, Any]:
-    """Status, worst row, utilization and requirement of each case; as `worst_row`."""
+    """Status, worst row, utilization and requirement of each case; as `standing`."""
     names = list(STATUS)
     gates = np.array([STATUS[name].gates for name in names])
     judged = np.array([STATUS[name].is_judged and name != "waived" for name in names])
@@ -420,10 +422,10 @@ def _verdict(checked: judged.Checked) -> dict[str, Any]:
     decides = np.where(fails[codes].any(axis=0), fails[codes], judged[codes])
     use = np.where(decides, use, -2.0)
     highest = use.max(axis=0)
-    worst = (use >= highest - _ALIKE * np.abs(highest)).argmax(axis=0)
+    worst = (use >= highest - ALIKE * np.abs(highest)).argmax(axis=0)
     has_one = decides.any(axis=0)
     ids = np.array([row.subject.id for row in rows], dtype=object)
-    metrics = np.array([_metric(row) for row in rows], dtype=object)
+    metrics = np.array([row.metric for row in rows], dtype=object)
     binding = np.take_along_axis(np.array([row.binding for row in rows]), worst[None], axis=0)[0]
     requirement = np.where(binding >= 0, np.array(REQUIREMENTS, dtype=object)[binding], metrics[worst])
     utilization = np.take_along_axis(np.array([row.utilization for row in rows]), worst[None], axis=0)[0]
@@ -433,10 +435,6 @@ def _verdict(checked: judged.Checked) -> dict[str, Any]:
         "utilization": np.where(has_one, utilization, math.nan),
         "binding_requirement": np.where(has_one, requirement, ""),
     }
-
-
-def _metric(row: Judged) -> str:
-    return row.subject.kind if row.subject.kind in REQUIREMENTS else REQUIREMENTS[0]
 
 
 def _within(number: Number, values: Any) -> NDArray[np.bool_]:

@@ -9,7 +9,7 @@ from typing import Any
 import yaml
 
 from bisar_budget.faults import Changed, InvalidValueError, KeyPath, SetValue, shown
-from bisar_budget.mission.readers import INVALID
+from bisar_budget.mission.readers import INVALID, is_place
 from bisar_budget.mission.tree import MAX_BYTES, Tree, UnusableError, events
 
 _ACCEPTED = "accepted: KEY=VALUE, such as radar.bandwidth=150MHz"
@@ -66,7 +66,7 @@ def _apply(tree: Tree, change: SetValue) -> None:
     path: KeyPath = ()
     first_new: KeyPath | None = None
     while True:
-        name, rest = _next_name(container, parts, is_of_ids=path == (_NAMED_BY_IDS,))
+        name, rest = next_name(container, parts, is_of_ids=path == (_NAMED_BY_IDS,))
         if name is None:
             tree.changes[path] = change
             is_list = isinstance(container, list)
@@ -93,12 +93,12 @@ def _apply(tree: Tree, change: SetValue) -> None:
     _put(container, name, value)
 
 
-def _next_name(
+def next_name(
     container: Any, parts: tuple[str, ...], is_of_ids: bool = False
 ) -> tuple[str | int | None, tuple[str, ...]]:
-    """The key or number that the path goes on with, and the parts behind it; None if there can be none."""
+    """Find the key or number that a path goes on with, and the parts behind it; None if there can be none."""
     if isinstance(container, list):
-        is_entry = parts[0].isascii() and parts[0].isdigit() and len(parts[0]) < 9 and int(parts[0]) <= len(container)
+        is_entry = is_place(parts[0]) and int(parts[0]) <= len(container)
         return (int(parts[0]) if is_entry else None), parts[1:]
     if not isinstance(container, dict):
         return None, ()

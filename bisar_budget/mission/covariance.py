@@ -231,6 +231,10 @@ class _CorrelationReader(Reader):
             is_valid = False
         return _Correlations(tuple(map(tuple, rows)), tuple(named.values())) if is_valid else INVALID
 
+    def below(self, part: str) -> Reader | None:
+        """Give the reader of the correlation of a pair."""
+        return self._NUMBER if "-" in part else None
+
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Object of pairs, or array of six arrays of six."""
         number = self._NUMBER.schema(definitions)

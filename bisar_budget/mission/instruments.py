@@ -93,6 +93,10 @@ class _Curve(Reader):
             return INVALID
         return tuple(sorted(points.items()))
 
+    def below(self, part: str) -> Reader | None:
+        """Give the reader of an ordinate."""
+        return self.ordinate
+
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Object of points."""
         return {
@@ -136,6 +140,10 @@ class _PowerLawReader(Reader):
                 continue
             read[key] = item if item is INVALID else _COEFFICIENT.read(item, (*path, key), report)
         return PowerLaw(*read.values()) if is_valid and INVALID not in read.values() else INVALID
+
+    def below(self, part: str) -> Reader | None:
+        """Give the reader of a coefficient."""
+        return _COEFFICIENT if part in _POWERS else None
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Object of coefficients."""

@@ -15,7 +15,7 @@ class Named(NamedTuple):
     paths: tuple[tuple[str, bytes], ...] = ()
     parts: tuple[tuple[str, str, bytes], ...] = ()
 
-    def parse(self, data: bytes, file: str, model: str | None, changes: Sequence[SetValue]) -> Mission:
+    def parse(self, data: bytes, file: str, model: str | None = None, *, changes: Sequence[SetValue] = ()) -> Mission:
         """Read a mission that names nothing else; arguments and faults are those of `parse_mission`."""
         paths = dict(self.paths)
         parts = {name: (of, content) for name, of, content in self.parts}

@@ -241,6 +241,17 @@ def finder_of(folder: str) -> Find:
     return find
 
 
+def find_part(name: str, beside: str) -> Part:
+    """Read the part that a mission names: one of the catalogue, or a file beside the mission's folder.
+
+    Raises
+    ------
+    PartError
+        There is none, or it is no part.
+    """
+    return _parsed(*finder_of(beside)(name))[0]
+
+
 def _file_of(name: str, beside: str) -> str:
     if name.endswith((".yaml", ".yml")):
         return os.path.join(beside, name)

@@ -44,6 +44,10 @@ class Reader:
         """Return the value; raises `InvalidValueError`."""
         raise NotImplementedError
 
+    def below(self, part: str) -> "Reader | None":
+        """Reader of the value at a key or a number within this one; None if it has no such part, or no parts."""
+        return None
+
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """JSON Schema of what is accepted; sections add theirs to `definitions`."""
         raise NotImplementedError
@@ -134,6 +138,10 @@ class Triple(Reader):
             return INVALID
         parts = tuple([_read(self.component, part, (*path, index), report) for index, part in enumerate(value)])
         return INVALID if INVALID in parts else parts
+
+    def below(self, part: str) -> Reader | None:
+        """Give the reader of one component."""
+        return self.component if is_place(part) else None
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Array of three, or also a single value."""
@@ -365,6 +373,10 @@ class Section(Reader):
                 is_valid = False
         return self.kind(**values) if is_valid else INVALID
 
+    def below(self, part: str) -> Reader | None:
+        """Give the reader of a key."""
+        return self.keys[part].reader if part in self.keys else None
+
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Reference to a definition, made on first use."""
         name = self.kind.__name__
@@ -412,6 +424,10 @@ class ListOf(Reader):
         entries = tuple([_read(self.section, entry, (*path, index), report) for index, entry in enumerate(value)])
         return INVALID if INVALID in entries else entries
 
+    def below(self, part: str) -> Reader | None:
+        """Give the reader of one entry."""
+        return self.section if is_place(part) else None
+
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Array of the section."""
         return {"type": "array", "items": self.section.schema(definitions), "maxItems": _MAX_ENTRIES}
@@ -450,6 +466,11 @@ class Late(Reader):
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Write its schema."""
         return self.load().schema(definitions)
+
+
+def is_place(part: str) -> bool:
+    """Whether a part of a key is the number of an entry, from 0."""
+    return part.isascii() and part.isdigit() and len(part) < 9
 
 
 def _read(reader: Reader, value: Any, path: KeyPath, report: Report) -> Any:

@@ -19,7 +19,7 @@ from tests.conftest import ROOT
 
 SECTION_V = str(ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml")
 TIME = "collection.aperture_time"
-# 64 cases, then 8192, 8192 and the rest: the arrays hold them.
+# 8192 cases, as many again, and the rest: the arrays hold them.
 ASKED = ("--vary", f"{TIME}=1:2s:17000", "--date", "2026-01-01")
 
 
@@ -72,7 +72,7 @@ def test_what_somebody_else_put_there_stays(tmp_path: Path) -> None:
 
 @pytest.fixture
 def ended(run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Path]]:
-    """Start a sweep, with these arguments, that is interrupted after two of four parts."""
+    """Start a sweep, with these arguments, that is interrupted after the first of three parts."""
     shared_out = Asked.shared_out
 
     def broken(self: Asked, *arguments: Any) -> Iterator[Part]:
@@ -86,7 +86,7 @@ def ended(run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Call
             found = run("sweep", mission, *ASKED, *arguments, "-o", str(output), "--resume")
         assert found.exit_code == 130
         assert (
-            f"{output}.parts keeps 2 of 4 parts; the same command with --resume{dated} goes on from there."
+            f"{output}.parts keeps 1 of 3 parts; the same command with --resume{dated} goes on from there."
             in found.stderr
         )
         assert not output.exists()
@@ -107,8 +107,8 @@ def test_a_sweep_goes_on_with_what_is_not_done(run, ended, monkeypatch: pytest.M
     monkeypatch.setattr(Asked, "shared_out", watched)
     found = run("sweep", SECTION_V, *ASKED, "-o", str(output), "--resume")
     assert found.exit_code == 0
-    assert found.stderr.splitlines()[0] == f"{output}.parts has 2 of 4 parts."
-    assert left == [64 + 8192, 64 + 2 * 8192]
+    assert found.stderr.splitlines()[0] == f"{output}.parts has 1 of 3 parts."
+    assert left == [8192, 2 * 8192]
     assert run("sweep", SECTION_V, *ASKED, "-o", f"{output}.plain.csv").exit_code == 0
     assert output.read_bytes() == Path(f"{output}.plain.csv").read_bytes()
     assert not os.path.exists(f"{output}.parts")

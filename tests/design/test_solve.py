@@ -203,6 +203,20 @@ def test_an_error_that_the_file_does_not_declare() -> None:
     assert found.given is None
 
 
+def test_a_point_of_a_mask_is_a_number_too() -> None:
+    """Keys with a dot and a blank; a level of noise complies from below."""
+    oscillator = {"frequency": "10 GHz", "phase_noise": {"0.5 Hz": "-30 dBc/Hz", "100 Hz": "-60 dBc/Hz"}}
+    text = mission_text(platforms__receiver__oscillator=oscillator, requirements__islr="-20 dB")
+    key = "platforms.receiver.oscillator.phase_noise.0.5 Hz"
+    found = solving.solve(
+        parse_mission(text, "m.yaml"), key, between="-90..-20 dBc/Hz", row="receiver.islr", today=DAY
+    )
+    (crossing,) = found.crossings
+    assert crossing.is_upper
+    assert crossing.is_verified
+    assert found.texts[crossing.inside.value].endswith(" dBc/Hz")
+
+
 def test_nothing_complies(run: Callable) -> None:
     done = run("solve", SECTION_V, "--for", "collection.aperture_time", "--between", "3..5 s")
     assert done.exit_code == 1

@@ -6,10 +6,11 @@ from typing import Any, NamedTuple
 
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.faults import KeyPath
+from bisar_budget.faults import Changed, KeyPath
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
+from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.model import Mission
 
 SMALL = 0.01  # a row that moves by less than this part tells a reader nothing
@@ -130,10 +131,20 @@ def _inputs(before: Mission | None, after: Mission | None) -> Iterator[Moved]:
 def _written(mission: Mission) -> dict[KeyPath, str]:
     """Values as the file writes them, by path; a list of plain values is one."""
     texts = {path: event.value for path, event in mission.places.items() if isinstance(_text(event), str)}
+    texts |= dict(_set_values(mission))
     lists: dict[KeyPath, list[str]] = {}
-    for path in [path for path in texts if isinstance(path[-1], int)]:
+    elements = [path for path in texts if isinstance(path[-1], int)]
+    for path in sorted(elements, key=lambda path: int(path[-1])):  # an element that was set stands last
         lists.setdefault(path[:-1], []).append(texts.pop(path))
     return texts | {path: f"[{', '.join(items)}]" for path, items in lists.items()}
+
+
+def _set_values(mission: Mission) -> Iterator[tuple[KeyPath, str]]:
+    """Values that options put into it, by path; below a key that is new, by the path that the option named."""
+    changed = {".".join(map(str, path)): path for path, event in mission.places.items() if isinstance(event, Changed)}
+    for change in mission.changes:
+        parts = parts_of(change.key)
+        yield changed.get(".".join(parts), parts), change.text
 
 
 def _text(event: object) -> object:

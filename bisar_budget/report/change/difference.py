@@ -4,7 +4,8 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-from bisar_budget.faults import printable
+from bisar_budget.faults import changes_words, printable
+from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report.change.comparison import Change, MissionChange, Moved
@@ -22,7 +23,7 @@ def as_text(missions: Sequence[MissionChange], tolerated: float | None, all_rows
 
 
 def _text(mission: MissionChange, tolerated: float | None, all_rows: bool) -> list[str]:
-    lines = [*wrapped(printable(f"{mission.before.file} -> {mission.after.file}"), "  "), ""]
+    lines = [*wrapped(printable(f"{mission.before.file} -> {_named(mission.after)}"), "  "), ""]
     for title, moves in (("Inputs", mission.inputs), ("Geometry", mission.geometry)):
         if moves:
             texts = [
@@ -36,6 +37,11 @@ def _text(mission: MissionChange, tolerated: float | None, all_rows: bool) -> li
         ]
         lines += [*table([("row", "before", "after", "erosion", "status"), *rows]), ""]
     return [*lines, *wrapped(_summary(mission, tolerated, all_rows), "  ")]
+
+
+def _named(found: MissionFindings) -> str:
+    """Name a mission by its file and the options that changed it."""
+    return f"{found.file} {changes_words(found.changes)}".rstrip()
 
 
 def _shown(mission: MissionChange, tolerated: float | None, all_rows: bool) -> list[Change]:
@@ -82,7 +88,7 @@ def as_markdown(missions: Sequence[MissionChange], tolerated: float | None, all_
     """Write the same for the comment of a pull request, with declared and allowable values."""
     lines: list[str] = []
     for mission in missions:
-        lines += [f"### {markdown_text(mission.after.file)}: {_summary(mission, tolerated, all_rows)}", ""]
+        lines += [f"### {markdown_text(_named(mission.after))}: {_summary(mission, tolerated, all_rows)}", ""]
         for title, moves in (("input", mission.inputs), ("geometry", mission.geometry)):
             for move in moves:
                 said = (
@@ -127,8 +133,14 @@ def as_json(version: str, missions: Sequence[MissionChange], tolerated: float | 
         "tolerated_erosion": tolerated,
         "missions": [
             {
-                "before": {"file": mission.before.file, "status": mission.before.status},
-                "after": {"file": mission.after.file, "status": mission.after.status},
+                **{
+                    name: {
+                        "file": found.file,
+                        "status": found.status,
+                        "set": [change._asdict() for change in found.changes],
+                    }
+                    for name, found in (("before", mission.before), ("after", mission.after))
+                },
                 "unchanged": mission.unchanged,
                 "inputs": [{"key": move.name, "before": move.before, "after": move.after} for move in mission.inputs],
                 "geometry": [move._asdict() for move in mission.geometry],

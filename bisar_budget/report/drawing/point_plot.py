@@ -1,16 +1,16 @@
 """Figures 3 to 7 of Rigling & Moses for a mission of one's own: drawn, saved, and said in a few lines."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from io import BytesIO
 from typing import Any
 
 import numpy as np
 
 from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.faults import changes_words, printable
+from bisar_budget.faults import SetValue, changes_words, printable
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
-from bisar_budget.report.drawing.figure_file import file_of, new_figure
+from bisar_budget.report.drawing.figure import BETTER, GRID, WORSE, figure_file, new_figure
 from bisar_budget.report.drawing.point_figures import FLOOR_DB, ImagePanel, Limits, Sheet, rotated_back, sheet
 from bisar_budget.report.words.layout import wrapped
 from bisar_budget.simulate.impulse_response import ImpulseResponse
@@ -20,17 +20,17 @@ from bisar_budget.simulate.point import PointImages
 _RESTORED_DB = 1.0  # below the error-free peak; a focused response is within a fraction of it
 _EQUAL = 8.0  # an image that is not longer for its width than this has equal scales
 _NOT_FORMED = "#3a3a3a"  # beside a patch that is narrower than the panel
-_ERROR, _TRUE, _AT = "#c1502e", "#5fd3f3", "#7CFC9A"
+_TRUE, _AT = "#5fd3f3", "#7CFC9A"
 _CUT_STYLES: tuple[Mapping[str, Any], ...] = (
     {"color": "#888888", "lw": 3},
-    {"color": _ERROR},
-    {"color": "#1f5fa8", "ls": "--"},
+    {"color": WORSE},
+    {"color": BETTER, "ls": "--"},
 )
 
 
 def drawn(images: PointImages, title: str, kind: str) -> bytes:
     """Draw the figures on one sheet, as a `png`, `svg` or `pdf` file."""
-    return file_of(figure(sheet(images), title), kind)
+    return figure_file(figure(sheet(images), title), kind)
 
 
 def figure(drawn: Sheet, title: str) -> Any:
@@ -48,7 +48,7 @@ def figure(drawn: Sheet, title: str) -> Any:
         for style, label in (
             (_stands(_TRUE), "where the target stands"),
             (_put(_AT), "where (25) puts it"),
-            ({"ls": "none", "marker": "o", "color": _ERROR, "ms": 5}, "points of (29)"),
+            ({"ls": "none", "marker": "o", "color": WORSE, "ms": 5}, "points of (29)"),
         )
     ]
     key.add_artist(key.legend(handles=panels[0, 3].lines, loc="upper center", fontsize=10, frameon=False))
@@ -66,11 +66,14 @@ def drawn_panel(name: str, drawn: Sheet) -> bytes:
         panel.legend(fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.06), frameon=False)  # above the data
     if artist is not None:
         page.colorbar(artist, ax=panel, pad=0.02).set_label("dB to the error-free peak")
-    return file_of(page, "png", dpi=80)
+    return figure_file(page, "png", dpi=80)
 
 
-def archive(images: PointImages) -> bytes:
-    """Give the images, complex, and what explains them, as an NPZ file."""
+def archive(images: PointImages, changes: Sequence[SetValue] = ()) -> bytes:
+    """Give the images, complex, and what explains them, as an NPZ file.
+
+    `changes` are the options that changed the mission; the file has them as texts `KEY=VALUE` (n,).
+    """
     file = BytesIO()
     np.savez_compressed(
         file,
@@ -92,6 +95,7 @@ def archive(images: PointImages) -> bytes:
         targets_m=[[one.east, one.north] for one in images.targets.points],
         targets_db=[one.level_db for one in images.targets.points],
         shown_m=[one.shown for one in images.responses],
+        set=np.array([f"{change.key}={change.text}" for change in changes], dtype=str),
     )
     return file.getvalue()
 
@@ -192,13 +196,13 @@ def _peak_and_width(response: ImpulseResponse | None, clean: ImpulseResponse | N
 def _range_error(panel: Any, drawn: Sheet) -> None:
     panel.plot(drawn.slow_time, drawn.range_error_mm, color="black")
     for segment in drawn.segments:
-        panel.plot(*segment.T, "--", color=_ERROR)
+        panel.plot(*segment.T, "--", color=WORSE)
     panel.set(title="Fig. 3: range error, three segments", xlabel="slow time [s]", ylabel="range error [mm]")
-    panel.grid(color="#dddddd", lw=0.5)
+    panel.grid(color=GRID, lw=0.5)
 
 
 def _points(panel: Any, drawn: Sheet) -> None:
-    panel.plot(*drawn.points.T, "o-", color=_ERROR, zorder=3)
+    panel.plot(*drawn.points.T, "o-", color=WORSE, zorder=3)
     panel.plot(0, 0, **_stands("#1b7fa3"))
     panel.plot(*drawn.points[1], **_put("#2a8f4f"))
     panel.set(title=f"Fig. 4: points of the segments, (29)\nby {drawn.points_by}", xlabel="x [m]", ylabel="y [m]")
@@ -211,7 +215,7 @@ def _points(panel: Any, drawn: Sheet) -> None:
     half = 0.65 * max(float((high - low).max()), span)
     (x, y) = (low + high) / 2
     panel.set(xlim=(x - half, x + half), ylim=(y - half, y + half), aspect="equal")
-    panel.grid(color="#dddddd", lw=0.5)
+    panel.grid(color=GRID, lw=0.5)
 
 
 def _image(panel: Any, picture: ImagePanel, *, with_points: bool = False) -> Any:
@@ -235,7 +239,7 @@ def _image(panel: Any, picture: ImagePanel, *, with_points: bool = False) -> Any
     panel.set(xlim=(left, right), ylim=(bottom, top), facecolor=_NOT_FORMED)
     if with_points:
         for three in picture.points:
-            panel.plot(*three.T, "o-", color=_ERROR, ms=4, lw=0.8)
+            panel.plot(*three.T, "o-", color=WORSE, ms=4, lw=0.8)
     panel.plot(*picture.shown_places.T, **_put(_AT))
     panel.plot(*picture.true_places.T, **_stands(_TRUE))
     for true in picture.true_places:
@@ -281,7 +285,7 @@ def _cuts(panel: Any, drawn: Sheet) -> None:
     places = [cut.place for cut in drawn.cuts]
     panel.set(xlabel="y′ [m]", ylabel="dB to the error-free peak", ylim=(-40, 2))
     panel.set(xlim=(min(float(one.min()) for one in places), max(float(one.max()) for one in places)))
-    panel.grid(color="#dddddd", lw=0.5)
+    panel.grid(color=GRID, lw=0.5)
     panel.set_title("Cross-range cuts")
 
 

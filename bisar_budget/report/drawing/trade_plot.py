@@ -13,7 +13,7 @@ from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.status import STATUS
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission
-from bisar_budget.report.drawing.figure_file import file_of, new_figure
+from bisar_budget.report.drawing.figure import figure_file, new_figure
 from bisar_budget.report.drawing.trades import Axis, Trade, borders, regions, runs
 from bisar_budget.resources import resource
 
@@ -35,7 +35,7 @@ def drawn(trade: Trade, rows: Mapping[str, NDArray[Any]], mission: Mission, kind
 
     `rows` are the utilizations of the rows that matter, over the one key that varies.
     """
-    return file_of(figure(trade, rows, mission, is_polar=is_polar), kind)
+    return figure_file(figure(trade, rows, mission, is_polar=is_polar), kind)
 
 
 def figure(trade: Trade, rows: Mapping[str, NDArray[Any]], mission: Mission, *, is_polar: bool) -> Any:

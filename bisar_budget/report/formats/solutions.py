@@ -4,21 +4,23 @@ import json
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from bisar_budget.design.solution import Crossing, Solution, State
+from bisar_budget.design.compared import Comparison, PartState
+from bisar_budget.design.solution import Crossing, Imaged, Solution, State
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
-from bisar_budget.report.words.layout import wrapped
+from bisar_budget.report.words.layout import table, wrapped
 from bisar_budget.report.words.sentences import percent
 from bisar_budget.units import format_quantity
 
 FORMAT = "bisar-budget/solve/1"
-_SGR = {"crossing": "32", "all": "32", "none": "1;31"}
+_SGR = {"crossing": "32", "all": "32", "some": "32", "none": "1;31"}
 
 
-def as_json(version: str, solutions: Sequence[Solution]) -> str:
+def as_json(version: str, solutions: Sequence[Solution | Comparison]) -> str:
     """Write the contract; values in SI, null where there is none."""
-    document = {"format": FORMAT, "version": version, "missions": [_mission(solution) for solution in solutions]}
+    missions = [_mission(one) if isinstance(one, Solution) else _compared(one) for one in solutions]
+    document = {"format": FORMAT, "version": version, "missions": missions}
     return json.dumps(document, indent=2, allow_nan=False) + "\n"
 
 
@@ -46,6 +48,68 @@ def _mission(solution: Solution) -> dict[str, Any]:
         "crossings": [_crossing(crossing) for crossing in solution.crossings],
         "nearest": _state(solution.nearest),
         "places_without_mission": solution.skipped,
+        "parts": None,
+        "verified": _imaged(solution.imaged),
+    }
+
+
+def _imaged(found: Imaged | None) -> dict[str, Any] | None:
+    """Write what images say; the verdict is that of `verify --format json`."""
+    if found is None:
+        return None
+    return {
+        "row": found.row,
+        "at": found.at,
+        "verdict": "not_evaluated" if found.verdict is None else found.verdict.verdict,
+        "verdict_autofocus": None if found.verdict is None else found.verdict.verdict_autofocus,
+        "reason": found.reason or None,
+        "image": None if found.verdict is None else found.verdict._asdict(),
+    }
+
+
+def _compared(found: Comparison) -> dict[str, Any]:
+    """The same keys for parts of the catalogue: there is no value, and no border."""
+    best = next(iter(found.complying), None)
+    return {
+        "file": found.file,
+        "name": found.name,
+        "set": [change._asdict() for change in found.changes],
+        "key": found.key,
+        "scale": False,
+        "unit": None,
+        "target": found.target,
+        "row": found.row,
+        "model": found.model,
+        "between": None,
+        "status": found.status,
+        "value": None,
+        "text": None if best is None else best.id,
+        "binding_row": None if best is None else best.standing.row,
+        "binding_requirement": None if best is None else best.standing.requirement,
+        "is_monotonic": None,
+        "is_constant": None,
+        "given": None,
+        "crossings": [],
+        "nearest": None,
+        "places_without_mission": sum(part.standing.status == "error" for part in found.parts),
+        "parts": [_part(part) for part in found.parts],
+        "verified": _imaged(found.imaged),
+    }
+
+
+def _part(part: PartState) -> dict[str, Any]:
+    return {
+        "id": part.id,
+        "name": part.name,
+        "kind": part.kind,
+        "file": part.file,
+        "is_given": part.is_given,
+        **part.standing._asdict(),
+        "figures": list(part.figures),
+        "silent_on": list(part.silent_on),
+        "own_row": part.own_row,
+        "own_utilization": part.own_utilization,
+        "reason": part.reason or None,
     }
 
 
@@ -63,9 +127,48 @@ def _state(state: State) -> dict[str, Any]:
     return {**state._asdict(), "reason": state.reason or None}
 
 
-def as_text(solutions: Sequence[Solution], style: Style) -> str:
-    """Write what complies, what binds on both sides of every crossing, and what was checked."""
-    return "\n\n".join("\n".join(_lines(solution, style)) for solution in solutions) + "\n"
+def as_text(solutions: Sequence[Solution | Comparison], style: Style) -> str:
+    """Write what complies, what binds on both sides of every crossing, and what was checked; of parts, in a table."""
+    texts = [_lines(one, style) if isinstance(one, Solution) else _table_of(one, style) for one in solutions]
+    return "\n\n".join("\n".join(lines) for lines in texts) + "\n"
+
+
+def _table_of(found: Comparison, style: Style) -> Iterator[str]:
+    """Say which parts comply, and how near the others are."""
+    count, total = len(found.complying), len(found.parts)
+    what = f"row {printable(found.row)} complies" if found.row else "the mission complies"
+    said = f"{what} with {count} of {total} parts" if count else f"{what} with none of {total} parts"
+    first, *rest = wrapped(f"{printable(found.key)}: {said}", "  ")
+    yield f"\x1b[{_SGR[found.status]}m{first}\x1b[0m" if style.color else first
+    yield from rest
+    changed = f" {changes_words(found.changes)}" if found.changes else ""
+    yield from wrapped(
+        f"{printable(found.file)}{changed}, {printable(found.name)}; {found.model} model"
+        + (", neither fails nor warns" if found.target == "warn" else ""),
+        "  ",
+    )
+    yield ""
+    is_mixed = len({part.kind for part in found.parts}) > 1
+    rows = [["part", *(["kind"] if is_mixed else []), "status", "use", ""]]
+    for part in found.parts:
+        stands = part.standing
+        use = "-" if stands.utilization is None else percent(stands.utilization)
+        row = printable(part.reason) if part.reason else stands.row or "no row decides"
+        marks = f"{' *' if part.is_given else ''}{' -' if part.silent_on else ''}"
+        kind = [part.kind] if is_mixed else []
+        rows.append([f"{part.id}{marks}", *kind, STATUS[stands.status].text, use, row])
+    yield from table(rows)
+    yield ""
+    if any(part.is_given for part in found.parts):
+        stays = "; of several each stays while parts of the other kind change" if found.kept else ""
+        yield from wrapped(f"*  named by the file{stays}", "   ")
+    if any(part.silent_on for part in found.parts):
+        yield from wrapped("-  says nothing of figures that others have: these errors are not declared", "   ")
+    yield from wrapped("What complies has the smallest margin first, what does not the nearest miss.", "  ")
+    if found.overridden:
+        yield from wrapped(f"Stated by the file itself, with every part: {', '.join(found.overridden)}.", "  ")
+    if found.imaged is not None:
+        yield from wrapped(f"Imaged: {_shown(found.imaged)}.", "  ")
 
 
 def _lines(solution: Solution, style: Style) -> Iterator[str]:
@@ -130,6 +233,8 @@ def _facts(solution: Solution) -> Iterator[tuple[str, str]]:
             yield "Checked", "both, as they are written here"
         else:
             yield "Not checked", "compliance changes again within the digits written here"
+    if solution.imaged is not None:
+        yield "Imaged", _shown(solution.imaged)
     if solution.is_constant and not solution.crossings:
         yield (
             "No effect",
@@ -139,6 +244,24 @@ def _facts(solution: Solution) -> Iterator[tuple[str, str]]:
         is_miss = solution.status == "none"
         nearest = solution.nearest
         yield "Nearest" if is_miss else "Least left", f"{_said(solution, nearest.value)}: {_stands(nearest)}"
+
+
+def _shown(found: Imaged) -> str:
+    """Say what images show of the row that binds."""
+    said = f"{printable(found.row)} at {printable(found.at)}"
+    one = found.verdict
+    if one is None:
+        return f"{said}: no verdict, {found.reason}"
+    words = [one.verdict.replace("_", " ")]
+    if one.measured_qpe_rad is not None and one.budget_rad is not None:
+        words.append(f"its limit is {one.budget_rad:.3g} rad, the image shows {one.measured_qpe_rad:.3g} rad")
+    elif one.measured_db is not None and one.requirement_db is not None:
+        words.append(f"{one.requirement_db:.4g} dB is required, the image shows {one.measured_db:.4g} dB")
+    if one.verdict_autofocus is not None:
+        words.append(f"after autofocus {one.verdict_autofocus.replace('_', ' ')}")
+    if found.reason:
+        words.append(printable(found.reason))
+    return f"{said}: {', '.join(words)}"
 
 
 def _stands(state: State) -> str:

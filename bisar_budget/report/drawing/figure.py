@@ -1,8 +1,13 @@
-"""A figure of Matplotlib that depends on nothing but what is drawn, and its file."""
+"""Matplotlib figures that look the same whatever a user's settings say, and their files."""
 
 import os
 from io import BytesIO
 from typing import Any
+
+WORSE, BETTER = "#c1502e", "#1f5fa8"  # of lines and bars: what uses more of a limit, and less
+PALE_WORSE, PALE_BETTER = "#e6b9ab", "#a5bfdc"
+GRID = "#dddddd"
+KINDS = ("png", "svg", "pdf")
 
 
 def new_figure(**settings: Any) -> Any:
@@ -19,9 +24,9 @@ def new_figure(**settings: Any) -> Any:
     return Figure(**settings, layout="constrained")
 
 
-def file_of(page: Any, kind: str, dpi: int = 110) -> bytes:
-    """Give the file of a figure: of the same input the same bytes."""
+def figure_file(figure: Any, kind: str, dpi: int = 110) -> bytes:
+    """Give the file of a figure, of a kind of `KINDS`: of the same input the same bytes."""
     undated = {"png": {"Software": None}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
     file = BytesIO()
-    page.savefig(file, format=kind, dpi=dpi, metadata=undated[kind])
+    figure.savefig(file, format=kind, dpi=dpi, metadata=undated[kind])
     return file.getvalue()

@@ -1,0 +1,59 @@
+"""A row of the budget in many cases at once."""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bisar_budget.arrays.collections import Floats
+from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
+from bisar_budget.effects.subject import Subject
+from bisar_budget.findings.status import RANK
+
+REQUIREMENTS = (QUADRATIC, CUBIC, LOCATION, "pslr", "islr")
+
+
+class Judged(NamedTuple):
+    """One row of many cases: codes of statuses, by the place of each in `STATUS`, and numbers; NaN where none is."""
+
+    subject: Subject
+    status: NDArray[np.int8]
+    declared: Floats
+    allowable: Floats
+    utilization: Floats
+    binding: NDArray[np.int8]  # place in REQUIREMENTS of what sets the allowable, or -1: the row's metric
+    qpe_published_rad: Floats
+    cubic_rad: Floats
+    never_fails: bool = False
+    metric: str = QUADRATIC
+
+    @classmethod
+    def of_none(cls, what: Subject, cases: int) -> "Judged":
+        """A row that is not declared in any case."""
+        status, binding = np.full(cases, RANK["not_declared"], np.int8), np.full(cases, -1, np.int8)
+        declared, allowable, utilization, qpe, cubic = (np.full(cases, math.nan) for _ in range(5))
+        return cls(what, status, declared, allowable, utilization, binding, qpe, cubic)
+
+    def where(self, is_other: Any, other: "Judged") -> "Judged":
+        """This row, but in some cases the other."""
+        return Judged(
+            self.subject,
+            np.where(is_other, other.status, self.status),
+            np.where(is_other, other.declared, self.declared),
+            np.where(is_other, other.allowable, self.allowable),
+            np.where(is_other, other.utilization, self.utilization),
+            np.where(is_other, other.binding, self.binding),
+            np.where(is_other, other.qpe_published_rad, self.qpe_published_rad),
+            np.where(is_other, other.cubic_rad, self.cubic_rad),
+            self.never_fails,
+            self.metric,
+        )
+
+    @property
+    def margin(self) -> Floats:
+        """Allowable over declared less one."""
+        with np.errstate(all="ignore"):
+            margin = self.allowable / self.declared - 1
+        margin[~np.isfinite(margin)] = math.nan
+        return margin

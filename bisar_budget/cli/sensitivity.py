@@ -1,0 +1,92 @@
+"""`bisar-budget sensitivity`: what each number of a mission does to its worst utilization."""
+
+import os
+from collections.abc import Sequence
+from datetime import datetime
+from typing import TYPE_CHECKING
+
+import click
+
+from bisar_budget import __version__
+from bisar_budget.cli.streams import (
+    FILE,
+    OUTPUT,
+    SET,
+    TEXT_OR_JSON,
+    day_of_run,
+    deliver,
+    expand,
+    fail,
+    load_all,
+    spare,
+    wants_color,
+    write_file,
+)
+
+if TYPE_CHECKING:
+    from bisar_budget.faults import SetValue
+
+
+@click.command()
+@click.argument("missions", type=FILE, nargs=-1, required=True, metavar="MISSION...")
+@click.option("--row", metavar="ID", help="A row to follow too; numbers are ordered by what they do to it.")
+@click.option(
+    "--model",
+    type=click.Choice(["published", "full", "strictest"]),
+    help="Model that decides, instead of the mission file's.",
+)
+@SET
+@click.option(
+    "--date",
+    "today",
+    type=click.DateTime(["%Y-%m-%d"]),
+    help="Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC).",
+)
+@TEXT_OR_JSON
+@OUTPUT
+@click.option("--plot", type=FILE, metavar="FILE", help="Draw the effects of a mission as bars: .svg, .png, .pdf.")
+def sensitivity(
+    missions: Sequence[str],
+    row: str | None,
+    model: str | None,
+    changes: "tuple[SetValue, ...]",
+    today: datetime | None,
+    format_name: str,
+    output: str | None,
+    plot: str | None,
+) -> None:
+    """Rank the numbers of a mission by what they do to its worst utilization.
+
+    Each number that the file states is changed by itself and the mission checked anew: by 1 % of it to both sides,
+    directions and levels by a quarter of what is said, a degree or a decibel, places on the Earth by 1 % of the
+    smaller slant range. With balanced shares a second table says what relaxing an error costs the others. Exit code:
+    0, or 2 for wrong usage or an unusable mission file.
+    """
+    from bisar_budget.design import sensitivity as asking
+    from bisar_budget.design.quantities import QuestionError
+    from bisar_budget.report import Style
+    from bisar_budget.report.formats import sensitivities
+
+    kind = "" if plot is None else os.path.splitext(plot)[1][1:].lower()
+    if plot is not None and kind not in ("svg", "png", "pdf"):
+        raise click.UsageError(f"{plot}: the suffix must be one of .svg, .png, .pdf")
+    files = expand(missions)
+    if plot is not None and len(files) > 1:
+        raise click.UsageError("--plot draws one mission.")
+    spare(files, [output, plot])
+    day = today.date() if today else day_of_run()
+    found = []
+    for mission in load_all(files, model, changes):
+        try:
+            found.append(asking.sensitivity(mission, row=row, model=model, today=day))
+        except QuestionError as error:
+            fail(f"{mission.file}: {error}")
+    if plot is not None:
+        from bisar_budget.report.drawing.tornado import tornado
+
+        write_file(plot, tornado(found[0], kind))
+    if format_name == "json":
+        text = sensitivities.as_json(__version__, found)
+    else:
+        text = sensitivities.as_text(found, Style(color=output is None and wants_color()))
+    deliver(text, output, format_name)

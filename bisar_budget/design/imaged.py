@@ -1,0 +1,69 @@
+"""The solution of a design question, imaged: whether the row that binds there is at a true limit."""
+
+from collections.abc import Callable
+from glob import escape
+from typing import NamedTuple
+
+from bisar_budget.design.compare import mission_with
+from bisar_budget.design.compared import Comparison
+from bisar_budget.design.scaled import scaled
+from bisar_budget.design.solution import Imaged, Solution
+from bisar_budget.design.variation import Variation
+from bisar_budget.faults import SetValue
+from bisar_budget.mission.model import Mission
+from bisar_budget.verify.limits import rows_to_verify, seconds_to_verify, verify_mission
+
+
+class ToImage(NamedTuple):
+    """What is imaged: a mission with the solution, the row that binds, and the solution as text."""
+
+    mission: Mission
+    row: str
+    at: str
+
+    @property
+    def seconds(self) -> float:
+        """About how long the images take; 0 where that is far below a minute. [s]"""
+        return seconds_to_verify(self.mission, escape(self.row))
+
+
+def to_image(mission: Mission, solution: Solution | Comparison, model: str | None) -> ToImage | None:
+    """Put a solution into its mission.
+
+    Parameters
+    ----------
+    mission : Mission
+        That the question was asked of.
+    solution : Solution or Comparison
+        The largest value at which compliance ends or begins is taken, or the part with the smallest margin.
+    model : str or None
+        The one that decided, where it was not the mission's own.
+
+    Returns
+    -------
+    ToImage or None
+        None where nothing complies, or where everything does, or where no row binds.
+    """
+    variation = Variation(mission, model)
+    if isinstance(solution, Comparison):
+        part = next(iter(solution.complying), None)
+        if part is None or part.standing.row is None:
+            return None
+        return ToImage(mission_with(variation, solution.key, part), part.standing.row, part.id)
+    best = solution.best
+    row = None if best is None else best.outside.row or best.inside.row
+    if best is None or row is None:
+        return None
+    text = solution.texts[best.inside.value]
+    if solution.is_scale:
+        return ToImage(scaled(variation.read(), solution.key, best.inside.value), row, f"factor {text}")
+    return ToImage(variation.read([SetValue(solution.key, text)]), row, text)
+
+
+def imaged(asked: ToImage, progress: Callable[[str], None] = lambda row_id: None) -> Imaged:
+    """Form the images at the limit of the row that binds, and say whether it is true."""
+    only = escape(asked.row)
+    if not rows_to_verify(asked.mission, only):
+        return Imaged(asked.row, asked.at, None, "its limit is not one that an image could show")
+    (verdict,) = verify_mission(asked.mission, only, progress=progress).rows
+    return Imaged(asked.row, asked.at, verdict, verdict.reason or "")

@@ -1,0 +1,95 @@
+"""What changing each number of a mission does to its utilizations, as frozen data. Values in SI and radians."""
+
+from typing import NamedTuple
+
+from bisar_budget.design.stated import Skipped
+from bisar_budget.faults import SetValue
+
+LITTLE = 1e-4  # of a utilization: less of a change is not shown
+
+
+class Slope(NamedTuple):
+    """What one number of the file does.
+
+    `text` is its value as the file has it, `value` the same in `unit`; of a covariance the factor 1 on its sigmas.
+    `per_text` says how much more of it `change` is for, `per` the same in SI, signed like the value. `change` is that
+    of the worst utilization, `row_change` that of the row that was asked for; None where there is none. Both are
+    differences over values `step` to either side, or, where there is no mission on one side, over two steps on the
+    other (`difference`: central, forward, backward). `row_below` and `row_above` have the worst utilization at the
+    smaller and the larger end of the difference, in magnitude; `is_mixed` is whether the row that has it at the value
+    itself uses less at an end: the change is then made of the slopes of two rows.
+    """
+
+    key: str
+    text: str
+    value: float
+    unit: str
+    per: float
+    per_text: str
+    step: float
+    difference: str
+    change: float
+    row_change: float | None
+    row_below: str
+    row_above: str
+    is_mixed: bool
+
+    @property
+    def effect(self) -> float:
+        """Change of what was asked for: the row, else the worst utilization."""
+        return self.change if self.row_change is None else self.row_change
+
+
+class Relaxed(NamedTuple):
+    """What doubling one declared error costs the others where shares are balanced.
+
+    `shares_before` and `shares_after` are those of transmitter and receiver. `transmitter` and `receiver` have, of
+    each, the worst utilization of the judged rows that are not of this error, before and after, and the row that has
+    it after; None where there is none.
+    """
+
+    key: str
+    shares_before: tuple[float, float]
+    shares_after: tuple[float, float]
+    transmitter: tuple[str, float, float] | None
+    receiver: tuple[str, float, float] | None
+
+    @property
+    def moves_shares(self) -> bool:
+        """Whether it takes from anybody."""
+        return abs(self.shares_after[0] - self.shares_before[0]) > LITTLE
+
+
+class Sensitivity(NamedTuple):
+    """Numbers of one mission by what they do, the largest effect first.
+
+    `worst_row` has the worst utilization of all rows that are judged and can fail, `requirement` sets its allowable.
+    `row` is the one that was asked for, whose effects order the numbers; None without one. `unchanging` are keys of
+    numbers that change neither. `relaxed` is empty where shares are not balanced.
+    """
+
+    file: str
+    name: str
+    model: str
+    status: str
+    worst_row: str
+    requirement: str
+    utilization: float
+    row: str | None
+    row_utilization: float | None
+    slopes: tuple[Slope, ...]
+    unchanging: tuple[str, ...]
+    skipped: tuple[Skipped, ...]
+    is_balanced: bool = False
+    relaxed: tuple[Relaxed, ...] = ()
+    changes: tuple[SetValue, ...] = ()
+
+    @property
+    def asked(self) -> float:
+        """Utilization of what was asked for: the row, else the worst."""
+        return self.utilization if self.row_utilization is None else self.row_utilization
+
+    @property
+    def shown(self) -> tuple[Slope, ...]:
+        """Numbers that a reader wants to see: they change it by a ten-thousandth of itself, or more."""
+        return tuple(slope for slope in self.slopes if abs(slope.effect) >= LITTLE * self.asked)
