@@ -53,11 +53,12 @@ def test_each_case_is_what_check_finds(run) -> None:
 
 def test_the_head_of_the_table_says_of_which_mission_it_is(run) -> None:
     lines = run("sweep", SECTION_V, "--vary", f"{TIME}=1s", "--set", "radar.bandwidth=150MHz").stdout.splitlines()
-    assert lines[0] == "# mission: Rigling & Moses, Section V"
-    assert lines[1].startswith("# mission_sha256: ")
-    assert lines[2] == "# set: --set radar.bandwidth=150MHz"
-    assert lines[3] == "# model: published"
-    assert lines[5].startswith(f"{TIME} [s],range_resolution [m],cross_range_resolution [m],bistatic_angle [rad],")
+    assert lines[0] == "# format: bisar-budget/sweep/1"
+    assert lines[1] == "# mission: Rigling & Moses, Section V"
+    assert lines[2].startswith("# mission_sha256: ")
+    assert lines[3] == "# set: --set radar.bandwidth=150MHz"
+    assert lines[4] == "# model: published"
+    assert lines[6].startswith(f"{TIME} [s],range_resolution [m],cross_range_resolution [m],bistatic_angle [rad],")
 
 
 def test_the_summary_counts_what_check_exits_with_0_on(run) -> None:

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from bisar_budget.design.cases import grid
 from bisar_budget.design.quantities import QuestionError
 from bisar_budget.design.swept import Column, Part, Swept
+from bisar_budget.faults import SetValue
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.tree import read_tree
@@ -167,6 +168,27 @@ class TestPlots:
         (path,) = contour.get_paths()
         assert path.vertices[:, 0] == pytest.approx(1, rel=2e-3)  # a step of 10 %, in logarithms
 
+    def test_the_line_leaves_out_what_is_not_evaluated(self) -> None:
+        """In the midst of what fails, one case has a low utilization because the row above its limit has none."""
+        shown = trade(f"{TIME}=2.0:2.8s:9", f"{AZIMUTH}=0:90deg:10")
+        shown.values["utilization"][4, 5] = 0.02
+        shown.values["status"][4, 5] = "fail"
+        assert "100 %" in texts_of(drawn(shown))
+        shown.values["status"][4, 5] = "not_evaluated"
+        assert "100 %" not in texts_of(drawn(shown))
+
+    @pytest.mark.parametrize("is_polar", [False, True])
+    def test_words_above_a_map_leave_its_room(self, is_polar: bool) -> None:
+        """However long the name of the mission is, and what was set: the map keeps half of the page."""
+        words = "speed: 30 m/s, motion_azimuth: 90 deg, " * 20
+        mission = MISSION._replace(name=words, changes=(SetValue("platforms.receiver", words),))
+        shown = trade(f"{AZIMUTH}=0:360deg:37", f"{TIME}=1:5s:5", is_polar=is_polar)
+        figure = trade_plot.figure(shown, {}, mission, is_polar=is_polar)
+        figure.draw_without_rendering()
+        panel = figure.axes[0]
+        assert panel.get_window_extent().height > 0.5 * figure.bbox.height
+        assert panel.title.get_window_extent().x1 < figure.bbox.x1
+
     def test_a_map_without_a_limit_says_none(self) -> None:
         assert "100 %" not in texts_of(drawn(trade(f"{TIME}=0.1:0.9s:9", f"{AZIMUTH}=0:90deg:10")))
 
@@ -189,6 +211,14 @@ class TestPlots:
         assert (around[0], around[-1]) == pytest.approx((0, 2 * math.pi))
         (mark,) = [line for line in panel.lines if line.get_label() == "direction of the transmitter"]
         assert float(mark.get_xdata()[0]) == 0  # Section V: due east
+
+    def test_what_stands_over_the_scene_is_in_the_middle_of_a_polar_map(self) -> None:
+        """Seen from above, a high elevation is near the scene, a low one far out."""
+        shown = trade(f"{AZIMUTH}=0:360deg:37", "platforms.receiver.elevation=10:80deg:8", is_polar=True)
+        panel = drawn(shown, is_polar=True)
+        assert panel.get_ylim() == pytest.approx((90, 10))
+        (mark,) = [line for line in panel.lines if line.get_label() == "direction of the transmitter"]
+        assert mark.get_ydata() == pytest.approx(10)
 
     def test_cases_without_a_mission(self) -> None:
         shown = trade(f"{AZIMUTH}=-90:90deg:19", f"{TIME}=1:2s:3")

@@ -25,6 +25,7 @@ _DASHES = ("-", "-", "-", "--", "--", "-.", ":")
 _TINTS = (0.8, 0.9, 0.65)  # part of white, of the first, second and third status of one colour
 _EMPTY = "reserve"
 _WORST = "#b9bfc6"
+_NAME, _LINE = 60, 95  # characters of a line above a drawing: a wider one would take its room
 _FEW = 3  # rows without a name on a map that a legend names
 _LIMIT = {"color": "#1b1e22", "lw": 1.8}
 _SUBTITLE = {"fontsize": 8.5, "color": "#555b63"}
@@ -43,12 +44,17 @@ def figure(trade: Trade, rows: Mapping[str, NDArray[Any]], mission: Mission, *, 
     page = new_figure(figsize=_SIZE if len(trade.axes) == 1 else _SQUARE)
     panel = page.add_subplot(projection="polar") if is_polar else page.add_subplot()
     about = ", ".join(filter(None, (*trade.fixed, changes_words(mission.changes), f"{mission.gating_model} model")))
+    about = fill(about, _LINE, max_lines=3, placeholder=" ...")
     if is_polar:
         around, radius = trade.axes
         about += f"\nangle: {around.label}, radius: {radius.label}"
     away = 30 if is_polar else 6  # points
     panel.set_title(
-        printable(mission.name), parse_math=False, fontsize=12, loc="left", pad=away + 15 * (1 + about.count("\n"))
+        fill(printable(mission.name), _NAME, max_lines=2, placeholder=" ..."),
+        parse_math=False,
+        fontsize=12,
+        loc="left",
+        pad=away + 15 + 11 * about.count("\n"),
     )
     panel.annotate(
         about,
@@ -262,6 +268,9 @@ def _heat(page: Any, panel: Any, trade: Trade, first: NDArray[Any], second: NDAr
 def _limit(panel: Any, trade: Trade, first: NDArray[Any], second: NDArray[Any]) -> bool:
     """Line of 100 %, if there is one: through the logarithms, which turn less than utilizations themselves."""
     uses = np.asarray(trade.values["utilization"], float)
+    # Where a row is not evaluated, those that are left do not say how near the limit is.
+    unknown = [name for name in trade.statuses if not STATUS[name].is_held]
+    uses = np.where(np.isin(trade.values["status"], unknown), np.nan, uses)
     with np.errstate(divide="ignore", invalid="ignore"):
         levels = np.ma.masked_invalid(np.log(uses))
     if levels.count() == 0 or not levels.min() < 0 < levels.max():
@@ -271,15 +280,20 @@ def _limit(panel: Any, trade: Trade, first: NDArray[Any], second: NDArray[Any]) 
 
 
 def _polar(page: Any, panel: Any, trade: Trade, mission: Mission) -> None:
-    """The map as seen from above: azimuth from east, counter-clockwise, the other key as a radius from 0."""
+    """The map as seen from above: azimuth from east, counter-clockwise, the other key as a radius from 0.
+
+    An elevation is 90 deg in the middle: what is seen from above there stands over the scene.
+    """
     around, radius = trade.axes
-    factor, divisor = around.number.dimension.scales[around.number.unit]
-    edges, middles = (values * factor / divisor for values in (around.edges, around.values))
+    edges, middles = (values * _si(around) for values in (around.edges, around.values))
     turn = middles[-1] - middles[0]
     if abs(turn - 2 * np.pi) < 1e-6:  # the first direction again: it needs no cell beyond
         edges[0], edges[-1] = middles[0], middles[-1]
-    handles = _map(page, panel, trade, edges, np.maximum(radius.edges, 0), middles, radius.values)
-    panel.set_rlim(0, radius.values[-1])
+    middle, rim = 0.0, radius.values[-1]
+    if radius.number.key.endswith(".elevation"):
+        middle, rim = np.pi / 2 / _si(radius), radius.values[0]
+    handles = _map(page, panel, trade, edges, np.clip(radius.edges, *sorted((middle, rim))), middles, radius.values)
+    panel.set_rlim(middle, rim)
     ticks = np.arange(0, 360, 45)
     names = {0: "east", 90: "north", 180: "west", 270: "south"}
     panel.set_thetagrids(ticks, [names.get(tick, f"{tick}°") for tick in ticks.tolist()])
@@ -288,6 +302,12 @@ def _polar(page: Any, panel: Any, trade: Trade, mission: Mission) -> None:
     panel.tick_params(axis="y", labelsize=8)
     panel.tick_params(axis="x", pad=8)
     _legend(page, [*handles, *_other_platform(panel, around, mission.geometry)])
+
+
+def _si(axis: Axis) -> float:
+    """What one of an axis is in SI."""
+    factor, divisor = axis.number.dimension.scales[axis.number.unit]
+    return factor / divisor
 
 
 def _free(edges: NDArray[Any]) -> float:
@@ -305,6 +325,6 @@ def _other_platform(panel: Any, around: Axis, geometry: BistaticGeometry) -> lis
     angle = np.arctan2(y, x)
     style = {"marker": (3, 0, float(np.degrees(angle)) + 90), "ms": 12, "color": _tones()[other], "ls": "none"}
     handles: list[Any] = panel.plot(
-        angle, panel.get_rmax(), label=f"direction of the {other}", clip_on=False, **style
+        angle, panel.get_ylim()[1], label=f"direction of the {other}", clip_on=False, **style
     )
     return handles

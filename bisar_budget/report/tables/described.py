@@ -10,6 +10,8 @@ from bisar_budget.design.swept import Column, Part, Swept, Values
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.mission.model import Mission
 
+FORMAT = "bisar-budget/sweep/1"
+
 
 class Described:
     """A sweep as a table: keys that vary stand in the unit that they were asked for in, all else in SI."""
@@ -19,6 +21,7 @@ class Described:
         self.numbers = {number.key: number for number in cases.numbers}
         changed = changes_words(mission.changes)
         self.facts = {
+            "format": FORMAT,
             "mission": printable(swept.mission_name),
             "mission_sha256": swept.mission_sha256,
             **({"set": changed} if changed else {}),
