@@ -115,6 +115,7 @@ def test_a_sweep_goes_on_with_what_is_not_done(run, ended, monkeypatch: pytest.M
 
 
 def test_parts_are_not_lost_by_starting_anew(run, ended) -> None:
+    pytest.importorskip("distributed")
     output = ended()
     before = sorted(os.listdir(f"{output}.parts"))
     found = run("sweep", SECTION_V, *ASKED, "-o", str(output), "--scheduler", "local:1")
