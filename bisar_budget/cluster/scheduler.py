@@ -85,7 +85,7 @@ def _client(address: str, ends: ExitStack) -> Any:
         cluster = LocalCluster(
             n_workers=int(match[1]),
             threads_per_worker=1,
-            dashboard_address=None,
+            dashboard_address="127.0.0.1:0",  # a port of its own: without one all would want 8787
             silence_logs=logging.CRITICAL + 1,
             preload=["bisar_budget.cluster.local_worker"],
         )

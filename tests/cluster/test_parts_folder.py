@@ -3,7 +3,9 @@
 import json
 import math
 import os
+import socket
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -112,6 +114,18 @@ def test_a_sweep_goes_on_with_what_is_not_done(run, ended, monkeypatch: pytest.M
     assert run("sweep", SECTION_V, *ASKED, "-o", f"{output}.plain.csv").exit_code == 0
     assert output.read_bytes() == Path(f"{output}.plain.csv").read_bytes()
     assert not os.path.exists(f"{output}.parts")
+
+
+def test_workers_start_beside_another_scheduler_of_dask(run, tmp_path) -> None:
+    """A second one on a machine ended with: Port 8787 is already in use."""
+    pytest.importorskip("distributed")
+    output = tmp_path / "trade.csv"
+    with socket.socket() as taken, suppress(OSError):  # somebody else may have it
+        taken.bind(("", 8787))
+        taken.listen()
+        few = ("--vary", "collection.aperture_time=1:5s:3")
+        assert run("sweep", SECTION_V, *few, "-o", str(output), "--scheduler", "local:1").exit_code == 0
+    assert output.exists()
 
 
 def test_parts_are_not_lost_by_starting_anew(run, ended) -> None:
