@@ -328,6 +328,62 @@ class TestSicd:
         assert found.center_frequency == pytest.approx(10e9)
         assert found.bandwidth == pytest.approx(337.4976e6, rel=1e-6)
 
+    def with_errors(self, tmp_path, inner: str, kind: str = "BISTATIC"):
+        tree = sample("example-sicd-1.4.0.xml")
+        tree.find("{*}CollectionInfo/{*}CollectType").text = kind
+        element(tree, f"<ErrorStatistics>{inner}</ErrorStatistics>")
+        path = tmp_path / "errors.xml"
+        tree.write(str(path))
+        return import_collection(str(path))
+
+    def test_covariances_of_both_platforms_and_clocks(self, tmp_path) -> None:
+        """Volume 1: a covariance of each in its frame; of times and clocks the second and fourth are clocks."""
+        along = [(1, 1, 1.0), (2, 2, 4.0), (3, 3, 9.0), (4, 4, 1e-4), (5, 5, 4e-4), (6, 6, 9e-4), (1, 5, -0.018)]
+        alike = [(row, row, 4.0 if row < 4 else 1e-4) for row in range(1, 7)]
+        clocks = [(2, 2, 9e-18), (4, 4, 16e-18), (2, 4, 5e-18), (1, 1, 1e-12)]
+
+        def matrix(name: str, size: int, entries: list[tuple[int, int, float]]) -> str:
+            inner = "".join(f'<Entry index1="{row}" index2="{column}">{x}</Entry>' for row, column, x in entries)
+            return f'<{name} size1="{size}" size2="{size}">{inner}</{name}>'
+
+        found = self.with_errors(
+            tmp_path,
+            "<BistaticComponents><PosVelErr><TxFrame>RIC_ECI</TxFrame>"
+            + matrix("TxPVCov", 6, along)
+            + "<RcvFrame>ECF</RcvFrame>"
+            + matrix("RcvPVCov", 6, alike)
+            + matrix("TxRcvPVXCov", 6, [(1, 1, 0.1)])
+            + "</PosVelErr><RadarSensor>"
+            + matrix("TxRcvTimeFreq", 4, clocks)
+            + "</RadarSensor></BistaticComponents>",
+        )
+        error = found.transmitter_error
+        assert error.frame == "ric"
+        assert error.position == pytest.approx((1, 2, 3), rel=1e-12)
+        assert error.velocity == pytest.approx((0.01, 0.02, 0.03), rel=1e-12)
+        assert error.correlation[0][4] == pytest.approx(-0.9, rel=1e-12)
+        error = found.receiver_error
+        assert (error.frame, error.correlation) == ("scene", ())
+        assert (*error.position, *error.velocity) == pytest.approx((2, 2, 2, 0.01, 0.01, 0.01), rel=1e-9)
+        assert found.timing_linear == pytest.approx(math.sqrt(15e-18), rel=1e-12)  # 9 + 16 less twice 5
+        said = " ".join(found.remarks)
+        assert "TxRcvPVXCov: how errors of both platforms go together is not taken over" in said
+        assert "errors of the times of transmission and reception are not taken over" in said
+        parse_mission(mission_text(found), "m.yaml")
+
+    def test_components_of_one_platform(self, tmp_path) -> None:
+        sigmas = "<P1>1</P1><P2>1</P2><P3>1</P3><V1>0.01</V1><V2>0.01</V2><V3>0.01</V3>"
+        found = self.with_errors(
+            tmp_path,
+            f"<Components><PosVelErr><Frame>ECF</Frame>{sigmas}</PosVelErr>"
+            "<RadarSensor><RangeBias>0.15</RangeBias></RadarSensor></Components>",
+            kind="MONOSTATIC",
+        )
+        assert found.common_error.position == pytest.approx((1, 1, 1))
+        assert found.timing_constant == pytest.approx(0.3 / flown.C)
+        assert found.transmitter_error is None
+        parse_mission(mission_text(found), "m.yaml")
+
     def test_a_nitf_file(self, tmp_path) -> None:
         import sarkit.sicd as sksicd
 
@@ -409,6 +465,13 @@ def test_crsd(tmp_path) -> None:
             float(flown.text(tree, f"ReferenceGeometry/{side}Parameters/SlantRange")), abs=1e-3
         )
     assert math.degrees(found.reference.bistatic_angle) == pytest.approx(0.002767539111287036, rel=1e-4)
+    # Its covariance along the Earth's axes is that of a platform that transmits and receives: traces stay.
+    error = found.transmitter_error
+    assert error == found.receiver_error
+    assert error.frame == "scene"
+    assert sum(sigma**2 for sigma in error.position) == pytest.approx(0 + 1 + 2, rel=1e-9)
+    assert sum(sigma**2 for sigma in error.velocity) == pytest.approx(3 + 4 + 5, rel=1e-9)
+    assert "errors of its times and clock are not taken over" in " ".join(found.remarks)
     parse_mission(mission_text(found), "m.yaml")
 
 
