@@ -19,7 +19,7 @@ import pytest
 from bisar_budget.cli import sweep as command
 from bisar_budget.design import sweep as engine
 from bisar_budget.design.swept import Part, Swept
-from tests.conftest import ROOT
+from tests.conftest import ROOT, heed_signals
 
 SECTION_V = str(ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml")
 SPOTLIGHT = str(ROOT / "specs" / "missions" / "one_stationary_spotlight.yaml")
@@ -228,7 +228,7 @@ def test_a_folder_that_cannot_be_written(run, tmp_path: Path) -> None:
 
 def started(*arguments: str, **more: Any) -> "subprocess.Popen[bytes]":
     line = [sys.executable, "-m", "bisar_budget", "sweep", SPOTLIGHT, *arguments]
-    return subprocess.Popen(line, cwd=ROOT, stdout=subprocess.PIPE, **more)
+    return subprocess.Popen(line, cwd=ROOT, stdout=subprocess.PIPE, preexec_fn=heed_signals, **more)
 
 
 def test_an_interrupt_leaves_no_half_file(tmp_path: Path) -> None:

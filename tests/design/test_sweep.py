@@ -269,3 +269,13 @@ def test_a_key_that_makes_no_mission_whatever_its_value_is_refused() -> None:
     cases = grid(mission, platforms__receiver__azimuth=np.linspace(0, 6, 7))
     with pytest.raises(QuestionError, match=r"no value of it makes a mission: .* mixes position with azimuth"):
         sweep(mission, cases, today=DAY)
+
+
+def test_a_fixed_platform_has_no_direction_to_fly_in() -> None:
+    """A speed that varies needs `motion_azimuth`: arrays flew the roof of an example along x."""
+    mission = load_mission(str(MISSIONS / "one_stationary_spotlight.yaml"))
+    cases = grid(mission, platforms__receiver__speed=[0.0, 30.0])
+    whole, _ = swept(mission, cases)
+    assert list(whole["status"])[1] == "error"
+    assert "motion_azimuth" in whole["reason"][1]
+    assert_as_checked(mission, cases, whole)

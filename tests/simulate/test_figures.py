@@ -11,6 +11,7 @@ import pytest
 from bisar_budget.cli.simulate import simulate
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.report.drawing import point_plot
+from bisar_budget.report.drawing.figure import figure_file
 from bisar_budget.report.drawing.point_figures import ImagePanel, rotated_back, sheet
 from bisar_budget.simulate import former, image_formation
 from bisar_budget.simulate import point as point_module
@@ -242,7 +243,7 @@ class TestDrawing:
         said = [text.get_text() for panel in page.axes for text in panel.texts]
         away = np.hypot(*images.points[1])
         assert said.count(f"the target stands {away:.3g} m away") >= 4
-        assert point_plot._file(page, "svg").decode("utf-8").endswith("</svg>\n")
+        assert figure_file(page, "svg").decode("utf-8").endswith("</svg>\n")
 
     @pytest.mark.parametrize("name", point_plot.PANELS)
     def test_one_panel_by_itself(self, polar, tmp_path, name: str) -> None:
