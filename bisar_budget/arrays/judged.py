@@ -79,7 +79,8 @@ class _Check:
         self.one = one
         platforms = [getattr(errors.mission.platforms, name) for name in PLATFORMS]
         self.vibrations = [platform.motion_error.vibration for platform in platforms]
-        self.slow = many_slow_phases(errors.cases, one) if any(one.sinusoidal for one in self.vibrations) else []
+        has_lines = any(vibration.sinusoidal for vibration in self.vibrations)
+        self.slow = many_slow_phases(errors.cases, one) if has_lines else []
         self.errors, self.mission, self.cases, self.today = errors, errors.mission, errors.cases, today
         self.array, self.does, self.combine = errors.array, errors.does, errors.mission.allocation.combine
 

@@ -223,18 +223,40 @@ def test_both_sides_of_the_limit() -> None:
     assert list(whole["timing.quadratic.status"]) == ["warn", "warn", "fail"]
 
 
-def test_waivers_and_what_must_be_declared(tmp_path) -> None:
+def test_a_waiver_holds_until_its_day() -> None:
     text = mission_text(timing_error__quadratic="1e-9 /s")
-    waived = text + "waivers:\n  - {id: 'timing.*', until: 2026-12-31, reason: known}\n"
-    asked = (
-        text.replace("requirements:", "requirements:\n  declare: [acceleration]") if "requirements:" in text else text
-    )
-    for one in (waived, asked):
-        mission = parse_mission(one, "m.yaml")
+    column = ["timing.quadratic.status"]
+    for until, status in (("2026-01-01", "waived"), ("2025-12-31", "fail")):  # judged on the first of January
+        waivers = f"waivers:\n  - {{id: 'timing.*', until: {until}, reason: known}}\n"
+        mission = parse_mission(text + waivers, "m.yaml")
         cases = grid(mission, collection__aperture_time=[1.0, 4.0])
-        whole, by_case = swept(mission, cases, ["timing.quadratic.status"])
+        whole, by_case = swept(mission, cases, column)
         assert by_case == 0
-        assert_as_checked(mission, cases, whole, ["timing.quadratic.status"])
+        assert list(whole[column[0]]) == [status] * 2
+        assert_as_checked(mission, cases, whole, column)
+
+
+def test_what_must_be_declared_and_is_not() -> None:
+    changes = [SetValue("requirements.declare", "[acceleration]")]
+    mission = parse_mission(mission_text(timing_error__quadratic="1e-13 /s"), "m.yaml", changes=changes)
+    cases = grid(mission, collection__aperture_time=[1.0, 4.0])
+    whole, by_case = swept(mission, cases)
+    assert by_case == 0
+    assert list(whole["status"]) == ["not_evaluated"] * 2
+    assert_as_checked(mission, cases, whole)
+
+
+@pytest.mark.parametrize("key", ["amplitude", "frequency"])
+def test_figures_of_a_vibration_vary(key) -> None:
+    """From slow to fast, and on both sides of the limit of echoes."""
+    mission = load_mission(str(MISSIONS / "one_stationary_spotlight.yaml"))
+    path = f"platforms__receiver__motion_error__vibration__sinusoidal__1__{key}"
+    cases = grid(mission, **{path: {"amplitude": [1e-6, 2e-5, 1e-3], "frequency": [0.2, 0.5, 2.0, 15.0]}[key]})
+    column = ["receiver.vibration.sinusoidal.1.status"]
+    whole, by_case = swept(mission, cases, column)
+    assert by_case == 0
+    assert len(set(whole[column[0]])) > (key == "amplitude")
+    assert_as_checked(mission, cases, whole, column)
 
 
 def test_processes_find_the_same() -> None:
