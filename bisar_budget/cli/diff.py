@@ -9,6 +9,7 @@ import click
 
 from bisar_budget import __version__
 from bisar_budget.cli.streams import (
+    DATE,
     EXIT_BROKEN,
     EXIT_USAGE,
     FILE,
@@ -68,12 +69,7 @@ class _Part(ParamType[float]):
 )
 @click.option("--all", "all_rows", is_flag=True, help="Also show rows that moved by less than 1 %.")
 @OUTPUT
-@click.option(
-    "--date",
-    "today",
-    type=click.DateTime(["%Y-%m-%d"]),
-    help="Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC).",
-)
+@DATE
 def diff(
     files: Sequence[str],
     base: str | None,

@@ -9,7 +9,9 @@ import click
 
 from bisar_budget import __version__
 from bisar_budget.cli.streams import (
+    DATE,
     FILE,
+    MODEL,
     OUTPUT,
     SET,
     TEXT_OR_JSON,
@@ -30,18 +32,9 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("missions", type=FILE, nargs=-1, required=True, metavar="MISSION...")
 @click.option("--row", metavar="ID", help="A row to follow too; numbers are ordered by what they do to it.")
-@click.option(
-    "--model",
-    type=click.Choice(["published", "full", "strictest"]),
-    help="Model that decides, instead of the mission file's.",
-)
+@MODEL
 @SET
-@click.option(
-    "--date",
-    "today",
-    type=click.DateTime(["%Y-%m-%d"]),
-    help="Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC).",
-)
+@DATE
 @TEXT_OR_JSON
 @OUTPUT
 @click.option("--plot", type=FILE, metavar="FILE", help="Draw the effects of a mission as bars: .svg, .png, .pdf.")

@@ -9,8 +9,10 @@ import click
 
 from bisar_budget import __version__
 from bisar_budget.cli.streams import (
+    DATE,
     EXIT_BROKEN,
     FILE,
+    MODEL,
     OUTPUT,
     SET,
     TEXT_OR_JSON,
@@ -58,18 +60,9 @@ if TYPE_CHECKING:
     show_default=True,
     help="What must not happen: fail, or also warn and what check --strict breaks on.",
 )
-@click.option(
-    "--model",
-    type=click.Choice(["published", "full", "strictest"]),
-    help="Model that decides, instead of the mission file's.",
-)
+@MODEL
 @SET
-@click.option(
-    "--date",
-    "today",
-    type=click.DateTime(["%Y-%m-%d"]),
-    help="Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC).",
-)
+@DATE
 @click.option("--verify", "is_imaged", is_flag=True, help="Form images of the row that binds at the solution.")
 @TEXT_OR_JSON
 @OUTPUT

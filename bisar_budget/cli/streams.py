@@ -90,6 +90,18 @@ TEXT_OR_JSON = click.option(
     help="Format of the output.",
 )
 
+MODEL = click.option(
+    "--model",
+    type=click.Choice(["published", "full", "strictest"]),
+    help="Model that decides, instead of the mission file's.",
+)
+DATE = click.option(
+    "--date",
+    "today",
+    type=click.DateTime(["%Y-%m-%d"]),
+    help="Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC).",
+)
+
 
 def expand(patterns: Iterable[str]) -> list[str]:
     """Expand the glob patterns that the shell left; a pattern without a match stays and fails to load."""

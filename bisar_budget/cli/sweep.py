@@ -13,7 +13,9 @@ import click
 from bisar_budget import __version__
 from bisar_budget.cli.keeping import Keeping, keeping, progress_bar
 from bisar_budget.cli.streams import (
+    DATE,
     FILE,
+    MODEL,
     SET,
     complain,
     day_of_run,
@@ -81,18 +83,9 @@ _PLOTS, _TABLES = (".svg", ".png", ".pdf"), (".csv", ".parquet", ".nc")
 )
 @click.option("--plot-column", metavar="NAME", help="Draw this column instead of utilization and status.")
 @click.option("--polar", "is_polar", is_flag=True, help="Draw the map over an azimuth as seen from above.")
-@click.option(
-    "--model",
-    type=click.Choice(["published", "full", "strictest"]),
-    help="Model that decides, instead of the mission file's.",
-)
+@MODEL
 @SET
-@click.option(
-    "--date",
-    "today",
-    type=click.DateTime(["%Y-%m-%d"]),
-    help="Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC).",
-)
+@DATE
 @click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Processes to use (default: number of cores).")
 @click.option(
     "--scheduler",
