@@ -13,6 +13,8 @@ from multiprocessing.connection import wait
 
 from bisar_budget.faults import WorkerLostError
 
+_PATIENCE = 10.0  # s for the pool's own thread, which ends as soon as its workers have
+
 
 @contextmanager
 def worker_pool(count: int, start: str | None = None) -> Iterator[ProcessPoolExecutor]:
@@ -30,6 +32,7 @@ def worker_pool(count: int, start: str | None = None) -> Iterator[ProcessPoolExe
     WorkerLostError
         Something ended a worker: the system does when memory runs out.
     """
+    others = set(threading.enumerate())
     pool = ProcessPoolExecutor(count, mp_context=get_context(start), initializer=_begin)
     try:
         yield pool
@@ -38,6 +41,9 @@ def worker_pool(count: int, start: str | None = None) -> Iterator[ProcessPoolExe
         pool.shutdown(wait=False, cancel_futures=True)
         for worker in active_children():
             worker.terminate()
+        for thread in set(threading.enumerate()) - others:
+            if not thread.daemon:  # the pool's own: at its exit Python might write to the pipe that it is closing
+                thread.join(_PATIENCE)
         if isinstance(error, BrokenProcessPool):
             raise WorkerLostError("a worker process was ended from outside, as when memory runs out") from None
         raise

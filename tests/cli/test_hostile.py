@@ -12,6 +12,7 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Mapping
 from functools import cache
@@ -30,6 +31,7 @@ from bisar_budget.findings.mission import Report
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.tree import MAX_FAULTS
 from bisar_budget.report import FORMATS, Style, render
+from bisar_budget.workers import worker_pool
 from tests.conftest import APART, ROOT, TODAY, findings, heed_signals, mission_text
 from tests.fuzz import RAW, RUN, case
 
@@ -130,6 +132,24 @@ class TestWorkers:
         assert until(lambda: not any(map(is_running, workers)), 20)
         assert output == b""
         assert b"Traceback" not in errors
+
+    def test_the_pool_s_thread_ends_first(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Python woke it at its own exit through a pipe that it was closing: a traceback after an interrupt."""
+        monkeypatch.setattr(threading, "excepthook", threading.excepthook)
+        before = set(threading.enumerate())
+
+        def those_that_keep_python() -> list[threading.Thread]:
+            return [thread for thread in set(threading.enumerate()) - before if not thread.daemon]
+
+        def interrupted() -> None:
+            with worker_pool(1, "spawn") as pool:
+                pool.submit(time.sleep, 60)
+                assert those_that_keep_python()
+                raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            interrupted()
+        assert not those_that_keep_python()
 
     def test_a_killed_worker_is_said(self) -> None:
         process, workers = self.start(stdout=subprocess.PIPE, stderr=subprocess.PIPE)
