@@ -38,6 +38,7 @@ def not_held(mission: Mission, keys: Sequence[str]) -> str:
             platform = getattr(mission.platforms, parts[1])
             is_added = parts[2] in ("acceleration", "jerk", "snap") or (parts[2] == "climb" and platform.slant_range)
             known = not on_earth and bool(is_added or getattr(platform, parts[2]) is not None)
+            known &= parts[2] != "speed" or platform.motion_azimuth is not None  # a fixed one has no direction
         elif parts[0] == "common_motion_error":
             known = mission.common_motion_error is not None
         else:

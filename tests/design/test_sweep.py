@@ -1,6 +1,7 @@
 """A sweep has the numbers of `check`, case by case, whatever arrays hold and whatever they leave to it."""
 
 import math
+import re
 from datetime import date
 
 import numpy as np
@@ -232,6 +233,19 @@ def test_cases_that_are_no_mission_are_rows_that_say_why() -> None:
     assert list(whole["status"]).count("error") == by_case >= 6
     assert any("below the ground" in reason for reason in whole["reason"])
     assert any("twice the centre frequency" in reason for reason in whole["reason"])
+
+
+def test_a_fixed_platform_that_moves_has_no_direction() -> None:
+    """Speed 0 is a mission; any other speed lacks `motion_azimuth`, as `check` says."""
+    text = (MISSIONS / "rigling_moses_section_v.yaml").read_bytes()
+    mission = parse_mission(
+        re.sub(rb"(receiver:.*?speed:) .*?\n +motion_azimuth: .*?\n", rb"\1 0 m/s\n", text, flags=re.S), "m.yaml"
+    )
+    cases = grid(mission, platforms__receiver__speed=[0.0, 2.0])
+    whole, by_case = swept(mission, cases)
+    assert by_case == 2
+    assert_as_checked(mission, cases, whole)
+    assert "lacks motion_azimuth" in whole["reason"][1]
 
 
 def test_both_sides_of_the_limit() -> None:
