@@ -5,16 +5,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bisar_budget import evaluators
 from bisar_budget.arrays.collections import Floats, Geometries, Vectors, angle_between_lines
-from bisar_budget.arrays.located import Effects, ManyExactRanges
+from bisar_budget.arrays.followed import Held, ManyPointPaths, Places
+from bisar_budget.arrays.located import Course, Effects, ManyExactRanges
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, ROUNDING, SPEED_OF_LIGHT
 from bisar_budget.effects import models
 from bisar_budget.effects.effect import CLOCK_UNITS, MOTION_UNITS, PLATFORMS
 from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
-from bisar_budget.effects.point_path import FLOOR_M, PARALLEL, STRAY
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.geometry import FRAME_AXES
 from bisar_budget.mission.model import Mission
@@ -80,6 +79,7 @@ class DeclaredErrors:
         self.listed = list(self._errors())
         self.stated = [error for error in self.listed if error.declared is not None and not error.is_shown_again]
         self._known: dict[tuple[str, str], Does] = {}
+        self._paths: dict[tuple[str, float], ManyPointPaths] = {}
 
     def array(self, value: Any) -> Floats:
         """One number for each case."""
@@ -270,31 +270,58 @@ class DeclaredErrors:
             self._exactly(error, found, size[some], some)
         return found
 
-    def _exactly(self, error: ManyErrors, found: Does, size: Floats, some: NDArray[Any]) -> None:
+    def _exactly(self, error: ManyErrors, found: Does, size: Floats, some: Places) -> None:
         """Put what exact ranges say into the cases that are too large for a first order."""
-        per_unit = [part[some] if np.ndim(part) else part for part in self.exact.displacement(error.full, 1.0)]
-        both = []
+        by_sign = []
         for sign in (1.0, -1.0):
-            near = (sign * size * per_unit[0], sign * size * per_unit[1])
+            path = self._path(error, sign)
+            path.to(some, np.abs(size))
+            by_sign.append(path.known(some, np.abs(size)))
+            self.is_left_out[some[np.isnan(by_sign[-1][0])]] = True
+        ahead, back = np.where(size > 0, by_sign, by_sign[::-1])
+        for kept, row in ((found.qpe, 3), (found.cubic, 4)):
+            kept[some] = np.copysign(np.maximum(np.abs(ahead[row]), np.abs(back[row])), kept[some])
+        for place, one in ((found.displacement, ahead), (found.opposite, back)):
+            place[0][some], place[1][some] = one[1], one[2]
+
+    def _path(self, error: ManyErrors, sign: float) -> ManyPointPaths:
+        """The ways of the point by an error with one sign, which all that asks for them shares."""
+        key = (error.subject.id, sign)
+        if key not in self._paths:
             if error.moves:
-                one = self.exact.moved((error.moves, error.unit, error.direction), sign * size, near, some)
+                course = Course(
+                    self.exact.powers(error.unit), error.moves, error.direction, is_velocity=error.unit == "m/s"
+                )
             else:
                 power = list(CLOCK_UNITS.values()).index(error.unit)
-                one = self.exact.timed(SPEED_OF_LIGHT * self.exact.times**power, sign * size, near, some)
-            with np.errstate(invalid="ignore"):
-                stray = np.hypot(one.east - near[0], one.north - near[1])
-                led = np.maximum(np.hypot(one.east, one.north), np.hypot(*near))
-                is_sure = one.is_found & (stray <= STRAY * led + FLOOR_M) & (np.abs(one.turn) >= PARALLEL)
-            self.is_left_out[some[~is_sure]] = True
-            both.append(one)
-        ahead, back = both
-        for kept, first, last in (
-            (found.qpe, ahead.quadratic, back.quadratic),
-            (found.cubic, ahead.cubic, back.cubic),
-        ):
-            kept[some] = np.copysign(np.maximum(np.abs(first), np.abs(last)), kept[some])
-        for place, one in ((found.displacement, ahead), (found.opposite, back)):
-            place[0][some], place[1][some] = one.east, one.north
+                course = Course(SPEED_OF_LIGHT * self.exact.times**power)
+            per_unit = np.array([self.array(part) for part in self.exact.displacement(error.full, 1.0)])
+            self._paths[key] = ManyPointPaths(self.exact, course, sign, per_unit, self.is_left_out)
+        return self._paths[key]
+
+    def forget(self, error: ManyErrors) -> None:
+        """Let go of the ways by an error that nobody will ask for again: they are large."""
+        for sign in (1.0, -1.0):
+            self._paths.pop((error.subject.id, sign), None)
+
+    def first_reaching(
+        self, error: ManyErrors, requirement: str, limit: Floats, first: Floats, farthest: Floats, some: Places
+    ) -> Floats:
+        """Smallest size, of either sign, at which an error of some cases reaches a limit; infinite: none does.
+
+        `limit`, what the search looks at `first`, and the `farthest` size are (cases,); found are (some,).
+        """
+        signed = {QUADRATIC: error.full.qpe, CUBIC: error.full.cubic}.get(requirement)
+        slope = self.array(self.per_unit("full", error, LOCATION) if signed is None else signed)[some]
+        limit, first, farthest = limit[some], first[some], farthest[some]
+        smallest = np.full(some.shape, math.inf)
+        for sign in (1.0, -1.0):
+            held = Held(requirement, limit, slope if signed is None else sign * slope)  # a length has no sign
+            found = self._path(error, sign).first_reaching(some, held, first, farthest)
+            is_found = np.isfinite(found)
+            smallest, farthest = (np.where(is_found, found, before) for before in (smallest, farthest))
+            first = np.minimum(first, smallest)
+        return smallest
 
     def farthest(self, error: ManyErrors) -> Any:
         """Size beyond which an error is none of navigation."""

@@ -1,7 +1,7 @@
 """Rows of many cases, judged at once: the arrays beside `budget`.
 
-A case is judged as `check_mission` judges it, by the same formulas and searches. Where that is not certain (exact
-ranges do not find a response at once, only a search finds a limit), the case is left out and says so.
+A case is judged as `check_mission` judges it, by the same formulas and searches. Where they do not hold it (a
+declared error leaves no image, a search takes very many steps), the case is left out and says so.
 """
 
 import math
@@ -51,6 +51,8 @@ def check_arrays(
     geometries: Geometries,
     shown: Mapping[str, Subject],
     one: Callable[[int], Mission],
+    *,
+    is_brief: bool,
 ) -> Checked:
     """Check cases that need the same number of nodes.
 
@@ -70,13 +72,15 @@ def check_arrays(
         Rows, by id, of which the allowable is asked though nothing is declared.
     one : callable
         Gives the mission of one case, with its numbers.
+    is_brief : bool
+        Search for limits as a brief check does: in an order that finds the one that binds early.
     """
-    return _Check(DeclaredErrors(mission, cases, nodes, geometries, shown), today, one).checked()
+    return _Check(DeclaredErrors(mission, cases, nodes, geometries, shown), today, one, is_brief).checked()
 
 
 class _Check:
-    def __init__(self, errors: DeclaredErrors, today: date, one: Callable[[int], Mission]) -> None:
-        self.one = one
+    def __init__(self, errors: DeclaredErrors, today: date, one: Callable[[int], Mission], is_brief: bool) -> None:
+        self.one, self.is_brief = one, is_brief
         platforms = [getattr(errors.mission.platforms, name) for name in PLATFORMS]
         self.vibrations = [platform.motion_error.vibration for platform in platforms]
         has_lines = any(vibration.sinusoidal for vibration in self.vibrations)
@@ -97,7 +101,9 @@ class _Check:
             per_unit = self.array(self.errors.per_unit(model, error, name))
             with np.errstate(all="ignore"):
                 smalls.append(np.where(per_unit > 0, required / per_unit, math.inf))
-        order = np.argsort(smalls, axis=0, kind="stable")
+        order = np.argsort(smalls, axis=0, kind="stable")  # the one that binds is likely to be found first
+        if not self.is_brief:
+            order = np.broadcast_to(np.arange(len(held))[:, None], order.shape)
         smallest, binding = np.full(self.cases, math.inf), np.full(self.cases, -1, dtype=np.int8)
         is_linear = model == "published" or not error.is_motion
         for turn in range(len(held)):
@@ -105,15 +111,20 @@ class _Check:
                 mine = order[turn] == place
                 if not mine.any():
                     continue
-                small, upto = smalls[place], smallest
+                is_whole = name == QUADRATIC and not self.is_brief
+                small, upto = smalls[place], math.inf if is_whole else smallest
                 sized = small
                 if not is_linear:
-                    farthest = np.minimum(upto, np.maximum(self.errors.farthest(error), self._size(error)))
+                    farthest = self.array(
+                        np.minimum(upto, np.maximum(self.errors.farthest(error), self._size(error)))
+                    )
                     first = np.minimum(small, farthest)
                     with np.errstate(invalid="ignore"):
                         is_sure = self.errors.adds(error, first, name) <= models.SHARE * required
-                    self.errors.is_left_out |= mine & ~is_sure
                     sized = np.where(small > farthest, math.inf, small)
+                    some = np.flatnonzero(mine & ~is_sure & ~self.errors.is_left_out)
+                    if some.size:
+                        sized[some] = self.errors.first_reaching(error, name, required, first, farthest, some)
                 is_less = mine & (sized < smallest)
                 smallest = np.where(is_less, sized, smallest)
                 binding[is_less] = REQUIREMENTS.index(name)
@@ -160,6 +171,9 @@ class _Check:
     def checked(self) -> Checked:
         """Judge every row by the model that gates."""
         gating = self.mission.gating_model
+        if gating != "published":  # searches start from what declared errors are known to do
+            for error in self.errors.stated:
+                self.does("full", error)
         self.split = self._split(gating)
         total = self.array(self.mission.requirements.quadratic_phase_error)
         n_pull = self.mission.autofocus.n_pull
@@ -173,7 +187,11 @@ class _Check:
 
     def _rows(self, gating: str) -> list[Judged]:
         other = "published" if gating == "full" else "full"
-        rows = [self._row(gating, other, error) for error in self.errors.listed]
+        rows = []
+        for error in self.errors.listed:
+            rows.append(self._row(gating, other, error))
+            if gating == "full" or self.mission.gating_model == "published":
+                self.errors.forget(error)
         rows += self._vibrations(gating)
         if self.combine != "each":
             rows += self._sums(gating, other)
@@ -208,6 +226,8 @@ class _Check:
     def _row(self, gating: str, other: str, error: ManyErrors) -> Judged:
         limit = self._limit(error.subject.owner) * self.gain
         allowable, binding = self._allowed(gating, error, limit)
+        if other == "full" and not self.is_brief and self.mission.gating_model != "published":
+            self._allowed(other, error, limit)  # a whole check asks for it here, and a later search starts from it
         none = np.full(self.cases, math.nan)
         if error.declared is None:
             return self._judged(error.subject, None, allowable)._replace(binding=binding)

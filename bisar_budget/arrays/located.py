@@ -5,6 +5,7 @@ case has the same numbers here as there.
 """
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +16,8 @@ from bisar_budget.constants import ROUNDING
 from bisar_budget.effects import exact_ranges as scalar
 from bisar_budget.evaluators import LEGENDRE_FITS, full_ground_inverse
 
+_STILL = [np.zeros((1, 1))] * 3  # a platform that no error moves
+
 
 class Effects(NamedTuple):
     """What a unit of an error does in each case, as `Effect`."""
@@ -23,6 +26,15 @@ class Effects(NamedTuple):
     linear: Any
     qpe: Any
     cubic: Any
+
+
+class Course(NamedTuple):
+    """A unit of an error at the nodes, (nodes, cases): of the position of `platforms`, or of the range by a clock."""
+
+    at_nodes: Floats
+    platforms: tuple[int, ...] = ()
+    direction: Vectors = (0.0, 0.0, 0.0)
+    is_velocity: bool = False
 
 
 class Found(NamedTuple):
@@ -46,6 +58,7 @@ class ManyExactRanges:
         self.nodes = np.array(nodes)
         self.fit: Floats = np.array(fit)  # (4, nodes)
         self.times = self.nodes[:, None] * self.half
+        self._powers = {"m": np.ones_like(self.times), "m/s": self.times, "m/s^2": self.times**2 / 2}
         paths = (geometries.transmitter, geometries.receiver)
         self.tracks = [path.at(self.times) for path in paths]
         self.ranges = [norm(track) for track in self.tracks]
@@ -80,7 +93,7 @@ class ManyExactRanges:
 
     def powers(self, unit: str) -> Any:
         """Position error at each node of a unit of an error."""
-        return {"m": np.ones_like(self.times), "m/s": self.times, "m/s^2": self.times**2 / 2}[unit]
+        return self._powers[unit]
 
     def along(self, platform: int, direction: Vectors) -> Floats:
         """What a metre along a direction does to the range of a platform at the nodes."""
@@ -113,59 +126,77 @@ class ManyExactRanges:
             (c * effect.constant + d * effect.linear) * scale,
         )
 
-    def moved(
-        self, error: tuple[tuple[int, ...], str, Vectors], size: Floats, near: tuple[Any, Any], some: NDArray[Any]
-    ) -> Found:
-        """Find where a position error of some cases moves a point at the centre, and what defocuses there.
+    def phases(self, error: Course, size: Floats, near: tuple[Any, Any], some: NDArray[Any]) -> Found:
+        """Find where an error of some cases moves a point at the centre, and what defocuses there.
 
-        `error` says which platforms it moves, its unit and direction; `size` (some,), signed, and `near`, where it
-        leads to first order, are those of the cases `some`.
+        `size` (some,), signed, and `near`, where the search starts, are those of the cases `some`.
         """
-        platforms, unit, direction = error
-        tracks = [tuple(part[:, some] for part in track) for track in self.tracks]
-        power = self.powers(unit)[:, some] * size
-        bend = np.zeros(size.shape)
-        for platform in platforms:
-            parts = (part[some] if np.ndim(part) else part for part in direction)
-            tracks[platform] = tuple(
-                track + power * part for track, part in zip(tracks[platform], parts, strict=True)
-            )
-            bend = bend + (np.abs(size) if unit == "m/s" else 0.0)
-        return self._settled(self.recorded[:, some], tracks, near, bend, some)
+        course = error.at_nodes[:, some]
+        if error.platforms:
+            along = [course * (size * (part[some] if np.ndim(part) else part)) for part in error.direction]
+            shifts = [along if platform in error.platforms else _STILL for platform in (0, 1)]
+            clock = np.zeros_like(course)
+        else:
+            shifts, clock = [_STILL, _STILL], course * size
+        bend = np.abs(size) * (len(error.platforms) if error.is_velocity else 0.0)
+        return self._settled(clock, shifts, near, bend, some)
 
-    def timed(self, shape: Floats, size: Floats, near: tuple[Any, Any], some: NDArray[Any]) -> Found:
-        """The same of a clock error, of so many metres a unit at the nodes."""
-        tracks = [tuple(part[:, some] for part in track) for track in self.tracks]
-        return self._settled(self.recorded[:, some] + shape[:, some] * size, tracks, near, np.zeros(size.shape), some)
+    def way(
+        self, error: Course, size: Floats, place: tuple[Floats, Floats], some: NDArray[Any]
+    ) -> tuple[Floats, Floats]:
+        """Where the point goes with a larger error, at the places that errors of some cases move it to. [m/unit]"""
+        x, y, z = (part[some] if np.ndim(part) else part for part in error.direction)
+        course, (east, north) = error.at_nodes[:, some], place
+        change = np.zeros_like(course) if error.platforms else course
+        by_east, by_north = np.zeros_like(course), np.zeros_like(course)
+        for platform, track in enumerate(self.tracks):
+            a, b, c = (part[:, some] for part in track)
+            moved = size * course if platform in error.platforms else 0.0
+            a, b, c = a + moved * x - east, b + moved * y - north, c + moved * z
+            R = np.sqrt(a * a + b * b + c * c)
+            by_east, by_north = by_east + a / R, by_north + b / R
+            if platform in error.platforms:
+                change = change - course * (a * x + b * y + c * z) / R
+        (a, c), (b, d), (constant, linear) = (self.fit[:2] @ one for one in (by_east, by_north, change))
+        determinant = a * d - b * c
+        return (b * linear - d * constant) / determinant, (c * constant - a * linear) / determinant
 
     def _settled(
-        self, recorded: Floats, tracks: list[Any], near: tuple[Any, Any], bend: Floats, some: NDArray[Any]
+        self, clock: Floats, shifts: list[Any], near: tuple[Any, Any], bend: Floats, some: NDArray[Any]
     ) -> Found:
         """Newton's method for the point, as `ExactRanges` has it: with the slopes of the centre where that does."""
-        cases = recorded.shape[1]
+        cases = clock.shape[1]
         start = [np.array(np.broadcast_to(one, (cases,)), dtype=float) for one in near]
         found = Found(np.zeros(cases, dtype=bool), *(np.full(cases, math.nan) for _ in range(5)))
         with np.errstate(all="ignore"):
             reach = np.where(bend * self.half[some] < self.bend[some], self.reach[some], 0.0)
             close = np.flatnonzero(np.hypot(*start) < reach)
             if close.size:
-                self._settle_near(found, recorded, tracks, start, close, some)
+                self._settle_near(found, self._measured(clock, shifts, close, some), start, close, some)
             rest = np.flatnonzero(~found.is_found)
             if rest.size:
-                self._settle(found, recorded, tracks, start, rest, some)
+                self._settle(found, self._measured(clock, shifts, rest, some), start, rest, some)
+        return found
+
+    def _measured(self, clock: Floats, shifts: list[Any], alive: NDArray[Any], some: NDArray[Any]) -> list[Floats]:
+        """Arrays (nodes, alive): the clock error; position, range and shift of each platform at the nodes."""
+        found = _of([clock], alive)
+        for track, ranges, shift in zip(self.tracks, self.ranges, shifts, strict=True):
+            found += [*_of([*track, ranges], some[alive]), *_of(shift, alive)]
         return found
 
     def _settle_near(
-        self, found: Found, recorded: Floats, tracks: list[Any], start: list[Floats], alive: NDArray[Any], some: Any
+        self, found: Found, measured: list[Floats], start: list[Floats], alive: NDArray[Any], some: Any
     ) -> None:
         of = some[alive]
-        gradient = [one[:, of] for one in self.gradient]
-        whole, held = recorded[:, alive], [tuple(part[:, alive] for part in track) for track in tracks]
+        gradient = _of(self.gradient, of)
         east, north = start[0][alive], start[1][alive]
         for _ in range(scalar.FEW):
             (a, c, quadratic_east, cubic_east), (b, d, quadratic_north, cubic_north) = gradient
             determinant = a * d - b * c
-            left = whole - sum(np.sqrt((x - east) ** 2 + (y - north) ** 2 + z**2) for x, y, z in held)
+            left = measured[0]
+            for platform in (measured[1:8], measured[8:]):
+                left = left - _grown(platform, east, north)[0]
             constant, linear, quadratic, cubic = self.fit @ left
             step_east = (b * linear - d * constant) / determinant
             step_north = (c * constant - a * linear) / determinant
@@ -177,27 +208,26 @@ class ManyExactRanges:
                 k * (cubic + cubic_east * step_east + cubic_north * step_north),
             )
             self._keep(found, alive, of, is_done, east, north, phases, np.ones(alive.size))
-            going = ~is_done
-            if not going.any():
+            going = np.flatnonzero(~is_done)
+            if not going.size:
                 return
-            alive, of, east, north, whole = alive[going], of[going], east[going], north[going], whole[:, going]
-            gradient = [one[:, going] for one in gradient]
-            held = [tuple(part[:, going] for part in track) for track in held]
+            alive, of, east, north = alive[going], of[going], east[going], north[going]
+            gradient = _of(gradient, going)
+            measured = _of(measured, going)
 
     def _settle(
-        self, found: Found, recorded: Floats, tracks: list[Any], start: list[Floats], alive: NDArray[Any], some: Any
+        self, found: Found, measured: list[Floats], start: list[Floats], alive: NDArray[Any], some: Any
     ) -> None:
         of = some[alive]
-        whole, held = recorded[:, alive], [tuple(part[:, alive] for part in track) for track in tracks]
         east, north, before = start[0][alive], start[1][alive], np.full(alive.size, math.inf)
         for _ in range(scalar.ITERATIONS):
-            left, by_east, by_north = whole, np.zeros_like(whole), np.zeros_like(whole)
+            left = measured[0]
+            by_east, by_north = np.zeros_like(left), np.zeros_like(left)
             nearest = np.full(alive.size, math.inf)
-            for x, y, z in held:
-                u, v = x - east, y - north
-                distance = np.sqrt(u * u + v * v + z * z)
+            for platform in (measured[1:8], measured[8:]):
+                grown, u, v, distance = _grown(platform, east, north)
                 nearest = np.minimum(nearest, distance.min(axis=0))
-                left, by_east, by_north = left - distance, by_east + u / distance, by_north + v / distance
+                left, by_east, by_north = left - grown, by_east + u / distance, by_north + v / distance
             a, c, quadratic_east, cubic_east = self.fit @ by_east
             b, d, quadratic_north, cubic_north = self.fit @ by_north
             constant, linear, quadratic, cubic = self.fit @ left
@@ -214,13 +244,11 @@ class ManyExactRanges:
             is_right = is_done & (determinant * self.determinant[of] > 0)
             turn = determinant / (self.determinant[of] * self.half[of])
             self._keep(found, alive, of, is_right, east, north, phases, turn)
-            going = ~is_done & (step < scalar.SHRINKS * before) & (nearest > 0)
-            if not going.any():
+            going = np.flatnonzero(~is_done & (step < scalar.SHRINKS * before) & (nearest > 0))
+            if not going.size:
                 return
-            alive, of, east, north, whole, before = (
-                alive[going], of[going], east[going], north[going], whole[:, going], step[going],
-            )  # fmt: skip
-            held = [tuple(part[:, going] for part in track) for track in held]
+            alive, of, east, north, before = alive[going], of[going], east[going], north[going], step[going]
+            measured = _of(measured, going)
 
     def _keep(
         self,
@@ -240,3 +268,20 @@ class ManyExactRanges:
         for kept, phase in zip((found.quadratic, found.cubic), phases, strict=True):
             one = phase[is_done]
             kept[places] = np.where(np.abs(one) > self.rounding[of[is_done]], one, 0.0)
+
+
+def _grown(platform: list[Floats], east: Floats, north: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """How much longer the range of a platform is to points than it was, without rounding of the ranges themselves.
+
+    With it where the platform is seen from there, east and north, and how far. [m]
+    """
+    x, y, z, R, a, b, c = platform
+    a, b = a - east, b - north
+    u, v, w = x + a, y + b, z + c
+    distance = np.sqrt(u * u + v * v + w * w)
+    return ((x + u) * a + (y + v) * b + (z + w) * c) / (R + distance), u, v, distance
+
+
+def _of(arrays: Sequence[Floats], some: NDArray[Any]) -> list[Floats]:
+    """Some of the cases of arrays (nodes, cases); a number that all of them share stays as it is."""
+    return [array if array.size == 1 else array.take(some, axis=1) for array in arrays]

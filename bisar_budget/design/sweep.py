@@ -343,10 +343,18 @@ class Engine:
 
     def _of_same_nodes(self, found: dict[str, Values], some: NDArray[Any], nodes: int) -> NDArray[np.bool_]:
         mission, geometries = self._arrays(found, some)
-        shown = {one.row: self.subjects[one.row] for one in self.asked}
+        # A brief check finds no allowable of what is not declared; vibrations have rows of their own.
+        shown = {id: what for id, what in self.subjects.items() if not self.is_brief or what.kind == "vibration"}
         with np.errstate(all="ignore"):
             checked = check_arrays(
-                mission, some.size, self.question.today, nodes, geometries, shown, partial(self._one, found, some)
+                mission,
+                some.size,
+                self.question.today,
+                nodes,
+                geometries,
+                shown,
+                partial(self._one, found, some),
+                is_brief=self.is_brief,
             )
         sure = ~checked.is_left_out
         to, rows = some[sure], {row.subject.id: row for row in checked.rows}

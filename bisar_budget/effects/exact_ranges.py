@@ -15,7 +15,7 @@ import math
 from collections.abc import Iterable, Sequence
 from functools import cached_property
 from math import sqrt
-from operator import add, mul, sub
+from operator import add, mul
 from typing import NamedTuple
 
 from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
@@ -98,7 +98,7 @@ class ExactRanges:
         # Distances of the platforms at the nodes, where they are the clock.
         self.baselines = list(map(math.dist, *self.tracks.values())) if has_direct_path else []
 
-        # Ranges in double precision hold no phase that is smaller.
+        # A phase history in double precision holds no phase that is smaller.
         self.rounding = EPSILON * self.k * (max(self.recorded) + max(self.baselines, default=0.0))
 
     @property
@@ -229,9 +229,15 @@ class ExactRanges:
         ]
         return {"transmitter": b, "receiver": [(-x, -y, -z) for x, y, z in b]}
 
-    def _heard(self, measured: dict[str, Track]) -> list[float]:
-        """What measured tracks put for c·t̃ at the nodes where the direct path is the clock. [m]"""
-        return list(map(sub, map(math.dist, *measured.values()), self.baselines))
+    def _heard(self, transmitter: Track, receiver: Track) -> list[float]:
+        """What shifts of the platforms make of c·t̃ at the nodes where the direct path is the clock. [m]"""
+        found = []
+        tracks = zip(*self.tracks.values(), transmitter, receiver, self.baselines, strict=True)
+        for (x, y, z), (u, v, w), (a, b, c), (d, e, f), D in tracks:
+            a, b, c, x, y, z = a - d, b - e, c - f, x - u, y - v, z - w
+            i, j, k = x + a, y + b, z + c
+            found.append(((x + i) * a + (y + j) * b + (z + k) * c) / (D + sqrt(i * i + j * j + k * k)))
+        return found
 
     @cached_property
     def _known_along(self) -> dict[tuple[str, Vector], list[float]]:
@@ -320,26 +326,47 @@ class ExactRanges:
         does not, and beyond a line on which range and Doppler gradients are parallel: no error leads there from
         nothing.
         """
-        measured = dict(self.tracks)
-        recorded, bend = self.recorded, 0.0
+        errors = list(errors)
+        clock, shifts = self._taken(errors)
+        turns = [(source, abs(size)) for source, size in errors if source.is_position and source.unit == "m/s"]
+        bend = sum(size * sum(map(source.moves, PLATFORMS)) for source, size in turns)
+        reach = self._reach if bend * self.half < self._bend else 0.0
+        return self._settled(clock, shifts, near, reach)
+
+    def _taken(self, errors: Iterable[tuple[ErrorSource, float]]) -> tuple[Samples, list[Track]]:
+        """What errors add to the recorded ranges at the nodes [m], and how far off they take each platform to be."""
+        shifts, clock = dict.fromkeys(PLATFORMS, self._still), self._unheard
         for source, size in errors:
             if source.is_position:
                 x, y, z = (size * part for part in source.direction)
                 powers = self.powers[source.unit]
                 for name in PLATFORMS:
                     if source.moves(name):
-                        bend += abs(size) if source.unit == "m/s" else 0.0
-                        measured[name] = [
+                        shifts[name] = [
                             (a + p * x, b + p * y, c + p * z)
-                            for (a, b, c), p in zip(measured[name], powers, strict=True)
+                            for (a, b, c), p in zip(shifts[name], powers, strict=True)
                         ]
             else:  # a clock, or a phase as such
                 shape = self.shape(source)
-                recorded = [whole + size * metres for whole, metres in zip(recorded, shape, strict=True)]
+                clock = [whole + size * metres for whole, metres in zip(clock, shape, strict=True)]
+        both = list(shifts.values())
         if self.has_direct_path:
-            recorded = list(map(add, recorded, self._heard(measured)))
-        reach = self._reach if bend * self.half < self._bend else 0.0
-        return self._settled(recorded, measured["transmitter"], measured["receiver"], near, reach)
+            clock = list(map(add, clock, self._heard(*both)))
+        return clock, both
+
+    @cached_property
+    def _still(self) -> Track:
+        return [(0.0, 0.0, 0.0)] * len(self.times)
+
+    @cached_property
+    def _unheard(self) -> list[float]:
+        return [0.0] * len(self.times)
+
+    @cached_property
+    def _nodes(self) -> list[tuple[float, ...]]:
+        """Position and range of both platforms at each node."""
+        platforms = (zip(self.tracks[name], self.ranges[name], strict=True) for name in PLATFORMS)
+        return [(*t, R, *r, S) for (t, R), (r, S) in zip(*platforms, strict=True)]
 
     @cached_property
     def _reach(self) -> float:
@@ -353,27 +380,18 @@ class ExactRanges:
 
     def left_over(self, source: ErrorSource, size: float, place: GroundVector) -> list[float]:
         """Range error at the nodes that an error leaves at a ground point. [m]"""
-        recorded = self.recorded
-        measured = dict(self.tracks)
-        if source.is_position:
-            x, y, z = (size * part for part in source.direction)
-            for name in PLATFORMS:
-                if source.moves(name):
-                    measured[name] = [
-                        (a + p * x, b + p * y, c + p * z)
-                        for (a, b, c), p in zip(measured[name], self.powers[source.unit], strict=True)
-                    ]
-        else:
-            recorded = [whole + size * metres for whole, metres in zip(recorded, self.shape(source), strict=True)]
-        if self.has_direct_path:
-            recorded = list(map(add, recorded, self._heard(measured)))
+        clock, shifts = self._taken([(source, size)])
         east, north = place
-        return [
-            whole
-            - sqrt((x - east) ** 2 + (y - north) ** 2 + z * z)
-            - sqrt((u - east) ** 2 + (v - north) ** 2 + w * w)
-            for whole, (x, y, z), (u, v, w) in zip(recorded, *measured.values(), strict=True)
-        ]
+        left = []
+        for whole, (a, b, c), (d, e, f), (x, y, z, R, u, v, w, S) in zip(clock, *shifts, self._nodes, strict=True):
+            a, b, d, e = a - east, b - north, d - east, e - north
+            i, j, k, m, n, o = x + a, y + b, z + c, u + d, v + e, w + f
+            left.append(
+                whole
+                - ((x + i) * a + (y + j) * b + (z + k) * c) / (R + sqrt(i * i + j * j + k * k))
+                - ((u + m) * d + (v + n) * e + (w + o) * f) / (S + sqrt(m * m + n * n + o * o))
+            )
+        return left
 
     def left_over_small(self, source: ErrorSource, size: float) -> list[float]:
         """The same at the displaced point, of an error so small that its effects are proportional to it. [m]"""
@@ -439,30 +457,39 @@ class ExactRanges:
         return [(node * node - 1 / 3) / self.k for node in self.nodes]  # a quadratic that displaces nothing
 
     def _settled(
-        self, recorded: Samples, transmitter: Track, receiver: Track, near: GroundVector, reach: float
+        self, clock: Samples, shifts: Sequence[Track], near: GroundVector, reach: float
     ) -> ExactPhases | None:
-        """Newton's method for the point; with the slopes of the centre where it stays within reach of that."""
+        """Newton's method for the point; with the slopes of the centre where it stays within reach of that.
+
+        `shifts` say how far off each platform is taken to be at the nodes. A range grows by
+        (|r̂|² - |r|²)/(|r| + |r̂|), where |r̂|² - |r|² = (r + r̂)·(r̂ - r): that has no rounding of the range itself.
+        """
         east, north = near
         if math.hypot(east, north) < reach:
-            found = self._settled_near(recorded, transmitter, receiver, east, north)
+            found = self._settled_near(clock, shifts, east, north)
             if found is not None:
                 return found
         value, slope, quadratic, cubic = self.fit
-        before = math.inf
+        nodes, before = list(zip(clock, *shifts, self._nodes, strict=True)), math.inf
         for _ in range(ITERATIONS):
             left, by_east, by_north, nearest = [], [], [], math.inf
-            for whole, (x, y, z), (u, v, w) in zip(recorded, transmitter, receiver, strict=True):
-                x, y, u, v = x - east, y - north, u - east, v - north
-                p, q = sqrt(x * x + y * y + z * z), sqrt(u * u + v * v + w * w)
+            for whole, (a, b, c), (d, e, f), (x, y, z, R, u, v, w, S) in nodes:
+                a, b, d, e = a - east, b - north, d - east, e - north
+                i, j, k, m, n, o = x + a, y + b, z + c, u + d, v + e, w + f
+                p, q = sqrt(i * i + j * j + k * k), sqrt(m * m + n * n + o * o)
                 if p < nearest:
                     nearest = p
                 if q < nearest:
                     nearest = q
                 if not nearest:
                     return None
-                left.append(whole - p - q)
-                by_east.append(x / p + u / q)
-                by_north.append(y / p + v / q)
+                left.append(
+                    whole
+                    - ((x + i) * a + (y + j) * b + (z + k) * c) / (R + p)
+                    - ((u + m) * d + (v + n) * e + (w + o) * f) / (S + q)
+                )
+                by_east.append(i / p + m / q)
+                by_north.append(j / p + n / q)
             # A step of a metre adds by_east, by_north to what is left.
             a, b = sum(map(mul, value, by_east)), sum(map(mul, value, by_north))
             c, d = sum(map(mul, slope, by_east)), sum(map(mul, slope, by_north))
@@ -494,21 +521,25 @@ class ExactRanges:
             before = step
         return None
 
-    def _settled_near(
-        self, recorded: Samples, transmitter: Track, receiver: Track, east: float, north: float
-    ) -> ExactPhases | None:
+    def _settled_near(self, clock: Samples, shifts: Sequence[Track], east: float, north: float) -> ExactPhases | None:
         """Search with the slopes of the centre: a third of the work. None where it does not settle in a few steps."""
-        (a, c, quadratic_east, cubic_east), (b, d, quadratic_north, cubic_north) = self._gradient
-        value, slope, quadratic, cubic = self.fit
-        determinant = a * d - b * c
+        (by_east, turn_east, quadratic_east, cubic_east), (by_north, turn_north, *rest) = self._gradient
+        (quadratic_north, cubic_north), (value, slope, quadratic, cubic) = rest, self.fit
+        determinant = by_east * turn_north - by_north * turn_east
+        nodes = list(zip(clock, *shifts, self._nodes, strict=True))
         for _ in range(FEW):
             left = []
-            for whole, (x, y, z), (u, v, w) in zip(recorded, transmitter, receiver, strict=True):
-                x, y, u, v = x - east, y - north, u - east, v - north
-                left.append(whole - sqrt(x * x + y * y + z * z) - sqrt(u * u + v * v + w * w))
+            for whole, (a, b, c), (d, e, f), (x, y, z, R, u, v, w, S) in nodes:
+                a, b, d, e = a - east, b - north, d - east, e - north
+                i, j, k, m, n, o = x + a, y + b, z + c, u + d, v + e, w + f
+                left.append(
+                    whole
+                    - ((x + i) * a + (y + j) * b + (z + k) * c) / (R + sqrt(i * i + j * j + k * k))
+                    - ((u + m) * d + (v + n) * e + (w + o) * f) / (S + sqrt(m * m + n * n + o * o))
+                )
             constant, linear = sum(map(mul, value, left)), sum(map(mul, slope, left))
-            step_east = (b * linear - d * constant) / determinant
-            step_north = (c * constant - a * linear) / determinant
+            step_east = (by_north * linear - turn_north * constant) / determinant
+            step_north = (turn_east * constant - by_east * linear) / determinant
             east, north = east + step_east, north + step_north
             if self.k * (abs(step_east) + abs(step_north)) < UNSEEN_RAD / NEAR:
                 left_quadratic, left_cubic = (

@@ -17,20 +17,20 @@ from bisar_budget.geometry import GroundVector
 # Of what range and Doppler gradients span at the centre: with less a point has no image, they are parallel there.
 PARALLEL = 0.02
 STRAY = 0.15  # of a step; farther from where it led, a point is not the one that was followed
-_STRAIGHT = 0.1  # of a displacement, by which it may be off a straight way
+STRAIGHT = 0.1  # of a displacement, by which it may be off a straight way
 FLOOR_M = 1e-3
-_LEAST_STEP = 1e-3  # of the size: allowables are right to 1 %
-_FINEST_STEP = 1e-6  # where the gradients stay apart, the way only turns
-_OF_FOLD = 0.8  # of the way to where the gradients seem to become parallel, that one step makes
-_SHORT = 0.1  # of the last step, below which that step says little of the way left
-_FOLDS = 0.1  # of what the gradients span at the centre; a way that ends at more of it does not end in a fold
-_CLOSE = 1e-5  # of a limit, where a search ends
-_ALMOST = 0.002  # of a limit, from where a parabola leads to it
+LEAST_STEP = 1e-3  # of the size: allowables are right to 1 %
+FINEST_STEP = 1e-6  # where the gradients stay apart, the way only turns
+OF_FOLD = 0.8  # of the way to where the gradients seem to become parallel, that one step makes
+SHORT = 0.1  # of the last step, below which that step says little of the way left
+FOLDS = 0.1  # of what the gradients span at the centre; a way that ends at more of it does not end in a fold
+CLOSE = 1e-5  # of a limit, where a search ends
+ALMOST = 0.002  # of a limit, from where a parabola leads to it
 _NOT_FOLDED = 0.5  # of what the gradients span at the centre
-_CREST = 0.01  # of a limit: so little below it, the crest of a curve through few points may be above
-_DEPARTS = 0.5  # of the limit: a value so far from a straight line may have been anywhere in between
-_COARSE = 0.02  # of the size: within a shorter interval a curve is trusted
-_STEPS = 40
+CREST = 0.01  # of a limit: so little below it, the crest of a curve through few points may be above
+DEPARTS = 0.5  # of the limit: a value so far from a straight line may have been anywhere in between
+COARSE = 0.02  # of the size: within a shorter interval a curve is trusted
+STEPS = 40
 
 Value = Callable[[ExactPhases], float]  # what is held to a limit, signed
 
@@ -70,7 +70,7 @@ class PointPath:
             if last.size == size:
                 return last.phases
             fold = self._to_fold(index)
-            step = min(step, size - last.size, _OF_FOLD * fold if fold > _FINEST_STEP * last.size else math.inf)
+            step = min(step, size - last.size, OF_FOLD * fold if fold > FINEST_STEP * last.size else math.inf)
             ahead = size if size - last.size < 1.2 * step else last.size + step
             near, is_straight = self._guess(index, ahead) if is_first_try else (self._ahead(index, ahead), False)
             found = self.exact.phases([(self.source, self.sign * ahead)], near)
@@ -86,9 +86,9 @@ class PointPath:
             if is_straight:
                 is_first_try = False
                 continue
-            is_fold = found is None and abs(last.phases.turn) < _FOLDS and fold < _LEAST_STEP * ahead
+            is_fold = found is None and abs(last.phases.turn) < FOLDS and fold < LEAST_STEP * ahead
             step, is_first_try = step / 2, True
-            if is_fold or step < _FINEST_STEP * ahead:
+            if is_fold or step < FINEST_STEP * ahead:
                 self.end = last.size + min(step, fold)
         return None
 
@@ -102,7 +102,7 @@ class PointPath:
         last, before = self.known[index - 1], self.known[index - 2]
         square, earlier, step = last.phases.turn**2, before.phases.turn**2, last.size - before.size
         fold = square * step / (earlier - square) if square < earlier else math.inf
-        return fold if fold > _SHORT * step else math.inf
+        return fold if fold > SHORT * step else math.inf
 
     def _way(self, known: _Known) -> GroundVector:
         """Where the point goes from a known one. [m/unit]"""
@@ -117,7 +117,7 @@ class PointPath:
         x, y = last.phases.displacement
         u, v = self._ways[0.0]
         bent = (x - u * last.size, y - v * last.size)
-        if math.hypot(*bent) > _STRAIGHT * math.hypot(x, y):
+        if math.hypot(*bent) > STRAIGHT * math.hypot(x, y):
             return self._ahead(index, size), False
         part = (size / last.size) ** 2 if last.size else 0.0  # a parabola from no error on
         return (u * size + bent[0] * part, v * size + bent[1] * part), True
@@ -150,13 +150,13 @@ class PointPath:
             Size to look at first, and the largest. [unit]
         """
         index = bisect(self.known, first, key=lambda one: one.size)
-        is_met = index < len(self.known) and self.known[index].size <= (1 + _ALMOST) * first
+        is_met = index < len(self.known) and self.known[index].size <= (1 + ALMOST) * first
         size = self.known[index].size if is_met else first
 
         def is_enough(phases: ExactPhases) -> bool:
-            return abs(value(phases)) >= limit * (1 - _CLOSE)
+            return abs(value(phases)) >= limit * (1 - CLOSE)
 
-        for _ in range(_STEPS):
+        for _ in range(STEPS):
             self.to(size, is_enough)
             crossed = self._crossed(value, limit, per_unit, min(size, self.end))
             if crossed is not None:
@@ -167,7 +167,7 @@ class PointPath:
                 return None
             index = bisect(self.known, size, key=lambda one: one.size) - 1
             reached = abs(value(self.known[index].phases))
-            if reached > (1 - _ALMOST) * limit:
+            if reached > (1 - ALMOST) * limit:
                 ahead = self._just_ahead(index, value, limit, per_unit)
                 if ahead is not None:
                     return ahead if ahead <= farthest else None
@@ -183,16 +183,14 @@ class PointPath:
         else:
             slope = (reached - abs(value(before.phases))) / (last.size - before.size)
             ahead = last.size + (limit - reached) / slope if slope > 0 else None
-        is_sure = (
-            ahead is not None and last.size <= ahead < (1 + 1.5 * _ALMOST) * last.size and last.phases.turn > 0.5
-        )
+        is_sure = ahead is not None and last.size <= ahead < (1 + 1.5 * ALMOST) * last.size and last.phases.turn > 0.5
         return ahead if is_sure else None
 
     def _crossed(self, value: Value, limit: float, per_unit: float, upto: float) -> float | None:
         """First size among the known ones, or between them, at which the value reaches the limit."""
         index = 1
         while index < len(self.known) and self.known[index].size <= upto:
-            if abs(value(self.known[index].phases)) >= limit * (1 - _CLOSE):
+            if abs(value(self.known[index].phases)) >= limit * (1 - CLOSE):
                 return self._between(value, limit, index, per_unit)
             doubtful = self._doubtful(index, value, limit, per_unit)
             if doubtful is not None and self.to(doubtful) is None:
@@ -210,8 +208,8 @@ class PointPath:
         a, b, width = value(low.phases), value(high.phases), high.size - low.size
         slope = per_unit if index == 1 else self._slope(index - 1, value)
         last = self._slope(index, value) if index + 1 < len(self.known) else 2 * (b - a) / width - slope
-        is_wide = width > _COARSE * high.size
-        near = limit * (1 - _CREST) if is_wide else limit
+        is_wide = width > COARSE * high.size
+        near = limit * (1 - CREST) if is_wide else limit
         for part in _crests(slope * width, b - a, last * width):
             square, cube = part * part, part * part * part
             on_curve = a + slope * width * (part - 2 * square + cube) + last * width * (cube - square)
@@ -219,7 +217,7 @@ class PointPath:
             if 0.02 < part < 0.98 and abs(on_curve) >= near:
                 return low.size + part * width
         departs = abs(b - a - slope * width)
-        return low.size + width / 2 if is_wide and departs > _DEPARTS * limit else None
+        return low.size + width / 2 if is_wide and departs > DEPARTS * limit else None
 
     def _slope(self, index: int, value: Value) -> float:
         """Slope at a known point of the parabola through it and its neighbours. [of the value per unit]"""
@@ -231,9 +229,9 @@ class PointPath:
     def _between(self, value: Value, limit: float, index: int, per_unit: float) -> float:
         """Size at which the magnitude reaches the limit, in the interval that ends at a known point."""
         low, high = self.known[index - 1], self.known[index]
-        for step in range(_STEPS):
+        for step in range(STEPS):
             a, b = abs(value(low.phases)), abs(value(high.phases))
-            if high.size - low.size <= _CLOSE * high.size:
+            if high.size - low.size <= CLOSE * high.size:
                 return low.size
             chord = (b - a) / (high.size - low.size)
             size = low.size + (limit - a) / chord
@@ -242,11 +240,11 @@ class PointPath:
                 size = bent
             elif step % 3 == 2:
                 size = (low.size + high.size) / 2
-            if b - limit < _ALMOST * limit:
+            if b - limit < ALMOST * limit:
                 if low.size:  # the slope there of a parabola from no error through both
                     chord += (chord - a / low.size) * (high.size - low.size) / high.size
                     size = high.size - (b - limit) / chord if chord > 0 else 0.0
-                if high.size - size < 2 * _ALMOST * high.size:
+                if high.size - size < 2 * ALMOST * high.size:
                     return size
             inside = 0.01 * (high.size - low.size)
             size = min(max(size, low.size + inside), high.size - inside)
@@ -254,7 +252,7 @@ class PointPath:
             if found is None:
                 return low.size
             middle = _Known(size, found)
-            if abs(value(found)) >= limit * (1 - _CLOSE):
+            if abs(value(found)) >= limit * (1 - CLOSE):
                 high = middle
             else:
                 low = middle

@@ -1,6 +1,7 @@
 """A sweep has the numbers of `check`, case by case, whatever arrays hold and whatever they leave to it."""
 
 import math
+import re
 from datetime import date
 
 import numpy as np
@@ -164,11 +165,32 @@ def test_examples_are_held_whole(name) -> None:
 
 
 @pytest.mark.parametrize("model", ["full", "strictest"])
-def test_a_model_may_stand_in(model) -> None:
+@pytest.mark.parametrize("name", [*EXAMPLES, "tandem_x.yaml"])
+def test_searches_of_the_full_model_are_held(name, model) -> None:
+    """Limits that only a search along exact ranges finds are those of `check`; few searches take too many steps."""
+    mission = load_mission(str(MISSIONS / name))
+    T = mission.collection.aperture_time
+    azimuth = mission.platforms.receiver.azimuth
+    axes = {"collection__aperture_time": [0.4 * T, 1.1 * T, 2 * T]}
+    if azimuth is None:
+        axes["radar__bandwidth"] = [20e6, 100e6]
+    else:
+        axes["platforms__receiver__azimuth"] = [azimuth - 0.4, azimuth, azimuth + 0.9]
+    cases = grid(mission, **axes)
+    whole, by_case = swept(mission, cases, model=model)
+    assert by_case <= 0.1 * cases.count
+    assert_as_checked(mission, cases, whole, model=model)
+
+
+@pytest.mark.parametrize("model", ["full", "strictest"])
+def test_a_whole_check_searches_in_another_order(model) -> None:
+    """Columns of errors that nobody declared ask for a whole check: requirements in their order, each to its end."""
     mission = load_mission(str(MISSIONS / "rigling_moses_section_v.yaml"))
     cases = grid(mission, collection__aperture_time=[1.0, 6.0], platforms__receiver__azimuth=[0.5, 2.5])
-    whole, _ = swept(mission, cases, model=model)
-    assert_as_checked(mission, cases, whole, model=model)
+    columns = ["receiver.position.z.allowable", "timing.cubic.allowable", "transmitter.velocity.y.allowable"]
+    whole, by_case = swept(mission, cases, columns, model=model)
+    assert by_case == 0
+    assert_as_checked(mission, cases, whole, columns, model=model)
 
 
 @pytest.mark.parametrize("rule", ["each", "sum", "rss"])
@@ -211,6 +233,19 @@ def test_cases_that_are_no_mission_are_rows_that_say_why() -> None:
     assert list(whole["status"]).count("error") == by_case >= 6
     assert any("below the ground" in reason for reason in whole["reason"])
     assert any("twice the centre frequency" in reason for reason in whole["reason"])
+
+
+def test_a_fixed_platform_that_moves_has_no_direction() -> None:
+    """Speed 0 is a mission; any other speed lacks `motion_azimuth`, as `check` says."""
+    text = (MISSIONS / "rigling_moses_section_v.yaml").read_bytes()
+    mission = parse_mission(
+        re.sub(rb"(receiver:.*?speed:) .*?\n +motion_azimuth: .*?\n", rb"\1 0 m/s\n", text, flags=re.S), "m.yaml"
+    )
+    cases = grid(mission, platforms__receiver__speed=[0.0, 2.0])
+    whole, by_case = swept(mission, cases)
+    assert by_case == 2
+    assert_as_checked(mission, cases, whole)
+    assert "lacks motion_azimuth" in whole["reason"][1]
 
 
 def test_both_sides_of_the_limit() -> None:
@@ -259,13 +294,15 @@ def test_figures_of_a_vibration_vary(key) -> None:
     assert_as_checked(mission, cases, whole, column)
 
 
-def test_processes_find_the_same() -> None:
+def test_processes_find_the_same(monkeypatch) -> None:
     """Where cases are checked one by one they are shared out, and come back in their order."""
-    mission = load_mission(str(MISSIONS / "rigling_moses_section_v.yaml"))
-    cases = grid(mission, collection__aperture_time=np.linspace(1, 9, 640))
-    alone, by_case = swept(mission, cases, model="full")
-    shared, _ = swept(mission, cases, model="full", jobs=2)
-    assert by_case > 500
+    monkeypatch.setattr("bisar_budget.design.sweep._MANY", 2)  # parts, from which processes are started
+    text = (MISSIONS / "rigling_moses_section_v.yaml").read_bytes()
+    mission = parse_mission(text, "m.yaml", changes=[SetValue("scene.radius", "500 m")])
+    cases = grid(mission, collection__aperture_time=np.linspace(1, 9, 200))
+    alone, by_case = swept(mission, cases)
+    shared, _ = swept(mission, cases, jobs=2)
+    assert by_case == 200  # arrays hold no edge of a scene
     for name, column in alone.items():
         assert np.array_equal(column, shared[name], equal_nan=column.dtype != object)
 

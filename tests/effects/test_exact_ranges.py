@@ -106,3 +106,15 @@ def test_a_start_nearby_changes_nothing() -> None:
     first = exact_effects(*tracks, 0.0, study.collection.wavelength)
     again = exact_effects(*tracks, 0.0, study.collection.wavelength, near=first.displacement + 0.5)
     assert again.displacement == pytest.approx(first.displacement, abs=1e-6)
+
+
+def test_phases_have_no_rounding_of_the_ranges() -> None:
+    """Errors a micrometre apart lie on a line; a range of 4e7 m in doubles is 4e-9 m off, which would be 1e-6 rad."""
+    analysis = Analysis(parse_mission(family_text("geostationary_drone", 3)))
+    source = next(one for one in analysis.sources if one.id == "transmitter.position.x")
+    near = analysis.exact.plane.displacement(source.full, 1.0)
+    found = [analysis.exact.phases([(source, 1 + part * 1e-6)], near) for part in range(10)]
+    phases = np.array([(one.quadratic, one.cubic) for one in found])
+    assert np.abs(phases[0]).max() > 1e-3
+    line = phases[0] + np.linspace(0, 1, 10)[:, None] * (phases[-1] - phases[0])
+    assert np.abs(phases - line).max() < 1e-10  # a second order of (1e-5)² of the phases
