@@ -44,10 +44,13 @@ class Keeping(NamedTuple):
         What ends it before leaves the parts, and says how to go on.
         """
         from bisar_budget.cluster.parts_folder import PartsFolder, manifest_of
+        from bisar_budget.design.cases import words_of
         from bisar_budget.design.sweep import Asked
+        from bisar_budget.faults import SetValue
         from bisar_budget.mission.named import named_by
 
-        mission, named = named_by(mission)
+        words = [SetValue(one.key, word) for one, words in words_of(cases) for word in words]
+        mission, named = named_by(mission, words)
         sent = named if self.workers else None  # processes here read the files themselves
         asked = Asked(mission, cases, columns=columns, model=model, today=today, named=sent)
         chunks = asked.chunks()

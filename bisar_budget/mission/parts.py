@@ -262,7 +262,7 @@ def _file_of(name: str, beside: str) -> str:
             if os.sep not in name and os.path.exists(file):
                 return file
     near = did_you_mean(name.lower(), tuple(catalogue(places)))
-    raise PartError(f"is no part of the catalogue; `bisar-budget sensors` lists them. {near}".rstrip())
+    raise PartError(f"is no part of the catalogue; `bisar-budget sensors` lists them{'. ' if near else ''}{near}")
 
 
 def with_parts(mission: Mission, beside: str, find: Find, report: Report) -> Any:

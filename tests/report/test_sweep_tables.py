@@ -40,7 +40,7 @@ def swept(cases: Cases, size: int) -> Swept:
         "reason": np.array([f'case {n}, "bad"' if n % 3 == 2 else "" for n in number], object),
     }
     columns = (
-        *(Column(number.key, number.dimension.si, f"the key {number.key}") for number in cases.numbers),
+        *(Column(one.key, one.unit and "SI", f"the key {one.key}", not one.unit) for one in cases.varied),
         Column("utilization", "", "what is declared over what is allowed"),
         Column("status", "", "status of the mission", True),
         Column("worst_row", "", "row of the highest utilization", True),
@@ -52,7 +52,7 @@ def swept(cases: Cases, size: int) -> Swept:
             stop = min(start + size, 24)
             yield Part(start, stop, {name: values[start:stop] for name, values in found.items()}, 0)
 
-    keys = tuple(number.key for number in cases.numbers)
+    keys = tuple(number.key for number in cases.varied)
     return Swept("A =name", "ab" * 32, keys, cases.shape, 24, columns, parts())
 
 
@@ -156,6 +156,26 @@ def test_netcdf_of_a_table_has_a_dimension_of_cases(tmp_path: Path) -> None:
         assert dict(read.sizes) == {"case": 24}
         assert read[TIME].values.tolist() == [100.0 * n for n in range(1, 25)]
         assert read[TIME].attrs["units"] == "ms"
+
+
+def test_words_are_text_in_every_format(tmp_path: Path) -> None:
+    """And the axis of a grid in NetCDF; no one model has found all the cases."""
+    import pyarrow.parquet as pq
+    import xarray
+
+    cases = grid(TREE, [f"{TIME}=1:2s:8", "allocation.model=published,full,strictest"])
+    lines = written(".csv", cases, tmp_path).read_text(encoding="utf-8").splitlines()
+    assert "# model: varies" in lines
+    rows = list(csv.DictReader(lines[6:]))
+    assert [row["allocation.model"] for row in rows[:4]] == ["published", "full", "strictest", "published"]
+    again = table(TREE, "".join(",".join(line.split(",")[:2]) + "\n" for line in lines), "again.csv")
+    assert again.values(0, 24)["allocation.model"].tolist() == cases.values(0, 24)["allocation.model"].tolist()
+    read = pq.read_table(written(".parquet", cases, tmp_path))
+    assert read.column("allocation.model").to_pylist()[:3] == ["published", "full", "strictest"]
+    with xarray.open_dataset(written(".nc", cases, tmp_path)) as dataset:
+        assert dict(dataset.sizes) == {TIME: 8, "allocation.model": 3}
+        assert dataset["allocation.model"].values.tolist() == ["published", "full", "strictest"]
+        assert float(dataset["utilization"].sel({TIME: 1, "allocation.model": "full"})) == 1 / 7
 
 
 @given(st.lists(st.integers(1, 5), min_size=1, max_size=4), st.data())
