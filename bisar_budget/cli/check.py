@@ -169,6 +169,14 @@ class _Draws(ParamType[int]):
     metavar="S",
     help="Seed of --monte-carlo (default: simulation.seed of the mission file, else 1).",
 )
+@click.option(
+    "--sweep",
+    "swept",
+    multiple=True,
+    metavar="KEY=VALUES",
+    help="For html and markdown: also check other values, written as for sweep --vary, and draw what complies: one "
+    "key as curves, two as a map.",
+)
 @click.option("-q", "--quiet", is_flag=True, help="One line per mission.")
 @click.option("--all", "all_rows", is_flag=True, help="Show every row, also those that are not declared.")
 @click.option(
@@ -205,6 +213,7 @@ def check(
     verifying: bool,
     draws: int | None,
     seed: int | None,
+    swept: Sequence[str],
     quiet: bool,
     all_rows: bool,
     verbose: bool,
@@ -230,12 +239,16 @@ def check(
     if seed is not None and draws is None and given("seed") is ParameterSource.COMMANDLINE:
         raise click.UsageError("--seed needs --monte-carlo N.")
     if explain is not None:
-        if any(given(name) is ParameterSource.COMMANDLINE for name in ("format_name", "reports", "draws")):
+        if any(given(name) is ParameterSource.COMMANDLINE for name in ("format_name", "reports", "draws", "swept")):
             raise click.UsageError(
-                "--explain writes text; it cannot be combined with --format, --report or --monte-carlo."
+                "--explain writes text; it cannot be combined with --format, --report, --monte-carlo or --sweep."
             )
         _explain(files, explain, today.date() if today else day_of_run(), model, output, changes)
         return
+    if swept:
+        from bisar_budget.cli.studies import check_options
+
+        check_options(swept, [format_name, *(name for _, name in written)])
     illustrated = any(FORMATS[name].is_illustrated for name in (format_name, *(name for _, name in written)))
     drawn = None if draws is None else (draws, seed)
     day = today.date() if today else day_of_run()
@@ -256,6 +269,10 @@ def check(
     else:
         report = check_all(files, day, model, verifying, illustrated, drawn, changes)
         judged_on = _given_day(today) or (day if _has_waivers(report.missions) else None)
+        if swept:
+            from bisar_budget.cli.studies import with_studies
+
+            report = report._replace(missions=tuple(with_studies(report.missions, swept, model, day)))
         report = report._replace(options=tuple(_options(judged_on)), day=judged_on)
         if says_faults:
             _say_faults(report.missions)
@@ -302,6 +319,9 @@ def _options(judged_on: date | None) -> "Iterator[Option]":
         elif name == "changes":
             if value:
                 yield Option("--set", ", ".join(f"{change.key}={change.text}" for change in value), origin)
+        elif name == "swept":
+            if value:
+                yield Option("--sweep", ", ".join(value), origin)
         elif name == "draws":
             yield Option("--monte-carlo", "no" if value is None else f"{value:,} draws", origin)
         elif name == "seed" and context.params["draws"] is not None:

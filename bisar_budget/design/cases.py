@@ -122,7 +122,7 @@ class _Asked(NamedTuple):
     is_log: bool = False
 
 
-def grid(tree: dict[str, Any], texts: Sequence[str]) -> Grid:
+def grid(tree: dict[str, Any], texts: Sequence[str], name: str = "--vary") -> Grid:
     """Read `KEY=FROM:TO UNIT:COUNT`, with `:log` behind it in equal ratios, or `KEY=VALUE,VALUE,...` of each option.
 
     Keys that have no number take `KEY=WORD,WORD,...`. Ends belong to the range. Values are those that have as few
@@ -134,6 +134,8 @@ def grid(tree: dict[str, Any], texts: Sequence[str]) -> Grid:
         What the mission file says, as text.
     texts : sequence of str
         What stands behind each `--vary`; an end or a value without unit has that of the last.
+    name : str
+        Of the option, for messages.
 
     Raises
     ------
@@ -142,7 +144,7 @@ def grid(tree: dict[str, Any], texts: Sequence[str]) -> Grid:
     """
     varied: list[Varied] = []
     axes: list[Values] = []
-    for asked in _all_asked(tree, texts):
+    for asked in _all_asked(tree, texts, name):
         varied.append(asked.varied)
         if isinstance(asked, _AskedWords):
             axes.append(asked.words)
@@ -186,7 +188,7 @@ def sample(tree: dict[str, Any], texts: Sequence[str], how: str) -> Table:
     if not (parts[1].isascii() and parts[1].isdigit() and len(parts[1]) <= 18):
         raise QuestionError(f"--sample {shown(how)}: the seed must be a whole number; {_LATIN}")
     rng = np.random.default_rng(int(parts[1]))
-    all_asked = list(_all_asked(tree, texts))
+    all_asked = list(_all_asked(tree, texts, "--vary"))
     if count * len(all_asked) > MAX_VALUES:
         most = MAX_VALUES // len(all_asked)
         raise QuestionError(
@@ -204,23 +206,23 @@ def sample(tree: dict[str, Any], texts: Sequence[str], how: str) -> Table:
     return Table(tuple(asked.varied for asked in all_asked), tuple(columns))
 
 
-def _all_asked(tree: dict[str, Any], texts: Sequence[str]) -> Iterator[_Asked | _AskedWords]:
+def _all_asked(tree: dict[str, Any], texts: Sequence[str], name: str) -> Iterator[_Asked | _AskedWords]:
     if not texts:
-        raise QuestionError(f"no --vary: nothing would vary; {_FORMS}")
+        raise QuestionError(f"no {name}: nothing would vary; {_FORMS}")
     seen: dict[tuple[str, ...], str] = {}
     for text in texts:
-        asked = _asked(tree, text)
+        asked = _asked(tree, text, name)
         parts = parts_of(asked.varied.key)
         if parts in seen:
-            raise QuestionError(f"--vary {asked.varied.key}: varies twice; accepted: each key once")
+            raise QuestionError(f"{name} {asked.varied.key}: varies twice; accepted: each key once")
         seen[parts] = text
         yield asked
 
 
-def _asked(tree: dict[str, Any], text: str) -> _Asked | _AskedWords:
+def _asked(tree: dict[str, Any], text: str, name: str) -> _Asked | _AskedWords:
     """Read one option, and hold its values to the bounds of the key."""
     key, equals, given = (part.strip() for part in text.partition("="))
-    option = f"--vary {shown(text)}"
+    option = f"{name} {shown(text)}"
     if not (key and equals and given):
         raise QuestionError(f"{option}: does not say which values; {_FORMS}")
     if (choices := choices_of(tree, key, given)) is not None:

@@ -1,6 +1,7 @@
 """What a plot of a sweep shows, as arrays: one axis for each key that varies."""
 
 from collections.abc import Mapping
+from datetime import date
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -63,7 +64,8 @@ class Study(NamedTuple):
     """A sweep that a report of the mission shows.
 
     `asked` is what stood behind each option; `rows` are the utilizations of the rows that are the worst anywhere,
-    over the one key that varies. Of `cases` `complying` break no requirement, and `missing` are no mission.
+    over the one key that varies. Of `cases` `complying` break no requirement, and `missing` are no mission. `model`
+    is the one that an option put in place of the mission's own, `day` that on which waivers were judged.
     """
 
     asked: tuple[str, ...]
@@ -72,3 +74,5 @@ class Study(NamedTuple):
     cases: int
     complying: int
     missing: int
+    day: date
+    model: str | None = None

@@ -1,8 +1,6 @@
 """Plots of a sweep: utilizations over one key, a map of statuses or of a column over two, also as seen from above."""
 
-import re
 from collections.abc import Mapping, Sequence
-from functools import cache
 from textwrap import fill, shorten
 from typing import Any
 
@@ -15,17 +13,15 @@ from bisar_budget.findings.trade import Axis, Trade
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission
 from bisar_budget.report.drawing.figure import figure_file, new_figure
+from bisar_budget.report.drawing.tones import ROWS, has_no_mission, light, status_words, strengths, tone_of
 from bisar_budget.report.drawing.trades import borders, per_word, regions, runs
 from bisar_budget.report.words.sentences import percent
-from bisar_budget.resources import resource
 
 _SIZE, _SQUARE = (9.5, 5.2), (8.4, 6.6)  # inches
 _HIGH = 3.0  # times the limit: above it utilizations are drawn in equal ratios
 _LEAST = 1e-3  # of the limit: what is smaller is not of interest there
-_PALETTE = ("transmitter", "receiver", "clock", "pass", "mission", "doubt", "reserve")
 _DASHES = ("-", "-", "-", "--", "--", "-.", ":")
 _TINTS = (0.8, 0.9, 0.65)  # part of white, of the first, second and third status of one colour
-_EMPTY = "reserve"
 _WORST = "#b9bfc6"
 _NAME, _LINE = 60, 95  # characters of a line above a drawing: a wider one would take its room
 _WORD, _ROOM = 40, 70  # characters of a word at an axis, and of all side by side
@@ -112,32 +108,13 @@ def _in_ratios(drawn: Any) -> None:
     drawn.set_minor_formatter(NullFormatter())
 
 
-@cache
-def _tones() -> dict[str, str]:
-    """Colours of a report on white, by their name."""
-    light, _, _ = resource("templates", "report.css").read_text(encoding="utf-8").partition("}")
-    return dict(re.findall(r"--([\w-]+): (#[0-9a-f]{6})", light))
-
-
 def _fills(statuses: Sequence[str]) -> dict[str, str]:
     """Light colours of statuses; of those that share a colour, the worst has the strongest."""
     fills: dict[str, str] = {}
-    used: dict[str, int] = {}
-    for name in statuses:
-        tone = _EMPTY if _has_no_mission(name) else STATUS[name].color
-        part = _TINTS[min(used.get(tone, 0), len(_TINTS) - 1)]
-        used[tone] = used.get(tone, 0) + 1
-        color = [int(_tones()[tone][place : place + 2], 16) for place in (1, 3, 5)]
+    for name, part in strengths(statuses, _TINTS).items():
+        color = [int(light()[tone_of(name)][place : place + 2], 16) for place in (1, 3, 5)]
         fills[name] = "#" + "".join(f"{round(one + (255 - one) * part):02x}" for one in color)
     return fills
-
-
-def _has_no_mission(name: str) -> bool:
-    return STATUS[name].junit == "error"
-
-
-def _words(name: str) -> str:
-    return "no such mission" if _has_no_mission(name) else STATUS[name].words
 
 
 def _patches(statuses: Sequence[str]) -> list[Any]:
@@ -145,7 +122,7 @@ def _patches(statuses: Sequence[str]) -> list[Any]:
     from matplotlib.patches import Patch
 
     fills = _fills(statuses)
-    return [Patch(facecolor=fills[name], edgecolor="#c9ced4", label=_words(name)) for name in statuses]
+    return [Patch(facecolor=fills[name], edgecolor="#c9ced4", label=status_words(name)) for name in statuses]
 
 
 def _curves(panel: Any, trade: Trade, rows: Mapping[str, NDArray[Any]]) -> None:
@@ -160,7 +137,7 @@ def _curves(panel: Any, trade: Trade, rows: Mapping[str, NDArray[Any]]) -> None:
     if trade.column:
         shown = trade.values[trade.column]
         lines += panel.plot(
-            axis.values, shown, color=_tones()["transmitter"], marker=marker, label=trade.column, **joined
+            axis.values, shown, color=light()["transmitter"], marker=marker, label=trade.column, **joined
         )
         panel.set_ylabel(trade.heading)
     else:
@@ -169,10 +146,10 @@ def _curves(panel: Any, trade: Trade, rows: Mapping[str, NDArray[Any]]) -> None:
             lines.append(panel.bar(axis.values, worst, color=_WORST, width=0.5, label="worst row"))
         else:
             lines += panel.plot(axis.values, worst, color=_WORST, lw=6, solid_capstyle="butt", label="worst row")
-        for (row, use), tone, dashes in zip(rows.items(), _PALETTE, _DASHES, strict=False):
-            style = {"color": _tones()[tone], "ls": dashes, "marker": marker, **joined}
+        for (row, use), tone, dashes in zip(rows.items(), ROWS, _DASHES, strict=False):
+            style = {"color": light()[tone], "ls": dashes, "marker": marker, **joined}
             lines += panel.plot(axis.values, 100 * use, label=printable(row), **style)
-        lines.append(panel.axhline(100, color=_tones()["fail"], lw=1.4, ls=(0, (6, 3)), label="limit"))
+        lines.append(panel.axhline(100, color=light()["fail"], lw=1.4, ls=(0, (6, 3)), label="limit"))
         _scale_uses(panel, np.concatenate([[1.0], trade.values["utilization"], *rows.values()]))
         panel.set_ylabel("utilization [%]")
     panel.set_xlabel(axis.label)
@@ -195,15 +172,15 @@ def _curves_of_words(panel: Any, words: Axis, trades: Mapping[str, Trade]) -> No
     (axis,) = first.axes
     marker = "." if axis.values.size <= 40 else ""
     uses = []
-    for (word, trade), tone, dashes in zip(trades.items(), _PALETTE, _DASHES, strict=False):
+    for (word, trade), tone, dashes in zip(trades.items(), ROWS, _DASHES, strict=False):
         shown = trade.values[trade.column] if trade.column else 100 * trade.values["utilization"]
         uses.append(trade.values["utilization"])
         name = shorten(printable(word), _WORD, placeholder="...")
-        panel.plot(axis.values, shown, color=_tones()[tone], ls=dashes, marker=marker, lw=1.8, label=name)
+        panel.plot(axis.values, shown, color=light()[tone], ls=dashes, marker=marker, lw=1.8, label=name)
     if first.column:
         panel.set_ylabel(first.heading)
     else:
-        panel.axhline(100, color=_tones()["fail"], lw=1.4, ls=(0, (6, 3)), label="limit")
+        panel.axhline(100, color=light()["fail"], lw=1.4, ls=(0, (6, 3)), label="limit")
         _scale_uses(panel, np.concatenate([[1.0], *uses]))
         panel.set_ylabel("utilization [%]")
     panel.set_xlabel(axis.label)
@@ -243,7 +220,7 @@ def _map(page: Any, panel: Any, trade: Trade, *grid: NDArray[Any]) -> list[Any]:
             handles += _what_binds(panel, trade, grid)
     else:
         _heat(page, panel, trade, first_edges, second_edges)
-        handles = [patch for patch, name in zip(handles, trade.statuses, strict=True) if _has_no_mission(name)]
+        handles = [patch for patch, name in zip(handles, trade.statuses, strict=True) if has_no_mission(name)]
     if not any(axis.words for axis in trade.axes) and _limit(panel, trade, first, second):
         handles.insert(0, panel.plot([], [], label="utilization 100 %", **_LIMIT)[0])
     return handles
@@ -324,7 +301,7 @@ def _heat(page: Any, panel: Any, trade: Trade, first: NDArray[Any], second: NDAr
         rasterized=True,
         norm=LogNorm() if is_log else None,
     )
-    if any(map(_has_no_mission, trade.statuses)):
+    if any(map(has_no_mission, trade.statuses)):
         panel.set_facecolor(_fills(["error"])["error"])
     bar = page.colorbar(mesh, ax=panel, pad=0.1 if panel.name == "polar" else 0.02)
     bar.set_label(trade.heading, parse_math=False)
@@ -382,7 +359,7 @@ def _other_platform(panel: Any, around: Axis, geometry: BistaticGeometry) -> lis
     other = "receiver" if names == ["transmitter"] else "transmitter"
     x, y, _ = getattr(geometry, other).position
     angle = np.arctan2(y, x)
-    style = {"marker": (3, 0, float(np.degrees(angle)) + 90), "ms": 12, "color": _tones()[other], "ls": "none"}
+    style = {"marker": (3, 0, float(np.degrees(angle)) + 90), "ms": 12, "color": light()[other], "ls": "none"}
     handles: list[Any] = panel.plot(
         angle, panel.get_ylim()[1], label=f"direction of the {other}", clip_on=False, **style
     )
