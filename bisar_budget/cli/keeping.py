@@ -2,9 +2,10 @@
 
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from datetime import date
 from io import StringIO
+from time import monotonic
 from typing import TYPE_CHECKING, NamedTuple
 
 import click
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     from bisar_budget.design.sweep import Asked, Chunks
     from bisar_budget.design.swept import Swept
     from bisar_budget.mission.model import Mission
+
+_MOMENT = 1.0  # s
 
 
 class Keeping(NamedTuple):
@@ -117,3 +120,20 @@ def progress_bar(total: int, label: str) -> "ProgressBar[int]":
     """Bar with the time left on standard error, where somebody watches."""
     watched = sys.stderr is not None and sys.stderr.isatty()
     return click.progressbar(length=total, label=label, file=sys.stderr if watched else StringIO())
+
+
+@contextmanager
+def late_bar(label: str) -> Iterator[Callable[[int, int], None]]:
+    """Give what takes how many of how many are done; a bar shows it where that takes longer than a moment."""
+    began = monotonic()
+    with ExitStack() as ends:
+        bars: list[ProgressBar[int]] = []
+
+        def progress(done: int, total: int) -> None:
+            if not bars:
+                if monotonic() - began < _MOMENT:
+                    return
+                bars.append(ends.enter_context(progress_bar(total, label)))
+            bars[0].update(done - bars[0].pos)
+
+        yield progress
