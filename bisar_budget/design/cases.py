@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from bisar_budget.design.quantities import Choices, Number, QuestionError, Varied, choices_of, number_of
 from bisar_budget.faults import Fault, InvalidValueError, printable, shown
@@ -162,6 +162,66 @@ def grid(tree: dict[str, Any], texts: Sequence[str], name: str = "--vary") -> Gr
             )
         axes.append(_spread(asked, np.arange(count) / (count - 1)))
     return Grid(tuple(varied), tuple(axes))
+
+
+def grid_of(tree: dict[str, Any], values: Mapping[str, ArrayLike]) -> Grid:
+    """Every combination of values that are at hand as arrays; the last key is the fastest.
+
+    Parameters
+    ----------
+    tree : dict
+        What the mission file says, as text.
+    values : mapping
+        Of each key its values: (n,) numbers in SI, or words. Whether a key can have a number is seen when the case is
+        checked.
+
+    Raises
+    ------
+    QuestionError
+        No such key, no number or word for it, no value.
+    """
+    varied, arrays = _at_hand(tree, values)
+    return Grid(varied, arrays)
+
+
+def table_of(tree: dict[str, Any], values: Mapping[str, ArrayLike]) -> Table:
+    """Cases of which each takes one value of every array; arguments and faults are those of `grid_of`.
+
+    Raises
+    ------
+    QuestionError
+        Also where arrays differ in length.
+    """
+    varied, arrays = _at_hand(tree, values)
+    if len({array.size for array in arrays}) > 1:
+        raise QuestionError(f"{', '.join(values)}: differ in length; accepted: one value of each for every case")
+    return Table(varied, arrays)
+
+
+def _at_hand(tree: dict[str, Any], values: Mapping[str, ArrayLike]) -> tuple[tuple[Varied, ...], tuple[Values, ...]]:
+    varied: list[Varied] = []
+    arrays: list[Values] = []
+    for key, given in values.items():
+        array = np.asarray(given)
+        if array.ndim != 1 or not array.size:
+            raise QuestionError(f"{key}: has values of the shape {array.shape}; accepted: (n,), n at least 1")
+        if array.dtype.kind in "US":
+            words = [str(word) for word in array.tolist()]
+            choices = choices_of(tree, key, words[0])
+            if choices is None:
+                number_of(tree, key)  # says it of what is neither
+                raise QuestionError(f"{key}: has words; accepted: numbers in SI")
+            for word in dict.fromkeys(words):
+                if problem := _wrong_word(choices, word):
+                    raise QuestionError(f"{key}: {problem}")
+            varied.append(choices)
+            arrays.append(np.array([*words, None], object)[:-1])
+        else:
+            varied.append(number_of(tree, key))
+            arrays.append(array.astype(float))
+    if not varied:
+        raise QuestionError(f"no key: nothing would vary; {_FORMS}")
+    return tuple(varied), tuple(arrays)
 
 
 def sample(tree: dict[str, Any], texts: Sequence[str], how: str) -> Table:
