@@ -107,6 +107,7 @@ def _study(
         rows=rows,
         cases=cases.count,
         complying=sum(name != "error" and not STATUS[name].fails for name in statuses),
+        unevaluated=statuses.count("not_evaluated"),
         missing=statuses.count("error"),
         day=today,
         model=model,

@@ -200,7 +200,7 @@ class _Run:
     ) -> None:
         self.mission, self.cases, self.columns, self.model = mission, cases, columns, model
         self.day, self.jobs, self.kept = day, jobs, kept
-        self.done = self.by_case = self.complying = self.missing = 0
+        self.done = self.by_case = self.complying = self.unevaluated = self.missing = 0
 
     def swept(self, cases: "Cases", columns: Sequence[str]) -> "Swept":
         """Ask the engine."""
@@ -286,6 +286,7 @@ class _Run:
             for name in set(statuses):
                 times = statuses.count(name)
                 self.missing += times * (name == "error")
+                self.unevaluated += times * (name == "not_evaluated")
                 self.complying += times * (name != "error" and not STATUS[name].fails)
             self.done += part.stop - part.start
             self.by_case += part.by_case
@@ -321,6 +322,8 @@ class _Run:
         if self.done < self.cases.count:
             said[0] += f" of {self.cases.count}"
         said.append(f"{self.complying} comply ({_part(self.complying, self.done)})")
+        if self.unevaluated:
+            said.append(f"{self.unevaluated} of them not evaluated")
         if self.missing:
             said.append(f"{self.missing} without a mission")
         said.append(f"{_part(self.by_case, self.done)} checked one by one")
