@@ -10,7 +10,7 @@ the draws.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -113,6 +113,9 @@ def joined(tallies: Iterable[Tally], count: int) -> Counted:
             squares[index] += Fraction(tally.squares[index])
     means = [float(square / number) if number else math.nan for square, number in zip(squares, imaged, strict=True)]
     return Counted(holds, means, all_hold)
+
+
+Share = Callable[[Drawing], Iterable[tuple[Piece, Tally]]]  # gives every piece once, in any order
 
 
 def in_turn(drawing: Drawing) -> Iterator[tuple[Piece, Tally]]:

@@ -10,7 +10,7 @@ Vibration is not drawn: its amplitude is declared and its limits are those of ec
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from bisar_budget import phrases
@@ -23,7 +23,7 @@ from bisar_budget.effects.effect import PLATFORMS, ErrorSource, ImagePlane
 from bisar_budget.findings.monte_carlo import MonteCarlo, Requirement
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
 from bisar_budget.mission.symmetric import eigensystem
-from bisar_budget.monte_carlo.draws import Drawing, Piece, Tally, drawing_of, in_turn, joined
+from bisar_budget.monte_carlo.draws import Share, drawing_of, in_turn, joined
 from bisar_budget.monte_carlo.variables import Judged, Variable
 from bisar_budget.phrases import Note
 
@@ -44,7 +44,7 @@ def monte_carlo(
     analysis: Analysis,
     draws: int,
     seed: int | None = None,
-    share: Callable[[Drawing], Iterable[tuple[Piece, Tally]]] = in_turn,
+    share: Share | None = None,
 ) -> MonteCarlo:
     """Draw the declared errors of a mission and count how often each requirement holds.
 
@@ -57,7 +57,7 @@ def monte_carlo(
     seed : int, optional
         None: `simulation.seed` of the file. The same seed gives the same result.
     share : callable, optional
-        Gives every piece of the draws once, in any order; the result does not depend on how.
+        Makes the pieces of the draws; None: one after the other, here. The result does not depend on who makes them.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def monte_carlo(
     variables = list(_variables(analysis))
     judged = list(_requirements(mission, analysis.allocation, variables))
     drawing = drawing_of(analysis, variables, judged, draws, seed)
-    counted = joined((tally for _, tally in share(drawing)), len(judged))
+    counted = joined((tally for _, tally in (share or in_turn)(drawing)), len(judged))
     predictions = _Predictions(analysis, variables)
     requirements = tuple(
         _requirement(one, holds, mean_square, draws, predictions)
