@@ -75,7 +75,7 @@ class _Watched:
 
 def _seconds(drawing: "Drawing") -> float:
     """Measure how long all draws will take in one thread, by some of them."""
-    from bisar_budget.monte_carlo.draws import CHUNK, Drawer, Piece
+    from bisar_budget.monte_carlo.draws import Drawer, Piece
 
     drawer, tried = Drawer(drawing), _FEW
     drawer.tally(Piece(0, tried))  # it makes what the others find
@@ -83,6 +83,6 @@ def _seconds(drawing: "Drawing") -> float:
         began = perf_counter()
         drawer.tally(Piece(0, tried))
         seconds = perf_counter() - began
-        if seconds > _TRIAL or tried >= min(CHUNK, drawing.draws):
+        if seconds > _TRIAL or tried >= min(drawing.chunk, drawing.draws):
             return seconds * drawing.draws / tried
         tried *= 4

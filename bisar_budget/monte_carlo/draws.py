@@ -24,7 +24,7 @@ from bisar_budget.monte_carlo.variables import Floats, Judged, Variable
 # a few megabytes and stay in a cache.
 BLOCK = 1 << 15
 CHUNK = 1 << 22  # draws of one stream; a second or so
-EXACT_PIECE = 1 << 18  # of a chunk, where each draw goes through exact ranges: as long
+EXACT_PIECE = 1 << 18  # of a chunk, which it divides, where each draw goes through exact ranges: as long
 _SAMPLE = 512  # draws that decide whether exact ranges are needed
 _DIFFERENT = 0.01  # of a limit
 _AFTER_BYTES = 256
@@ -40,7 +40,7 @@ class Piece(NamedTuple):
 class Drawing(NamedTuple):
     """All that draws need, so that another process can make pieces of them; `name` is the mission's.
 
-    `is_exact` says that every draw goes through exact ranges.
+    `is_exact` says that every draw goes through exact ranges, `chunk` how many of them have one stream.
     """
 
     name: str
@@ -50,10 +50,11 @@ class Drawing(NamedTuple):
     draws: int
     seed: int
     is_exact: bool
+    chunk: int
 
     def pieces(self) -> Iterator[Piece]:
         """Cut the draws into pieces, always the same ones."""
-        size = EXACT_PIECE if self.is_exact else CHUNK
+        size = min(EXACT_PIECE, self.chunk) if self.is_exact else self.chunk
         for start in range(0, self.draws, size):
             yield Piece(start, min(start + size, self.draws))
 
@@ -88,7 +89,7 @@ def drawing_of(
 ) -> Drawing:
     """Prepare draws of all variables; a sample decides whether they need exact ranges."""
     paths, name = paths_of(analysis.exact), analysis.mission.name
-    drawing = Drawing(name, tuple(variables), tuple(judged), paths, draws, seed, is_exact=False)
+    drawing = Drawing(name, tuple(variables), tuple(judged), paths, draws, seed, False, CHUNK)
     is_exact = bool(variables and judged) and _needs_exact_ranges(drawing)
     drawn = tuple(variable for variable in variables if _counts(variable, judged, is_exact))
     return drawing._replace(variables=drawn, is_exact=is_exact)
@@ -162,9 +163,9 @@ class Drawer:
 
     def _go_to(self, start: int) -> None:
         """Have streams of the chunk at a draw."""
-        chunk = start // CHUNK
+        chunk = start // self._drawing.chunk
         if chunk != self._chunk or start < self._at:
-            self._chunk, self._at = chunk, chunk * CHUNK
+            self._chunk, self._at = chunk, chunk * self._drawing.chunk
             self._streams = [_Stream(variable, self._drawing.seed, chunk) for variable in self._drawing.variables]
         for stream in self._streams:
             stream.skip(start - self._at, self._buffer)

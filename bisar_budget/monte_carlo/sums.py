@@ -10,7 +10,7 @@ import numpy as np
 
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.effect import CLOCK_UNITS, PLATFORMS, ErrorSource
-from bisar_budget.effects.exact_arrays import ExactEffects, direct_path_clock, exact_effects
+from bisar_budget.effects.exact_arrays import TOGETHER, ExactEffects, column_effects, direct_path_clock, projection
 from bisar_budget.effects.exact_ranges import ExactRanges
 from bisar_budget.monte_carlo.variables import Floats, Judged, Variable
 
@@ -147,24 +147,30 @@ class Sums:
 
     def _by_exact_ranges(self, owners: tuple[str, ...]) -> ExactEffects:
         times, actual = self.paths.times, self.paths.tracks
-        powers = np.stack((np.ones_like(times), times, times**2 / 2))  # of (22)
-        motion = _sum(self.motion, owners, np.zeros((2, 3, 3, 1)))
-        clock = _sum(self.clock, owners, np.zeros((4, 1)))
-        clock_range = SPEED_OF_LIGHT * np.einsum("pd,pn->dn", clock, times ** np.arange(4)[:, None])
-        transmitter, receiver = (
-            track + np.einsum("kad,kn->dna", motion[platform], powers) for platform, track in enumerate(actual)
+        powers = np.stack((np.ones_like(times), times, times**2 / 2), axis=-1)  # of (22)
+        clock_powers = SPEED_OF_LIGHT * times[:, None] ** np.arange(4)
+        weights = projection(len(times))
+        motion = _sum(self.motion, owners, np.zeros((2, 3, 3, self.size)))
+        clock = _sum(self.clock, owners, np.zeros((4, self.size)))
+        found = ExactEffects(
+            np.empty((self.size, 2)), np.empty(self.size), np.empty(self.size), np.empty(self.size, dtype=bool)
         )
-        if self.paths.has_direct_path:
-            clock_range = direct_path_clock(transmitter, receiver, *actual)
-        found = exact_effects(transmitter, receiver, *actual, clock_range, self.paths.wavelength)
-        if found.quadratic.size == self.size:
-            return found
-        return ExactEffects(  # no such owner has an error: every draw is alike
-            np.broadcast_to(found.displacement, (self.size, 2)),
-            np.broadcast_to(found.quadratic, (self.size,)),
-            np.broadcast_to(found.cubic, (self.size,)),
-            np.broadcast_to(found.found, (self.size,)),
-        )
+        size = max(1, TOGETHER // len(times))
+        for start in range(0, self.size, size):
+            some = slice(start, start + size)
+            transmitter, receiver = (
+                track.T[:, :, None] + powers @ motion[platform][..., some].swapaxes(0, 1)
+                for platform, track in enumerate(actual)
+            )
+            clock_range = clock_powers @ clock[:, some]
+            if self.paths.has_direct_path:
+                clock_range = direct_path_clock(
+                    *(np.moveaxis(one, 0, -1) for one in (transmitter, receiver)), *(one[:, None] for one in actual)
+                )
+            part = column_effects((transmitter, receiver), actual, clock_range, weights, self.paths.wavelength)
+            for whole, value in zip(found, part, strict=True):
+                whole[some] = value
+        return found
 
 
 def _sum(parts: Mapping[str, Floats], owners: Sequence[str], nothing: Floats) -> Floats:
