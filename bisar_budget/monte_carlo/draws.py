@@ -12,6 +12,7 @@ the draws.
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from fractions import Fraction
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +29,7 @@ EXACT_PIECE = 1 << 18  # of a chunk, which it divides, where each draw goes thro
 _SAMPLE = 512  # draws that decide whether exact ranges are needed
 _DIFFERENT = 0.01  # of a limit
 _AFTER_BYTES = 256
+_WORTH_COMPILING = 1 << 30  # normal numbers; then Numba saves more seconds than it takes
 
 
 class Piece(NamedTuple):
@@ -133,6 +135,8 @@ class Drawer:
         self._drawing = drawing
         self._chunk, self._at = -1, 0
         self._streams: list[_Stream] = []
+        normal = sum(variable.distribution == "normal" for variable in drawing.variables)
+        self._fill_normal = _compiled() if drawing.draws * normal >= _WORTH_COMPILING else _fill_normal
         self._buffer = np.empty(BLOCK)
 
     def tally(self, piece: Piece) -> Tally:
@@ -166,7 +170,10 @@ class Drawer:
         chunk = start // self._drawing.chunk
         if chunk != self._chunk or start < self._at:
             self._chunk, self._at = chunk, chunk * self._drawing.chunk
-            self._streams = [_Stream(variable, self._drawing.seed, chunk) for variable in self._drawing.variables]
+            self._streams = [
+                _Stream(variable, self._drawing.seed, chunk, self._fill_normal)
+                for variable in self._drawing.variables
+            ]
         for stream in self._streams:
             stream.skip(start - self._at, self._buffer)
         self._at = start
@@ -198,6 +205,21 @@ def _needs_exact_ranges(drawing: Drawing) -> bool:
     return False
 
 
+def _fill_normal(generator: np.random.Generator, out: Floats) -> None:
+    generator.standard_normal(out=out)
+
+
+@cache
+def _compiled() -> Callable[[np.random.Generator, Floats], None]:
+    """The same, compiled where Numba is there and can keep what it compiles."""
+    try:
+        from bisar_budget.monte_carlo.compiled import fill_normal
+    except (ImportError, RuntimeError):
+        return _fill_normal
+    found: Callable[[np.random.Generator, Floats], None] = fill_normal
+    return found
+
+
 class _Stream:
     """Draws of a variable in a chunk. Each has a stream of its own, so that another error in the file changes none.
 
@@ -205,16 +227,22 @@ class _Stream:
     child is no byte of a name: those of one variable are not the streams of another with a longer name.
     """
 
-    def __init__(self, variable: Variable, seed: int, chunk: int = 0) -> None:
+    def __init__(
+        self,
+        variable: Variable,
+        seed: int,
+        chunk: int = 0,
+        fill_normal: Callable[[np.random.Generator, Floats], None] = _fill_normal,
+    ) -> None:
         child = (_AFTER_BYTES + chunk,) if chunk else ()
         self._bits = np.random.PCG64(np.random.SeedSequence([seed, *variable.id.encode()], spawn_key=child))
         self._generator = np.random.Generator(self._bits)
-        self._distribution = variable.distribution
+        self._distribution, self._fill_normal = variable.distribution, fill_normal
 
     def fill(self, out: Floats) -> None:
         """Draw into an array (draws,)."""
         if self._distribution == "normal":
-            self._generator.standard_normal(out=out)
+            self._fill_normal(self._generator, out)
             return
         self._generator.random(out=out)
         out -= 0.5
