@@ -1,6 +1,7 @@
 """Draws on the workers of a scheduler: the bytes of draws without one, whoever is lost, and clear words otherwise."""
 
 import os
+import pty
 import random
 import signal
 import subprocess
@@ -20,6 +21,7 @@ from bisar_budget.mission.load import load_mission
 from bisar_budget.monte_carlo import draws as drawing
 from bisar_budget.monte_carlo.draws import Drawing, in_turn, joined
 from bisar_budget.monte_carlo.probability import monte_carlo
+from tests.cli.test_sweep import read_all
 from tests.cluster.conftest import Cluster, wait_until
 from tests.cluster.test_scheduler import Client
 from tests.conftest import ROOT, heed_signals
@@ -118,6 +120,17 @@ def test_how_many_draws_one_machine_makes(run) -> None:
         "--monte-carlo 2,000,000,000: must be at most 1,000,000,000 draws; with --scheduler ADDRESS, whose workers "
         "share them, 1,000,000,000,000.\n"
     ) in found.stderr
+
+
+def test_a_terminal_has_a_bar() -> None:
+    master, slave = pty.openpty()
+    line = [sys.executable, "-m", "bisar_budget", "check", "-q", DRONES, "--monte-carlo", "1e5"]
+    with subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=slave) as process:
+        os.close(slave)
+        shown = read_all(lambda: os.read(master, 65536))
+        assert process.wait(timeout=120) == 1
+    os.close(master)
+    assert "Drawing errors" in shown
 
 
 def test_how_long_many_draws_take(run, monkeypatch: pytest.MonkeyPatch) -> None:
