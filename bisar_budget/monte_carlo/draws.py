@@ -55,9 +55,9 @@ class Drawing(NamedTuple):
     chunk: int
 
     def pieces(self) -> Iterator[Piece]:
-        """Cut the draws into pieces, always the same ones."""
+        """Cut the draws into pieces, always the same ones; none where they are held to nothing."""
         size = min(EXACT_PIECE, self.chunk) if self.is_exact else self.chunk
-        for start in range(0, self.draws, size):
+        for start in range(0, self.draws if self.judged else 0, size):
             yield Piece(start, min(start + size, self.draws))
 
 
