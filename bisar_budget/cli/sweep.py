@@ -52,7 +52,7 @@ _PLOTS, _TABLES = (".svg", ".png", ".pdf"), (".csv", ".parquet", ".nc")
     multiple=True,
     metavar="KEY=FROM:TO UNIT:COUNT",
     help="Values of a key, such as platforms.receiver.azimuth=0:180deg:181; with :log behind it in equal ratios. Or "
-    "a list, KEY=1,2,5 s. Repeatable: every combination is a case.",
+    "a list, KEY=1,2,5 s, also of words: allocation.model=published,full. Repeatable: every combination is a case.",
 )
 @click.option(
     "--cases",
@@ -117,7 +117,7 @@ def sweep(
     is_resumed: bool,
     force: bool,
 ) -> None:
-    """Check a mission for many values of its numbers: a table with one line for each case.
+    """Check a mission for many values of its keys: a table with one line for each case.
 
     It has what varied, resolutions, angles, the status, the worst row, its utilization, and the requirement that
     binds. Cases for which there is no mission, such as a platform below the ground, have the status error and a
@@ -301,7 +301,7 @@ class _Run:
 
         trade = gathered.trade(is_polar=is_polar)
         uses = {}
-        if len(trade.axes) == 1 and trade.column is None:
+        if len(trade.axes) == 1 and not trade.column:
             names = {f"{row}.utilization": row for row in rows_that_matter(trade)}
             swept = self.swept(self.cases, tuple(names))
             again = Gathered(Described(swept, self.cases, self.mission, __version__), tuple(names))
