@@ -248,7 +248,7 @@ def check(
     if seed is not None and draws is None and given("seed") is ParameterSource.COMMANDLINE:
         raise click.UsageError("--seed needs --monte-carlo N.")
     if draws is not None or scheduler is not None:
-        from bisar_budget.cli.drawing import check_draws
+        from bisar_budget.cli.draws import check_draws
 
         check_draws(draws, scheduler)
     if explain is not None:
@@ -281,7 +281,7 @@ def check(
         deliver(joined(format_name, pieces, __version__, style), output, format_name)
         statuses = {piece.status for piece in pieces}
     else:
-        from bisar_budget.cli.drawing import drawn_by
+        from bisar_budget.cli.draws import drawn_by
 
         with drawn_by(scheduler, draws, seed, len(files)) as drawn:
             report = check_all(files, day, model, verifying, illustrated, drawn, changes)
