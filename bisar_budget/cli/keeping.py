@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from bisar_budget.design.swept import Swept
     from bisar_budget.mission.model import Mission
 
+LONG = 60.0  # s; what takes longer is announced
 _MOMENT = 1.0  # s
 
 
@@ -114,6 +115,14 @@ def keeping(output: str | None, scheduler: str | None, is_resumed: bool, jobs: i
         return
     with connected(scheduler, complain) as workers:
         yield Keeping(output, is_resumed, jobs, workers)
+
+
+def lasting(seconds: float) -> str:
+    """Say how long something takes."""
+    for unit, size in (("years", 365.25 * 86400), ("days", 86400), ("hours", 3600), ("minutes", 60)):
+        if seconds >= 2 * size:
+            return f"{seconds / size:.0f} {unit}"
+    return f"{max(seconds, 1):.0f} s"
 
 
 def progress_bar(total: int, label: str) -> "ProgressBar[int]":

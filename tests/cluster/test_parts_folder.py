@@ -139,9 +139,10 @@ def test_workers_start_beside_another_scheduler_of_dask(run, tmp_path) -> None:
     """A second one on a machine ended with: Port 8787 is already in use."""
     pytest.importorskip("distributed")
     output = tmp_path / "trade.csv"
-    with socket.socket() as taken, suppress(OSError):  # somebody else may have it
-        taken.bind(("", 8787))
-        taken.listen()
+    with socket.socket() as taken:
+        with suppress(OSError):  # somebody else may have it
+            taken.bind(("", 8787))
+            taken.listen()
         few = ("--vary", "collection.aperture_time=1:5s:3")
         assert run("sweep", SECTION_V, *few, "-o", str(output), "--scheduler", "local:1").exit_code == 0
     assert output.exists()
