@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import click
 
 from bisar_budget.cli.streams import complain
+from bisar_budget.faults import printable
 
 if TYPE_CHECKING:
     from click._termui_impl import ProgressBar
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from bisar_budget.design.cases import Cases
     from bisar_budget.design.sweep import Asked, Chunks
     from bisar_budget.design.swept import Swept
+    from bisar_budget.design.watched import Watch
     from bisar_budget.mission.model import Mission
 
 
@@ -108,6 +110,22 @@ def keeping(output: str | None, scheduler: str | None, is_resumed: bool, jobs: i
         return
     with connected(scheduler, complain) as workers:
         yield Keeping(output, is_resumed, jobs, workers)
+
+
+@contextmanager
+def watching(mission: "Mission") -> "Iterator[Watch]":
+    """Say of a question about a mission how long it will take if that is long, and show where it is."""
+    from bisar_budget.cli.verify import foretell
+    from bisar_budget.design.watched import Watch
+
+    with progress_bar(1, "Checking values") as bar:
+
+        def foreseen(seconds: float, count: int) -> None:
+            bar.length = count
+            doing = f"Checking {printable(mission.name)} for {count} values or more"
+            foretell(seconds, doing, "fewer declared errors and --model published take less")
+
+        yield Watch(foreseen, bar.update)
 
 
 def progress_bar(total: int, label: str) -> "ProgressBar[int]":

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from bisar_budget import __version__
+from bisar_budget.cli.keeping import watching
 from bisar_budget.cli.streams import (
     DATE,
     FILE,
@@ -71,7 +72,8 @@ def sensitivity(
     found = []
     for mission in load_all(files, model, changes):
         try:
-            found.append(asking.sensitivity(mission, row=row, model=model, today=day))
+            with watching(mission) as watch:
+                found.append(asking.sensitivity(mission, row=row, model=model, today=day, watch=watch))
         except QuestionError as error:
             fail(f"{mission.file}: {error}")
     if plot is not None:

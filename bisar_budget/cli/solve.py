@@ -3,11 +3,12 @@
 import sys
 from collections.abc import Sequence
 from datetime import datetime
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from bisar_budget import __version__
+from bisar_budget.cli.keeping import watching
 from bisar_budget.cli.streams import (
     DATE,
     EXIT_BROKEN,
@@ -108,16 +109,9 @@ def solve(
             if is_of_parts:
                 found = compare.compare_parts(mission, key, row=row, target=target, model=model, today=day)
             else:
-                found = solving.solve(
-                    mission,
-                    key,
-                    between=between,
-                    row=row,
-                    target=target,
-                    model=model,
-                    is_scale=is_scale,
-                    today=day,
-                )
+                asked: dict[str, Any] = {"between": between, "target": target, "is_scale": is_scale}
+                with watching(mission) as watch:
+                    found = solving.solve(mission, key, **asked, row=row, model=model, today=day, watch=watch)
         except QuestionError as error:
             fail(f"{mission.file}: {error}")
         solved.append(_imaged(mission, found, model) if is_imaged else found)

@@ -179,9 +179,13 @@ def _cases(mission: "Mission", varied: Sequence[str], cases_file: str | None, sa
         return cases.grid(tree, varied) if sample is None else cases.sample(tree, varied, sample)
     try:
         with open(cases_file, encoding="utf-8", newline="") as file:
-            text = file.read()
+            text = file.read(cases.LARGEST_TABLE + 1)
     except (OSError, ValueError) as error:  # ValueError: not UTF-8, a NUL in the name
         fail(f"{cases_file}: cannot be read: {getattr(error, 'strerror', None) or error}")
+    if len(text) > cases.LARGEST_TABLE:
+        fail(
+            f"{cases_file}: is larger than {cases.LARGEST_TABLE >> 20} MiB; accepted: up to {cases.MAX_VALUES} values"
+        )
     return cases.table(tree, text, cases_file)
 
 

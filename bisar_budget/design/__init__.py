@@ -13,4 +13,5 @@ __all__ = [
     "solve",
     "sweep",
     "swept",
+    "watched",
 ]

@@ -12,6 +12,7 @@ from bisar_budget.design.scaled import scaled
 from bisar_budget.design.slopes import Sensitivity, Slope
 from bisar_budget.design.stated import Skipped, Stated, stated_numbers
 from bisar_budget.design.variation import Variation, deciding_row, hold_to_decisions
+from bisar_budget.design.watched import Watch, watched
 from bisar_budget.faults import MissionError
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.model import Mission
@@ -20,7 +21,14 @@ _BREAKS = ("fail",)
 _NOTHING = 1e-9  # of a utilization: what rounding leaves of a check
 
 
-def sensitivity(mission: Mission, *, row: str | None = None, model: str | None = None, today: date) -> Sensitivity:
+def sensitivity(
+    mission: Mission,
+    *,
+    row: str | None = None,
+    model: str | None = None,
+    today: date,
+    watch: Watch | None = None,
+) -> Sensitivity:
     """Find what each number that a mission file states does to the worst utilization.
 
     Each number is changed by itself, to both sides, and the mission is checked anew: no effect is left out. Numbers
@@ -37,6 +45,8 @@ def sensitivity(mission: Mission, *, row: str | None = None, model: str | None =
         Gating model in place of the mission's own.
     today : date
         Day on which waivers are judged, UTC.
+    watch : Watch, optional
+        Who waits for it.
 
     Returns
     -------
@@ -59,7 +69,7 @@ def sensitivity(mission: Mission, *, row: str | None = None, model: str | None =
     nearest = min(geometry.transmitter.slant_range, geometry.receiver.slant_range)
     numbers, skipped = stated_numbers(tree_of(variation.mission), nearest)
     slopes, unchanging = [], []
-    for number in numbers:
+    for number in watched(numbers, watch):
         slope = _Differences(variation, base, number, row, today).slope(at_file)
         if isinstance(slope, Skipped):
             skipped.append(slope)

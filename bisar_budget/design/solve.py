@@ -15,6 +15,7 @@ from bisar_budget.design.quantities import FACTOR, Number, QuestionError, Range,
 from bisar_budget.design.scaled import scaled
 from bisar_budget.design.solution import Crossing, Solution, State
 from bisar_budget.design.variation import Variation, breaking, hold_to_decisions, standing
+from bisar_budget.design.watched import Watch, watched
 from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.mission.model import Mission
@@ -40,6 +41,7 @@ def solve(
     model: str | None = None,
     is_scale: bool = False,
     today: date,
+    watch: Watch | None = None,
 ) -> Solution:
     """Find every value of a number of a mission at which its compliance begins or ends.
 
@@ -62,6 +64,8 @@ def solve(
         Solve for the factor that multiplies all errors below the key.
     today : date
         Day on which waivers are judged, UTC.
+    watch : Watch, optional
+        Who waits for it.
 
     Returns
     -------
@@ -74,7 +78,7 @@ def solve(
         The question cannot be asked of this mission; says why.
     """
     question = _Question(mission, key, between, row, target, model, is_scale, today)
-    scanned = _scan(question.evaluate, question.places())
+    scanned = _scan(question.evaluate, question.places(), watch)
     crossings = tuple(
         question.crossing(low, high) for low, high in pairwise(scanned) if low.complies != high.complies
     )
@@ -207,9 +211,9 @@ class _Question:
         return {value: self.number.text(value) for value in values}
 
 
-def _scan(evaluate: Evaluate, places: Sequence[float]) -> list[State]:
+def _scan(evaluate: Evaluate, places: Sequence[float], watch: Watch | None = None) -> list[State]:
     """Look at every place, and where the utilization turns without a change of compliance, at the turn."""
-    states = [evaluate(place) for place in places]
+    states = [evaluate(place) for place in watched(places, watch)]
     found = list(states)
     turns = 0
     for before, here, after in zip(states, states[1:], states[2:], strict=False):
