@@ -177,6 +177,14 @@ class _Draws(ParamType[int]):
     help="Draw on the workers of a Dask scheduler, tcp://HOST:PORT, or on local:N processes of its own. The result "
     "is the same.",
 )
+@click.option(
+    "--sweep",
+    "swept",
+    multiple=True,
+    metavar="KEY=VALUES",
+    help="For html and markdown: also check other values, written as for sweep --vary, and draw what complies: one "
+    "key as curves, two as a map.",
+)
 @click.option("-q", "--quiet", is_flag=True, help="One line per mission.")
 @click.option("--all", "all_rows", is_flag=True, help="Show every row, also those that are not declared.")
 @click.option(
@@ -214,6 +222,7 @@ def check(
     draws: int | None,
     seed: int | None,
     scheduler: str | None,
+    swept: Sequence[str],
     quiet: bool,
     all_rows: bool,
     verbose: bool,
@@ -239,17 +248,22 @@ def check(
     if seed is not None and draws is None and given("seed") is ParameterSource.COMMANDLINE:
         raise click.UsageError("--seed needs --monte-carlo N.")
     if draws is not None or scheduler is not None:
-        from bisar_budget.cli.drawing import check_draws
+        from bisar_budget.cli.draws import check_draws
 
         check_draws(draws, scheduler)
     if explain is not None:
-        excluded = ("format_name", "reports", "draws", "scheduler")
+        excluded = ("format_name", "reports", "draws", "scheduler", "swept")
         if any(given(name) is ParameterSource.COMMANDLINE for name in excluded):
             raise click.UsageError(
-                "--explain writes text; it cannot be combined with --format, --report, --monte-carlo or --scheduler."
+                "--explain writes text; it cannot be combined with --format, --report, --monte-carlo, --scheduler or "
+                "--sweep."
             )
         _explain(files, explain, today.date() if today else day_of_run(), model, output, changes)
         return
+    if swept:
+        from bisar_budget.cli.studies import check_options
+
+        check_options(swept, [format_name, *(name for _, name in written)])
     illustrated = any(FORMATS[name].is_illustrated for name in (format_name, *(name for _, name in written)))
     day = today.date() if today else day_of_run()
     use_color = color == "always" or (color == "auto" and output is None and wants_color())
@@ -267,11 +281,15 @@ def check(
         deliver(joined(format_name, pieces, __version__, style), output, format_name)
         statuses = {piece.status for piece in pieces}
     else:
-        from bisar_budget.cli.drawing import drawn_by
+        from bisar_budget.cli.draws import drawn_by
 
         with drawn_by(scheduler, draws, seed, len(files)) as drawn:
             report = check_all(files, day, model, verifying, illustrated, drawn, changes)
         judged_on = _given_day(today) or (day if _has_waivers(report.missions) else None)
+        if swept:
+            from bisar_budget.cli.studies import with_studies
+
+            report = report._replace(missions=tuple(with_studies(report.missions, swept, model, day)))
         report = report._replace(options=tuple(_options(judged_on)), day=judged_on)
         if says_faults:
             _say_faults(report.missions)
@@ -318,6 +336,9 @@ def _options(judged_on: date | None) -> "Iterator[Option]":
         elif name == "changes":
             if value:
                 yield Option("--set", ", ".join(f"{change.key}={change.text}" for change in value), origin)
+        elif name == "swept":
+            if value:
+                yield Option("--sweep", ", ".join(value), origin)
         elif name == "draws":
             yield Option("--monte-carlo", "no" if value is None else f"{value:,} draws", origin)
         elif name == "seed" and context.params["draws"] is not None:

@@ -52,7 +52,7 @@ _PLOTS, _TABLES = (".svg", ".png", ".pdf"), (".csv", ".parquet", ".nc")
     multiple=True,
     metavar="KEY=FROM:TO UNIT:COUNT",
     help="Values of a key, such as platforms.receiver.azimuth=0:180deg:181; with :log behind it in equal ratios. Or "
-    "a list, KEY=1,2,5 s. Repeatable: every combination is a case.",
+    "a list, KEY=1,2,5 s, also of words: allocation.model=published,full. Repeatable: every combination is a case.",
 )
 @click.option(
     "--cases",
@@ -117,7 +117,7 @@ def sweep(
     is_resumed: bool,
     force: bool,
 ) -> None:
-    """Check a mission for many values of its numbers: a table with one line for each case.
+    """Check a mission for many values of its keys: a table with one line for each case.
 
     It has what varied, resolutions, angles, the status, the worst row, its utilization, and the requirement that
     binds. Cases for which there is no mission, such as a platform below the ground, have the status error and a
@@ -199,7 +199,7 @@ class _Run:
     ) -> None:
         self.mission, self.cases, self.columns, self.model = mission, cases, columns, model
         self.day, self.jobs, self.kept = day, jobs, kept
-        self.done = self.by_case = self.complying = self.missing = 0
+        self.done = self.by_case = self.complying = self.unevaluated = self.missing = 0
 
     def swept(self, cases: "Cases", columns: Sequence[str]) -> "Swept":
         """Ask the engine."""
@@ -285,6 +285,7 @@ class _Run:
             for name in set(statuses):
                 times = statuses.count(name)
                 self.missing += times * (name == "error")
+                self.unevaluated += times * (name == "not_evaluated")
                 self.complying += times * (name != "error" and not STATUS[name].fails)
             self.done += part.stop - part.start
             self.by_case += part.by_case
@@ -301,7 +302,7 @@ class _Run:
 
         trade = gathered.trade(is_polar=is_polar)
         uses = {}
-        if len(trade.axes) == 1 and trade.column is None:
+        if len(trade.axes) == 1 and not trade.column:
             names = {f"{row}.utilization": row for row in rows_that_matter(trade)}
             swept = self.swept(self.cases, tuple(names))
             again = Gathered(Described(swept, self.cases, self.mission, __version__), tuple(names))
@@ -320,6 +321,8 @@ class _Run:
         if self.done < self.cases.count:
             said[0] += f" of {self.cases.count}"
         said.append(f"{self.complying} comply ({_part(self.complying, self.done)})")
+        if self.unevaluated:
+            said.append(f"{self.unevaluated} of them not evaluated")
         if self.missing:
             said.append(f"{self.missing} without a mission")
         said.append(f"{_part(self.by_case, self.done)} checked one by one")
