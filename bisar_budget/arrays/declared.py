@@ -8,7 +8,7 @@ import numpy as np
 
 from bisar_budget import evaluators
 from bisar_budget.arrays.collections import Floats, Geometries, Vectors, angle_between_lines
-from bisar_budget.arrays.followed import Held, ManyPointPaths, Places
+from bisar_budget.arrays.followed import Held, ManyPointPaths, Places, Truths
 from bisar_budget.arrays.located import Course, Effects, ManyExactRanges
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, ROUNDING, SPEED_OF_LIGHT
 from bisar_budget.effects import models
@@ -73,12 +73,13 @@ class DeclaredErrors:
         self.mission, self.cases, self.geometries, self.shown = mission, cases, geometries, shown
         self.is_left_out = np.zeros(cases, dtype=bool)
         wavelength, T = mission.radar.wavelength, mission.collection.aperture_time
-        self.exact = ManyExactRanges(geometries, wavelength, T, nodes, cases)
+        self.exact = ManyExactRanges.of(geometries, wavelength, T, nodes, cases)
         self.plane = self._published_plane()
         self._limits_of_size()
         self.listed = list(self._errors())
         self.stated = [error for error in self.listed if error.declared is not None and not error.is_shown_again]
         self._known: dict[tuple[str, str], Does] = {}
+        self._quadratics: dict[str, Floats] = {}
         self._paths: dict[tuple[str, float], ManyPointPaths] = {}
 
     def array(self, value: Any) -> Floats:
@@ -122,7 +123,7 @@ class DeclaredErrors:
                 if values is None and not any(asked) and not common and not is_terrain:
                     continue
                 published = [Effects._make(row) for row in rows[3 * index : 3 * index + 3]]
-                powers = self.exact.powers(unit)
+                powers = self.exact.powers[unit]
                 full = [self.exact.effect(self.exact.along(place, axis) * powers) for axis in _AXES]
                 legs[place, kind] = (published, full)
                 if is_terrain:
@@ -256,19 +257,27 @@ class DeclaredErrors:
         found = Does(qpe, cubic, (east, north), (-east, -north))
         if model == "published":
             return found
-        is_large = np.zeros(self.cases, dtype=bool)
+        some = np.flatnonzero(self.is_large(error))
+        if some.size:
+            self._exactly(error, found, size[some], some)
+        return found
+
+    def is_large(self, error: ManyErrors) -> Truths:
+        """In which cases effects of a declared error are not proportional to its size; as `is_small`, negated."""
+        size, found = np.abs(self.array(error.declared)), np.zeros(self.cases, dtype=bool)
         for requirement, floor in (
             (QUADRATIC, models.FLOOR_RAD),
             (CUBIC, models.FLOOR_RAD),
             (LOCATION, models.FLOOR_M),
         ):
-            of_it = self.per_unit(model, error, requirement) * np.abs(size)
-            adds = self.adds(error, np.abs(size), requirement)
-            is_large |= adds > np.maximum(floor, models.SHARE * of_it)
-        some = np.flatnonzero(is_large & (size != 0))
-        if some.size:
-            self._exactly(error, found, size[some], some)
-        return found
+            of_it = self.per_unit("full", error, requirement) * size
+            found |= self.adds(error, size, requirement) > np.maximum(floor, models.SHARE * of_it)
+        return np.asarray(found & (size != 0))
+
+    def quadratic_by_sign(self, error: ManyErrors) -> Floats:
+        """Quadratic phases of a declared error of each sign, positive first, where it is large, (2, cases). [rad]"""
+        self.does("full", error)
+        return self._quadratics[error.subject.id]
 
     def _exactly(self, error: ManyErrors, found: Does, size: Floats, some: Places) -> None:
         """Put what exact ranges say into the cases that are too large for a first order."""
@@ -278,6 +287,8 @@ class DeclaredErrors:
             path.to(some, np.abs(size))
             by_sign.append(path.known(some, np.abs(size)))
             self.is_left_out[some[np.isnan(by_sign[-1][0])]] = True
+        kept = self._quadratics.setdefault(error.subject.id, np.full((2, self.cases), math.nan))
+        kept[:, some] = by_sign[0][3], by_sign[1][3]
         ahead, back = np.where(size > 0, by_sign, by_sign[::-1])
         for kept, row in ((found.qpe, 3), (found.cubic, 4)):
             kept[some] = np.copysign(np.maximum(np.abs(ahead[row]), np.abs(back[row])), kept[some])
@@ -288,16 +299,16 @@ class DeclaredErrors:
         """The ways of the point by an error with one sign, which all that asks for them shares."""
         key = (error.subject.id, sign)
         if key not in self._paths:
-            if error.moves:
-                course = Course(
-                    self.exact.powers(error.unit), error.moves, error.direction, is_velocity=error.unit == "m/s"
-                )
-            else:
-                power = list(CLOCK_UNITS.values()).index(error.unit)
-                course = Course(SPEED_OF_LIGHT * self.exact.times**power)
             per_unit = np.array([self.array(part) for part in self.exact.displacement(error.full, 1.0)])
-            self._paths[key] = ManyPointPaths(self.exact, course, sign, per_unit, self.is_left_out)
+            self._paths[key] = ManyPointPaths(self.exact, self.course(error), sign, per_unit, self.is_left_out)
         return self._paths[key]
+
+    def course(self, error: ManyErrors) -> Course:
+        """A unit of an error at the nodes."""
+        if error.moves:
+            return Course(self.exact.powers[error.unit], error.unit, error.moves, error.direction)
+        power = list(CLOCK_UNITS.values()).index(error.unit)
+        return Course(SPEED_OF_LIGHT * self.exact.times**power, error.unit)
 
     def forget(self, error: ManyErrors) -> None:
         """Let go of the ways by an error that nobody will ask for again: they are large."""

@@ -26,7 +26,6 @@ def not_held(mission: Mission, keys: Sequence[str]) -> str:
     reasons = {
         "sensors and clocks": has_instruments(mission),
         "covariance": any(error.covariance is not None for error in errors),
-        "scene.radius": mission.scene.radius is not None or "scene.radius" in keys,
         "allocation.split": any(key.startswith("allocation.split") for key in keys),
     }
     on_earth = flies_on_earth(mission)
@@ -53,6 +52,7 @@ _PLAIN = {
     "radar.center_frequency",
     "radar.bandwidth",
     "collection.aperture_time",
+    "scene.radius",
     "scene.height_error",
     *(f"timing_error.{term}" for term in CLOCK_UNITS),
     "requirements.quadratic_phase_error",

@@ -7,6 +7,7 @@ declared error leaves no image, a search takes very many steps), the case is lef
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import date
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +17,16 @@ from bisar_budget import evaluators
 from bisar_budget.analysis.allocation import BALANCED_RANGE, EQUAL, Allocation, Split, allocate
 from bisar_budget.arrays.collections import Floats, Geometries, norm
 from bisar_budget.arrays.declared import DeclaredErrors, ManyErrors
+from bisar_budget.arrays.edge import HeldTogether, ManySceneEdges, many_scene_edges
+from bisar_budget.arrays.rim import ManyScenePhases
 from bisar_budget.arrays.rows import REQUIREMENTS, Judged
+from bisar_budget.arrays.together import (
+    Phases,
+    combined_displacement,
+    combined_phase,
+    largest_signed_sum,
+    many_correlated,
+)
 from bisar_budget.arrays.vibrating import judged_vibrations, many_slow_phases
 from bisar_budget.budget.orbit import FASTEST_FLIGHT
 from bisar_budget.budget.required import missing_declarations
@@ -87,6 +97,7 @@ class _Check:
         self.slow = many_slow_phases(errors.cases, one) if has_lines else []
         self.errors, self.mission, self.cases, self.today = errors, errors.mission, errors.cases, today
         self.array, self.does, self.combine = errors.array, errors.does, errors.mission.allocation.combine
+        self.groups = many_correlated(errors.mission)
 
     # ---------------------------------------------------------------- limits
     def _allowed(self, model: str, error: ManyErrors, limit: Floats) -> tuple[Floats, NDArray[np.int8]]:
@@ -151,21 +162,16 @@ class _Check:
                 if EQUAL.includes(error.subject.owner, owner):
                     phases = np.array([self.does(model, error).qpe for model in by])
                     largest = np.abs(phases).argmax(axis=0)
-                    members.append(np.take_along_axis(phases, largest[None], axis=0)[0])
-            members += [one.qpe for one in self.slow if one.owner == owner]
+                    members.append((error.subject.id, np.take_along_axis(phases, largest[None], axis=0)[0]))
+            members += [(one.row_id, one.qpe) for one in self.slow if one.owner == owner]
             weight.append(np.minimum(self._combined(members), 1e300))
         with np.errstate(all="ignore"):
             share: Any = np.where(sum(weight) == 0, 0.5, np.clip(weight[0] / sum(weight), *BALANCED_RANGE))
         return Split(transmitter=share, receiver=1 - share)
 
-    def _combined(self, phases: Sequence[Floats], rule: str = "") -> Floats:
+    def _combined(self, phases: Phases, rule: str = "") -> Floats:
         """Combine phases by the mission's rule, or another."""
-        if not phases:
-            return np.zeros(self.cases)
-        sizes, rule = np.abs(np.array(phases)), rule or self.combine
-        if rule == "each":
-            return np.asarray(sizes.max(axis=0))
-        return np.asarray(sizes.sum(axis=0) if rule == "sum" else np.sqrt((sizes**2).sum(axis=0)))
+        return self.array(combined_phase(phases, rule or self.combine, self.groups))
 
     # ---------------------------------------------------------------- rows
     def checked(self) -> Checked:
@@ -200,6 +206,8 @@ class _Check:
         rows += [self._cubic(gating, other), self._location(gating, other)]
         if self.mission.autofocus.n_pull is not None:
             rows.append(self._pull_in(gating, other))
+        if self.mission.scene.radius is not None:
+            rows.append(self._spatial_variance(gating))
         return rows
 
     @property
@@ -220,11 +228,12 @@ class _Check:
 
         return judged_vibrations(np.flatnonzero(~self.errors.is_left_out), self.cases, of_case, gating)
 
-    def _limit(self, owner: str) -> Floats:
-        return self.array(self.split.of(owner) * self.total)
+    def _held(self, owner: str) -> Floats:
+        """Quadratic phase that an owner is held to, gain of autofocus included. [rad]"""
+        return self.array(self.split.of(owner) * self.total) * self.gain
 
     def _row(self, gating: str, other: str, error: ManyErrors) -> Judged:
-        limit = self._limit(error.subject.owner) * self.gain
+        limit = self._held(error.subject.owner)
         allowable, binding = self._allowed(gating, error, limit)
         if other == "full" and not self.is_brief and self.mission.gating_model != "published":
             self._allowed(other, error, limit)  # a whole check asks for it here, and a later search starts from it
@@ -292,27 +301,34 @@ class _Check:
         return Judged(what, status, declared, allowed, use, unknown, none, none, never_fails)
 
     def _members(self, owner: str) -> list[ManyErrors]:
-        return [
-            error
-            for error in self.errors.stated
-            if owner == "mission" or self.split.includes(error.subject.owner, owner)
-        ]
+        return [error for error in self.errors.stated if self._is_owed(error, owner)]
 
-    def _counts(self, members: Sequence[ManyErrors], own: Sequence[Floats]) -> bool:
+    def _is_owed(self, error: ManyErrors, owner: str) -> bool:
+        """Whether an error counts against the share of an owner; against the mission's all do."""
+        return owner == "mission" or self.split.includes(error.subject.owner, owner)
+
+    def _counts(self, members: Sequence[ManyErrors], own: Phases) -> bool:
         """Whether anything is declared that counts; cases in which vibrations alone may, or may not, are left out."""
         if own and not members:
             self.errors.is_left_out[:] = True
         return bool(members)
 
-    def _phases(self, model: str, errors: Sequence[ManyErrors], *, is_cubic: bool = False) -> list[Floats]:
-        return [self.does(model, error).cubic if is_cubic else self.does(model, error).qpe for error in errors]
+    def _phases(
+        self, model: str, errors: Sequence[ManyErrors], *, is_cubic: bool = False
+    ) -> list[tuple[str, Floats]]:
+        does = [(error.subject.id, self.does(model, error)) for error in errors]
+        return [(row_id, one.cubic if is_cubic else one.qpe) for row_id, one in does]
 
     def _sums(self, gating: str, other: str) -> Iterator[Judged]:
         owners = ["transmitter", "receiver", *(["clock"] if self.split.clock is not None else []), "mission"]
         for owner in owners:
             members, what = self._members(owner), subject(owner, QUADRATIC)
-            limit = self._limit(owner) * self.gain
-            own = [one.qpe for one in self.slow if owner == "mission" or self.split.includes(one.owner, owner)]
+            limit = self._held(owner)
+            own = [
+                (one.row_id, one.qpe)
+                for one in self.slow
+                if owner == "mission" or self.split.includes(one.owner, owner)
+            ]
             if not self._counts(members, own):
                 yield self._judged(what, None, limit)
                 continue
@@ -323,7 +339,7 @@ class _Check:
 
     def _all_together(self, gating: str) -> Iterator[Judged]:
         """A warning where each error stands alone and all together exceed the total; else there is no row."""
-        own = [one.qpe for one in self.slow]
+        own = [(one.row_id, one.qpe) for one in self.slow]
         if not self._counts(self.errors.stated, own):
             return
         phases = [*self._phases(gating, self.errors.stated), *own]
@@ -337,7 +353,7 @@ class _Check:
     def _cubic(self, gating: str, other: str) -> Judged:
         motion, what = [error for error in self.errors.stated if error.is_motion], subject("mission", CUBIC)
         limit = self.mission.requirements.cubic_phase_error
-        own = [one.cubic for one in self.slow]
+        own = [(one.row_id, one.cubic) for one in self.slow]
         if not self._counts(motion, own):
             return self._judged(what, None, None if limit is None else self.array(limit))
         phases = [*self._phases(gating, motion, is_cubic=True), *own]
@@ -364,10 +380,10 @@ class _Check:
 
     def _moved(self, model: str, motion: Sequence[ManyErrors], rule: str) -> Floats:
         """Displacements combined by a rule. [m]"""
-        found = [self.does(model, error) for error in motion]
         if rule != "sum":
-            lengths = np.array([np.hypot(*one.farthest) for one in found])
-            return np.asarray(lengths.max(axis=0) if rule == "each" else np.sqrt((lengths**2).sum(axis=0)))
+            moves = {error.subject.id: self.does(model, error).farthest for error in motion}
+            return self.array(combined_displacement(moves, rule, self.groups))
+        found = [self.does(model, error) for error in motion]
         parts = np.array(
             [
                 [(ahead - back) / 2 for ahead, back in zip(one.displacement, one.opposite, strict=True)]
@@ -378,16 +394,47 @@ class _Check:
             np.array([(ahead + back) / 2 for ahead, back in zip(one.displacement, one.opposite, strict=True)])
             for one in found
         )
-        return _largest_signed_sum(np.concatenate((parts, np.asarray(rest)[None])))
+        return largest_signed_sum(np.concatenate((parts, np.asarray(rest)[None])))
 
     def _pull_in(self, gating: str, other: str) -> Judged:
         what, pull_in = subject("mission", "autofocus_pull_in"), math.pi * self.array(self.mission.autofocus.n_pull)
-        own = [one.qpe for one in self.slow]
+        own = [(one.row_id, one.qpe) for one in self.slow]
         if not self._counts(self.errors.stated, own):
             return self._judged(what, None, pull_in, never_fails=True)
         phases = ([*self._phases(model, self.errors.stated), *own] for model in (gating, other))
         total, by_other = (self._combined(of, "sum") for of in phases)
         return self._judged(what, total, pull_in, doubt=by_other > pull_in * _BOUND, never_fails=True)
+
+    @cached_property
+    def _edges(self) -> ManySceneEdges | None:
+        """What the edges of the scenes add; none without a declared error."""
+        phases = ManyScenePhases(self.errors)
+        if not phases.members:
+            return None
+        if self.combine == "each":
+            held = [HeldTogether([i], self._held(error.subject.owner)) for i, error in enumerate(phases.members)]
+        else:
+            held = [
+                HeldTogether([i for i, error in enumerate(phases.members) if self._is_owed(error, owner)], limit)
+                for owner in (*PLATFORMS, "clock", "mission")
+                for limit in [self._held(owner)]
+            ]
+        return many_scene_edges(phases, held)
+
+    def _spatial_variance(self, gating: str) -> Judged:
+        """Row of the scene's edge; to the published model an error is the same all over the scene."""
+        what, edges = subject("mission", "spatial_variance"), self._edges
+        allowable = None if gating == "published" else self.total
+        if edges is None:
+            return self._judged(what, None, allowable)
+        doubt = edges.has_doubt
+        if gating == "published":
+            doubt = doubt | (edges.difference > self.total * _BOUND)
+        judged = self._judged(what, edges.difference, allowable, doubt=doubt)
+        judged = judged._replace(qpe_published_rad=np.zeros(self.cases))
+        nothing = self._judged(what, None, allowable)
+        nothing.status[:] = _CODE["not_evaluated"]
+        return judged.where(np.isinf(edges.difference), nothing)
 
     def _waived(self, row: Judged) -> Judged:
         """Waive a row where it fails and a waiver that holds names it."""
@@ -410,18 +457,6 @@ class _Check:
         if not (self.errors.stated or self._vibrates) or any(missing_declarations(self.mission)):
             floor[:] = _CODE["not_evaluated"]
         return floor
-
-
-def _largest_signed_sum(vectors: Floats) -> Floats:
-    """Length of the longest of the sums ±v₁ ± v₂ …, (cases,), of vectors (n, 2, cases); see `largest_signed_sum`."""
-    x, y = vectors[:, 0], vectors[:, 1]
-    is_upper = (y > 0) | ((y == 0) & (x > 0))
-    x, y = np.where(is_upper, x, -x), np.where(is_upper, y, -y)
-    order = np.argsort(np.arctan2(y, x), axis=0)
-    x, y = np.take_along_axis(x, order, axis=0), np.take_along_axis(y, order, axis=0)
-    corners_x, corners_y = (part.sum(axis=0) - 2 * np.cumsum(part, axis=0) for part in (x, y))
-    whole = np.hypot(x.sum(axis=0), y.sum(axis=0))
-    return np.asarray(np.maximum(whole, np.hypot(corners_x, corners_y).max(axis=0)))
 
 
 def _stricter(published: Sequence[Judged], full: Sequence[Judged]) -> list[Judged]:

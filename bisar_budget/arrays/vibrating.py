@@ -19,21 +19,22 @@ from bisar_budget.findings.status import RANK
 from bisar_budget.mission.model import Mission
 
 
-class SlowPhase(NamedTuple):
-    """Phases of a vibration in the cases in which it is below one cycle per aperture, 0 in others; as `OwnPhase`."""
+class ManyOwnPhases(NamedTuple):
+    """What has no displacement, but phases that count in sums, (cases,); as `OwnPhase`. [rad]"""
 
+    row_id: str
     owner: str
     qpe: Floats
     cubic: Floats
 
 
-def many_slow_phases(count: int, one: Callable[[int], Mission]) -> list[SlowPhase]:
-    """Phases of slow vibrations in `count` cases; `one` gives the mission of a case, with its numbers."""
-    found: dict[str, SlowPhase] = {}
+def many_slow_phases(count: int, one: Callable[[int], Mission]) -> list[ManyOwnPhases]:
+    """Phases of slow vibrations in `count` cases, 0 where one is faster; `one` gives the mission of a case."""
+    found: dict[str, ManyOwnPhases] = {}
     for place in range(count):
         for phase in slow_phases(one(place)):
             if phase.row_id not in found:
-                found[phase.row_id] = SlowPhase(phase.owner, np.zeros(count), np.zeros(count))
+                found[phase.row_id] = ManyOwnPhases(phase.row_id, phase.owner, np.zeros(count), np.zeros(count))
             found[phase.row_id].qpe[place] = phase.qpe_rad
             found[phase.row_id].cubic[place] = phase.cubic_rad
     return list(found.values())

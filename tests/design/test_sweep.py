@@ -104,6 +104,7 @@ _KEYS = {
     "timing_error__quadratic": _FACTORS,
     "requirements__quadratic_phase_error": _FACTORS,
     "allocation__coverage_factor": _FACTORS,
+    "scene__radius": _FACTORS,
 }
 _RULES = {
     "allocation.combine": ("each", "sum", "rss"),
@@ -114,6 +115,7 @@ _RULES = {
     "requirements.location_error": ("0.5 m", "20 m"),
     "common_motion_error.position": ("2 m",),
     "scene.height_error": ("3 m",),
+    "scene.radius": ("100 m", "3 km"),
     "timing_error.quadratic": ("1e-12 /s",),
 }
 
@@ -191,6 +193,24 @@ def test_a_whole_check_searches_in_another_order(model) -> None:
     whole, by_case = swept(mission, cases, columns, model=model)
     assert by_case == 0
     assert_as_checked(mission, cases, whole, columns, model=model)
+
+
+EDGE = [f"mission.spatial_variance.{field}" for field in ("declared", "allowable", "margin", "status")]
+
+
+@pytest.mark.parametrize(("rule", "model"), [("each", "published"), ("rss", "full"), ("sum", "strictest")])
+def test_edges_of_scenes_are_held(rule, model) -> None:
+    """Errors that grow with the radius in proportion, others that do not, and an edge without an image."""
+    rules = {"allocation.combine": rule, "allocation.model": model, "scene.radius": "500 m"}
+    text = (MISSIONS / "rigling_moses_section_v.yaml").read_bytes()
+    mission = parse_mission(text, "m.yaml", changes=[SetValue(*one) for one in rules.items()])
+    axes = {"scene__radius": [300.0, 2e3, 30e3], "platforms__transmitter__motion_error__acceleration__0": [5e-3, 0.3]}
+    cases = grid(mission, **axes)
+    whole, by_case = swept(mission, cases, EDGE)
+    assert by_case == 0
+    of_edge = ["pass", "pass", "pass", "warn" if model == "published" else "fail", "not_evaluated", "not_evaluated"]
+    assert list(whole["mission.spatial_variance.status"]) == of_edge
+    assert_as_checked(mission, cases, whole, EDGE)
 
 
 @pytest.mark.parametrize("rule", ["each", "sum", "rss"])
@@ -297,12 +317,12 @@ def test_figures_of_a_vibration_vary(key) -> None:
 def test_processes_find_the_same(monkeypatch) -> None:
     """Where cases are checked one by one they are shared out, and come back in their order."""
     monkeypatch.setattr("bisar_budget.design.sweep._MANY", 2)  # parts, from which processes are started
-    text = (MISSIONS / "rigling_moses_section_v.yaml").read_bytes()
-    mission = parse_mission(text, "m.yaml", changes=[SetValue("scene.radius", "500 m")])
+    mission = load_mission(str(MISSIONS / "rigling_moses_section_v.yaml"))
     cases = grid(mission, collection__aperture_time=np.linspace(1, 9, 200))
-    alone, by_case = swept(mission, cases)
-    shared, _ = swept(mission, cases, jobs=2)
-    assert by_case == 200  # arrays hold no edge of a scene
+    column = ["receiver.acceleration.x.allowable_full"]
+    alone, by_case = swept(mission, cases, column)
+    shared, _ = swept(mission, cases, column, jobs=2)
+    assert by_case == 200  # arrays hold the model that gates
     for name, column in alone.items():
         assert np.array_equal(column, shared[name], equal_nan=column.dtype != object)
 
