@@ -7,15 +7,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bisar_budget import evaluators
-from bisar_budget.arrays.collections import Floats, Geometries, Vectors, angle_between_lines
+from bisar_budget.arrays.collections import Floats, Geometries, Vectors, angle_between_lines, axes_of
 from bisar_budget.arrays.followed import Held, ManyPointPaths, Places, Truths
 from bisar_budget.arrays.located import Course, Effects, ManyExactRanges
+from bisar_budget.arrays.together import squared
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, ROUNDING, SPEED_OF_LIGHT
 from bisar_budget.effects import models
 from bisar_budget.effects.effect import CLOCK_UNITS, MOTION_UNITS, PLATFORMS
 from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.geometry import FRAME_AXES
+from bisar_budget.mission.covariance import Covariance
 from bisar_budget.mission.model import Mission
 
 SAFE = 1 + 1e-6  # nearer to a border of what forms an image, a case is checked by itself
@@ -73,7 +75,8 @@ class DeclaredErrors:
         self.mission, self.cases, self.geometries, self.shown = mission, cases, geometries, shown
         self.is_left_out = np.zeros(cases, dtype=bool)
         wavelength, T = mission.radar.wavelength, mission.collection.aperture_time
-        self.exact = ManyExactRanges.of(geometries, wavelength, T, nodes, cases)
+        self.has_direct_path = mission.has_direct_path
+        self.exact = ManyExactRanges.of(geometries, wavelength, T, nodes, cases, has_direct_path=self.has_direct_path)
         self.plane = self._published_plane()
         self._limits_of_size()
         self.listed = list(self._errors())
@@ -93,8 +96,10 @@ class DeclaredErrors:
             ground += [*path.position[:2], *path.velocity[:2], path.slant_range]
         first, second, (determinant,) = evaluators.published_ground_inverse(*ground)
         angle = angle_between_lines((-second[1], first[1]), (second[0], -first[0]))
-        self.is_left_out |= np.degrees(angle) < MIN_GRADIENT_ANGLE_DEG * SAFE
-        return first, second, determinant
+        is_degenerate = np.degrees(angle) < MIN_GRADIENT_ANGLE_DEG * SAFE
+        if self.mission.gating_model != "full":
+            self.is_left_out |= is_degenerate
+        return first, second, np.where(is_degenerate, math.inf, determinant)  # no displacement that casts a doubt
 
     def _errors(self) -> Iterator[ManyErrors]:
         """Every error that is declared, or whose allowable is asked."""
@@ -106,13 +111,10 @@ class DeclaredErrors:
         for place, (name, path) in enumerate(zip(PLATFORMS, paths, strict=True)):
             rows = evaluators.published_motion(*path.position, *path.velocity, path.slant_range, wavelength, T)
             error = getattr(mission.platforms, name).motion_error
-            axes = (
-                path.frame(error.frame)
-                if error.frame != "ric"
-                else getattr(mission.platforms, name).state.frame("ric")
-            )
+            axes = axes_of(mission, name, path)
             for index, (kind, unit) in enumerate(MOTION_UNITS.items()):
-                values = getattr(error, kind)
+                covariance = error.covariance if kind != "acceleration" else None
+                values = error.stated(kind)
                 own = [subject(name, kind, letter) for letter in "xyz"]
                 asked = [one.id in self.shown for one in own]
                 common = mission.common_motion_error is not None and (
@@ -139,7 +141,10 @@ class DeclaredErrors:
                 for axis in range(3):
                     if asked[axis]:
                         on_axis = None
-                        if values is not None:
+                        if covariance is not None:
+                            along = [direction[axis] for direction in axes]
+                            on_axis = factor * _along_covariance(covariance, kind, along)
+                        elif values is not None:
                             on_axis = factor * _along_scene_axis(values, axes, axis, error.distribution)
                         yield ManyErrors(
                             own[axis],
@@ -185,7 +190,7 @@ class DeclaredErrors:
             value, what = getattr(self.mission.timing_error, term), subject("clock", "timing", term)
             if value is not None or what.id in self.shown:
                 declared = None if value is None else value * factor
-                full = self.exact.effect(SPEED_OF_LIGHT * self.exact.times**power)
+                full = self.exact.effect(self._clock_course(unit).at_nodes)
                 yield ManyErrors(what, unit, declared, Effects._make(rows[power]), full, (), _NOWHERE)
 
     def _common(
@@ -221,8 +226,16 @@ class DeclaredErrors:
 
     def adds(self, error: ManyErrors, size: Any, requirement: str) -> Any:
         """Bound of what the second order adds to a phase [rad] or a displacement [m]; see `FullModel`."""
-        reach = size * (self.edge.get(error.unit, 0.0) + self.per_unit("full", error, LOCATION))
-        return self.per_metre[requirement] * reach * reach / self.exact.nearest_node
+        own, moved = size * self.edge.get(error.unit, 0.0), size * self.per_unit("full", error, LOCATION)
+        if self.has_direct_path and error.subject.owner in PLATFORMS:
+            return self.per_metre[requirement] * self._adds_heard(error.moves[0], own, moved)
+        return self.per_metre[requirement] * (own + moved) * (own + moved) / self.exact.nearest_node
+
+    def _adds_heard(self, platform: int, own: Any, moved: Any) -> Any:
+        """The same of the ranges less the direct path; see `FullModel`. [m]"""
+        nearest = [ranges.min(axis=0) for ranges in self.exact.ranges]
+        of_ranges = (own + moved) ** 2 / nearest[platform] + moved**2 / nearest[1 - platform]
+        return np.maximum(of_ranges, own**2 / self.exact.baselines.min(axis=0)) / 2
 
     def per_unit(self, model: str, error: ManyErrors, requirement: str) -> Any:
         """What a small unit of an error does: magnitude of a phase [rad], or displacement [m]."""
@@ -307,8 +320,21 @@ class DeclaredErrors:
         """A unit of an error at the nodes."""
         if error.moves:
             return Course(self.exact.powers[error.unit], error.unit, error.moves, error.direction)
-        power = list(CLOCK_UNITS.values()).index(error.unit)
-        return Course(SPEED_OF_LIGHT * self.exact.times**power, error.unit)
+        return self._clock_course(error.unit)
+
+    def _clock_course(self, unit: str) -> Course:
+        """A unit of a clock error at the nodes; nothing where the direct path stands in for the clock."""
+        power = list(CLOCK_UNITS.values()).index(unit)
+        metres = SPEED_OF_LIGHT * self.exact.times**power
+        return Course(metres * 0.0 if self.has_direct_path else metres, unit)
+
+    def doubts(self, model: str, is_over: Any) -> Any:
+        """Where a model that does not gate casts a doubt; the published one does not know a direct path."""
+        return False if model == "published" and self.has_direct_path else is_over
+
+    def is_heard_out(self, error: ManyErrors) -> bool:
+        """Whether an error is one of a clock that the direct path stands in for."""
+        return self.has_direct_path and error.is_motion and not error.moves
 
     def forget(self, error: ManyErrors) -> None:
         """Let go of the ways by an error that nobody will ask for again: they are large."""
@@ -335,11 +361,12 @@ class DeclaredErrors:
         return smallest
 
     def farthest(self, error: ManyErrors) -> Any:
-        """Size beyond which an error is none of navigation."""
+        """Size beyond which an error is none of navigation; infinite: it has no effect whatever its size."""
+        if self.is_heard_out(error):
+            return math.inf
         slant = [path.slant_range for path in (self.geometries.transmitter, self.geometries.receiver)]
         if not error.moves:
-            power = list(CLOCK_UNITS.values()).index(error.unit)
-            return models.FARTHEST * np.minimum(*slant) / np.abs(SPEED_OF_LIGHT * self.exact.times**power).max(axis=0)
+            return models.FARTHEST * np.minimum(*slant) / np.abs(self.course(error).at_nodes).max(axis=0)
         reached = [slant[place] for place in error.moves]
         return models.FARTHEST * (np.minimum(*reached) if len(reached) > 1 else reached[0]) / self.edge[error.unit]
 
@@ -354,6 +381,12 @@ def _along_scene_axis(
     else:
         size = np.abs(parts[0]) + np.abs(parts[1]) + np.abs(parts[2])
     return np.copysign(size, parts[0] + parts[1] + parts[2])
+
+
+def _along_covariance(covariance: Covariance, kind: str, direction: Sequence[Any]) -> Any:
+    """Sigma of position or velocity error along a direction given in the frame's axes; as `Covariance.along`."""
+    parts = [sigma * along for sigma, along in zip(covariance.of(kind), direction, strict=True)]
+    return np.sqrt(squared(covariance.block(kind), parts))
 
 
 def _along(effects: Sequence[Effects], direction: Vectors) -> Effects:

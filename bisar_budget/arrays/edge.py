@@ -10,10 +10,8 @@ from numpy.typing import NDArray
 from bisar_budget.analysis import scene as scalar
 from bisar_budget.arrays.climbing import Heights, Places, crest
 from bisar_budget.arrays.collections import Floats
+from bisar_budget.arrays.judgement import BOUND
 from bisar_budget.arrays.rim import ManyScenePhases, Rims
-from bisar_budget.constants import UTILIZATION_TOLERANCE
-
-_BOUND = 1 + UTILIZATION_TOLERANCE
 
 
 class HeldTogether(NamedTuple):
@@ -146,7 +144,7 @@ def _is_over_at_the_edge(
     more = np.array([phases.errors.does("full", error).qpe for error in phases.members])[:, of] - phases.centre[:, of]
     found = np.zeros(of.size, dtype=bool)
     for indices, limit_of_all in held:
-        limit = limit_of_all[of] * _BOUND
+        limit = limit_of_all[of] * BOUND
         is_inside = phases.together(phases.centre[:, of] + more, of, indices) <= limit
         if not is_inside.any():
             continue

@@ -5,7 +5,7 @@ declared error leaves no image, a search takes very many steps), the case is lef
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from datetime import date
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -15,33 +15,33 @@ from numpy.typing import NDArray
 
 from bisar_budget import evaluators
 from bisar_budget.analysis.allocation import BALANCED_RANGE, EQUAL, Allocation, Split, allocate
+from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.arrays.aggregates import Aggregates, ManyTogether, is_owed
 from bisar_budget.arrays.collections import Floats, Geometries, norm
 from bisar_budget.arrays.declared import DeclaredErrors, ManyErrors
 from bisar_budget.arrays.edge import HeldTogether, ManySceneEdges, many_scene_edges
+from bisar_budget.arrays.instruments import many_random_errors
+from bisar_budget.arrays.judgement import BOUND, CODE, Judging
+from bisar_budget.arrays.random_rows import RandomRows
 from bisar_budget.arrays.rim import ManyScenePhases
 from bisar_budget.arrays.rows import REQUIREMENTS, Judged
-from bisar_budget.arrays.together import (
-    Phases,
-    combined_displacement,
-    combined_phase,
-    largest_signed_sum,
-    many_correlated,
-)
-from bisar_budget.arrays.vibrating import judged_vibrations, many_slow_phases
+from bisar_budget.arrays.together import ManyOwnPhases, combined_phase, many_correlated
+from bisar_budget.arrays.vibrating import judged_one_by_one, many_slow_phases
 from bisar_budget.budget.orbit import FASTEST_FLIGHT
-from bisar_budget.budget.required import missing_declarations
+from bisar_budget.budget.random_rows import spur_rows
+from bisar_budget.budget.required import is_asked_for, missing_declarations
+from bisar_budget.budget.vibration_rows import vibration_rows
 from bisar_budget.budget.waivers import named_by
-from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.effects import models
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.subject import Subject, subject
-from bisar_budget.findings.status import RANK, STATUS
-from bisar_budget.mission.model import MetricSplits, Mission, Shares
+from bisar_budget.findings.row import Row
+from bisar_budget.findings.status import STATUS
+from bisar_budget.mission.model import MetricSplits, Mission
 
-_BOUND = 1 + UTILIZATION_TOLERANCE
+MODELS = ("published", "full")
 _STATUSES = tuple(STATUS)
-_CODE = {name: np.int8(rank) for name, rank in RANK.items()}
 
 
 class Checked(NamedTuple):
@@ -97,7 +97,17 @@ class _Check:
         self.slow = many_slow_phases(errors.cases, one) if has_lines else []
         self.errors, self.mission, self.cases, self.today = errors, errors.mission, errors.cases, today
         self.array, self.does, self.combine = errors.array, errors.does, errors.mission.allocation.combine
-        self.groups = many_correlated(errors.mission)
+        self.judging = Judging(errors.cases, errors.mission.allocation.warn_above)
+        self.random = many_random_errors(errors.mission, errors.geometries, errors.cases)
+        self.stated_random = [error for error in self.random if error.declared is not None]
+
+    def _own(self, model: str) -> list[ManyOwnPhases]:
+        """Phases of what displaces nothing: slow vibrations, and the declared errors of sensors and clocks."""
+        found = list(self.slow)
+        for error in self.stated_random:
+            quadratic, cubic, _ = (self.array(part * error.declared) for part in error.effect(model))
+            found.append(ManyOwnPhases(error.subject.id, error.subject.owner, quadratic, cubic))
+        return found
 
     # ---------------------------------------------------------------- limits
     def _allowed(self, model: str, error: ManyErrors, limit: Floats) -> tuple[Floats, NDArray[np.int8]]:
@@ -116,7 +126,7 @@ class _Check:
         if not self.is_brief:
             order = np.broadcast_to(np.arange(len(held))[:, None], order.shape)
         smallest, binding = np.full(self.cases, math.inf), np.full(self.cases, -1, dtype=np.int8)
-        is_linear = model == "published" or not error.is_motion
+        is_linear = model == "published" or not error.is_motion or self.errors.is_heard_out(error)
         for turn in range(len(held)):
             for place, (name, required) in enumerate(held):
                 mine = order[turn] == place
@@ -145,16 +155,18 @@ class _Check:
     def _size(self, error: ManyErrors) -> Any:
         return 0.0 if error.declared is None else np.abs(error.declared)
 
+    @property
+    def _is_balanced(self) -> bool:
+        split = self.mission.allocation.split
+        return (split.quadratic_phase_error if isinstance(split, MetricSplits) else split) == "balanced"
+
     def _split(self, gating: str) -> Split:
         """Shares of the phase; `balanced` are arrays."""
-        split = self.mission.allocation.split
-        if isinstance(split, MetricSplits):
-            split = split.quadratic_phase_error
-        if isinstance(split, Shares):
-            return Split(split.transmitter, split.receiver, split.clock, split.reserve)
-        if split != "balanced":
-            return EQUAL
-        by = [model for model in ("published", "full") if gating in (model, "strictest")]
+        if not self._is_balanced:
+            return allocate(self.mission, (), {}).qpe
+        by = [model for model in MODELS if gating in (model, "strictest")]
+        by_model = zip(*map(self._own, by), strict=True)
+        own = [(of_one[0], np.maximum.reduce([one.qpe for one in of_one])) for of_one in by_model]
         weight = []
         for owner in PLATFORMS:
             members = []
@@ -163,15 +175,12 @@ class _Check:
                     phases = np.array([self.does(model, error).qpe for model in by])
                     largest = np.abs(phases).argmax(axis=0)
                     members.append((error.subject.id, np.take_along_axis(phases, largest[None], axis=0)[0]))
-            members += [(one.row_id, one.qpe) for one in self.slow if one.owner == owner]
-            weight.append(np.minimum(self._combined(members), 1e300))
+            members += [(one.row_id, qpe) for one, qpe in own if EQUAL.includes(one.owner, owner)]
+            combined = combined_phase(members, self.combine, many_correlated(self.mission))
+            weight.append(np.minimum(self.array(combined), 1e300))
         with np.errstate(all="ignore"):
             share: Any = np.where(sum(weight) == 0, 0.5, np.clip(weight[0] / sum(weight), *BALANCED_RANGE))
         return Split(transmitter=share, receiver=1 - share)
-
-    def _combined(self, phases: Phases, rule: str = "") -> Floats:
-        """Combine phases by the mission's rule, or another."""
-        return self.array(combined_phase(phases, rule or self.combine, self.groups))
 
     # ---------------------------------------------------------------- rows
     def checked(self) -> Checked:
@@ -187,9 +196,18 @@ class _Check:
         if n_pull is not None:
             self.gain = np.maximum(1.0, self.array(evaluators.autofocus_gain(n_pull, total)))  # type: ignore[arg-type]
         self.total = total
-        by_model = [self._rows(model) for model in ("published", "full") if gating in (model, "strictest")]
+        owners = (*PLATFORMS, "clock", "mission")
+        self.limits = {owner: self.array(self.split.of(owner) * total) * self.gain for owner in owners}
+        together = {model: ManyTogether(self.errors, model, self._own(model), self.split) for model in MODELS}
+        self.aggregates = Aggregates(self.judging, self.errors, together, self.limits, self.gain)
+        by_model = [self._rows(model) for model in MODELS if gating in (model, "strictest")]
         rows = _stricter(*by_model) if len(by_model) > 1 else by_model[0]
-        return Checked(tuple(map(self._waived, rows)), self.errors.is_left_out, self._floor(), self.errors.geometries)
+        return Checked(
+            tuple(self._waived(self._required(row)) for row in rows),
+            self.errors.is_left_out,
+            self._floor(),
+            self.errors.geometries,
+        )
 
     def _rows(self, gating: str) -> list[Judged]:
         other = "published" if gating == "full" else "full"
@@ -199,13 +217,8 @@ class _Check:
             if gating == "full" or self.mission.gating_model == "published":
                 self.errors.forget(error)
         rows += self._vibrations(gating)
-        if self.combine != "each":
-            rows += self._sums(gating, other)
-        else:
-            rows += self._all_together(gating)
-        rows += [self._cubic(gating, other), self._location(gating, other)]
-        if self.mission.autofocus.n_pull is not None:
-            rows.append(self._pull_in(gating, other))
+        rows += self._instruments(gating)
+        rows += self.aggregates.rows(gating, other)
         if self.mission.scene.radius is not None:
             rows.append(self._spatial_variance(gating))
         return rows
@@ -216,30 +229,46 @@ class _Check:
 
     def _vibrations(self, gating: str) -> list[Judged]:
         """Rows of vibrations, where one is declared or asked for."""
-        asked = any(what.kind == "vibration" for what in self.errors.shown.values())
-        if not self._vibrates and not asked:
+        if not self._vibrates and not any(what.kind == "vibration" for what in self.errors.shown.values()):
             return []
-        shares = [self.array(self.split.of(name)) for name in PLATFORMS]
+        return self._one_by_one(lambda mission, allocation: vibration_rows(mission, allocation, gating))
 
-        def of_case(place: int) -> tuple[Mission, Allocation]:
+    def _one_by_one(self, rows_of: Callable[[Mission, Allocation], Iterable[Row]]) -> list[Judged]:
+        """Rows that follow from the wavelength, the aperture time, the lines of sight and the shares alone."""
+        by_phase = self.split if self._is_balanced else None
+
+        def of_case(place: int) -> Iterable[Row]:
             mission = self.one(place)
-            split = self.split._replace(transmitter=float(shares[0][place]), receiver=float(shares[1][place]))
-            return mission, allocate(mission, (), {})._replace(qpe=split)
+            allocation = allocate(mission, (), {})
+            if by_phase is not None:
+                shares = (float(self.array(by_phase.of(name))[place]) for name in PLATFORMS)
+                allocation = allocation._replace(qpe=Split(*shares))
+            return rows_of(mission, allocation)
 
-        return judged_vibrations(np.flatnonzero(~self.errors.is_left_out), self.cases, of_case, gating)
+        return judged_one_by_one(np.flatnonzero(~self.errors.is_left_out), self.cases, of_case)
 
-    def _held(self, owner: str) -> Floats:
-        """Quadratic phase that an owner is held to, gain of autofocus included. [rad]"""
-        return self.array(self.split.of(owner) * self.total) * self.gain
+    def _instruments(self, gating: str) -> Iterator[Judged]:
+        """Rows of sensors and clocks, which few missions name."""
+        if not self.random:
+            return
+        islr = allocate(self.mission, (), {}).islr
+        rows = RandomRows(
+            self.judging, self.mission, self.errors.geometries, self.random, self.limits, self.gain, islr
+        )
+        yield from rows.rows(gating)
+        oscillators = [getattr(self.mission.platforms, name).oscillator for name in PLATFORMS]
+        if any(one is not None and one.spurs for one in oscillators):
+            yield from self._one_by_one(lambda mission, allocation: spur_rows(Analysis(mission), gating, allocation))
+        yield from rows.islr_rows(gating)
 
     def _row(self, gating: str, other: str, error: ManyErrors) -> Judged:
-        limit = self._held(error.subject.owner)
+        limit = self.limits[error.subject.owner]
         allowable, binding = self._allowed(gating, error, limit)
         if other == "full" and not self.is_brief and self.mission.gating_model != "published":
             self._allowed(other, error, limit)  # a whole check asks for it here, and a later search starts from it
         none = np.full(self.cases, math.nan)
         if error.declared is None:
-            return self._judged(error.subject, None, allowable)._replace(binding=binding)
+            return self.judging.row(error.subject, None, allowable)._replace(binding=binding)
         mine, theirs = self.does(gating, error), self.does(other, error)
         published = mine if gating == "published" else theirs
         needs = self.mission.requirements
@@ -248,8 +277,9 @@ class _Check:
             moved = np.hypot(*theirs.farthest)
             others = ((np.abs(theirs.cubic), needs.cubic_phase_error), (moved, needs.location_error))
             held += [(size, self.array(required)) for size, required in others if required is not None]
-        doubt = np.any([size / required > _BOUND for size, required in held], axis=0)
-        judged = self._judged(
+        is_over = np.any([size / required > BOUND for size, required in held], axis=0)
+        doubt = self.errors.doubts(other, is_over)
+        judged = self.judging.row(
             error.subject,
             np.abs(self.array(error.declared)),
             allowable,
@@ -260,164 +290,19 @@ class _Check:
         cubic = np.abs(mine.cubic) if error.is_motion else none
         return judged._replace(binding=binding, qpe_published_rad=np.abs(published.qpe), cubic_rad=cubic)
 
-    def _judged(
-        self,
-        what: Subject,
-        declared: Floats | None,
-        allowable: Floats | None,
-        *,
-        doubt: Any = False,
-        without_autofocus: Any = 0.0,
-        is_info: bool = False,
-        never_fails: bool = False,
-    ) -> Judged:
-        """Judge a row, as `judgement` does: the first status that applies."""
-        none = np.full(self.cases, math.nan)
-        allowed = none if allowable is None else allowable
-        unknown = np.full(self.cases, -1, dtype=np.int8)
-        if declared is None:
-            status = np.full(self.cases, _CODE["not_declared"])
-            return Judged(what, status, none, allowed, none, unknown, none, none, never_fails)
-        with np.errstate(all="ignore"):
-            use = np.where(np.isnan(allowed), 0.0, declared / allowed)
-        if is_info:
-            status = np.full(self.cases, _CODE["info"])
-        else:
-            status = np.select(
-                [
-                    use > _BOUND,
-                    np.broadcast_to(doubt, (self.cases,)),
-                    np.broadcast_to(without_autofocus > _BOUND, (self.cases,)),
-                    use > self.mission.allocation.warn_above,
-                ],
-                [
-                    _CODE["warn" if never_fails else "fail"],
-                    _CODE["warn"],
-                    _CODE["pass_with_autofocus"],
-                    _CODE["warn"],
-                ],
-                _CODE["pass"],
-            ).astype(np.int8)
-        return Judged(what, status, declared, allowed, use, unknown, none, none, never_fails)
-
-    def _members(self, owner: str) -> list[ManyErrors]:
-        return [error for error in self.errors.stated if self._is_owed(error, owner)]
-
-    def _is_owed(self, error: ManyErrors, owner: str) -> bool:
-        """Whether an error counts against the share of an owner; against the mission's all do."""
-        return owner == "mission" or self.split.includes(error.subject.owner, owner)
-
-    def _counts(self, members: Sequence[ManyErrors], own: Phases) -> bool:
-        """Whether anything is declared that counts; cases in which vibrations alone may, or may not, are left out."""
-        if own and not members:
-            self.errors.is_left_out[:] = True
-        return bool(members)
-
-    def _phases(
-        self, model: str, errors: Sequence[ManyErrors], *, is_cubic: bool = False
-    ) -> list[tuple[str, Floats]]:
-        does = [(error.subject.id, self.does(model, error)) for error in errors]
-        return [(row_id, one.cubic if is_cubic else one.qpe) for row_id, one in does]
-
-    def _sums(self, gating: str, other: str) -> Iterator[Judged]:
-        owners = ["transmitter", "receiver", *(["clock"] if self.split.clock is not None else []), "mission"]
-        for owner in owners:
-            members, what = self._members(owner), subject(owner, QUADRATIC)
-            limit = self._held(owner)
-            own = [
-                (one.row_id, one.qpe)
-                for one in self.slow
-                if owner == "mission" or self.split.includes(one.owner, owner)
-            ]
-            if not self._counts(members, own):
-                yield self._judged(what, None, limit)
-                continue
-            qpe, by_other = (self._combined([*self._phases(model, members), *own]) for model in (gating, other))
-            yield self._judged(
-                what, qpe, limit, doubt=by_other > limit * _BOUND, without_autofocus=qpe / limit * self.gain
-            )
-
-    def _all_together(self, gating: str) -> Iterator[Judged]:
-        """A warning where each error stands alone and all together exceed the total; else there is no row."""
-        own = [(one.row_id, one.qpe) for one in self.slow]
-        if not self._counts(self.errors.stated, own):
-            return
-        phases = [*self._phases(gating, self.errors.stated), *own]
-        limit = self.total * self.gain
-        largest = self._combined(phases, "each")
-        is_there = (self._combined(phases, "rss") > limit * _BOUND) & (largest <= limit * _BOUND)
-        what = subject("mission", QUADRATIC)
-        judged, nothing = self._judged(what, largest, limit, doubt=True), self._judged(what, None, None)
-        yield judged.where(~is_there, nothing)
-
-    def _cubic(self, gating: str, other: str) -> Judged:
-        motion, what = [error for error in self.errors.stated if error.is_motion], subject("mission", CUBIC)
-        limit = self.mission.requirements.cubic_phase_error
-        own = [(one.row_id, one.cubic) for one in self.slow]
-        if not self._counts(motion, own):
-            return self._judged(what, None, None if limit is None else self.array(limit))
-        phases = [*self._phases(gating, motion, is_cubic=True), *own]
-        size = self._combined(phases)
-        if limit is None:
-            return self._judged(what, size, None, is_info=True)._replace(cubic_rad=size)
-        doubt = self._combined([*self._phases(other, motion, is_cubic=True), *own]) > limit * _BOUND
-        if self.combine == "each":
-            doubt = doubt | (self._combined(phases, "rss") > limit * _BOUND)
-        return self._judged(what, size, self.array(limit), doubt=doubt)._replace(cubic_rad=size, metric=CUBIC)
-
-    def _location(self, gating: str, other: str) -> Judged:
-        motion, what = [error for error in self.errors.stated if error.is_motion], subject("mission", LOCATION)
-        limit = self.mission.requirements.location_error
-        if not motion:
-            return self._judged(what, None, None if limit is None else self.array(limit))
-        moved = self._moved(gating, motion, self.combine)
-        if limit is None:
-            return self._judged(what, moved, None, is_info=True)
-        doubt = self._moved(other, motion, self.combine) > limit * _BOUND
-        if self.combine == "each":
-            doubt = doubt | (self._moved(gating, motion, "rss") > limit * _BOUND)
-        return self._judged(what, moved, self.array(limit), doubt=doubt)._replace(metric=LOCATION)
-
-    def _moved(self, model: str, motion: Sequence[ManyErrors], rule: str) -> Floats:
-        """Displacements combined by a rule. [m]"""
-        if rule != "sum":
-            moves = {error.subject.id: self.does(model, error).farthest for error in motion}
-            return self.array(combined_displacement(moves, rule, self.groups))
-        found = [self.does(model, error) for error in motion]
-        parts = np.array(
-            [
-                [(ahead - back) / 2 for ahead, back in zip(one.displacement, one.opposite, strict=True)]
-                for one in found
-            ]
-        )
-        rest = sum(
-            np.array([(ahead + back) / 2 for ahead, back in zip(one.displacement, one.opposite, strict=True)])
-            for one in found
-        )
-        return largest_signed_sum(np.concatenate((parts, np.asarray(rest)[None])))
-
-    def _pull_in(self, gating: str, other: str) -> Judged:
-        what, pull_in = subject("mission", "autofocus_pull_in"), math.pi * self.array(self.mission.autofocus.n_pull)
-        own = [(one.row_id, one.qpe) for one in self.slow]
-        if not self._counts(self.errors.stated, own):
-            return self._judged(what, None, pull_in, never_fails=True)
-        phases = ([*self._phases(model, self.errors.stated), *own] for model in (gating, other))
-        total, by_other = (self._combined(of, "sum") for of in phases)
-        return self._judged(what, total, pull_in, doubt=by_other > pull_in * _BOUND, never_fails=True)
-
     @cached_property
     def _edges(self) -> ManySceneEdges | None:
         """What the edges of the scenes add; none without a declared error."""
         phases = ManyScenePhases(self.errors)
         if not phases.members:
             return None
+        owners = [error.subject.owner for error in phases.members]
         if self.combine == "each":
-            held = [HeldTogether([i], self._held(error.subject.owner)) for i, error in enumerate(phases.members)]
+            held = [HeldTogether([i], self.limits[owner]) for i, owner in enumerate(owners)]
         else:
             held = [
-                HeldTogether([i for i, error in enumerate(phases.members) if self._is_owed(error, owner)], limit)
-                for owner in (*PLATFORMS, "clock", "mission")
-                for limit in [self._held(owner)]
+                HeldTogether([i for i, one in enumerate(owners) if is_owed(one, owner, self.split)], limit)
+                for owner, limit in self.limits.items()
             ]
         return many_scene_edges(phases, held)
 
@@ -426,14 +311,14 @@ class _Check:
         what, edges = subject("mission", "spatial_variance"), self._edges
         allowable = None if gating == "published" else self.total
         if edges is None:
-            return self._judged(what, None, allowable)
+            return self.judging.row(what, None, allowable)
         doubt = edges.has_doubt
         if gating == "published":
-            doubt = doubt | (edges.difference > self.total * _BOUND)
-        judged = self._judged(what, edges.difference, allowable, doubt=doubt)
+            doubt = doubt | (edges.difference > self.total * BOUND)
+        judged = self.judging.row(what, edges.difference, allowable, doubt=doubt)
         judged = judged._replace(qpe_published_rad=np.zeros(self.cases))
-        nothing = self._judged(what, None, allowable)
-        nothing.status[:] = _CODE["not_evaluated"]
+        nothing = self.judging.row(what, None, allowable)
+        nothing.status[:] = CODE["not_evaluated"]
         return judged.where(np.isinf(edges.difference), nothing)
 
     def _waived(self, row: Judged) -> Judged:
@@ -441,21 +326,30 @@ class _Check:
         names = [row.subject.id]
         if not any(self.today <= one.until and named_by(one.id, names) for one in self.mission.waivers):
             return row
-        return row._replace(status=np.where(row.status == _CODE["fail"], _CODE["waived"], row.status))
+        return row._replace(status=np.where(row.status == CODE["fail"], CODE["waived"], row.status))
+
+    def _required(self, row: Judged) -> Judged:
+        """Turn a row that the file should declare and does not from `not_declared` into `not_evaluated`."""
+        if not any(is_asked_for(row.subject, one) for one in missing_declarations(self.mission)):
+            return row
+        is_missing = row.status == CODE["not_declared"]
+        return row._replace(status=np.where(is_missing, CODE["not_evaluated"], row.status))
 
     def _floor(self) -> NDArray[np.int8]:
         """Best status that each case can have: paths may be in doubt, and errors missing that must be declared."""
-        floor = np.full(self.cases, _CODE["pass"])
+        floor = np.full(self.cases, CODE["pass"])
         for name, path in zip(
             PLATFORMS, (self.errors.geometries.transmitter, self.errors.geometries.receiver), strict=True
         ):
             platform = getattr(self.mission.platforms, name)
             if platform.path is not None and platform.path.doubts:
-                floor[:] = _CODE["warn"]
+                floor[:] = CODE["warn"]
             if platform.acceleration is None and not platform.is_of_the_earth:
-                floor[np.broadcast_to(norm(path.velocity) > FASTEST_FLIGHT, floor.shape)] = _CODE["warn"]
-        if not (self.errors.stated or self._vibrates) or any(missing_declarations(self.mission)):
-            floor[:] = _CODE["not_evaluated"]
+                floor[np.broadcast_to(norm(path.velocity) > FASTEST_FLIGHT, floor.shape)] = CODE["warn"]
+        if not (self.errors.stated or self._vibrates or self.stated_random) or any(
+            missing_declarations(self.mission)
+        ):
+            floor[:] = CODE["not_evaluated"]
         return floor
 
 

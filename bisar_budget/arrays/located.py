@@ -55,7 +55,7 @@ class Found(NamedTuple):
 
 
 class ManyExactRanges:
-    """`ExactRanges` of cases (n,) that need the same number of nodes and have no direct path.
+    """`ExactRanges` of cases (n,) that need the same number of nodes.
 
     Parameters
     ----------
@@ -67,12 +67,22 @@ class ManyExactRanges:
         Positions of both platforms at the nodes, as what stands for the scene centre sees them, (count, n). [m]
     positions : sequence of Vectors
         The same at the middle of the aperture, (n,). [m]
+    has_direct_path : bool
+        Whether the direct path is the clock.
     """
 
     def __init__(
-        self, half: Floats, k: Floats, count: int, tracks: Sequence[Vectors], positions: Sequence[Vectors]
+        self,
+        half: Floats,
+        k: Floats,
+        count: int,
+        tracks: Sequence[Vectors],
+        positions: Sequence[Vectors],
+        *,
+        has_direct_path: bool = False,
     ) -> None:
         self.half, self.k, self.count, self.tracks, self.positions = half, k, count, tracks, positions
+        self.has_direct_path = has_direct_path
         _, *fit = LEGENDRE_FITS[count]
         self.fit: Floats = np.array(fit)  # (4, nodes)
         self.ranges = [norm(track) for track in tracks]
@@ -88,24 +98,33 @@ class ManyExactRanges:
 
     @classmethod
     def of(
-        cls, geometries: Geometries, wavelength: Any, aperture_time: Any, count: int, cases: int
+        cls,
+        geometries: Geometries,
+        wavelength: Any,
+        aperture_time: Any,
+        count: int,
+        cases: int,
+        *,
+        has_direct_path: bool = False,
     ) -> "ManyExactRanges":
         """Exact ranges of collections, at their scene centres."""
         half: Floats = np.array(np.broadcast_to(np.asarray(aperture_time, dtype=float) / 2, (cases,)))
         k: Floats = np.array(np.broadcast_to(2 * math.pi / np.asarray(wavelength, dtype=float), (cases,)))
         times = np.array(LEGENDRE_FITS[count][0])[:, None] * half
         tracks, positions = [], []
-        for path in (geometries.transmitter, geometries.receiver):
+        for path in geometries.both:
             x, y, z = (np.broadcast_to(part, (cases,)) for part in path.position)
             tracks.append(path.at(times))
             positions.append((x, y, z))
-        return cls(half, k, count, tracks, positions)
+        return cls(half, k, count, tracks, positions, has_direct_path=has_direct_path)
 
     def at(self, east: Floats, north: Floats, some: NDArray[Any]) -> "ManyExactRanges":
         """Exact ranges of some of the cases at points of the ground, (some,), in place of the centre. [m]"""
         tracks = [(x[:, some] - east, y[:, some] - north, z[:, some]) for x, y, z in self.tracks]
         positions = [(x[some] - east, y[some] - north, z[some]) for x, y, z in self.positions]
-        return ManyExactRanges(self.half[some], self.k[some], self.count, tracks, positions)
+        return ManyExactRanges(
+            self.half[some], self.k[some], self.count, tracks, positions, has_direct_path=self.has_direct_path
+        )
 
     @cached_property
     def times(self) -> Floats:
@@ -137,8 +156,27 @@ class ManyExactRanges:
     @cached_property
     def rounding(self) -> Floats:
         """A phase history in double precision holds no phase that is smaller. [rad]"""
-        recorded = self.ranges[0] + self.ranges[1]
-        return np.asarray(scalar.EPSILON * self.k * recorded.max(axis=0))
+        recorded = (self.ranges[0] + self.ranges[1]).max(axis=0)
+        if self.has_direct_path:
+            recorded = recorded + self.baselines.max(axis=0)
+        return np.asarray(scalar.EPSILON * self.k * recorded)
+
+    @cached_property
+    def _between(self) -> Vectors:
+        """The transmitter at the nodes, as the receiver has it. [m]"""
+        (x, y, z), (u, v, w) = self.tracks
+        return (x - u, y - v, z - w)
+
+    @cached_property
+    def baselines(self) -> Floats:
+        """Distances of the platforms at the nodes. [m]"""
+        return np.asarray(norm(self._between))
+
+    @cached_property
+    def _heard_along(self) -> tuple[Vectors, Vectors]:
+        """Unit vectors along the direct path at the nodes, from the other platform to each."""
+        x, y, z = (part / self.baselines for part in self._between)
+        return ((x, y, z), (-x, -y, -z))
 
     @cached_property
     def reach(self) -> Floats:
@@ -161,9 +199,9 @@ class ManyExactRanges:
         return {"m": np.ones_like(self.times), "m/s": self.times, "m/s^2": self.times**2 / 2}
 
     def along(self, platform: int, direction: Vectors) -> Floats:
-        """What a metre along a direction does to the range of a platform at the nodes."""
+        """What a metre along a direction does to the range of a platform at the nodes; as `along`."""
         found: Floats = -dot(self.tracks[platform], direction) / self.ranges[platform]
-        return found
+        return found + dot(self._heard_along[platform], direction) if self.has_direct_path else found
 
     def range_error(self, course: Course) -> Floats:
         """Range error at the nodes of a small unit of any error, before it displaces anything. [m/unit]"""
@@ -174,16 +212,14 @@ class ManyExactRanges:
 
     def quadratics_of(self, courses: Sequence[Course]) -> list[Floats]:
         """Quadratic phase of a small unit of each error, that of `effect`, in a tenth of its time. [rad/unit]"""
-        weights = self._quadratic_weights
+        weights = self.phase_weights[0]
         whole = np.abs(weights).sum(axis=0)
         of_axes: dict[tuple[int, str], Vectors] = {}
         found = []
         for course in courses:
             for platform in course.platforms:
                 if (platform, course.unit) not in of_axes:
-                    by_metre = -weights * course.at_nodes / self.ranges[platform]
-                    x, y, z = ((by_metre * track).sum(axis=0) for track in self.tracks[platform])
-                    of_axes[platform, course.unit] = (x, y, z)
+                    of_axes[platform, course.unit] = self._along_axes(platform, weights * course.at_nodes)
             if course.platforms:
                 phase = sum(dot(of_axes[one, course.unit], course.direction) for one in course.platforms)
                 seen = len(course.platforms) * whole * course.at_nodes[-1]
@@ -193,13 +229,24 @@ class ManyExactRanges:
             found.append(np.where(np.abs(phase) > ROUNDING * seen, phase, 0.0))
         return found
 
+    def _along_axes(self, platform: int, weights: Floats) -> Vectors:
+        """What a metre at each node, weighted, does along x, y and z."""
+        by_metre = -weights / self.ranges[platform]
+        x, y, z = ((by_metre * track).sum(axis=0) for track in self.tracks[platform])
+        if self.has_direct_path:
+            a, b, c = ((weights * part).sum(axis=0) for part in self._heard_along[platform])
+            x, y, z = x + a, y + b, z + c
+        return (x, y, z)
+
     @cached_property
-    def _quadratic_weights(self) -> Floats:
-        """What a metre at each node adds to the quadratic phase, that of the displacement included. [rad/m]"""
-        (by_value, by_slope), _ = self.phases_per_term
-        value, slope, own, _ = (weights[:, None] for weights in self.fit)
-        weights: Floats = self.k * own + by_value * value + by_slope / self.half * slope
-        return weights
+    def phase_weights(self) -> tuple[Floats, Floats]:
+        """What a metre at each node adds to quadratic and cubic phase, that of the displacement included. [rad/m]"""
+        value, slope, *phases = (weights[:, None] for weights in self.fit)
+        quadratic, cubic = (
+            self.k * own + by_value * value + by_slope / self.half * slope
+            for own, (by_value, by_slope) in zip(phases, self.phases_per_term, strict=True)
+        )
+        return quadratic, cubic
 
     def effect(self, range_error: Floats) -> Effects:
         """Effect of a range error at the nodes, that of the displacement included; as `ExactRanges.effect`."""
@@ -236,11 +283,19 @@ class ManyExactRanges:
         if error.platforms:
             along = [course * (size * part) for part in direction]
             shifts = [along if platform in error.platforms else _STILL for platform in (0, 1)]
-            clock = np.zeros_like(course)
+            clock = self._heard(shifts, some) if self.has_direct_path else np.zeros_like(course)
         else:
             shifts, clock = [_STILL, _STILL], course * size
         bend = np.abs(size) * (len(error.platforms) if error.unit == "m/s" else 0.0)
         return self._settled(clock, shifts, near, bend, some)
+
+    def _heard(self, shifts: Sequence[Any], some: NDArray[Any]) -> Floats:
+        """What shifts of the platforms make of c·t̃ at the nodes where the direct path is the clock. [m]"""
+        a, b, c = (one - other for one, other in zip(*shifts, strict=True))
+        x, y, z = (part[:, some] for part in self._between)
+        i, j, k = x + a, y + b, z + c
+        grown = (x + i) * a + (y + j) * b + (z + k) * c
+        return np.asarray(grown / (self.baselines[:, some] + np.sqrt(i * i + j * j + k * k)))
 
     def way(
         self, error: Course, size: Floats, place: tuple[Floats, Floats], some: NDArray[Any]
@@ -258,6 +313,12 @@ class ManyExactRanges:
             by_east, by_north = by_east + a / R, by_north + b / R
             if platform in error.platforms:
                 change = change - course * (a * x + b * y + c * z) / R
+        if self.has_direct_path and len(error.platforms) == 1:
+            side = 1.0 if error.platforms == (0,) else -1.0
+            a, b, c = (side * part[:, some] for part in self._between)
+            a, b, c = a + size * course * x, b + size * course * y, c + size * course * z
+            apart = np.sqrt(a * a + b * b + c * c)
+            change = change + np.where(apart > 0, course * (a * x + b * y + c * z) / apart, 0.0)
         (a, c), (b, d), (constant, linear) = (self.fit[:2] @ one for one in (by_east, by_north, change))
         determinant = a * d - b * c
         return (b * linear - d * constant) / determinant, (c * constant - a * linear) / determinant

@@ -14,6 +14,19 @@ Phases = Sequence[tuple[str, Floats]]  # by row id, signed [rad]
 Moves = Mapping[str, tuple[Floats, Floats]]  # by row id, east and north [m]
 
 
+class ManyOwnPhases(NamedTuple):
+    """What has no displacement, but phases that count in sums, (cases,); as `OwnPhase`. [rad]
+
+    A vibration has phases, other than 0, only in the cases in which it is slow.
+    """
+
+    row_id: str
+    owner: str
+    qpe: Floats
+    cubic: Floats
+    is_in_every_case: bool = True
+
+
 class ManyCorrelated(NamedTuple):
     """The six errors of a covariance, by the ids of their rows, and their correlations (6, 6); as `Correlated`."""
 
@@ -26,16 +39,16 @@ class ManyCorrelated(NamedTuple):
         rows = [[rho[some] if np.ndim(rho) else rho for rho in row] for row in self.correlation]
         return self._replace(correlation=rows)
 
-    def square(self, parts: Sequence[Floats]) -> Floats:
-        """What parts add up to, squared: Σ ρᵢⱼvᵢvⱼ; what rounding leaves below zero is zero."""
-        rows = [sum(rho * v for rho, v in zip(row, parts, strict=True)) for row in self.correlation]
-        total = sum(v * row for v, row in zip(parts, rows, strict=True))
-        return np.asarray(np.maximum(0.0, total))
-
 
 def many_correlated(mission: Mission) -> tuple[ManyCorrelated, ...]:
     """List the covariances of a mission; nothing for nearly every one."""
     return tuple(ManyCorrelated(one.id, one.ids, one.correlation) for one in correlated_errors(mission))
+
+
+def squared(correlation: Sequence[Sequence[Any]], parts: Sequence[Any]) -> Any:
+    """What correlated parts add up to, squared: Σ ρᵢⱼvᵢvⱼ; what rounding leaves below zero is zero."""
+    rows = [sum(rho * v for rho, v in zip(row, parts, strict=True)) for row in correlation]
+    return np.maximum(0.0, sum(v * row for v, row in zip(parts, rows, strict=True)))
 
 
 def combined_phase(phases: Phases, rule: str, groups: Sequence[ManyCorrelated] = ()) -> Any:
@@ -44,7 +57,7 @@ def combined_phase(phases: Phases, rule: str, groups: Sequence[ManyCorrelated] =
     if rule == "rss":
         for group in groups:
             if left.keys() >= set(group.ids):
-                parts.append(np.sqrt(group.square([left.pop(row_id) for row_id in group.ids])))
+                parts.append(np.sqrt(squared(group.correlation, [left.pop(row_id) for row_id in group.ids])))
     return combined([*parts, *left.values()], rule)
 
 
@@ -65,7 +78,7 @@ def combined_displacement(moves: Moves, rule: str, groups: Sequence[ManyCorrelat
         for group in groups:
             if left.keys() >= set(group.ids):
                 of_axes = zip(*(left.pop(row_id) for row_id in group.ids), strict=True)
-                parts.append(np.sqrt(sum(group.square(along) for along in of_axes)))
+                parts.append(np.sqrt(sum(squared(group.correlation, along) for along in of_axes)))
     return combined([*parts, *(np.hypot(*move) for move in left.values())], rule)
 
 

@@ -4,28 +4,17 @@ They depend on the wavelength, the aperture time, the lines of sight and the sha
 """
 
 import math
-from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Callable, Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.analysis.allocation import Allocation
-from bisar_budget.arrays.collections import Floats
 from bisar_budget.arrays.rows import REQUIREMENTS, Judged
-from bisar_budget.budget.vibration_rows import vibration_rows
+from bisar_budget.arrays.together import ManyOwnPhases
 from bisar_budget.effects.slow_vibration import slow_phases
+from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import RANK
 from bisar_budget.mission.model import Mission
-
-
-class ManyOwnPhases(NamedTuple):
-    """What has no displacement, but phases that count in sums, (cases,); as `OwnPhase`. [rad]"""
-
-    row_id: str
-    owner: str
-    qpe: Floats
-    cubic: Floats
 
 
 def many_slow_phases(count: int, one: Callable[[int], Mission]) -> list[ManyOwnPhases]:
@@ -34,22 +23,19 @@ def many_slow_phases(count: int, one: Callable[[int], Mission]) -> list[ManyOwnP
     for place in range(count):
         for phase in slow_phases(one(place)):
             if phase.row_id not in found:
-                found[phase.row_id] = ManyOwnPhases(phase.row_id, phase.owner, np.zeros(count), np.zeros(count))
+                found[phase.row_id] = ManyOwnPhases(
+                    phase.row_id, phase.owner, np.zeros(count), np.zeros(count), is_in_every_case=False
+                )
             found[phase.row_id].qpe[place] = phase.qpe_rad
             found[phase.row_id].cubic[place] = phase.cubic_rad
     return list(found.values())
 
 
-def judged_vibrations(
-    cases: NDArray[np.intp], count: int, one: Callable[[int], tuple[Mission, Allocation]], model: str
-) -> list[Judged]:
-    """Judge the vibrations of some of `count` cases by a model; a row that a case does not have is not declared.
-
-    `one` gives the mission of a case, with its numbers, and its shares.
-    """
+def judged_one_by_one(cases: NDArray[np.intp], count: int, rows_of: Callable[[int], Iterable[Row]]) -> list[Judged]:
+    """Rows of some of `count` cases as `check` judges them; one that a case does not have is not declared."""
     found: dict[str, Judged] = {}
     for place in cases.tolist():
-        for row in vibration_rows(*one(place), model):
+        for row in rows_of(place):
             if row.id not in found:
                 found[row.id] = Judged.of_none(row.subject, count)
             judged = found[row.id]

@@ -17,6 +17,7 @@ from bisar_budget.design.variation import breaking, standing
 from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.mission.changes import apply_changes
 from bisar_budget.mission.load import load_mission, parse_mission
+from bisar_budget.mission.model import flies_on_earth
 from bisar_budget.mission.tree import read_tree
 from tests.conftest import ROOT, mission_text
 from tests.families import FAMILIES
@@ -106,6 +107,13 @@ _KEYS = {
     "allocation__coverage_factor": _FACTORS,
     "scene__radius": _FACTORS,
 }
+MASK = """
+{frequency: 10 MHz, phase_noise: {1 Hz: -95 dBc/Hz, 10 Hz: -125 dBc/Hz, 1 kHz: -150 dBc/Hz}, spurs: {60 Hz: -90 dBc}}
+"""
+COVARIANCE = """
+{covariance: {position: [1 m, 1 m, 2 m], velocity: 5 mm/s,
+ correlation: {position.x-velocity.x: 0.6, position.x-position.z: -0.3}}}
+"""
 _RULES = {
     "allocation.combine": ("each", "sum", "rss"),
     "allocation.split": ("equal", "balanced"),
@@ -117,6 +125,12 @@ _RULES = {
     "scene.height_error": ("3 m",),
     "scene.radius": ("100 m", "3 km"),
     "timing_error.quadratic": ("1e-12 /s",),
+    "requirements.islr": ("-25 dB",),
+    "platforms.transmitter.motion_error.imu": ("{attitude: 0.01 deg, velocity_random_walk: 0.05 m/s/sqrt(h)}",),
+    "platforms.receiver.motion_error.random": ("[{name: GNSS, sigma: [1 mm, 2 mm, 0], correlation_time: 2 s}]",),
+    "platforms.receiver.motion_error": (COVARIANCE,),
+    "platforms.receiver.oscillator": (MASK, "{allan_deviation: {1 s: 3e-12, 10 s: 2e-12, 100 s: 4e-12}}"),
+    "synchronization": ("{error: 1 deg, interval: 0.3 s}", "{error: 1 deg, method: direct_path}"),
 }
 
 
@@ -153,6 +167,15 @@ EXAMPLES = [
     "uav_pair_l_band.yaml",
     "one_stationary_spotlight.yaml",
 ]
+# Sensors; clocks that run free, are synchronised or replaced by the direct path; covariances; an orbit and a log.
+INSTRUMENTS = [
+    "uav_stim300.yaml",
+    "ocxo_free_running.yaml",
+    "tandem_x_synchronized.yaml",
+    "ocxo_direct_path.yaml",
+    "drones_same_gnss.yaml",
+    "sentinel1_aircraft_log.yaml",
+]
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
@@ -164,6 +187,24 @@ def test_examples_are_held_whole(name) -> None:
     whole, by_case = swept(mission, cases, COLUMNS)
     assert by_case == 0
     assert_as_checked(mission, cases, whole, COLUMNS)
+
+
+@pytest.mark.parametrize("name", INSTRUMENTS)
+def test_sensors_and_clocks_are_held(name) -> None:
+    """Every row of what the mission names, and the rows that count it."""
+    mission = load_mission(str(MISSIONS / name))
+    T, f = mission.collection.aperture_time, mission.radar.center_frequency
+    axes = {"radar__center_frequency": [0.9 * f, f], "allocation__coverage_factor": [1.0, 2.0]}
+    if not flies_on_earth(mission):
+        axes["collection__aperture_time"] = [0.3 * T, 1.7 * T]
+    cases = grid(mission, **axes)
+    kinds = ("imu", "random", "oscillator", "synchronization", "islr")
+    rows = [row.id for row in check_mission(mission, DAY).rows if row.subject.kind in kinds]
+    fields = ("declared", "allowable", "margin", "utilization", "status", "qpe_published_rad", "cubic_rad")
+    columns = [f"{row}.{field}" for row in rows for field in fields]
+    whole, by_case = swept(mission, cases, columns)
+    assert by_case == 0
+    assert_as_checked(mission, cases, whole, columns)
 
 
 @pytest.mark.parametrize("model", ["full", "strictest"])
@@ -232,11 +273,48 @@ def test_vibrations_may_be_slow(rule) -> None:
 
 
 def test_what_arrays_do_not_hold_is_checked_one_by_one() -> None:
-    mission = load_mission(str(MISSIONS / "uav_stim300.yaml"))
-    cases = grid(mission, collection__aperture_time=[1.0, 3.0])
+    """A path that the Earth decides is found anew for every aperture."""
+    mission = load_mission(str(MISSIONS / "sentinel1_elements_besancon.yaml"))
+    cases = grid(mission, collection__aperture_time=[1.0, 1.5])
     whole, by_case = swept(mission, cases)
     assert by_case == 2
     assert_as_checked(mission, cases, whole)
+
+
+_FIGURES = """
+synchronization: {error: 1 deg, interval: 0.3 s}
+requirements: {islr: -25 dB, pslr: -30 dB, quadratic_phase_error: 45 deg}
+allocation: {split: {transmitter: 0.3, receiver: 0.5, clock: 0.2}, combine: rss}
+"""
+
+
+@pytest.mark.parametrize(
+    "axes",
+    [
+        {"platforms__receiver__oscillator__phase_noise__10 Hz": [-130.0, -110.0, -90.0]},  # a rise is no oscillator
+        {"platforms__receiver__oscillator__spurs__60 Hz": [-120.0, -60.0]},
+        {"platforms__receiver__oscillator__bandwidth": [50.0, 2e3], "synchronization__interval": [0.1, 1.0]},
+        {"synchronization__error": [1e-3, 0.1], "requirements__islr": [-40.0, -20.0]},
+        {"platforms__transmitter__motion_error__imu__attitude": [1e-5, 1e-3]},
+        {"platforms__transmitter__motion_error__imu__gyro_bias": [0.0, 1e-5]},  # a figure that the file leaves out
+        {"platforms__receiver__motion_error__covariance__velocity": [1e-4, 1e-2]},
+        {"platforms__receiver__motion_error__covariance__correlation__position.x-velocity.x": [-0.9, 0.9, 0.99]},
+        {"allocation__split__receiver": [0.4, 0.5, 0.6], "allocation__split__clock": [0.1, 0.2]},
+    ],
+    ids=lambda axes: next(iter(axes)).rpartition("__")[2],
+)
+def test_figures_of_sensors_clocks_and_covariances_vary(axes) -> None:
+    changes = {
+        "platforms.receiver.oscillator": MASK,
+        "platforms.receiver.motion_error": COVARIANCE,
+        "platforms.transmitter.motion_error": "{frame: track, imu: {attitude: 0.01 deg}}",
+    }
+    mission = parse_mission(mission_text() + _FIGURES, "m.yaml", changes=[SetValue(*one) for one in changes.items()])
+    cases = grid(mission, **axes)
+    columns = ["receiver.oscillator.allowable", "mission.quadratic_phase_error.declared", "receiver.islr.margin"]
+    whole, by_case = swept(mission, cases, columns)
+    assert by_case == list(whole["status"]).count("error")
+    assert_as_checked(mission, cases, whole, columns)
 
 
 def test_cases_that_are_no_mission_are_rows_that_say_why() -> None:
@@ -295,10 +373,11 @@ def test_what_must_be_declared_and_is_not() -> None:
     changes = [SetValue("requirements.declare", "[acceleration]")]
     mission = parse_mission(mission_text(timing_error__quadratic="1e-13 /s"), "m.yaml", changes=changes)
     cases = grid(mission, collection__aperture_time=[1.0, 4.0])
-    whole, by_case = swept(mission, cases)
+    column = ["receiver.acceleration.x.status"]
+    whole, by_case = swept(mission, cases, column)
     assert by_case == 0
-    assert list(whole["status"]) == ["not_evaluated"] * 2
-    assert_as_checked(mission, cases, whole)
+    assert list(whole["status"]) == list(whole[column[0]]) == ["not_evaluated"] * 2
+    assert_as_checked(mission, cases, whole, column)
 
 
 @pytest.mark.parametrize("key", ["amplitude", "frequency"])
