@@ -2,9 +2,10 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bisar_budget.analysis.allocation import Split
 from bisar_budget.arrays.collections import Floats
@@ -25,6 +26,13 @@ from bisar_budget.effects.subject import subject
 Own = Sequence[ManyOwnPhases]
 
 
+class Owed(NamedTuple):
+    """Phases that add up, and in which cases any of them is declared."""
+
+    phases: Phases
+    is_declared: NDArray[np.bool_]
+
+
 class ManyTogether:
     """Declared errors of many cases by one model; as `Together`."""
 
@@ -33,25 +41,21 @@ class ManyTogether:
         self.motion = [error for error in errors.stated if error.is_motion]
         self.rule, self.groups = errors.mission.allocation.combine, many_correlated(errors.mission)
 
-    def owed(self, owner: str) -> Phases:
-        """Quadratic phases that count against the share of an owner; none where nothing is declared that does."""
+    def owed(self, owner: str) -> Owed:
+        """Quadratic phases that count against the share of an owner."""
         members = [error for error in self.errors.stated if is_owed(error.subject.owner, owner, self.split)]
         own = [one for one in self.own if is_owed(one.owner, owner, self.split)]
         found = [(error.subject.id, self.errors.does(self.model, error).qpe) for error in members]
-        return self._counted(found, own, [(one.row_id, one.qpe) for one in own])
+        return self._with(found, own, [(one.row_id, one.qpe) for one in own])
 
-    def all_cubics(self) -> Phases:
+    def all_cubics(self) -> Owed:
         """Cubic phases of motion, the clock, slow vibrations and sensors."""
         found = [(error.subject.id, self.errors.does(self.model, error).cubic) for error in self.motion]
-        return self._counted(found, self.own, [(one.row_id, one.cubic) for one in self.own])
+        return self._with(found, self.own, [(one.row_id, one.cubic) for one in self.own])
 
-    def _counted(self, phases: Phases, own: Own, of_own: Phases) -> Phases:
-        """All of them; cases in which slow vibrations alone count, or do not, are left out."""
-        if phases or any(one.is_in_every_case for one in own):
-            return [*phases, *of_own]
-        if own:
-            self.errors.is_left_out[:] = True
-        return []
+    def _with(self, phases: Phases, own: Own, of_own: Phases) -> Owed:
+        is_there = [np.full(self.errors.cases, bool(phases)), *(one.is_there for one in own)]
+        return Owed([*phases, *of_own], np.any(is_there, axis=0))
 
     def combined(self, phases: Phases, rule: str = "") -> Floats:
         """Combine phases by the mission's rule, or another. [rad]"""
@@ -118,19 +122,15 @@ class Aggregates:
     def _sums(self, mine: ManyTogether, theirs: ManyTogether) -> Iterator[Judged]:
         has_clock = mine.split.clock is not None  # else it counts with the receiver
         for owner in ("transmitter", "receiver", *(["clock"] if has_clock else []), "mission"):
-            phases, what, limit = mine.owed(owner), subject(owner, QUADRATIC), self.limits[owner]
-            if not phases:
-                yield self.judging.row(what, None, limit)
-                continue
-            qpe, by_other = mine.combined(phases), theirs.combined(theirs.owed(owner))
+            (phases, is_declared), what, limit = mine.owed(owner), subject(owner, QUADRATIC), self.limits[owner]
+            qpe, by_other = mine.combined(phases), theirs.combined(theirs.owed(owner).phases)
             doubt = self.errors.doubts(theirs.model, by_other > limit * BOUND)
-            yield self.judging.row(what, qpe, limit, doubt=doubt, without_autofocus=qpe / limit * self.gain)
+            judged = self.judging.row(what, qpe, limit, doubt=doubt, without_autofocus=qpe / limit * self.gain)
+            yield judged.where(~is_declared, self.judging.row(what, None, limit))
 
     def _all_together(self, mine: ManyTogether) -> Iterator[Judged]:
         """A warning where each error stands alone and all together exceed the total; else there is no row."""
-        phases, limit = mine.owed("mission"), self.limits["mission"]
-        if not phases:
-            return
+        phases, limit = mine.owed("mission").phases, self.limits["mission"]
         largest = mine.combined(phases, "each")
         is_there = (mine.combined(phases, "rss") > limit * BOUND) & (largest <= limit * BOUND)
         what = subject("mission", QUADRATIC)
@@ -138,17 +138,16 @@ class Aggregates:
         yield judged.where(~is_there, nothing)
 
     def _cubic(self, mine: ManyTogether, theirs: ManyTogether) -> Judged:
-        phases, what = mine.all_cubics(), subject("mission", CUBIC)
-        limit = self._required(self.errors.mission.requirements.cubic_phase_error)
-        if not phases:
-            return self.judging.row(what, None, limit)
-        size = mine.combined(phases)
-        if limit is None:
-            return self.judging.row(what, size, None, is_info=True)._replace(cubic_rad=size)
-        doubt = self.errors.doubts(theirs.model, theirs.combined(theirs.all_cubics()) > limit * BOUND)
-        if self.combine == "each":
-            doubt = doubt | (mine.combined(phases, "rss") > limit * BOUND)
-        return self.judging.row(what, size, limit, doubt=doubt)._replace(cubic_rad=size, metric=CUBIC)
+        (phases, is_declared), what = mine.all_cubics(), subject("mission", CUBIC)
+        limit, size = self._required(self.errors.mission.requirements.cubic_phase_error), mine.combined(phases)
+        doubt: Any = False
+        if limit is not None:
+            by_other = theirs.combined(theirs.all_cubics().phases)
+            doubt = self.errors.doubts(theirs.model, by_other > limit * BOUND)
+            if self.combine == "each":
+                doubt = doubt | (mine.combined(phases, "rss") > limit * BOUND)
+        judged = self.judging.row(what, size, limit, doubt=doubt, is_info=limit is None)
+        return judged._replace(cubic_rad=size, metric=CUBIC).where(~is_declared, self.judging.row(what, None, limit))
 
     def _location(self, mine: ManyTogether, theirs: ManyTogether) -> Judged:
         what, limit = subject("mission", LOCATION), self._required(self.errors.mission.requirements.location_error)
@@ -163,13 +162,13 @@ class Aggregates:
         return self.judging.row(what, moved, limit, doubt=doubt)._replace(metric=LOCATION)
 
     def _pull_in(self, mine: ManyTogether, theirs: ManyTogether) -> Judged:
-        what, phases = subject("mission", "autofocus_pull_in"), mine.owed("mission")
+        (phases, is_declared), what = mine.owed("mission"), subject("mission", "autofocus_pull_in")
         pull_in = self.errors.array(math.pi * np.asarray(self.errors.mission.autofocus.n_pull))
-        if not phases:
-            return self.judging.row(what, None, pull_in, never_fails=True)
-        total, by_other = (one.combined(one.owed("mission"), "sum") for one in (mine, theirs))
+        by_other = theirs.combined(theirs.owed("mission").phases, "sum")
         doubt = self.errors.doubts(theirs.model, by_other > pull_in * BOUND)
-        return self.judging.row(what, total, pull_in, doubt=doubt, never_fails=True)
+        total = mine.combined(phases, "sum")
+        judged = self.judging.row(what, total, pull_in, doubt=doubt, never_fails=True)
+        return judged.where(~is_declared, self.judging.row(what, None, pull_in, never_fails=True))
 
     def _required(self, value: Any) -> Floats | None:
         return None if value is None else self.errors.array(value)

@@ -106,7 +106,8 @@ class _Check:
         found = list(self.slow)
         for error in self.stated_random:
             quadratic, cubic, _ = (self.array(part * error.declared) for part in error.effect(model))
-            found.append(ManyOwnPhases(error.subject.id, error.subject.owner, quadratic, cubic))
+            always = np.ones(self.cases, dtype=bool)
+            found.append(ManyOwnPhases(error.subject.id, error.subject.owner, quadratic, cubic, always))
         return found
 
     # ---------------------------------------------------------------- limits

@@ -17,14 +17,14 @@ Moves = Mapping[str, tuple[Floats, Floats]]  # by row id, east and north [m]
 class ManyOwnPhases(NamedTuple):
     """What has no displacement, but phases that count in sums, (cases,); as `OwnPhase`. [rad]
 
-    A vibration has phases, other than 0, only in the cases in which it is slow.
+    A vibration is there, and its phases are not 0, only in the cases in which it is slow.
     """
 
     row_id: str
     owner: str
     qpe: Floats
     cubic: Floats
-    is_in_every_case: bool = True
+    is_there: NDArray[np.bool_]
 
 
 class ManyCorrelated(NamedTuple):

@@ -23,11 +23,10 @@ def many_slow_phases(count: int, one: Callable[[int], Mission]) -> list[ManyOwnP
     for place in range(count):
         for phase in slow_phases(one(place)):
             if phase.row_id not in found:
-                found[phase.row_id] = ManyOwnPhases(
-                    phase.row_id, phase.owner, np.zeros(count), np.zeros(count), is_in_every_case=False
-                )
-            found[phase.row_id].qpe[place] = phase.qpe_rad
-            found[phase.row_id].cubic[place] = phase.cubic_rad
+                nothing = (np.zeros(count), np.zeros(count), np.zeros(count, dtype=bool))
+                found[phase.row_id] = ManyOwnPhases(phase.row_id, phase.owner, *nothing)
+            of_row = found[phase.row_id]
+            of_row.qpe[place], of_row.cubic[place], of_row.is_there[place] = phase.qpe_rad, phase.cubic_rad, True
     return list(found.values())
 
 

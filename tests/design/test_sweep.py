@@ -288,6 +288,25 @@ allocation: {split: {transmitter: 0.3, receiver: 0.5, clock: 0.2}, combine: rss}
 """
 
 
+@pytest.mark.parametrize("rule", ["each", "sum"])
+def test_a_slow_vibration_alone(rule) -> None:
+    """What it is counted in is declared only in the cases in which it is slow."""
+    vibration = "{sinusoidal: [{amplitude: 2 mm, frequency: 2 Hz}]}"
+    changes = {
+        "platforms.receiver.motion_error.vibration": vibration,
+        "requirements.cubic_phase_error": "0.2 rad",
+        "autofocus.n_pull": "1",
+        "allocation.combine": rule,
+    }
+    mission = parse_mission(mission_text(), "m.yaml", changes=[SetValue(*one) for one in changes.items()])
+    cases = grid(mission, collection__aperture_time=[0.2, 0.4, 0.6])
+    columns = ["mission.cubic_phase_error.status", "mission.autofocus_pull_in.status"]
+    whole, by_case = swept(mission, cases, columns)
+    assert by_case == 0
+    assert [one == "not_declared" for one in whole[columns[0]]] == [False, False, True]
+    assert_as_checked(mission, cases, whole, columns)
+
+
 @pytest.mark.parametrize(
     "axes",
     [
