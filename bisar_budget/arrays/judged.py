@@ -14,31 +14,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import evaluators
-from bisar_budget.analysis.allocation import BALANCED_RANGE, EQUAL, Allocation, Split, allocate
+from bisar_budget.analysis.allocation import Allocation, Split, allocate
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.arrays.aggregates import Aggregates, ManyTogether, is_owed
-from bisar_budget.arrays.collections import Floats, Geometries, norm
-from bisar_budget.arrays.declared import DeclaredErrors, ManyErrors
+from bisar_budget.arrays.collections import Geometries, norm
+from bisar_budget.arrays.declared import DeclaredErrors
 from bisar_budget.arrays.edge import HeldTogether, ManySceneEdges, many_scene_edges
+from bisar_budget.arrays.error_rows import ErrorRows
 from bisar_budget.arrays.instruments import many_random_errors
 from bisar_budget.arrays.judgement import BOUND, CODE, Judging
 from bisar_budget.arrays.random_rows import RandomRows
 from bisar_budget.arrays.rim import ManyScenePhases
-from bisar_budget.arrays.rows import REQUIREMENTS, Judged
-from bisar_budget.arrays.together import ManyOwnPhases, combined_phase, many_correlated
+from bisar_budget.arrays.rows import Judged
+from bisar_budget.arrays.shares import is_balanced, shares_of
+from bisar_budget.arrays.together import ManyOwnPhases
 from bisar_budget.arrays.vibrating import judged_one_by_one, many_slow_phases
 from bisar_budget.budget.orbit import FASTEST_FLIGHT
 from bisar_budget.budget.random_rows import spur_rows
 from bisar_budget.budget.required import is_asked_for, missing_declarations
 from bisar_budget.budget.vibration_rows import vibration_rows
 from bisar_budget.budget.waivers import named_by
-from bisar_budget.effects import models
 from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
-from bisar_budget.mission.model import MetricSplits, Mission
+from bisar_budget.mission.model import Mission
 
 MODELS = ("published", "full")
 _STATUSES = tuple(STATUS)
@@ -110,87 +110,15 @@ class _Check:
             found.append(ManyOwnPhases(error.subject.id, error.subject.owner, quadratic, cubic, always))
         return found
 
-    # ---------------------------------------------------------------- limits
-    def _allowed(self, model: str, error: ManyErrors, limit: Floats) -> tuple[Floats, NDArray[np.int8]]:
-        """How large an error may be by a model, and the requirement that sets it: smallest size, NaN where none."""
-        needs = self.mission.requirements
-        held = [(QUADRATIC, limit)]
-        if error.is_motion:
-            others = ((CUBIC, needs.cubic_phase_error), (LOCATION, needs.location_error))
-            held += [(name, self.array(required)) for name, required in others if required is not None]
-        smalls = []
-        for name, required in held:
-            per_unit = self.array(self.errors.per_unit(model, error, name))
-            with np.errstate(all="ignore"):
-                smalls.append(np.where(per_unit > 0, required / per_unit, math.inf))
-        order = np.argsort(smalls, axis=0, kind="stable")  # the one that binds is likely to be found first
-        if not self.is_brief:
-            order = np.broadcast_to(np.arange(len(held))[:, None], order.shape)
-        smallest, binding = np.full(self.cases, math.inf), np.full(self.cases, -1, dtype=np.int8)
-        is_linear = model == "published" or not error.is_motion or self.errors.is_heard_out(error)
-        for turn in range(len(held)):
-            for place, (name, required) in enumerate(held):
-                mine = order[turn] == place
-                if not mine.any():
-                    continue
-                is_whole = name == QUADRATIC and not self.is_brief
-                small, upto = smalls[place], math.inf if is_whole else smallest
-                sized = small
-                if not is_linear:
-                    farthest = self.array(
-                        np.minimum(upto, np.maximum(self.errors.farthest(error), self._size(error)))
-                    )
-                    first = np.minimum(small, farthest)
-                    with np.errstate(invalid="ignore"):
-                        is_sure = self.errors.adds(error, first, name) <= models.SHARE * required
-                    sized = np.where(small > farthest, math.inf, small)
-                    some = np.flatnonzero(mine & ~is_sure & ~self.errors.is_left_out)
-                    if some.size:
-                        sized[some] = self.errors.first_reaching(error, name, required, first, farthest, some)
-                is_less = mine & (sized < smallest)
-                smallest = np.where(is_less, sized, smallest)
-                binding[is_less] = REQUIREMENTS.index(name)
-        smallest[~np.isfinite(smallest)] = math.nan
-        return smallest, binding
-
-    def _size(self, error: ManyErrors) -> Any:
-        return 0.0 if error.declared is None else np.abs(error.declared)
-
-    @property
-    def _is_balanced(self) -> bool:
-        split = self.mission.allocation.split
-        return (split.quadratic_phase_error if isinstance(split, MetricSplits) else split) == "balanced"
-
-    def _split(self, gating: str) -> Split:
-        """Shares of the phase; `balanced` are arrays."""
-        if not self._is_balanced:
-            return allocate(self.mission, (), {}).qpe
-        by = [model for model in MODELS if gating in (model, "strictest")]
-        by_model = zip(*map(self._own, by), strict=True)
-        own = [(of_one[0], np.maximum.reduce([one.qpe for one in of_one])) for of_one in by_model]
-        weight = []
-        for owner in PLATFORMS:
-            members = []
-            for error in self.errors.stated:
-                if EQUAL.includes(error.subject.owner, owner):
-                    phases = np.array([self.does(model, error).qpe for model in by])
-                    largest = np.abs(phases).argmax(axis=0)
-                    members.append((error.subject.id, np.take_along_axis(phases, largest[None], axis=0)[0]))
-            members += [(one.row_id, qpe) for one, qpe in own if EQUAL.includes(one.owner, owner)]
-            combined = combined_phase(members, self.combine, many_correlated(self.mission))
-            weight.append(np.minimum(self.array(combined), 1e300))
-        with np.errstate(all="ignore"):
-            share: Any = np.where(sum(weight) == 0, 0.5, np.clip(weight[0] / sum(weight), *BALANCED_RANGE))
-        return Split(transmitter=share, receiver=1 - share)
-
-    # ---------------------------------------------------------------- rows
     def checked(self) -> Checked:
         """Judge every row by the model that gates."""
         gating = self.mission.gating_model
         if gating != "published":  # searches start from what declared errors are known to do
             for error in self.errors.stated:
                 self.does("full", error)
-        self.split = self._split(gating)
+        gates = [model for model in MODELS if gating in (model, "strictest")]
+        own = {model: self._own(model) for model in MODELS}
+        self.split = shares_of(self.errors, gates, [own[model] for model in gates])
         total = self.array(self.mission.requirements.quadratic_phase_error)
         n_pull = self.mission.autofocus.n_pull
         self.gain = np.ones(self.cases)
@@ -199,9 +127,10 @@ class _Check:
         self.total = total
         owners = (*PLATFORMS, "clock", "mission")
         self.limits = {owner: self.array(self.split.of(owner) * total) * self.gain for owner in owners}
-        together = {model: ManyTogether(self.errors, model, self._own(model), self.split) for model in MODELS}
+        together = {model: ManyTogether(self.errors, model, own[model], self.split) for model in MODELS}
+        self.error_rows = ErrorRows(self.judging, self.errors, self.limits, self.gain, is_brief=self.is_brief)
         self.aggregates = Aggregates(self.judging, self.errors, together, self.limits, self.gain)
-        by_model = [self._rows(model) for model in MODELS if gating in (model, "strictest")]
+        by_model = [self._rows(model) for model in gates]
         rows = _stricter(*by_model) if len(by_model) > 1 else by_model[0]
         return Checked(
             tuple(self._waived(self._required(row)) for row in rows),
@@ -212,12 +141,7 @@ class _Check:
 
     def _rows(self, gating: str) -> list[Judged]:
         other = "published" if gating == "full" else "full"
-        rows = []
-        for error in self.errors.listed:
-            rows.append(self._row(gating, other, error))
-            if gating == "full" or self.mission.gating_model == "published":
-                self.errors.forget(error)
-        rows += self._vibrations(gating)
+        rows = [*self.error_rows.rows(gating, other), *self._vibrations(gating)]
         rows += self._instruments(gating)
         rows += self.aggregates.rows(gating, other)
         if self.mission.scene.radius is not None:
@@ -236,14 +160,13 @@ class _Check:
 
     def _one_by_one(self, rows_of: Callable[[Mission, Allocation], Iterable[Row]]) -> list[Judged]:
         """Rows that follow from the wavelength, the aperture time, the lines of sight and the shares alone."""
-        by_phase = self.split if self._is_balanced else None
+        balanced = [self.array(self.split.of(name)) for name in PLATFORMS] if is_balanced(self.mission) else []
 
         def of_case(place: int) -> Iterable[Row]:
             mission = self.one(place)
             allocation = allocate(mission, (), {})
-            if by_phase is not None:
-                shares = (float(self.array(by_phase.of(name))[place]) for name in PLATFORMS)
-                allocation = allocation._replace(qpe=Split(*shares))
+            if balanced:
+                allocation = allocation._replace(qpe=Split(*(float(share[place]) for share in balanced)))
             return rows_of(mission, allocation)
 
         return judged_one_by_one(np.flatnonzero(~self.errors.is_left_out), self.cases, of_case)
@@ -261,35 +184,6 @@ class _Check:
         if any(one is not None and one.spurs for one in oscillators):
             yield from self._one_by_one(lambda mission, allocation: spur_rows(Analysis(mission), gating, allocation))
         yield from rows.islr_rows(gating)
-
-    def _row(self, gating: str, other: str, error: ManyErrors) -> Judged:
-        limit = self.limits[error.subject.owner]
-        allowable, binding = self._allowed(gating, error, limit)
-        if other == "full" and not self.is_brief and self.mission.gating_model != "published":
-            self._allowed(other, error, limit)  # a whole check asks for it here, and a later search starts from it
-        none = np.full(self.cases, math.nan)
-        if error.declared is None:
-            return self.judging.row(error.subject, None, allowable)._replace(binding=binding)
-        mine, theirs = self.does(gating, error), self.does(other, error)
-        published = mine if gating == "published" else theirs
-        needs = self.mission.requirements
-        held = [(np.abs(theirs.qpe), limit)]
-        if error.is_motion:
-            moved = np.hypot(*theirs.farthest)
-            others = ((np.abs(theirs.cubic), needs.cubic_phase_error), (moved, needs.location_error))
-            held += [(size, self.array(required)) for size, required in others if required is not None]
-        is_over = np.any([size / required > BOUND for size, required in held], axis=0)
-        doubt = self.errors.doubts(other, is_over)
-        judged = self.judging.row(
-            error.subject,
-            np.abs(self.array(error.declared)),
-            allowable,
-            doubt=doubt,
-            without_autofocus=np.where(self.gain > 1, np.abs(mine.qpe) / (limit / self.gain), 0.0),
-            is_info=self.combine != "each" or error.is_shown_again,
-        )
-        cubic = np.abs(mine.cubic) if error.is_motion else none
-        return judged._replace(binding=binding, qpe_published_rad=np.abs(published.qpe), cubic_rad=cubic)
 
     @cached_property
     def _edges(self) -> ManySceneEdges | None:
