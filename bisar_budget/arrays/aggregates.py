@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from bisar_budget.analysis.allocation import Split
 from bisar_budget.arrays.collections import Floats
 from bisar_budget.arrays.declared import DeclaredErrors
-from bisar_budget.arrays.judgement import BOUND, Judging
+from bisar_budget.arrays.judgement import BOUND, CODE, Judging
 from bisar_budget.arrays.rows import Judged
 from bisar_budget.arrays.together import (
     ManyOwnPhases,
@@ -21,7 +21,7 @@ from bisar_budget.arrays.together import (
     many_correlated,
 )
 from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
-from bisar_budget.effects.subject import subject
+from bisar_budget.effects.subject import Subject, subject
 
 Own = Sequence[ManyOwnPhases]
 
@@ -58,8 +58,10 @@ class ManyTogether:
         return Owed([*phases, *of_own], np.any(is_there, axis=0))
 
     def combined(self, phases: Phases, rule: str = "") -> Floats:
-        """Combine phases by the mission's rule, or another. [rad]"""
-        return self.errors.array(combined_phase(phases, rule or self.rule, self.groups))
+        """Combine phases by the mission's rule, or another; cases without any number are left out. [rad]"""
+        found = self.errors.array(combined_phase(phases, rule or self.rule, self.groups))
+        self.errors.is_left_out |= np.isnan(found)  # a covariance of which an error has no image
+        return found
 
     def moved(self, rule: str) -> Floats:
         """Displacements combined by a rule. [m]"""
@@ -125,7 +127,7 @@ class Aggregates:
             (phases, is_declared), what, limit = mine.owed(owner), subject(owner, QUADRATIC), self.limits[owner]
             qpe, by_other = mine.combined(phases), theirs.combined(theirs.owed(owner).phases)
             doubt = self.errors.doubts(theirs.model, by_other > limit * BOUND)
-            judged = self.judging.row(what, qpe, limit, doubt=doubt, without_autofocus=qpe / limit * self.gain)
+            judged = self._judged(what, qpe, limit, doubt=doubt, without_autofocus=qpe / limit * self.gain)
             yield judged.where(~is_declared, self.judging.row(what, None, limit))
 
     def _all_together(self, mine: ManyTogether) -> Iterator[Judged]:
@@ -146,20 +148,25 @@ class Aggregates:
             doubt = self.errors.doubts(theirs.model, by_other > limit * BOUND)
             if self.combine == "each":
                 doubt = doubt | (mine.combined(phases, "rss") > limit * BOUND)
-        judged = self.judging.row(what, size, limit, doubt=doubt, is_info=limit is None)
-        return judged._replace(cubic_rad=size, metric=CUBIC).where(~is_declared, self.judging.row(what, None, limit))
+        judged = self._judged(what, size, limit, doubt=doubt, is_info=limit is None)
+        return judged._replace(cubic_rad=judged.declared, metric=CUBIC).where(
+            ~is_declared, self.judging.row(what, None, limit)
+        )
 
     def _location(self, mine: ManyTogether, theirs: ManyTogether) -> Judged:
         what, limit = subject("mission", LOCATION), self._required(self.errors.mission.requirements.location_error)
         if not mine.motion:
             return self.judging.row(what, None, limit)
         moved = mine.moved(self.combine)
-        if limit is None:
-            return self.judging.row(what, moved, None, is_info=True)
-        doubt = self.errors.doubts(theirs.model, theirs.moved(self.combine) > limit * BOUND)
-        if self.combine == "each":
-            doubt = doubt | (mine.moved("rss") > limit * BOUND)
-        return self.judging.row(what, moved, limit, doubt=doubt)._replace(metric=LOCATION)
+        doubt: Any = False
+        if limit is not None:
+            doubt = self.errors.doubts(theirs.model, theirs.moved(self.combine) > limit * BOUND)
+            if self.combine == "each":
+                doubt = doubt | (mine.moved("rss") > limit * BOUND)
+        judged = self.judging.row(what, moved, limit, doubt=doubt, is_info=limit is None)._replace(metric=LOCATION)
+        nothing = self.judging.row(what, None, limit)
+        nothing.status[:] = CODE["info" if limit is None else "not_evaluated"]
+        return judged.where(np.isnan(moved), nothing)  # one of the errors has no image to place
 
     def _pull_in(self, mine: ManyTogether, theirs: ManyTogether) -> Judged:
         (phases, is_declared), what = mine.owed("mission"), subject("mission", "autofocus_pull_in")
@@ -167,8 +174,19 @@ class Aggregates:
         by_other = theirs.combined(theirs.owed("mission").phases, "sum")
         doubt = self.errors.doubts(theirs.model, by_other > pull_in * BOUND)
         total = mine.combined(phases, "sum")
-        judged = self.judging.row(what, total, pull_in, doubt=doubt, never_fails=True)
+        judged = self._judged(what, total, pull_in, doubt=doubt, never_fails=True)
         return judged.where(~is_declared, self.judging.row(what, None, pull_in, never_fails=True))
+
+    def _judged(self, what: Subject, size: Floats, limit: Floats | None, **of_row: Any) -> Judged:
+        """Judge a sum; one without a finite value fails, since one of its errors has no image at all."""
+        judged = self.judging.row(what, size, limit, **of_row)
+        is_endless = ~np.isfinite(size)
+        if not is_endless.any():
+            return judged
+        nothing = self.judging.row(what, None, limit, never_fails=judged.never_fails)
+        if not of_row.get("is_info"):
+            nothing.status[:] = CODE["fail"]
+        return judged.where(is_endless, nothing)
 
     def _required(self, value: Any) -> Floats | None:
         return None if value is None else self.errors.array(value)

@@ -47,7 +47,7 @@ class ManyErrors(NamedTuple):
 
 
 class Does(NamedTuple):
-    """What a declared error does in each case, as `models.Declared`; NaN where that is not certain."""
+    """What a declared error does in each case, as `models.Declared`; displacements are NaN where there is none."""
 
     qpe: Floats
     cubic: Floats
@@ -288,7 +288,10 @@ class DeclaredErrors:
         return np.asarray(found & (size != 0))
 
     def quadratic_by_sign(self, error: ManyErrors) -> Floats:
-        """Quadratic phases of a declared error of each sign, positive first, where it is large, (2, cases). [rad]"""
+        """Quadratic phases of a declared error of each sign, positive first, where it is large, (2, cases). [rad]
+
+        Not a number where it leaves no image.
+        """
         self.does("full", error)
         return self._quadratics[error.subject.id]
 
@@ -299,14 +302,15 @@ class DeclaredErrors:
             path = self._path(error, sign)
             path.to(some, np.abs(size))
             by_sign.append(path.known(some, np.abs(size)))
-            self.is_left_out[some[np.isnan(by_sign[-1][0])]] = True
-        kept = self._quadratics.setdefault(error.subject.id, np.full((2, self.cases), math.nan))
-        kept[:, some] = by_sign[0][3], by_sign[1][3]
+        quadratics = self._quadratics.setdefault(error.subject.id, np.full((2, self.cases), math.nan))
+        quadratics[:, some] = by_sign[0][3], by_sign[1][3]
         ahead, back = np.where(size > 0, by_sign, by_sign[::-1])
+        is_gone = np.isnan(ahead[0]) | np.isnan(back[0])  # no ground point: phases are infinite, none moves
         for kept, row in ((found.qpe, 3), (found.cubic, 4)):
-            kept[some] = np.copysign(np.maximum(np.abs(ahead[row]), np.abs(back[row])), kept[some])
+            largest = np.copysign(np.maximum(np.abs(ahead[row]), np.abs(back[row])), kept[some])
+            kept[some] = np.where(is_gone, math.inf, largest)
         for place, one in ((found.displacement, ahead), (found.opposite, back)):
-            place[0][some], place[1][some] = one[1], one[2]
+            place[0][some], place[1][some] = np.where(is_gone, math.nan, one[1:3])
 
     def _path(self, error: ManyErrors, sign: float) -> ManyPointPaths:
         """The ways of the point by an error with one sign, which all that asks for them shares."""

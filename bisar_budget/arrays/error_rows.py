@@ -68,7 +68,9 @@ class ErrorRows:
             without_autofocus=np.where(self.gain > 1, np.abs(mine.qpe) / (limit / self.gain), 0.0),
             is_info=self.errors.mission.allocation.combine != "each" or error.is_shown_again,
         )
-        cubic = np.abs(mine.cubic) if error.is_motion else array(math.nan)
+        cubic = (
+            np.where(np.isfinite(mine.cubic), np.abs(mine.cubic), math.nan) if error.is_motion else array(math.nan)
+        )
         return judged._replace(binding=binding, qpe_published_rad=np.abs(published.qpe), cubic_rad=cubic)
 
     def _held(self, error: ManyErrors) -> list[tuple[str, Floats]]:

@@ -1,7 +1,7 @@
 """Rows of many cases, judged at once: the arrays beside `budget`.
 
-A case is judged as `check_mission` judges it, by the same formulas and searches. Where they do not hold it (a
-declared error leaves no image, a search takes very many steps), the case is left out and says so.
+A case is judged as `check_mission` judges it, by the same formulas and searches. Where they do not hold it (a search
+takes very many steps), the case is left out and says so.
 """
 
 import math

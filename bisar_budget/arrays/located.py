@@ -120,7 +120,8 @@ class ManyExactRanges:
 
     def at(self, east: Floats, north: Floats, some: NDArray[Any]) -> "ManyExactRanges":
         """Exact ranges of some of the cases at points of the ground, (some,), in place of the centre. [m]"""
-        tracks = [(x[:, some] - east, y[:, some] - north, z[:, some]) for x, y, z in self.tracks]
+        of = [[part.take(some, axis=1) for part in track] for track in self.tracks]
+        tracks = [(x - east, y - north, z) for x, y, z in of]
         positions = [(x[some] - east, y[some] - north, z[some]) for x, y, z in self.positions]
         return ManyExactRanges(
             self.half[some], self.k[some], self.count, tracks, positions, has_direct_path=self.has_direct_path

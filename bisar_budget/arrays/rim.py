@@ -104,8 +104,8 @@ class ManyScenePhases:
                 path = ManyPointPaths(there, course, sign, per_unit, lost)
                 path.to(some, size[some])
                 away = path.known(some, size[some])
-                is_gone = np.isnan(away[0])
-                worst = np.maximum(worst, np.where(is_gone, math.inf, np.abs(away[3] - here[of[some]])))
+                is_gone, differs = np.isnan(away[0]), np.abs(away[3] - here[of[some]])
+                worst = np.maximum(worst, np.where(np.isnan(differs), math.inf, differs))
                 if turns is not None:
                     turns[some] = np.minimum(turns[some], np.where(is_gone, 0.0, away[5]))
             self.errors.is_left_out[of[lost]] = True

@@ -288,6 +288,33 @@ allocation: {split: {transmitter: 0.3, receiver: 0.5, clock: 0.2}, combine: rss}
 """
 
 
+@pytest.mark.parametrize(("rule", "model"), [("each", "published"), ("rss", "full"), ("sum", "strictest")])
+def test_errors_that_leave_no_image_are_held(rule, model) -> None:
+    """Nothing is where range and Doppler gradients have become parallel: phases without end, no place to move to."""
+    changes = {
+        "allocation.combine": rule,
+        "allocation.model": model,
+        "requirements.cubic_phase_error": "0.2 rad",
+        "requirements.location_error": "20 m",
+        "autofocus.n_pull": "2",
+        "scene.radius": "100 m",
+    }
+    text = (MISSIONS / "rigling_moses_section_v.yaml").read_bytes()
+    mission = parse_mission(text, "m.yaml", changes=[SetValue(*one) for one in changes.items()])
+    cases = grid(mission, platforms__receiver__motion_error__velocity=[0.01, 100.0, 900.0])
+    sums = ("cubic_phase_error", "location_error", "autofocus_pull_in", "spatial_variance", "quadratic_phase_error")
+    columns = [
+        f"mission.{one}.{field}"
+        for one in sums
+        for field in ("status", "declared")
+        if rule != "each" or one != sums[-1]
+    ]
+    whole, by_case = swept(mission, cases, columns)
+    assert by_case == 0
+    assert whole["mission.spatial_variance.status"][2] == "not_evaluated"
+    assert_as_checked(mission, cases, whole, columns)
+
+
 @pytest.mark.parametrize("rule", ["each", "sum"])
 def test_a_slow_vibration_alone(rule) -> None:
     """What it is counted in is declared only in the cases in which it is slow."""
