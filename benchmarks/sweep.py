@@ -120,7 +120,7 @@ def of_kinds(runs: int, side: int = 64, few: int = 16) -> None:
         def one_by_one(mission: Mission = mission, cases: Grid = cases) -> None:
             for place in range(0, cases.count, cases.count // few):
                 values = {key: float(one[0]) for key, one in cases.values(place, place + 1).items()}
-                found = [SetValue(one.key, f"{values[one.key]!r} {one.dimension.si}") for one in cases.numbers]
+                found = [SetValue(one.key, f"{values[one.key]!r} {one.dimension.si}") for one in cases.varied]
                 case = parse_mission(mission.data, mission.file, changes=(*mission.changes, *found))
                 check_mission(case, DAY, is_brief=True)
 
@@ -166,7 +166,7 @@ def of_a_million(count: int, runs: int) -> None:
         print(
             f"  {label:5} {ours:6.2f} s ÷ {hand:6.2f} s = {ratio:.2f}    a loop of check ÷ sweep = {loop / ours:.0f}"
         )
-    few = Grid(cases.numbers, tuple(axis[:: side // 50] for axis in axes))
+    few = Grid(cases.varied, tuple(axis[:: side // 50] for axis in axes))
     found = sweep(mission, few, today=DAY)
     whole = np.concatenate([part.values["utilization"] for part in found.parts])
     use, *_ = by_hand(*(axis.ravel() for axis in np.meshgrid(*few.axes, indexing="ij")))

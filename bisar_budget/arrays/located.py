@@ -294,9 +294,9 @@ class ManyExactRanges:
         """What shifts of the platforms make of c·t̃ at the nodes where the direct path is the clock. [m]"""
         a, b, c = (one - other for one, other in zip(*shifts, strict=True))
         x, y, z = (part[:, some] for part in self._between)
-        i, j, k = x + a, y + b, z + c
-        grown = (x + i) * a + (y + j) * b + (z + k) * c
-        return np.asarray(grown / (self.baselines[:, some] + np.sqrt(i * i + j * j + k * k)))
+        grown = a * (2 * x + a) + b * (2 * y + b) + c * (2 * z + c)
+        baseline = self.baselines[:, some]
+        return np.asarray(grown / (baseline + np.sqrt(np.abs(baseline * baseline + grown))))
 
     def way(
         self, error: Course, size: Floats, place: tuple[Floats, Floats], some: NDArray[Any]
@@ -439,10 +439,10 @@ def _grown(platform: list[Floats], east: Floats, north: Floats) -> tuple[Floats,
     With it where the platform is seen from there, east and north, and how far. [m]
     """
     x, y, z, R, a, b, c = platform
-    a, b = a - east, b - north
-    u, v, w = x + a, y + b, z + c
-    distance = np.sqrt(u * u + v * v + w * w)
-    return ((x + u) * a + (y + v) * b + (z + w) * c) / (R + distance), u, v, distance
+    u, v = x + a, y + b
+    grown = a * (x + u) + b * (y + v) + c * (z + z + c) - 2 * u * east - 2 * v * north + (east * east + north * north)
+    distance = np.sqrt(R * R + grown)
+    return grown / (R + distance), u - east, v - north, distance
 
 
 def _of(arrays: Sequence[Floats], some: NDArray[Any]) -> list[Floats]:
