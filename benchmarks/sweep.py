@@ -1,9 +1,11 @@
 """A sweep of a million cases of the paper's example: against its formulas by hand, and a loop of check.
 
+Then what else arrays hold: cases of other examples together ÷ the same one by one.
+
 By hand stands what the sweep finds too: geometry, the published phase and limit, the same by the full model to first
 order at six or ten nodes, exact ranges of both signs, and the verdict. All in one process and one thread.
 
-    OMP_NUM_THREADS=1 python benchmarks/sweep.py [--cases 1000000] [--runs 3]
+    OMP_NUM_THREADS=1 python benchmarks/sweep.py [million] [kinds] [--cases 1000000] [--runs 3]
 """
 
 import argparse
@@ -25,6 +27,7 @@ from bisar_budget.design.sweep import sweep
 from bisar_budget.evaluators import LEGENDRE_FITS
 from bisar_budget.faults import SetValue
 from bisar_budget.mission.load import load_mission, parse_mission
+from bisar_budget.mission.model import Mission
 from bisar_budget.mission.tree import read_tree
 
 MISSION = Path(__file__).parent.parent / "specs" / "missions" / "rigling_moses_section_v.yaml"
@@ -87,15 +90,52 @@ def timed(task: Callable[[], object]) -> tuple[float, float]:
     return time.perf_counter() - clock, time.process_time() - cpu
 
 
-def main() -> None:
-    """Measure in turn, after one round of warm-up."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--cases", type=int, default=1_000_000)
-    parser.add_argument("--runs", type=int, default=3)
-    chosen = parser.parse_args()
+# What a mission has, and the example that has it.
+KINDS = {
+    "a scene's radius": ("rigling_moses_section_v", {"scene.radius": "500 m"}),
+    "the same, full model": ("rigling_moses_section_v", {"scene.radius": "500 m", "allocation.model": "full"}),
+    "inertial sensor and GNSS": ("uav_stim300", {}),
+    "oscillators": ("ocxo_free_running", {}),
+    "oscillators, synchronised": ("tandem_x_synchronized", {}),
+    "a direct path": ("ocxo_direct_path", {}),
+    "covariances and a radius": ("drones_same_gnss", {"scene.radius": "100 m"}),
+}
+
+
+def of_kinds(runs: int, side: int = 64, few: int = 16) -> None:
+    """Measure each kind of mission over apertures and bandwidths, `few` of the cases one by one."""
+    print(f"{side * side} cases of an example together, and {few} of them one by one; time of one case")
+    for kind, (name, changes) in KINDS.items():
+        text = MISSION.with_name(f"{name}.yaml")
+        mission = parse_mission(text.read_bytes(), str(text), changes=[SetValue(*one) for one in changes.items()])
+        tree = read_tree(mission.data, mission.file).root
+        keys = ("collection.aperture_time", "radar.bandwidth")
+        numbers = tuple(number_of(tree, key) for key in keys)
+        axes = tuple(np.linspace(0.5, 1.5, side) * number.value for number in numbers)
+        cases = Grid(numbers, axes)
+
+        def together(mission: Mission = mission, cases: Grid = cases) -> None:
+            assert not sum(part.by_case for part in sweep(mission, cases, today=DAY).parts)
+
+        def one_by_one(mission: Mission = mission, cases: Grid = cases) -> None:
+            for place in range(0, cases.count, cases.count // few):
+                values = {key: float(one[0]) for key, one in cases.values(place, place + 1).items()}
+                found = [SetValue(one.key, f"{values[one.key]!r} {one.dimension.si}") for one in cases.varied]
+                case = parse_mission(mission.data, mission.file, changes=(*mission.changes, *found))
+                check_mission(case, DAY, is_brief=True)
+
+        together()
+        rounds = [(timed(together)[1] / cases.count, timed(one_by_one)[1] / few) for _ in range(runs)]
+        ours, loop = (statistics.median(one[task] for one in rounds) for task in (0, 1))
+        ratio = statistics.median(loop / ours for ours, loop in rounds)
+        print(f"  {kind:26} {loop * 1e3:6.2f} ms ÷ {ours * 1e6:5.0f} µs = {ratio:4.0f}")
+
+
+def of_a_million(count: int, runs: int) -> None:
+    """Measure cases of Section V against its formulas by hand, and against a loop of check."""
     mission = load_mission(str(MISSION))
     tree = read_tree(mission.data, mission.file).root
-    side = math.isqrt(chosen.cases)
+    side = math.isqrt(count)
     axes = (np.radians(np.linspace(10, 170, side)), np.linspace(1, 10, side))
     keys = ("platforms.receiver.azimuth", "collection.aperture_time")
     cases = Grid(tuple(number_of(tree, key) for key in keys), axes)
@@ -105,8 +145,8 @@ def main() -> None:
         for part in sweep(mission, cases, today=DAY).parts:
             assert not part.by_case
 
-    def looped(count: int = 200) -> None:
-        for place in range(count):
+    def looped(few: int = 200) -> None:
+        for place in range(few):
             values = zip(keys, (f"{float(azimuth[place])!r} rad", f"{float(T[place])!r} s"), strict=True)
             check_mission(
                 parse_mission(mission.data, mission.file, changes=[SetValue(*one) for one in values]),
@@ -117,7 +157,7 @@ def main() -> None:
     # Memory first: by hand, whole arrays take gigabytes.
     swept()
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    rounds = [(timed(lambda: by_hand(azimuth, T)), timed(swept), timed(looped)) for _ in range(chosen.runs)]
+    rounds = [(timed(lambda: by_hand(azimuth, T)), timed(swept), timed(looped)) for _ in range(runs)]
     print(f"sweep of {cases.count} cases of Section V ÷ its formulas by hand over whole arrays (at most 3)")
     for label, place in (("clock", 0), ("CPU", 1)):
         hand, ours = (statistics.median(one[task][place] for one in rounds) for task in (0, 1))
@@ -126,12 +166,25 @@ def main() -> None:
         print(
             f"  {label:5} {ours:6.2f} s ÷ {hand:6.2f} s = {ratio:.2f}    a loop of check ÷ sweep = {loop / ours:.0f}"
         )
-    few = Grid(cases.numbers, tuple(axis[:: side // 50] for axis in axes))
+    few = Grid(cases.varied, tuple(axis[:: side // 50] for axis in axes))
     found = sweep(mission, few, today=DAY)
     whole = np.concatenate([part.values["utilization"] for part in found.parts])
     use, *_ = by_hand(*(axis.ravel() for axis in np.meshgrid(*few.axes, indexing="ij")))
     print(f"  largest difference of the utilization {np.abs(whole / use - 1).max():.0e} of itself")
     print(f"  peak memory of the sweep {peak:.0f} MB (at most 1000)")
+
+
+def main() -> None:
+    """Measure in turn, after one round of warm-up."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("what", nargs="*", choices=["million", "kinds"], default=["million", "kinds"])
+    parser.add_argument("--cases", type=int, default=1_000_000)
+    parser.add_argument("--runs", type=int, default=3)
+    chosen = parser.parse_args()
+    if "million" in chosen.what:
+        of_a_million(chosen.cases, chosen.runs)
+    if "kinds" in chosen.what:
+        of_kinds(chosen.runs)
 
 
 if __name__ == "__main__":

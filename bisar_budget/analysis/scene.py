@@ -30,21 +30,21 @@ from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.units import format_quantity
 
 RIM_POINTS = 16
-_WIDE = 0.1  # of the nearest slant range; beyond, twice as many
-_LIKE_A_COSINE = 1e-4  # as near to the crest of a cosine; its azimuth is then right to a degree
-_ROUGH = 0.1  # by so much, of itself, a crest through points of the rim may be off
-_CLIMBS = 5  # until then, each in a quarter of the arc before
-_NARROW = 10.0  # of a place's clearances; below, it is looked at whatever its difference
-_MIN_SINE = math.sin(math.radians(MIN_GRADIENT_ANGLE_DEG))
-_NEAREST_M = 1.0  # of a platform to a place; nearer, no image
+WIDE = 0.1  # of the nearest slant range; beyond, twice as many
+LIKE_A_COSINE = 1e-4  # as near to the crest of a cosine; its azimuth is then right to a degree
+ROUGH = 0.1  # by so much, of itself, a crest through points of the rim may be off
+CLIMBS = 5  # until then, each in a quarter of the arc before
+NARROW = 10.0  # of a place's clearances; below, it is looked at whatever its difference
+MIN_SINE = math.sin(math.radians(MIN_GRADIENT_ANGLE_DEG))
+NEAREST_M = 1.0  # of a platform to a place; nearer, no image
 _FARTHEST = 0.5  # of the nearest slant range: the search for a radius ends there
 _PRECISION = 1e-3  # of the radius
 _ALIKE = 5e-3  # of the total: so near to it, large errors need no search of their own
 _TURNS = 2  # of the azimuth along which it is searched; then it is the whole circle's
-_PROBES = 3
-_FLOOR_RAD, _SHARE = 1e-4, 3e-4  # of the largest difference: what one error may differ by and be taken as small
-_FINEST = 1e-3  # rad, of the azimuth of a largest difference: a cosine loses half its square
-_MAY_FOLD = 0.7  # of what gradients span without an error: with less left of it a point may have no image nearby
+PROBES = 3
+FLOOR_RAD, SHARE = 1e-4, 3e-4  # of the largest difference: what one error may differ by and be taken as small
+FINEST = 1e-3  # rad, of the azimuth of a largest difference: a cosine loses half its square
+MAY_FOLD = 0.7  # of what gradients span without an error: with less left of it a point may have no image nearby
 
 
 class SceneEdge(NamedTuple):
@@ -132,14 +132,14 @@ class ScenePhases:
 
     def place_of(self, there: ExactRanges) -> "RimPlace":
         """What there is where exact ranges are taken."""
-        if there.nearest < _NEAREST_M:
+        if there.nearest < NEAREST_M:
             return self.nowhere
         try:
             sine = there.gradient_sine
             phases = list(map(mul, there.quadratics_of(self.members), self.sizes))
         except ZeroDivisionError:  # a gradient vanishes, or both are parallel to the last digit
             return self.nowhere
-        clearances = (self.turn * sine / _MIN_SINE, there.range_gradient / MIN_GROUND_GRADIENT)
+        clearances = (self.turn * sine / MIN_SINE, there.range_gradient / MIN_GROUND_GRADIENT)
         return RimPlace(phases, self.combined(phases), clearances)
 
     def differences(
@@ -204,7 +204,7 @@ class ScenePhases:
         arc = math.pi / RIM_POINTS
         places = [rim.azimuth, *(2 * arc * place for place in range(RIM_POINTS))]
         size, azimuth = max((size_at(place), place) for place in places)
-        while arc > _FINEST and math.isfinite(size):
+        while arc > FINEST and math.isfinite(size):
             sides = [(size_at(azimuth + step), azimuth + step) for step in (-arc, arc)]
             if max(sides)[0] > size:
                 size, azimuth = max(sides)
@@ -212,7 +212,7 @@ class ScenePhases:
                 arc /= 4
         turn, lowest = min(seen)
         arc = math.pi / RIM_POINTS
-        while math.isfinite(size) and turn < _MAY_FOLD and arc > _FINEST:
+        while math.isfinite(size) and turn < MAY_FOLD and arc > FINEST:
             sides = [(size_at(lowest + step), lowest + step) for step in (-arc, arc)]
             size, azimuth = max((size, azimuth), *sides)
             if min(seen)[0] < turn:
@@ -224,9 +224,9 @@ class ScenePhases:
     def _bent(self, rim: "Rim", radius: float) -> list[int]:
         """Which of the large errors differ otherwise than small ones do: seen at three places, two harmonics show."""
         found = set[int]()
-        floor = max(_FLOOR_RAD, _SHARE * rim.difference)
-        for third in range(_PROBES):
-            azimuth = rim.azimuth + 2 * math.pi * third / _PROBES
+        floor = max(FLOOR_RAD, SHARE * rim.difference)
+        for third in range(PROBES):
+            azimuth = rim.azimuth + 2 * math.pi * third / PROBES
             small, exact = (self.differences(radius, azimuth, which) for which in ((), self.large))
             found |= {i for i in self.large if not abs(exact[i] - small[i]) <= floor}
         return sorted(found)
@@ -252,7 +252,7 @@ class ScenePhases:
         That is where the difference is largest; and where a clearance is least, if it comes near to 1: a difference
         grows there as its inverse, in an arc that points of a circle may miss.
         """
-        count = RIM_POINTS if radius <= _WIDE * self.nearest else 2 * RIM_POINTS
+        count = RIM_POINTS if radius <= WIDE * self.nearest else 2 * RIM_POINTS
         places = [self.place(radius, 2 * math.pi * k / count) for k in range(count)]
         phases = [place.phases for place in places]
 
@@ -266,11 +266,11 @@ class ScenePhases:
                 return -self.place(radius, azimuth).clearances[which]
 
             # None is left out: a valley that is milder at the points may be the deeper one between them.
-            narrow += _tops([-place.clearances[which] for place in places], nearness_at, -_NARROW)
+            narrow += _tops([-place.clearances[which] for place in places], nearness_at, -NARROW)
         nearness, azimuth = max(narrow, default=(-math.inf, 0.0))
         if nearness >= -1:
             return Rim(azimuth % (2 * math.pi), math.inf, phases, self.centre)
-        tops = _tops([place.size for place in places], size_at, rough=_ROUGH)
+        tops = _tops([place.size for place in places], size_at, rough=ROUGH)
         arc = math.pi / count / 8
         for _, azimuth in narrow:
             sides = (size_at(azimuth - arc), size_at(azimuth + arc))
@@ -342,11 +342,11 @@ def _climbed(
     found there, that is looked for again in a quarter of the arc.
     """
     found = [(height, azimuth)]
-    for _ in range(_CLIMBS):
+    for _ in range(CLIMBS):
         offset, crest = _crest(*sides, height, arc)
         there = (height_at(azimuth + offset), azimuth + offset)
         found.append(there)
-        if abs(there[0] - crest) <= _LIKE_A_COSINE * abs(crest):
+        if abs(there[0] - crest) <= LIKE_A_COSINE * abs(crest):
             break
         height, azimuth = max(there, (height, azimuth))
         arc /= 4
@@ -397,8 +397,8 @@ def scene_edge(analysis: Analysis, allocation: Allocation) -> SceneEdge | None:
 
 
 def _degeneracy(there: BistaticGeometry) -> str:
-    if min(there.transmitter.slant_range, there.receiver.slant_range) < _NEAREST_M:
-        return phrases.platform_at_the_edge(_NEAREST_M)
+    if min(there.transmitter.slant_range, there.receiver.slant_range) < NEAREST_M:
+        return phrases.platform_at_the_edge(NEAREST_M)
     return there.degeneracy() or phrases.gradients_become_parallel()
 
 

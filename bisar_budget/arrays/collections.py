@@ -4,7 +4,8 @@ Every number is an array (cases,), or a float that all cases share.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from bisar_budget.constants import ROUNDING
 from bisar_budget.effects.exact_ranges import NODES
 from bisar_budget.geometry import FRAME_AXES
+from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import Platform
 
 Floats = NDArray[np.float64]
@@ -38,6 +40,10 @@ def norm(a: Vectors) -> Any:
 
 def _over(a: Vectors, length: Any) -> Vectors:
     return (a[0] / length, a[1] / length, a[2] / length)
+
+
+def _minus(a: Vectors, b: Vectors) -> Vectors:
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
 def _without_rounding(a: Vectors) -> Vectors:
@@ -145,12 +151,44 @@ def paths_of(platform: Platform) -> Paths:
     return Paths(_without_rounding(position), _without_rounding(velocity), acceleration, bends)
 
 
+def axes_of(mission: Mission, name: str, path: Paths) -> tuple[Vectors, Vectors, Vectors]:
+    """Axes of the frame of a platform's errors."""
+    platform: Platform = getattr(mission.platforms, name)
+    frame = platform.motion_error.frame
+    return platform.state.frame("ric") if frame == "ric" else path.frame(frame)
+
+
 @dataclass(frozen=True)
 class Geometries:
     """Both platforms in many cases; as `BistaticGeometry`."""
 
     transmitter: Paths
     receiver: Paths
+
+    @property
+    def both(self) -> tuple[Paths, Paths]:
+        """Paths of transmitter and receiver."""
+        return self.transmitter, self.receiver
+
+    @cached_property
+    def apart(self) -> Paths:
+        """The transmitter as the receiver has it: its position is the baseline."""
+        t, r = self.both
+        bends = tuple(_minus(*pair) for pair in zip_longest(t.bends, r.bends, fillvalue=_STRAIGHT))
+        return Paths(
+            _minus(t.position, r.position),
+            _minus(t.velocity, r.velocity),
+            _minus(t.acceleration, r.acceleration),
+            bends,
+        )
+
+    def sights(self, *, has_direct_path: bool) -> tuple[Vectors, Vectors]:
+        """What a metre of each platform's motion takes from the range at mid-aperture; as `sights`. [-]"""
+        t, r = self.transmitter.look, self.receiver.look
+        if not has_direct_path:
+            return t, r
+        b = self.apart.look
+        return _minus(t, b), _minus(r, (-b[0], -b[1], -b[2]))
 
     @cached_property
     def range_gradient(self) -> tuple[Any, Any]:
@@ -183,11 +221,11 @@ class Geometries:
         """Peak to first null across it, along a line of constant range. [m]"""
         return wavelength / (aperture_time * np.hypot(*self.doppler_gradient) * np.sin(self.gradient_angle))
 
-    def nodes(self, aperture_time: Any) -> Any:
+    def nodes(self, aperture_time: Any, *, has_direct_path: bool = False) -> Any:
         """Number of nodes that each case needs, as `nodes_for` has it."""
         half = aperture_time / 2
-        ways = [path.travelled(half) / path.slant_range for path in (self.transmitter, self.receiver)]
-        way = np.maximum(*ways)
+        turning = (*self.both, *((self.apart,) if has_direct_path else ()))
+        way = reduce(np.maximum, [path.travelled(half) / path.slant_range for path in turning])
         limits = [limit for limit, _ in NODES]
         counts = np.array([count for _, count in NODES])
         return counts[np.searchsorted(limits, way, side="left")]

@@ -7,15 +7,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bisar_budget import evaluators
-from bisar_budget.arrays.collections import Floats, Geometries, Vectors, angle_between_lines
-from bisar_budget.arrays.followed import Held, ManyPointPaths, Places
+from bisar_budget.arrays.collections import Floats, Geometries, Vectors, angle_between_lines, axes_of
+from bisar_budget.arrays.followed import Held, ManyPointPaths, Places, Truths
 from bisar_budget.arrays.located import Course, Effects, ManyExactRanges
+from bisar_budget.arrays.together import squared
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, ROUNDING, SPEED_OF_LIGHT
 from bisar_budget.effects import models
 from bisar_budget.effects.effect import CLOCK_UNITS, MOTION_UNITS, PLATFORMS
 from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.geometry import FRAME_AXES
+from bisar_budget.mission.covariance import Covariance
 from bisar_budget.mission.model import Mission
 
 SAFE = 1 + 1e-6  # nearer to a border of what forms an image, a case is checked by itself
@@ -45,7 +47,7 @@ class ManyErrors(NamedTuple):
 
 
 class Does(NamedTuple):
-    """What a declared error does in each case, as `models.Declared`; NaN where that is not certain."""
+    """What a declared error does in each case, as `models.Declared`; displacements are NaN where there is none."""
 
     qpe: Floats
     cubic: Floats
@@ -73,12 +75,14 @@ class DeclaredErrors:
         self.mission, self.cases, self.geometries, self.shown = mission, cases, geometries, shown
         self.is_left_out = np.zeros(cases, dtype=bool)
         wavelength, T = mission.radar.wavelength, mission.collection.aperture_time
-        self.exact = ManyExactRanges(geometries, wavelength, T, nodes, cases)
+        self.has_direct_path = mission.has_direct_path
+        self.exact = ManyExactRanges.of(geometries, wavelength, T, nodes, cases, has_direct_path=self.has_direct_path)
         self.plane = self._published_plane()
         self._limits_of_size()
         self.listed = list(self._errors())
         self.stated = [error for error in self.listed if error.declared is not None and not error.is_shown_again]
         self._known: dict[tuple[str, str], Does] = {}
+        self._quadratics: dict[str, Floats] = {}
         self._paths: dict[tuple[str, float], ManyPointPaths] = {}
 
     def array(self, value: Any) -> Floats:
@@ -92,8 +96,10 @@ class DeclaredErrors:
             ground += [*path.position[:2], *path.velocity[:2], path.slant_range]
         first, second, (determinant,) = evaluators.published_ground_inverse(*ground)
         angle = angle_between_lines((-second[1], first[1]), (second[0], -first[0]))
-        self.is_left_out |= np.degrees(angle) < MIN_GRADIENT_ANGLE_DEG * SAFE
-        return first, second, determinant
+        is_degenerate = np.degrees(angle) < MIN_GRADIENT_ANGLE_DEG * SAFE
+        if self.mission.gating_model != "full":
+            self.is_left_out |= is_degenerate
+        return first, second, np.where(is_degenerate, math.inf, determinant)  # no displacement that casts a doubt
 
     def _errors(self) -> Iterator[ManyErrors]:
         """Every error that is declared, or whose allowable is asked."""
@@ -105,13 +111,10 @@ class DeclaredErrors:
         for place, (name, path) in enumerate(zip(PLATFORMS, paths, strict=True)):
             rows = evaluators.published_motion(*path.position, *path.velocity, path.slant_range, wavelength, T)
             error = getattr(mission.platforms, name).motion_error
-            axes = (
-                path.frame(error.frame)
-                if error.frame != "ric"
-                else getattr(mission.platforms, name).state.frame("ric")
-            )
+            axes = axes_of(mission, name, path)
             for index, (kind, unit) in enumerate(MOTION_UNITS.items()):
-                values = getattr(error, kind)
+                covariance = error.covariance if kind != "acceleration" else None
+                values = error.stated(kind)
                 own = [subject(name, kind, letter) for letter in "xyz"]
                 asked = [one.id in self.shown for one in own]
                 common = mission.common_motion_error is not None and (
@@ -122,7 +125,7 @@ class DeclaredErrors:
                 if values is None and not any(asked) and not common and not is_terrain:
                     continue
                 published = [Effects._make(row) for row in rows[3 * index : 3 * index + 3]]
-                powers = self.exact.powers(unit)
+                powers = self.exact.powers[unit]
                 full = [self.exact.effect(self.exact.along(place, axis) * powers) for axis in _AXES]
                 legs[place, kind] = (published, full)
                 if is_terrain:
@@ -138,7 +141,10 @@ class DeclaredErrors:
                 for axis in range(3):
                     if asked[axis]:
                         on_axis = None
-                        if values is not None:
+                        if covariance is not None:
+                            along = [direction[axis] for direction in axes]
+                            on_axis = factor * _along_covariance(covariance, kind, along)
+                        elif values is not None:
                             on_axis = factor * _along_scene_axis(values, axes, axis, error.distribution)
                         yield ManyErrors(
                             own[axis],
@@ -184,7 +190,7 @@ class DeclaredErrors:
             value, what = getattr(self.mission.timing_error, term), subject("clock", "timing", term)
             if value is not None or what.id in self.shown:
                 declared = None if value is None else value * factor
-                full = self.exact.effect(SPEED_OF_LIGHT * self.exact.times**power)
+                full = self.exact.effect(self._clock_course(unit).at_nodes)
                 yield ManyErrors(what, unit, declared, Effects._make(rows[power]), full, (), _NOWHERE)
 
     def _common(
@@ -220,8 +226,16 @@ class DeclaredErrors:
 
     def adds(self, error: ManyErrors, size: Any, requirement: str) -> Any:
         """Bound of what the second order adds to a phase [rad] or a displacement [m]; see `FullModel`."""
-        reach = size * (self.edge.get(error.unit, 0.0) + self.per_unit("full", error, LOCATION))
-        return self.per_metre[requirement] * reach * reach / self.exact.nearest_node
+        own, moved = size * self.edge.get(error.unit, 0.0), size * self.per_unit("full", error, LOCATION)
+        if self.has_direct_path and error.subject.owner in PLATFORMS:
+            return self.per_metre[requirement] * self._adds_heard(error.moves[0], own, moved)
+        return self.per_metre[requirement] * (own + moved) * (own + moved) / self.exact.nearest_node
+
+    def _adds_heard(self, platform: int, own: Any, moved: Any) -> Any:
+        """The same of the ranges less the direct path; see `FullModel`. [m]"""
+        nearest = [ranges.min(axis=0) for ranges in self.exact.ranges]
+        of_ranges = (own + moved) ** 2 / nearest[platform] + moved**2 / nearest[1 - platform]
+        return np.maximum(of_ranges, own**2 / self.exact.baselines.min(axis=0)) / 2
 
     def per_unit(self, model: str, error: ManyErrors, requirement: str) -> Any:
         """What a small unit of an error does: magnitude of a phase [rad], or displacement [m]."""
@@ -256,19 +270,30 @@ class DeclaredErrors:
         found = Does(qpe, cubic, (east, north), (-east, -north))
         if model == "published":
             return found
-        is_large = np.zeros(self.cases, dtype=bool)
+        some = np.flatnonzero(self.is_large(error))
+        if some.size:
+            self._exactly(error, found, size[some], some)
+        return found
+
+    def is_large(self, error: ManyErrors) -> Truths:
+        """In which cases effects of a declared error are not proportional to its size; as `is_small`, negated."""
+        size, found = np.abs(self.array(error.declared)), np.zeros(self.cases, dtype=bool)
         for requirement, floor in (
             (QUADRATIC, models.FLOOR_RAD),
             (CUBIC, models.FLOOR_RAD),
             (LOCATION, models.FLOOR_M),
         ):
-            of_it = self.per_unit(model, error, requirement) * np.abs(size)
-            adds = self.adds(error, np.abs(size), requirement)
-            is_large |= adds > np.maximum(floor, models.SHARE * of_it)
-        some = np.flatnonzero(is_large & (size != 0))
-        if some.size:
-            self._exactly(error, found, size[some], some)
-        return found
+            of_it = self.per_unit("full", error, requirement) * size
+            found |= self.adds(error, size, requirement) > np.maximum(floor, models.SHARE * of_it)
+        return np.asarray(found & (size != 0))
+
+    def quadratic_by_sign(self, error: ManyErrors) -> Floats:
+        """Quadratic phases of a declared error of each sign, positive first, where it is large, (2, cases). [rad]
+
+        Not a number where it leaves no image.
+        """
+        self.does("full", error)
+        return self._quadratics[error.subject.id]
 
     def _exactly(self, error: ManyErrors, found: Does, size: Floats, some: Places) -> None:
         """Put what exact ranges say into the cases that are too large for a first order."""
@@ -277,27 +302,43 @@ class DeclaredErrors:
             path = self._path(error, sign)
             path.to(some, np.abs(size))
             by_sign.append(path.known(some, np.abs(size)))
-            self.is_left_out[some[np.isnan(by_sign[-1][0])]] = True
+        quadratics = self._quadratics.setdefault(error.subject.id, np.full((2, self.cases), math.nan))
+        quadratics[:, some] = by_sign[0][3], by_sign[1][3]
         ahead, back = np.where(size > 0, by_sign, by_sign[::-1])
+        is_gone = np.isnan(ahead[0]) | np.isnan(back[0])  # no ground point: phases are infinite, none moves
         for kept, row in ((found.qpe, 3), (found.cubic, 4)):
-            kept[some] = np.copysign(np.maximum(np.abs(ahead[row]), np.abs(back[row])), kept[some])
+            largest = np.copysign(np.maximum(np.abs(ahead[row]), np.abs(back[row])), kept[some])
+            kept[some] = np.where(is_gone, math.inf, largest)
         for place, one in ((found.displacement, ahead), (found.opposite, back)):
-            place[0][some], place[1][some] = one[1], one[2]
+            place[0][some], place[1][some] = np.where(is_gone, math.nan, one[1:3])
 
     def _path(self, error: ManyErrors, sign: float) -> ManyPointPaths:
         """The ways of the point by an error with one sign, which all that asks for them shares."""
         key = (error.subject.id, sign)
         if key not in self._paths:
-            if error.moves:
-                course = Course(
-                    self.exact.powers(error.unit), error.moves, error.direction, is_velocity=error.unit == "m/s"
-                )
-            else:
-                power = list(CLOCK_UNITS.values()).index(error.unit)
-                course = Course(SPEED_OF_LIGHT * self.exact.times**power)
             per_unit = np.array([self.array(part) for part in self.exact.displacement(error.full, 1.0)])
-            self._paths[key] = ManyPointPaths(self.exact, course, sign, per_unit, self.is_left_out)
+            self._paths[key] = ManyPointPaths(self.exact, self.course(error), sign, per_unit, self.is_left_out)
         return self._paths[key]
+
+    def course(self, error: ManyErrors) -> Course:
+        """A unit of an error at the nodes."""
+        if error.moves:
+            return Course(self.exact.powers[error.unit], error.unit, error.moves, error.direction)
+        return self._clock_course(error.unit)
+
+    def _clock_course(self, unit: str) -> Course:
+        """A unit of a clock error at the nodes; nothing where the direct path stands in for the clock."""
+        power = list(CLOCK_UNITS.values()).index(unit)
+        metres = SPEED_OF_LIGHT * self.exact.times**power
+        return Course(metres * 0.0 if self.has_direct_path else metres, unit)
+
+    def doubts(self, model: str, is_over: Any) -> Any:
+        """Where a model that does not gate casts a doubt; the published one does not know a direct path."""
+        return False if model == "published" and self.has_direct_path else is_over
+
+    def is_heard_out(self, error: ManyErrors) -> bool:
+        """Whether an error is one of a clock that the direct path stands in for."""
+        return self.has_direct_path and error.is_motion and not error.moves
 
     def forget(self, error: ManyErrors) -> None:
         """Let go of the ways by an error that nobody will ask for again: they are large."""
@@ -324,11 +365,12 @@ class DeclaredErrors:
         return smallest
 
     def farthest(self, error: ManyErrors) -> Any:
-        """Size beyond which an error is none of navigation."""
+        """Size beyond which an error is none of navigation; infinite: it has no effect whatever its size."""
+        if self.is_heard_out(error):
+            return math.inf
         slant = [path.slant_range for path in (self.geometries.transmitter, self.geometries.receiver)]
         if not error.moves:
-            power = list(CLOCK_UNITS.values()).index(error.unit)
-            return models.FARTHEST * np.minimum(*slant) / np.abs(SPEED_OF_LIGHT * self.exact.times**power).max(axis=0)
+            return models.FARTHEST * np.minimum(*slant) / np.abs(self.course(error).at_nodes).max(axis=0)
         reached = [slant[place] for place in error.moves]
         return models.FARTHEST * (np.minimum(*reached) if len(reached) > 1 else reached[0]) / self.edge[error.unit]
 
@@ -343,6 +385,12 @@ def _along_scene_axis(
     else:
         size = np.abs(parts[0]) + np.abs(parts[1]) + np.abs(parts[2])
     return np.copysign(size, parts[0] + parts[1] + parts[2])
+
+
+def _along_covariance(covariance: Covariance, kind: str, direction: Sequence[Any]) -> Any:
+    """Sigma of position or velocity error along a direction given in the frame's axes; as `Covariance.along`."""
+    parts = [sigma * along for sigma, along in zip(covariance.of(kind), direction, strict=True)]
+    return np.sqrt(squared(covariance.block(kind), parts))
 
 
 def _along(effects: Sequence[Effects], direction: Vectors) -> Effects:

@@ -1,72 +1,73 @@
 """Which missions, keys and cases arrays hold; what they do not, `check_mission` does one by one."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.arrays.collections import Geometries, norm
+from bisar_budget.arrays.collections import Floats, Geometries, Paths, norm
 from bisar_budget.arrays.declared import SAFE
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT
-from bisar_budget.effects.effect import CLOCK_UNITS, PLATFORMS
+from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.subject import MOTION
 from bisar_budget.mission.changes import parts_of
-from bisar_budget.mission.model import Mission, flies_on_earth, has_instruments
-from bisar_budget.mission.platforms import STILL
+from bisar_budget.mission.covariance import EIGENVALUE_TOLERANCE
+from bisar_budget.mission.instruments import RISE, STEEPEST
+from bisar_budget.mission.model import PLACE_KEYS, WHOLE, MetricSplits, Mission, Shares, flies_on_earth
+from bisar_budget.mission.platforms import BASELINE_PLACES, FARTHEST_BY, LEAST_BASELINE, STILL, MotionError, Platform
 
 
-def not_held(mission: Mission, keys: Sequence[str]) -> str:
-    """Say what of a mission arrays do not hold; empty where they hold all of it.
+def not_held(mission: Mission, keys: Mapping[str, bool]) -> str:
+    """Say which of the keys that vary arrays do not hold; empty where they hold all of them.
 
-    `keys` vary. A path that the Earth, an orbit or a log decides is held as long as nothing varies that it follows
-    from.
+    `keys` are true where the file states them. Arrays hold everything else that a mission can have. A path that the
+    Earth, an orbit or a log decides is held as long as nothing varies that it follows from.
     """
-    errors = [getattr(mission.platforms, name).motion_error for name in PLATFORMS]
-    reasons = {
-        "sensors and clocks": has_instruments(mission),
-        "covariance": any(error.covariance is not None for error in errors),
-        "scene.radius": mission.scene.radius is not None or "scene.radius" in keys,
-        "allocation.split": any(key.startswith("allocation.split") for key in keys),
-    }
-    on_earth = flies_on_earth(mission)
-    for key in keys:
-        parts = list(parts_of(key))
-        if key in _PLAIN or (parts[0] == "platforms" and parts[2:3] == ["motion_error"] and parts[3:4][0] in MOTION):
-            known = True
-        elif parts[0] == "platforms":
-            platform = getattr(mission.platforms, parts[1])
-            is_added = parts[2] in ("acceleration", "jerk", "snap") or (parts[2] == "climb" and platform.slant_range)
-            known = not on_earth and bool(is_added or getattr(platform, parts[2]) is not None)
-            known &= parts[2] != "speed" or platform.motion_azimuth is not None  # a fixed one has no direction
-        elif parts[0] == "common_motion_error":
-            known = mission.common_motion_error is not None
-        else:
-            known = parts[0] == "other_errors"
-        if on_earth and key in ("collection.aperture_time",):
-            known = False
-        reasons[key] = not known
-    return next((reason for reason, is_held in reasons.items() if is_held), "")
+    return next((key for key, is_stated in keys.items() if not _is_held(mission, key, is_stated)), "")
 
 
-_PLAIN = {
-    "radar.center_frequency",
-    "radar.bandwidth",
-    "collection.aperture_time",
-    "scene.height_error",
-    *(f"timing_error.{term}" for term in CLOCK_UNITS),
-    "requirements.quadratic_phase_error",
-    "requirements.cubic_phase_error",
-    "requirements.location_error",
-    "allocation.coverage_factor",
-    "allocation.warn_above",
-    "autofocus.n_pull",
+def _is_held(mission: Mission, key: str, is_stated: bool) -> bool:
+    section, *parts = parts_of(key)
+    if section == "platforms":
+        platform: Platform = getattr(mission.platforms, parts[0])
+        if parts[1] == "motion_error":
+            return _is_held_of_error(platform.motion_error, parts[2:], is_stated)
+        if parts[1] == "oscillator":
+            return platform.oscillator is not None and (is_stated or parts[2] in ("frequency", "bandwidth"))
+        return not flies_on_earth(mission) and _is_held_of_path(platform, parts[1], is_stated)
+    if key == "collection.aperture_time" or (section == "scene" and parts[0] in PLACE_KEYS):
+        return not flies_on_earth(mission)
+    return is_stated or section in _FREE or key in _FREE
+
+
+def _is_held_of_error(error: MotionError, parts: Sequence[str], is_stated: bool) -> bool:
+    if parts[0] in MOTION:
+        return parts[0] == "acceleration" or error.covariance is None  # which replaces the others
+    if parts[0] == "covariance" and error.covariance is not None:
+        return is_stated and not error.covariance.is_matrix  # an element of a matrix has a twin
+    return is_stated or parts[0] == "imu"
+
+
+def _is_held_of_path(platform: Platform, name: str, is_stated: bool) -> bool:
+    if name == "speed":
+        return is_stated and platform.motion_azimuth is not None  # a fixed one has no direction
+    return is_stated or (name == "climb" and platform.slant_range is not None)
+
+
+# Sections and keys that a file may leave out and that may be stated by themselves.
+_FREE = {
+    *("timing_error", "common_motion_error", "requirements", "autofocus", "simulation"),
+    *("scene.radius", "scene.height_error", "allocation.coverage_factor", "allocation.warn_above"),
+    *("allocation.split.clock", "allocation.split.reserve"),
 }
 
 
 def is_image(mission: Mission, geometries: Geometries, cases: int) -> NDArray[np.bool_]:
     """Whether each case forms an image, with room to spare; `mission` may hold arrays, (cases,)."""
-    is_one = np.ones(cases, dtype=bool)
+    is_one = _has_possible_figures(mission, cases)
     half = np.asarray(mission.collection.aperture_time) / 2
     still: Any = True
     for name, paths in zip(PLATFORMS, (geometries.transmitter, geometries.receiver), strict=True):
@@ -81,4 +82,34 @@ def is_image(mission: Mission, geometries: Geometries, cases: int) -> NDArray[np
     is_one &= np.hypot(*geometries.range_gradient) > MIN_GROUND_GRADIENT * SAFE
     is_one &= np.hypot(*geometries.doppler_gradient) > 1e-9 * SAFE * turning
     is_one &= np.degrees(geometries.gradient_angle) > MIN_GRADIENT_ANGLE_DEG * SAFE
+    if mission.has_direct_path:
+        is_one &= _has_baseline(geometries.apart, np.broadcast_to(half, (cases,)))
     return is_one & (np.asarray(mission.radar.bandwidth) * SAFE < 2 * np.asarray(mission.radar.center_frequency))
+
+
+def _has_baseline(apart: Paths, half: Floats) -> NDArray[np.bool_]:
+    """Whether there is a direct path to follow, with room to spare."""
+    least = norm(apart.at(half * np.linspace(-1, 1, BASELINE_PLACES)[:, None])).min(axis=0)
+    return np.asarray(least > SAFE * np.maximum(LEAST_BASELINE, apart.travelled(half) / FARTHEST_BY))
+
+
+def _has_possible_figures(mission: Mission, cases: int) -> NDArray[np.bool_]:
+    """Whether numbers that a file holds to each other fit, with room to spare: shares, masks and correlations."""
+    is_one = np.ones(cases, dtype=bool)
+    split = mission.allocation.split
+    for shares in split if isinstance(split, MetricSplits) else (split,):
+        if isinstance(shares, Shares):
+            total = sum(0.0 if share is None else share for share in shares)
+            is_one &= np.abs(np.asarray(total) - 1) * SAFE < WHOLE
+    for name in PLATFORMS:
+        platform: Platform = getattr(mission.platforms, name)
+        if platform.oscillator is not None:
+            for (f, level), (g, next_level) in pairwise(platform.oscillator.phase_noise or ()):
+                slope = (np.asarray(next_level) - level) / math.log10(g / f)
+                is_one &= (slope * SAFE > -STEEPEST) & (slope * SAFE < RISE)
+        covariance = platform.motion_error.covariance
+        if covariance is not None:
+            rows = [[np.broadcast_to(rho, (cases,)) for rho in row] for row in covariance.correlation]
+            least = np.linalg.eigvalsh(np.array(rows).transpose(2, 0, 1)).min(axis=1)
+            is_one &= least > -EIGENVALUE_TOLERANCE / 2
+    return is_one

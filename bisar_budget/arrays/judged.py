@@ -1,37 +1,47 @@
 """Rows of many cases, judged at once: the arrays beside `budget`.
 
-A case is judged as `check_mission` judges it, by the same formulas and searches. Where they do not hold it (a
-declared error leaves no image, a search takes very many steps), the case is left out and says so.
+A case is judged as `check_mission` judges it, by the same formulas and searches. Where they do not hold it (a search
+takes very many steps), the case is left out and says so.
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from datetime import date
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import evaluators
-from bisar_budget.analysis.allocation import BALANCED_RANGE, EQUAL, Allocation, Split, allocate
-from bisar_budget.arrays.collections import Floats, Geometries, norm
-from bisar_budget.arrays.declared import DeclaredErrors, ManyErrors
-from bisar_budget.arrays.rows import REQUIREMENTS, Judged
-from bisar_budget.arrays.vibrating import judged_vibrations, many_slow_phases
+from bisar_budget.analysis.allocation import Allocation, Split, allocate
+from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.arrays.aggregates import Aggregates, ManyTogether, is_owed
+from bisar_budget.arrays.collections import Geometries, norm
+from bisar_budget.arrays.declared import DeclaredErrors
+from bisar_budget.arrays.edge import HeldTogether, ManySceneEdges, many_scene_edges
+from bisar_budget.arrays.error_rows import ErrorRows
+from bisar_budget.arrays.instruments import many_random_errors
+from bisar_budget.arrays.judgement import BOUND, CODE, Judging
+from bisar_budget.arrays.random_rows import RandomRows
+from bisar_budget.arrays.rim import ManyScenePhases
+from bisar_budget.arrays.rows import Judged
+from bisar_budget.arrays.shares import is_balanced, shares_of
+from bisar_budget.arrays.together import ManyOwnPhases
+from bisar_budget.arrays.vibrating import judged_one_by_one, many_slow_phases
 from bisar_budget.budget.orbit import FASTEST_FLIGHT
-from bisar_budget.budget.required import missing_declarations
+from bisar_budget.budget.random_rows import spur_rows
+from bisar_budget.budget.required import is_asked_for, missing_declarations
+from bisar_budget.budget.vibration_rows import vibration_rows
 from bisar_budget.budget.waivers import named_by
-from bisar_budget.constants import UTILIZATION_TOLERANCE
-from bisar_budget.effects import models
 from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.subject import Subject, subject
-from bisar_budget.findings.status import RANK, STATUS
-from bisar_budget.mission.model import MetricSplits, Mission, Shares
+from bisar_budget.findings.row import Row
+from bisar_budget.findings.status import STATUS
+from bisar_budget.mission.model import Mission
 
-_BOUND = 1 + UTILIZATION_TOLERANCE
+MODELS = ("published", "full")
 _STATUSES = tuple(STATUS)
-_CODE = {name: np.int8(rank) for name, rank in RANK.items()}
 
 
 class Checked(NamedTuple):
@@ -87,119 +97,55 @@ class _Check:
         self.slow = many_slow_phases(errors.cases, one) if has_lines else []
         self.errors, self.mission, self.cases, self.today = errors, errors.mission, errors.cases, today
         self.array, self.does, self.combine = errors.array, errors.does, errors.mission.allocation.combine
+        self.judging = Judging(errors.cases, errors.mission.allocation.warn_above)
+        self.random = many_random_errors(errors.mission, errors.geometries, errors.cases)
+        self.stated_random = [error for error in self.random if error.declared is not None]
 
-    # ---------------------------------------------------------------- limits
-    def _allowed(self, model: str, error: ManyErrors, limit: Floats) -> tuple[Floats, NDArray[np.int8]]:
-        """How large an error may be by a model, and the requirement that sets it: smallest size, NaN where none."""
-        needs = self.mission.requirements
-        held = [(QUADRATIC, limit)]
-        if error.is_motion:
-            others = ((CUBIC, needs.cubic_phase_error), (LOCATION, needs.location_error))
-            held += [(name, self.array(required)) for name, required in others if required is not None]
-        smalls = []
-        for name, required in held:
-            per_unit = self.array(self.errors.per_unit(model, error, name))
-            with np.errstate(all="ignore"):
-                smalls.append(np.where(per_unit > 0, required / per_unit, math.inf))
-        order = np.argsort(smalls, axis=0, kind="stable")  # the one that binds is likely to be found first
-        if not self.is_brief:
-            order = np.broadcast_to(np.arange(len(held))[:, None], order.shape)
-        smallest, binding = np.full(self.cases, math.inf), np.full(self.cases, -1, dtype=np.int8)
-        is_linear = model == "published" or not error.is_motion
-        for turn in range(len(held)):
-            for place, (name, required) in enumerate(held):
-                mine = order[turn] == place
-                if not mine.any():
-                    continue
-                is_whole = name == QUADRATIC and not self.is_brief
-                small, upto = smalls[place], math.inf if is_whole else smallest
-                sized = small
-                if not is_linear:
-                    farthest = self.array(
-                        np.minimum(upto, np.maximum(self.errors.farthest(error), self._size(error)))
-                    )
-                    first = np.minimum(small, farthest)
-                    with np.errstate(invalid="ignore"):
-                        is_sure = self.errors.adds(error, first, name) <= models.SHARE * required
-                    sized = np.where(small > farthest, math.inf, small)
-                    some = np.flatnonzero(mine & ~is_sure & ~self.errors.is_left_out)
-                    if some.size:
-                        sized[some] = self.errors.first_reaching(error, name, required, first, farthest, some)
-                is_less = mine & (sized < smallest)
-                smallest = np.where(is_less, sized, smallest)
-                binding[is_less] = REQUIREMENTS.index(name)
-        smallest[~np.isfinite(smallest)] = math.nan
-        return smallest, binding
+    def _own(self, model: str) -> list[ManyOwnPhases]:
+        """Phases of what displaces nothing: slow vibrations, and the declared errors of sensors and clocks."""
+        found = list(self.slow)
+        for error in self.stated_random:
+            quadratic, cubic, _ = (self.array(part * error.declared) for part in error.effect(model))
+            always = np.ones(self.cases, dtype=bool)
+            found.append(ManyOwnPhases(error.subject.id, error.subject.owner, quadratic, cubic, always))
+        return found
 
-    def _size(self, error: ManyErrors) -> Any:
-        return 0.0 if error.declared is None else np.abs(error.declared)
-
-    def _split(self, gating: str) -> Split:
-        """Shares of the phase; `balanced` are arrays."""
-        split = self.mission.allocation.split
-        if isinstance(split, MetricSplits):
-            split = split.quadratic_phase_error
-        if isinstance(split, Shares):
-            return Split(split.transmitter, split.receiver, split.clock, split.reserve)
-        if split != "balanced":
-            return EQUAL
-        by = [model for model in ("published", "full") if gating in (model, "strictest")]
-        weight = []
-        for owner in PLATFORMS:
-            members = []
-            for error in self.errors.stated:
-                if EQUAL.includes(error.subject.owner, owner):
-                    phases = np.array([self.does(model, error).qpe for model in by])
-                    largest = np.abs(phases).argmax(axis=0)
-                    members.append(np.take_along_axis(phases, largest[None], axis=0)[0])
-            members += [one.qpe for one in self.slow if one.owner == owner]
-            weight.append(np.minimum(self._combined(members), 1e300))
-        with np.errstate(all="ignore"):
-            share: Any = np.where(sum(weight) == 0, 0.5, np.clip(weight[0] / sum(weight), *BALANCED_RANGE))
-        return Split(transmitter=share, receiver=1 - share)
-
-    def _combined(self, phases: Sequence[Floats], rule: str = "") -> Floats:
-        """Combine phases by the mission's rule, or another."""
-        if not phases:
-            return np.zeros(self.cases)
-        sizes, rule = np.abs(np.array(phases)), rule or self.combine
-        if rule == "each":
-            return np.asarray(sizes.max(axis=0))
-        return np.asarray(sizes.sum(axis=0) if rule == "sum" else np.sqrt((sizes**2).sum(axis=0)))
-
-    # ---------------------------------------------------------------- rows
     def checked(self) -> Checked:
         """Judge every row by the model that gates."""
         gating = self.mission.gating_model
         if gating != "published":  # searches start from what declared errors are known to do
             for error in self.errors.stated:
                 self.does("full", error)
-        self.split = self._split(gating)
+        gates = [model for model in MODELS if gating in (model, "strictest")]
+        own = {model: self._own(model) for model in MODELS}
+        self.split = shares_of(self.errors, gates, [own[model] for model in gates])
         total = self.array(self.mission.requirements.quadratic_phase_error)
         n_pull = self.mission.autofocus.n_pull
         self.gain = np.ones(self.cases)
         if n_pull is not None:
             self.gain = np.maximum(1.0, self.array(evaluators.autofocus_gain(n_pull, total)))  # type: ignore[arg-type]
         self.total = total
-        by_model = [self._rows(model) for model in ("published", "full") if gating in (model, "strictest")]
+        owners = (*PLATFORMS, "clock", "mission")
+        self.limits = {owner: self.array(self.split.of(owner) * total) * self.gain for owner in owners}
+        together = {model: ManyTogether(self.errors, model, own[model], self.split) for model in MODELS}
+        self.error_rows = ErrorRows(self.judging, self.errors, self.limits, self.gain, is_brief=self.is_brief)
+        self.aggregates = Aggregates(self.judging, self.errors, together, self.limits, self.gain)
+        by_model = [self._rows(model) for model in gates]
         rows = _stricter(*by_model) if len(by_model) > 1 else by_model[0]
-        return Checked(tuple(map(self._waived, rows)), self.errors.is_left_out, self._floor(), self.errors.geometries)
+        return Checked(
+            tuple(self._waived(self._required(row)) for row in rows),
+            self.errors.is_left_out,
+            self._floor(),
+            self.errors.geometries,
+        )
 
     def _rows(self, gating: str) -> list[Judged]:
         other = "published" if gating == "full" else "full"
-        rows = []
-        for error in self.errors.listed:
-            rows.append(self._row(gating, other, error))
-            if gating == "full" or self.mission.gating_model == "published":
-                self.errors.forget(error)
-        rows += self._vibrations(gating)
-        if self.combine != "each":
-            rows += self._sums(gating, other)
-        else:
-            rows += self._all_together(gating)
-        rows += [self._cubic(gating, other), self._location(gating, other)]
-        if self.mission.autofocus.n_pull is not None:
-            rows.append(self._pull_in(gating, other))
+        rows = [*self.error_rows.rows(gating, other), *self._vibrations(gating)]
+        rows += self._instruments(gating)
+        rows += self.aggregates.rows(gating, other)
+        if self.mission.scene.radius is not None:
+            rows.append(self._spatial_variance(gating))
         return rows
 
     @property
@@ -208,220 +154,98 @@ class _Check:
 
     def _vibrations(self, gating: str) -> list[Judged]:
         """Rows of vibrations, where one is declared or asked for."""
-        asked = any(what.kind == "vibration" for what in self.errors.shown.values())
-        if not self._vibrates and not asked:
+        if not self._vibrates and not any(what.kind == "vibration" for what in self.errors.shown.values()):
             return []
-        shares = [self.array(self.split.of(name)) for name in PLATFORMS]
+        return self._one_by_one(lambda mission, allocation: vibration_rows(mission, allocation, gating))
 
-        def of_case(place: int) -> tuple[Mission, Allocation]:
+    def _one_by_one(self, rows_of: Callable[[Mission, Allocation], Iterable[Row]]) -> list[Judged]:
+        """Rows that follow from the wavelength, the aperture time, the lines of sight and the shares alone."""
+        balanced = [self.array(self.split.of(name)) for name in PLATFORMS] if is_balanced(self.mission) else []
+
+        def of_case(place: int) -> Iterable[Row]:
             mission = self.one(place)
-            split = self.split._replace(transmitter=float(shares[0][place]), receiver=float(shares[1][place]))
-            return mission, allocate(mission, (), {})._replace(qpe=split)
+            allocation = allocate(mission, (), {})
+            if balanced:
+                allocation = allocation._replace(qpe=Split(*(float(share[place]) for share in balanced)))
+            return rows_of(mission, allocation)
 
-        return judged_vibrations(np.flatnonzero(~self.errors.is_left_out), self.cases, of_case, gating)
+        return judged_one_by_one(np.flatnonzero(~self.errors.is_left_out), self.cases, of_case)
 
-    def _limit(self, owner: str) -> Floats:
-        return self.array(self.split.of(owner) * self.total)
-
-    def _row(self, gating: str, other: str, error: ManyErrors) -> Judged:
-        limit = self._limit(error.subject.owner) * self.gain
-        allowable, binding = self._allowed(gating, error, limit)
-        if other == "full" and not self.is_brief and self.mission.gating_model != "published":
-            self._allowed(other, error, limit)  # a whole check asks for it here, and a later search starts from it
-        none = np.full(self.cases, math.nan)
-        if error.declared is None:
-            return self._judged(error.subject, None, allowable)._replace(binding=binding)
-        mine, theirs = self.does(gating, error), self.does(other, error)
-        published = mine if gating == "published" else theirs
-        needs = self.mission.requirements
-        held = [(np.abs(theirs.qpe), limit)]
-        if error.is_motion:
-            moved = np.hypot(*theirs.farthest)
-            others = ((np.abs(theirs.cubic), needs.cubic_phase_error), (moved, needs.location_error))
-            held += [(size, self.array(required)) for size, required in others if required is not None]
-        doubt = np.any([size / required > _BOUND for size, required in held], axis=0)
-        judged = self._judged(
-            error.subject,
-            np.abs(self.array(error.declared)),
-            allowable,
-            doubt=doubt,
-            without_autofocus=np.where(self.gain > 1, np.abs(mine.qpe) / (limit / self.gain), 0.0),
-            is_info=self.combine != "each" or error.is_shown_again,
-        )
-        cubic = np.abs(mine.cubic) if error.is_motion else none
-        return judged._replace(binding=binding, qpe_published_rad=np.abs(published.qpe), cubic_rad=cubic)
-
-    def _judged(
-        self,
-        what: Subject,
-        declared: Floats | None,
-        allowable: Floats | None,
-        *,
-        doubt: Any = False,
-        without_autofocus: Any = 0.0,
-        is_info: bool = False,
-        never_fails: bool = False,
-    ) -> Judged:
-        """Judge a row, as `judgement` does: the first status that applies."""
-        none = np.full(self.cases, math.nan)
-        allowed = none if allowable is None else allowable
-        unknown = np.full(self.cases, -1, dtype=np.int8)
-        if declared is None:
-            status = np.full(self.cases, _CODE["not_declared"])
-            return Judged(what, status, none, allowed, none, unknown, none, none, never_fails)
-        with np.errstate(all="ignore"):
-            use = np.where(np.isnan(allowed), 0.0, declared / allowed)
-        if is_info:
-            status = np.full(self.cases, _CODE["info"])
-        else:
-            status = np.select(
-                [
-                    use > _BOUND,
-                    np.broadcast_to(doubt, (self.cases,)),
-                    np.broadcast_to(without_autofocus > _BOUND, (self.cases,)),
-                    use > self.mission.allocation.warn_above,
-                ],
-                [
-                    _CODE["warn" if never_fails else "fail"],
-                    _CODE["warn"],
-                    _CODE["pass_with_autofocus"],
-                    _CODE["warn"],
-                ],
-                _CODE["pass"],
-            ).astype(np.int8)
-        return Judged(what, status, declared, allowed, use, unknown, none, none, never_fails)
-
-    def _members(self, owner: str) -> list[ManyErrors]:
-        return [
-            error
-            for error in self.errors.stated
-            if owner == "mission" or self.split.includes(error.subject.owner, owner)
-        ]
-
-    def _counts(self, members: Sequence[ManyErrors], own: Sequence[Floats]) -> bool:
-        """Whether anything is declared that counts; cases in which vibrations alone may, or may not, are left out."""
-        if own and not members:
-            self.errors.is_left_out[:] = True
-        return bool(members)
-
-    def _phases(self, model: str, errors: Sequence[ManyErrors], *, is_cubic: bool = False) -> list[Floats]:
-        return [self.does(model, error).cubic if is_cubic else self.does(model, error).qpe for error in errors]
-
-    def _sums(self, gating: str, other: str) -> Iterator[Judged]:
-        owners = ["transmitter", "receiver", *(["clock"] if self.split.clock is not None else []), "mission"]
-        for owner in owners:
-            members, what = self._members(owner), subject(owner, QUADRATIC)
-            limit = self._limit(owner) * self.gain
-            own = [one.qpe for one in self.slow if owner == "mission" or self.split.includes(one.owner, owner)]
-            if not self._counts(members, own):
-                yield self._judged(what, None, limit)
-                continue
-            qpe, by_other = (self._combined([*self._phases(model, members), *own]) for model in (gating, other))
-            yield self._judged(
-                what, qpe, limit, doubt=by_other > limit * _BOUND, without_autofocus=qpe / limit * self.gain
-            )
-
-    def _all_together(self, gating: str) -> Iterator[Judged]:
-        """A warning where each error stands alone and all together exceed the total; else there is no row."""
-        own = [one.qpe for one in self.slow]
-        if not self._counts(self.errors.stated, own):
+    def _instruments(self, gating: str) -> Iterator[Judged]:
+        """Rows of sensors and clocks, which few missions name."""
+        if not self.random:
             return
-        phases = [*self._phases(gating, self.errors.stated), *own]
-        limit = self.total * self.gain
-        largest = self._combined(phases, "each")
-        is_there = (self._combined(phases, "rss") > limit * _BOUND) & (largest <= limit * _BOUND)
-        what = subject("mission", QUADRATIC)
-        judged, nothing = self._judged(what, largest, limit, doubt=True), self._judged(what, None, None)
-        yield judged.where(~is_there, nothing)
+        islr = allocate(self.mission, (), {}).islr
+        rows = RandomRows(
+            self.judging, self.mission, self.errors.geometries, self.random, self.limits, self.gain, islr
+        )
+        yield from rows.rows(gating)
+        oscillators = [getattr(self.mission.platforms, name).oscillator for name in PLATFORMS]
+        if any(one is not None and one.spurs for one in oscillators):
+            yield from self._one_by_one(lambda mission, allocation: spur_rows(Analysis(mission), gating, allocation))
+        yield from rows.islr_rows(gating)
 
-    def _cubic(self, gating: str, other: str) -> Judged:
-        motion, what = [error for error in self.errors.stated if error.is_motion], subject("mission", CUBIC)
-        limit = self.mission.requirements.cubic_phase_error
-        own = [one.cubic for one in self.slow]
-        if not self._counts(motion, own):
-            return self._judged(what, None, None if limit is None else self.array(limit))
-        phases = [*self._phases(gating, motion, is_cubic=True), *own]
-        size = self._combined(phases)
-        if limit is None:
-            return self._judged(what, size, None, is_info=True)._replace(cubic_rad=size)
-        doubt = self._combined([*self._phases(other, motion, is_cubic=True), *own]) > limit * _BOUND
+    @cached_property
+    def _edges(self) -> ManySceneEdges | None:
+        """What the edges of the scenes add; none without a declared error."""
+        phases = ManyScenePhases(self.errors)
+        if not phases.members:
+            return None
+        owners = [error.subject.owner for error in phases.members]
         if self.combine == "each":
-            doubt = doubt | (self._combined(phases, "rss") > limit * _BOUND)
-        return self._judged(what, size, self.array(limit), doubt=doubt)._replace(cubic_rad=size, metric=CUBIC)
-
-    def _location(self, gating: str, other: str) -> Judged:
-        motion, what = [error for error in self.errors.stated if error.is_motion], subject("mission", LOCATION)
-        limit = self.mission.requirements.location_error
-        if not motion:
-            return self._judged(what, None, None if limit is None else self.array(limit))
-        moved = self._moved(gating, motion, self.combine)
-        if limit is None:
-            return self._judged(what, moved, None, is_info=True)
-        doubt = self._moved(other, motion, self.combine) > limit * _BOUND
-        if self.combine == "each":
-            doubt = doubt | (self._moved(gating, motion, "rss") > limit * _BOUND)
-        return self._judged(what, moved, self.array(limit), doubt=doubt)._replace(metric=LOCATION)
-
-    def _moved(self, model: str, motion: Sequence[ManyErrors], rule: str) -> Floats:
-        """Displacements combined by a rule. [m]"""
-        found = [self.does(model, error) for error in motion]
-        if rule != "sum":
-            lengths = np.array([np.hypot(*one.farthest) for one in found])
-            return np.asarray(lengths.max(axis=0) if rule == "each" else np.sqrt((lengths**2).sum(axis=0)))
-        parts = np.array(
-            [
-                [(ahead - back) / 2 for ahead, back in zip(one.displacement, one.opposite, strict=True)]
-                for one in found
+            held = [HeldTogether([i], self.limits[owner]) for i, owner in enumerate(owners)]
+        else:
+            held = [
+                HeldTogether([i for i, one in enumerate(owners) if is_owed(one, owner, self.split)], limit)
+                for owner, limit in self.limits.items()
             ]
-        )
-        rest = sum(
-            np.array([(ahead + back) / 2 for ahead, back in zip(one.displacement, one.opposite, strict=True)])
-            for one in found
-        )
-        return _largest_signed_sum(np.concatenate((parts, np.asarray(rest)[None])))
+        return many_scene_edges(phases, held)
 
-    def _pull_in(self, gating: str, other: str) -> Judged:
-        what, pull_in = subject("mission", "autofocus_pull_in"), math.pi * self.array(self.mission.autofocus.n_pull)
-        own = [one.qpe for one in self.slow]
-        if not self._counts(self.errors.stated, own):
-            return self._judged(what, None, pull_in, never_fails=True)
-        phases = ([*self._phases(model, self.errors.stated), *own] for model in (gating, other))
-        total, by_other = (self._combined(of, "sum") for of in phases)
-        return self._judged(what, total, pull_in, doubt=by_other > pull_in * _BOUND, never_fails=True)
+    def _spatial_variance(self, gating: str) -> Judged:
+        """Row of the scene's edge; to the published model an error is the same all over the scene."""
+        what, edges = subject("mission", "spatial_variance"), self._edges
+        allowable = None if gating == "published" else self.total
+        if edges is None:
+            return self.judging.row(what, None, allowable)
+        doubt = edges.has_doubt
+        if gating == "published":
+            doubt = doubt | (edges.difference > self.total * BOUND)
+        judged = self.judging.row(what, edges.difference, allowable, doubt=doubt)
+        judged = judged._replace(qpe_published_rad=np.zeros(self.cases))
+        nothing = self.judging.row(what, None, allowable)
+        nothing.status[:] = CODE["not_evaluated"]
+        return judged.where(np.isinf(edges.difference), nothing)
 
     def _waived(self, row: Judged) -> Judged:
         """Waive a row where it fails and a waiver that holds names it."""
         names = [row.subject.id]
         if not any(self.today <= one.until and named_by(one.id, names) for one in self.mission.waivers):
             return row
-        return row._replace(status=np.where(row.status == _CODE["fail"], _CODE["waived"], row.status))
+        return row._replace(status=np.where(row.status == CODE["fail"], CODE["waived"], row.status))
+
+    def _required(self, row: Judged) -> Judged:
+        """Turn a row that the file should declare and does not from `not_declared` into `not_evaluated`."""
+        if not any(is_asked_for(row.subject, one) for one in missing_declarations(self.mission)):
+            return row
+        is_missing = row.status == CODE["not_declared"]
+        return row._replace(status=np.where(is_missing, CODE["not_evaluated"], row.status))
 
     def _floor(self) -> NDArray[np.int8]:
         """Best status that each case can have: paths may be in doubt, and errors missing that must be declared."""
-        floor = np.full(self.cases, _CODE["pass"])
+        floor = np.full(self.cases, CODE["pass"])
         for name, path in zip(
             PLATFORMS, (self.errors.geometries.transmitter, self.errors.geometries.receiver), strict=True
         ):
             platform = getattr(self.mission.platforms, name)
             if platform.path is not None and platform.path.doubts:
-                floor[:] = _CODE["warn"]
+                floor[:] = CODE["warn"]
             if platform.acceleration is None and not platform.is_of_the_earth:
-                floor[np.broadcast_to(norm(path.velocity) > FASTEST_FLIGHT, floor.shape)] = _CODE["warn"]
-        if not (self.errors.stated or self._vibrates) or any(missing_declarations(self.mission)):
-            floor[:] = _CODE["not_evaluated"]
+                floor[np.broadcast_to(norm(path.velocity) > FASTEST_FLIGHT, floor.shape)] = CODE["warn"]
+        if not (self.errors.stated or self._vibrates or self.stated_random) or any(
+            missing_declarations(self.mission)
+        ):
+            floor[:] = CODE["not_evaluated"]
         return floor
-
-
-def _largest_signed_sum(vectors: Floats) -> Floats:
-    """Length of the longest of the sums ±v₁ ± v₂ …, (cases,), of vectors (n, 2, cases); see `largest_signed_sum`."""
-    x, y = vectors[:, 0], vectors[:, 1]
-    is_upper = (y > 0) | ((y == 0) & (x > 0))
-    x, y = np.where(is_upper, x, -x), np.where(is_upper, y, -y)
-    order = np.argsort(np.arctan2(y, x), axis=0)
-    x, y = np.take_along_axis(x, order, axis=0), np.take_along_axis(y, order, axis=0)
-    corners_x, corners_y = (part.sum(axis=0) - 2 * np.cumsum(part, axis=0) for part in (x, y))
-    whole = np.hypot(x.sum(axis=0), y.sum(axis=0))
-    return np.asarray(np.maximum(whole, np.hypot(corners_x, corners_y).max(axis=0)))
 
 
 def _stricter(published: Sequence[Judged], full: Sequence[Judged]) -> list[Judged]:

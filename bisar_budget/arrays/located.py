@@ -6,6 +6,7 @@ case has the same numbers here as there.
 
 import math
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,9 +33,14 @@ class Course(NamedTuple):
     """A unit of an error at the nodes, (nodes, cases): of the position of `platforms`, or of the range by a clock."""
 
     at_nodes: Floats
+    unit: str
     platforms: tuple[int, ...] = ()
     direction: Vectors = (0.0, 0.0, 0.0)
-    is_velocity: bool = False
+
+    def of(self, some: NDArray[Any]) -> "Course":
+        """The same in some of the cases."""
+        x, y, z = (part[some] if np.ndim(part) else part for part in self.direction)
+        return self._replace(at_nodes=self.at_nodes[:, some], direction=(x, y, z))
 
 
 class Found(NamedTuple):
@@ -49,56 +55,199 @@ class Found(NamedTuple):
 
 
 class ManyExactRanges:
-    """`ExactRanges` of cases (n,) that need the same number of nodes and have no direct path."""
+    """`ExactRanges` of cases (n,) that need the same number of nodes.
 
-    def __init__(self, geometries: Geometries, wavelength: Any, aperture_time: Any, count: int, cases: int) -> None:
-        self.half = np.broadcast_to(np.asarray(aperture_time, dtype=float) / 2, (cases,))
-        self.k = np.broadcast_to(2 * math.pi / np.asarray(wavelength, dtype=float), (cases,))
-        nodes, *fit = LEGENDRE_FITS[count]
-        self.nodes = np.array(nodes)
+    Parameters
+    ----------
+    half, k : (n,)
+        Half the aperture time [s], and 2π over the wavelength. [rad/m]
+    count : int
+        Number of nodes.
+    tracks : sequence of Vectors
+        Positions of both platforms at the nodes, as what stands for the scene centre sees them, (count, n). [m]
+    positions : sequence of Vectors
+        The same at the middle of the aperture, (n,). [m]
+    has_direct_path : bool
+        Whether the direct path is the clock.
+    """
+
+    def __init__(
+        self,
+        half: Floats,
+        k: Floats,
+        count: int,
+        tracks: Sequence[Vectors],
+        positions: Sequence[Vectors],
+        *,
+        has_direct_path: bool = False,
+    ) -> None:
+        self.half, self.k, self.count, self.tracks, self.positions = half, k, count, tracks, positions
+        self.has_direct_path = has_direct_path
+        _, *fit = LEGENDRE_FITS[count]
         self.fit: Floats = np.array(fit)  # (4, nodes)
-        self.times = self.nodes[:, None] * self.half
-        self._powers = {"m": np.ones_like(self.times), "m/s": self.times, "m/s^2": self.times**2 / 2}
-        paths = (geometries.transmitter, geometries.receiver)
-        self.tracks = [path.at(self.times) for path in paths]
-        self.ranges = [norm(track) for track in self.tracks]
-        middle = np.minimum(*(np.broadcast_to(path.slant_range, (cases,)) for path in paths))
-        self.recorded = self.ranges[0] + self.ranges[1]
-        self.nearest_node = np.minimum(*(ranges.min(axis=0) for ranges in self.ranges))
-        self.nearest = np.minimum(middle, self.nearest_node)
-        self.rounding = scalar.EPSILON * self.k * self.recorded.max(axis=0)
+        self.ranges = [norm(track) for track in tracks]
         self.gradient = [
-            self._fitted(self.tracks[0][axis] / self.ranges[0] + self.tracks[1][axis] / self.ranges[1])
-            for axis in (0, 1)
+            self._fitted(tracks[0][axis] / self.ranges[0] + tracks[1][axis] / self.ranges[1]) for axis in (0, 1)
         ]
         (s_x, rate_x, *_), (s_y, rate_y, *_) = self.gradient
         self.determinant: Any
-        first, second, (self.determinant,) = full_ground_inverse(s_x, s_y, rate_x / self.half, rate_y / self.half)
+        first, second, (self.determinant,) = full_ground_inverse(s_x, s_y, rate_x / half, rate_y / half)
         self.adjugate = (first, second)
+        self.range_gradient = np.hypot(s_x, s_y)
+        self.sine = (s_x * rate_y - s_y * rate_x) / (self.range_gradient * np.hypot(rate_x, rate_y))
+
+    @classmethod
+    def of(
+        cls,
+        geometries: Geometries,
+        wavelength: Any,
+        aperture_time: Any,
+        count: int,
+        cases: int,
+        *,
+        has_direct_path: bool = False,
+    ) -> "ManyExactRanges":
+        """Exact ranges of collections, at their scene centres."""
+        half: Floats = np.array(np.broadcast_to(np.asarray(aperture_time, dtype=float) / 2, (cases,)))
+        k: Floats = np.array(np.broadcast_to(2 * math.pi / np.asarray(wavelength, dtype=float), (cases,)))
+        times = np.array(LEGENDRE_FITS[count][0])[:, None] * half
+        tracks, positions = [], []
+        for path in geometries.both:
+            x, y, z = (np.broadcast_to(part, (cases,)) for part in path.position)
+            tracks.append(path.at(times))
+            positions.append((x, y, z))
+        return cls(half, k, count, tracks, positions, has_direct_path=has_direct_path)
+
+    def at(self, east: Floats, north: Floats, some: NDArray[Any]) -> "ManyExactRanges":
+        """Exact ranges of some of the cases at points of the ground, (some,), in place of the centre. [m]"""
+        of = [[part.take(some, axis=1) for part in track] for track in self.tracks]
+        tracks = [(x - east, y - north, z) for x, y, z in of]
+        positions = [(x[some] - east, y[some] - north, z[some]) for x, y, z in self.positions]
+        return ManyExactRanges(
+            self.half[some], self.k[some], self.count, tracks, positions, has_direct_path=self.has_direct_path
+        )
+
+    @cached_property
+    def times(self) -> Floats:
+        """Slow times of the nodes, (nodes, cases). [s]"""
+        times: Floats = np.array(LEGENDRE_FITS[self.count][0])[:, None] * self.half
+        return times
+
+    @cached_property
+    def phases_per_term(self) -> Any:
+        """Quadratic phase, and cubic, that the displacement by a unit of the constant and of the linear part adds."""
         (_, _, q_x, c_x), (_, _, q_y, c_y) = self.gradient
         (a, b), (c, d) = self.adjugate
         scale = self.k / self.determinant
-        self.phases_per_term = (
+        return (
             ((q_x * a + q_y * c) * scale, (q_x * b + q_y * d) * scale),
             ((c_x * a + c_y * c) * scale, (c_x * b + c_y * d) * scale),
         )
-        sine = (s_x * rate_y - s_y * rate_x) / (np.hypot(s_x, s_y) * np.hypot(rate_x, rate_y))
-        self.reach = np.minimum(scalar.NEAR, scalar.SKEWED * np.abs(sine)) * self.nearest
-        self.bend = scalar.BENT * np.abs(self.determinant) * self.half / np.hypot(s_x, s_y) * self.nearest
+
+    @cached_property
+    def nearest_node(self) -> Floats:
+        """Least range at the nodes. [m]"""
+        return np.asarray(np.minimum(*(ranges.min(axis=0) for ranges in self.ranges)))
+
+    @cached_property
+    def nearest(self) -> Floats:
+        """Least range at the nodes and at the middle of the aperture. [m]"""
+        return np.asarray(np.minimum(np.minimum(*map(norm, self.positions)), self.nearest_node))
+
+    @cached_property
+    def rounding(self) -> Floats:
+        """A phase history in double precision holds no phase that is smaller. [rad]"""
+        recorded = (self.ranges[0] + self.ranges[1]).max(axis=0)
+        if self.has_direct_path:
+            recorded = recorded + self.baselines.max(axis=0)
+        return np.asarray(scalar.EPSILON * self.k * recorded)
+
+    @cached_property
+    def _between(self) -> Vectors:
+        """The transmitter at the nodes, as the receiver has it. [m]"""
+        (x, y, z), (u, v, w) = self.tracks
+        return (x - u, y - v, z - w)
+
+    @cached_property
+    def baselines(self) -> Floats:
+        """Distances of the platforms at the nodes. [m]"""
+        return np.asarray(norm(self._between))
+
+    @cached_property
+    def _heard_along(self) -> tuple[Vectors, Vectors]:
+        """Unit vectors along the direct path at the nodes, from the other platform to each."""
+        x, y, z = (part / self.baselines for part in self._between)
+        return ((x, y, z), (-x, -y, -z))
+
+    @cached_property
+    def reach(self) -> Floats:
+        """Distance from the centre up to which its slopes find a point. [m]"""
+        return np.asarray(np.minimum(scalar.NEAR, scalar.SKEWED * np.abs(self.sine)) * self.nearest)
+
+    @cached_property
+    def bend(self) -> Floats:
+        """Way of both platforms by velocity errors within half an aperture up to which they do. [m]"""
+        return np.asarray(scalar.BENT * np.abs(self.determinant) * self.half / self.range_gradient * self.nearest)
 
     def _fitted(self, samples: Floats) -> Floats:
         """Value, slope over the half aperture, quadratic and cubic at its edge, (4, cases)."""
         fitted: Floats = self.fit @ samples
         return fitted
 
-    def powers(self, unit: str) -> Any:
-        """Position error at each node of a unit of an error."""
-        return self._powers[unit]
+    @cached_property
+    def powers(self) -> dict[str, Floats]:
+        """Position error at the nodes of a unit of an error: 1, τ or τ²/2."""
+        return {"m": np.ones_like(self.times), "m/s": self.times, "m/s^2": self.times**2 / 2}
 
     def along(self, platform: int, direction: Vectors) -> Floats:
-        """What a metre along a direction does to the range of a platform at the nodes."""
+        """What a metre along a direction does to the range of a platform at the nodes; as `along`."""
         found: Floats = -dot(self.tracks[platform], direction) / self.ranges[platform]
+        return found + dot(self._heard_along[platform], direction) if self.has_direct_path else found
+
+    def range_error(self, course: Course) -> Floats:
+        """Range error at the nodes of a small unit of any error, before it displaces anything. [m/unit]"""
+        if not course.platforms:
+            return course.at_nodes
+        moved: Floats = sum(self.along(platform, course.direction) for platform in course.platforms)  # type: ignore[assignment]
+        return moved * course.at_nodes
+
+    def quadratics_of(self, courses: Sequence[Course]) -> list[Floats]:
+        """Quadratic phase of a small unit of each error, that of `effect`, in a tenth of its time. [rad/unit]"""
+        weights = self.phase_weights[0]
+        whole = np.abs(weights).sum(axis=0)
+        of_axes: dict[tuple[int, str], Vectors] = {}
+        found = []
+        for course in courses:
+            for platform in course.platforms:
+                if (platform, course.unit) not in of_axes:
+                    of_axes[platform, course.unit] = self._along_axes(platform, weights * course.at_nodes)
+            if course.platforms:
+                phase = sum(dot(of_axes[one, course.unit], course.direction) for one in course.platforms)
+                seen = len(course.platforms) * whole * course.at_nodes[-1]
+            else:
+                parts = weights * course.at_nodes
+                phase, seen = parts.sum(axis=0), np.abs(parts).sum(axis=0)
+            found.append(np.where(np.abs(phase) > ROUNDING * seen, phase, 0.0))
         return found
+
+    def _along_axes(self, platform: int, weights: Floats) -> Vectors:
+        """What a metre at each node, weighted, does along x, y and z."""
+        by_metre = -weights / self.ranges[platform]
+        x, y, z = ((by_metre * track).sum(axis=0) for track in self.tracks[platform])
+        if self.has_direct_path:
+            a, b, c = ((weights * part).sum(axis=0) for part in self._heard_along[platform])
+            x, y, z = x + a, y + b, z + c
+        return (x, y, z)
+
+    @cached_property
+    def phase_weights(self) -> tuple[Floats, Floats]:
+        """What a metre at each node adds to quadratic and cubic phase, that of the displacement included. [rad/m]"""
+        value, slope, *phases = (weights[:, None] for weights in self.fit)
+        quadratic, cubic = (
+            self.k * own + by_value * value + by_slope / self.half * slope
+            for own, (by_value, by_slope) in zip(phases, self.phases_per_term, strict=True)
+        )
+        return quadratic, cubic
 
     def effect(self, range_error: Floats) -> Effects:
         """Effect of a range error at the nodes, that of the displacement included; as `ExactRanges.effect`."""
@@ -131,22 +280,30 @@ class ManyExactRanges:
 
         `size` (some,), signed, and `near`, where the search starts, are those of the cases `some`.
         """
-        course = error.at_nodes[:, some]
+        course, _, _, direction = error.of(some)
         if error.platforms:
-            along = [course * (size * (part[some] if np.ndim(part) else part)) for part in error.direction]
+            along = [course * (size * part) for part in direction]
             shifts = [along if platform in error.platforms else _STILL for platform in (0, 1)]
-            clock = np.zeros_like(course)
+            clock = self._heard(shifts, some) if self.has_direct_path else np.zeros_like(course)
         else:
             shifts, clock = [_STILL, _STILL], course * size
-        bend = np.abs(size) * (len(error.platforms) if error.is_velocity else 0.0)
+        bend = np.abs(size) * (len(error.platforms) if error.unit == "m/s" else 0.0)
         return self._settled(clock, shifts, near, bend, some)
+
+    def _heard(self, shifts: Sequence[Any], some: NDArray[Any]) -> Floats:
+        """What shifts of the platforms make of c·t̃ at the nodes where the direct path is the clock. [m]"""
+        a, b, c = (one - other for one, other in zip(*shifts, strict=True))
+        x, y, z = (part[:, some] for part in self._between)
+        grown = a * (2 * x + a) + b * (2 * y + b) + c * (2 * z + c)
+        baseline = self.baselines[:, some]
+        return np.asarray(grown / (baseline + np.sqrt(np.abs(baseline * baseline + grown))))
 
     def way(
         self, error: Course, size: Floats, place: tuple[Floats, Floats], some: NDArray[Any]
     ) -> tuple[Floats, Floats]:
         """Where the point goes with a larger error, at the places that errors of some cases move it to. [m/unit]"""
-        x, y, z = (part[some] if np.ndim(part) else part for part in error.direction)
-        course, (east, north) = error.at_nodes[:, some], place
+        course, _, _, (x, y, z) = error.of(some)
+        east, north = place
         change = np.zeros_like(course) if error.platforms else course
         by_east, by_north = np.zeros_like(course), np.zeros_like(course)
         for platform, track in enumerate(self.tracks):
@@ -157,6 +314,12 @@ class ManyExactRanges:
             by_east, by_north = by_east + a / R, by_north + b / R
             if platform in error.platforms:
                 change = change - course * (a * x + b * y + c * z) / R
+        if self.has_direct_path and len(error.platforms) == 1:
+            side = 1.0 if error.platforms == (0,) else -1.0
+            a, b, c = (side * part[:, some] for part in self._between)
+            a, b, c = a + size * course * x, b + size * course * y, c + size * course * z
+            apart = np.sqrt(a * a + b * b + c * c)
+            change = change + np.where(apart > 0, course * (a * x + b * y + c * z) / apart, 0.0)
         (a, c), (b, d), (constant, linear) = (self.fit[:2] @ one for one in (by_east, by_north, change))
         determinant = a * d - b * c
         return (b * linear - d * constant) / determinant, (c * constant - a * linear) / determinant

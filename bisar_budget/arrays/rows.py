@@ -52,8 +52,8 @@ class Judged(NamedTuple):
 
     @property
     def margin(self) -> Floats:
-        """Allowable over declared less one."""
+        """Allowable over declared less one, as factors where the row has them in decibel."""
         with np.errstate(all="ignore"):
-            margin = self.allowable / self.declared - 1
+            margin = 1 / self.utilization - 1
         margin[~np.isfinite(margin)] = math.nan
         return margin

@@ -4,51 +4,37 @@ They depend on the wavelength, the aperture time, the lines of sight and the sha
 """
 
 import math
-from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Callable, Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.analysis.allocation import Allocation
-from bisar_budget.arrays.collections import Floats
 from bisar_budget.arrays.rows import REQUIREMENTS, Judged
-from bisar_budget.budget.vibration_rows import vibration_rows
+from bisar_budget.arrays.together import ManyOwnPhases
 from bisar_budget.effects.slow_vibration import slow_phases
+from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import RANK
 from bisar_budget.mission.model import Mission
 
 
-class SlowPhase(NamedTuple):
-    """Phases of a vibration in the cases in which it is below one cycle per aperture, 0 in others; as `OwnPhase`."""
-
-    owner: str
-    qpe: Floats
-    cubic: Floats
-
-
-def many_slow_phases(count: int, one: Callable[[int], Mission]) -> list[SlowPhase]:
-    """Phases of slow vibrations in `count` cases; `one` gives the mission of a case, with its numbers."""
-    found: dict[str, SlowPhase] = {}
+def many_slow_phases(count: int, one: Callable[[int], Mission]) -> list[ManyOwnPhases]:
+    """Phases of slow vibrations in `count` cases, 0 where one is faster; `one` gives the mission of a case."""
+    found: dict[str, ManyOwnPhases] = {}
     for place in range(count):
         for phase in slow_phases(one(place)):
             if phase.row_id not in found:
-                found[phase.row_id] = SlowPhase(phase.owner, np.zeros(count), np.zeros(count))
-            found[phase.row_id].qpe[place] = phase.qpe_rad
-            found[phase.row_id].cubic[place] = phase.cubic_rad
+                nothing = (np.zeros(count), np.zeros(count), np.zeros(count, dtype=bool))
+                found[phase.row_id] = ManyOwnPhases(phase.row_id, phase.owner, *nothing)
+            of_row = found[phase.row_id]
+            of_row.qpe[place], of_row.cubic[place], of_row.is_there[place] = phase.qpe_rad, phase.cubic_rad, True
     return list(found.values())
 
 
-def judged_vibrations(
-    cases: NDArray[np.intp], count: int, one: Callable[[int], tuple[Mission, Allocation]], model: str
-) -> list[Judged]:
-    """Judge the vibrations of some of `count` cases by a model; a row that a case does not have is not declared.
-
-    `one` gives the mission of a case, with its numbers, and its shares.
-    """
+def judged_one_by_one(cases: NDArray[np.intp], count: int, rows_of: Callable[[int], Iterable[Row]]) -> list[Judged]:
+    """Rows of some of `count` cases as `check` judges them; one that a case does not have is not declared."""
     found: dict[str, Judged] = {}
     for place in cases.tolist():
-        for row in vibration_rows(*one(place), model):
+        for row in rows_of(place):
             if row.id not in found:
                 found[row.id] = Judged.of_none(row.subject, count)
             judged = found[row.id]

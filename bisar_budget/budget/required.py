@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from bisar_budget import phrases
 from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.subject import Subject
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.model import Mission
 
@@ -34,7 +35,13 @@ def with_required(rows: Sequence[Row], mission: Mission) -> list[Row]:
 
 def _required(row: Row, missing: Sequence[tuple[str, str, str]]) -> Row:
     if row.status == "not_declared":
-        for owner, kind, key in missing:
-            if row.subject.owner == owner and (row.subject.kind == kind or owner == "clock"):
-                return row._replace(status="not_evaluated", reason=phrases.not_declared_as_required(key))
+        for one in missing:
+            if is_asked_for(row.subject, one):
+                return row._replace(status="not_evaluated", reason=phrases.not_declared_as_required(one[2]))
     return row
+
+
+def is_asked_for(what: Subject, missing: tuple[str, str, str]) -> bool:
+    """Whether a row is about what is asked for and missing."""
+    owner, kind, _ = missing
+    return what.owner == owner and (what.kind == kind or owner == "clock")

@@ -21,7 +21,9 @@ from bisar_budget.arrays.collections import Geometries, paths_of
 from bisar_budget.arrays.held import is_image, not_held
 from bisar_budget.arrays.judged import check_arrays, statuses
 from bisar_budget.arrays.rows import REQUIREMENTS
+from bisar_budget.arrays.varied import varied
 from bisar_budget.budget.check import check_mission
+from bisar_budget.budget.required import is_asked_for, missing_declarations
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.design.cases import Cases, words_of
 from bisar_budget.design.quantities import Choices, Number, QuestionError, number_of, tree_of
@@ -30,7 +32,6 @@ from bisar_budget.design.variation import ALIKE, Variation, breaking, standing
 from bisar_budget.faults import Fault, MissionError, SetValue, shown
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import RANK, STATUS
-from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.named import Named
@@ -332,7 +333,7 @@ class Engine:
         rows = {row.id: row for row in check_mission(self.mission, question.today).rows} if self.asked else {}
         here = [one for one in self.asked if one.row in rows]
         self.subjects = {one.row: rows[one.row].subject for one in here}
-        self.not_held = not_held(self.mission, question.keys)
+        self.not_held = not_held(self.mission, {number.key: number.value is not None for number in self.numbers})
         # A brief check leaves out allowables of what is not declared, and those of the model that does not gate.
         self.is_brief = not any(
             one.field in ("allowable_published", "allowable_full")
@@ -420,7 +421,8 @@ class Engine:
         mission, geometries = self._arrays(found, some)
         held[some] &= is_image(mission, geometries, some.size)
         counts = np.zeros(held.size, dtype=int)
-        counts[some] = geometries.nodes(np.broadcast_to(mission.collection.aperture_time, (some.size,)))
+        T = np.broadcast_to(mission.collection.aperture_time, (some.size,))
+        counts[some] = geometries.nodes(T, has_direct_path=mission.has_direct_path)
         for count in np.unique(counts[held]):
             same = np.flatnonzero(held & (counts == count))
             held[same] = self._of_same_nodes(found, same, int(count))
@@ -429,7 +431,7 @@ class Engine:
     def _arrays(self, found: Mapping[str, Values], some: NDArray[Any]) -> tuple[Mission, Geometries]:
         mission = self.mission
         for number in self.numbers:
-            mission = with_value(mission, parts_of(number.key), found[number.key][some])
+            mission = varied(mission, number.key, found[number.key][some])
         platforms = mission.platforms
         return mission, Geometries(paths_of(platforms.transmitter), paths_of(platforms.receiver))
 
@@ -464,14 +466,20 @@ class Engine:
             if one.row in rows:
                 found[one.name][to] = judged.field(rows[one.row], one.field)[sure]
             elif one.field == "status":
-                found[one.name][to] = "not_declared"
+                found[one.name][to] = self._status_of_nothing(one.row)
         return sure
+
+    def _status_of_nothing(self, row: str) -> str:
+        """Status of a row that is not declared."""
+        what, missing = self.subjects.get(row), missing_declarations(self.mission)
+        is_asked = what is not None and any(is_asked_for(what, one) for one in missing)
+        return "not_evaluated" if is_asked else "not_declared"
 
     def _one(self, found: Mapping[str, Values], some: NDArray[Any], place: int) -> Mission:
         """The mission of one case of some, with its numbers."""
         mission = self.mission
         for number in self.numbers:
-            mission = with_value(mission, parts_of(number.key), float(found[number.key][some[place]]))
+            mission = varied(mission, number.key, float(found[number.key][some[place]]))
         return mission
 
     # ---------------------------------------------------------------- one by one
@@ -542,19 +550,6 @@ def _within(number: Number, values: Any) -> NDArray[np.bool_]:
     """Whether each value is one that the file may have."""
     gt, ge, lt, le = number.reader.bounds
     return cast("NDArray[np.bool_]", (values > gt) & (values >= ge) & (values < lt) & (values <= le))
-
-
-def with_value(value: Any, parts: Sequence[str], number: Any) -> Any:
-    """Put a number, or an array of numbers, into a mission in the place of a key; a scalar for each axis into all."""
-    if not parts:
-        return (number, number, number) if isinstance(value, tuple) else number
-    part, *rest = parts
-    if part.isdigit():
-        place = int(part)
-        return (*value[:place], with_value(value[place], rest, number), *value[place + 1 :])
-    if part in ("position", "velocity", "acceleration") and getattr(value, part) is None and not rest:
-        return value._replace(**{part: (number, number, number)})
-    return value._replace(**{part: with_value(getattr(value, part), rest, number)})
 
 
 def _gated(mission: Mission, model: str) -> Mission:

@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 from itertools import combinations, pairwise
 from typing import NamedTuple
 
 from bisar_budget import evaluators, phrases
 from bisar_budget.effects.spectra import Piece
-from bisar_budget.mission.instruments import Oscillator, PowerLaw
+from bisar_budget.mission.instruments import Oscillator, Points, PowerLaw
 from bisar_budget.phrases import NOTHING, Note
 
 _EXACT, _DESCRIBES = 1e-6, 0.01  # misfits of an Allan deviation: nothing, and so little that no term is added
@@ -80,17 +81,40 @@ def allan_variances(tau: float, bandwidth: float) -> tuple[float, ...]:
     )
 
 
-def fitted(points: Sequence[tuple[float, float]], bandwidth: float, aperture_time: float) -> tuple[PowerLaw, float]:
+class Fit(NamedTuple):
+    """A power law that is fitted to an Allan deviation, and its largest misfit, of a deviation."""
+
+    misfit: float
+    law: PowerLaw
+
+
+def fitted(points: Points, bandwidth: float, aperture_time: float) -> tuple[PowerLaw, float]:
     """Fit h₋₂ … h₁, none negative, to an Allan deviation; and the largest misfit, of a deviation.
 
     Least squares of relative variances, of as few terms as describe the points. Of terms that do it equally well
     those with the largest quadratic phase over the aperture.
     """
+    per_term = evaluators.power_law_parts(aperture_time)[0]
+
+    def phase(fit: Fit) -> float:
+        return math.fsum(value * part for value, part in zip(fit.law, reversed(per_term), strict=True))
+
+    best = Fit(math.inf, PowerLaw())
+    for found in _fits(points, bandwidth):
+        least = min(fit.misfit for fit in found)
+        fits = max((fit for fit in found if fit.misfit <= 1.1 * least), key=phase)
+        if fits.misfit < 0.9 * best.misfit and best.misfit > _DESCRIBES:
+            best = fits
+    return best.law, best.misfit
+
+
+@lru_cache(maxsize=64)
+def _fits(points: Points, bandwidth: float) -> tuple[tuple[Fit, ...], ...]:
+    """Fit every choice of one term, of two and so on, none of them negative."""
     terms = 4  # white and flicker phase noise have nearly the same Allan variance
     basis = [allan_variances(tau, bandwidth) for tau, _ in points]
     scaled = [[one / deviation**2 for one in row[:terms]] for row, (_, deviation) in zip(basis, points, strict=True)]
-    per_term = evaluators.power_law_parts(aperture_time)[0]
-    best: tuple[float, float, list[float]] = (math.inf, 0.0, [0.0] * 5)  # misfit, phase, coefficients
+    fits = []
     for count in range(1, min(terms, len(points)) + 1):
         found = []
         for chosen in combinations(range(terms), count):
@@ -105,14 +129,10 @@ def fitted(points: Sequence[tuple[float, float]], bandwidth: float, aperture_tim
             worst = max(
                 abs(math.sqrt(math.fsum(a * b for a, b in zip(row, h[:terms], strict=True))) - 1) for row in scaled
             )
-            phase = math.fsum(value * part for value, part in zip(h, reversed(per_term), strict=True))
-            found.append((max(worst, _EXACT), phase, h))
+            found.append(Fit(max(worst, _EXACT), PowerLaw(*h)))
         if found:
-            least = min(found)[0]
-            fits = max((one for one in found if one[0] <= 1.1 * least), key=lambda one: one[1])
-            if fits[0] < 0.9 * best[0] and best[0] > _DESCRIBES:
-                best = fits
-    return PowerLaw(*best[2]), best[0]
+            fits.append(tuple(found))
+    return tuple(fits)
 
 
 def _least_squares(rows: Sequence[Sequence[float]]) -> list[float] | None:

@@ -28,9 +28,11 @@ from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import NOTHING, Note
 
 IMU_UNITS = dict(zip(IMU_KINDS, ("m/s^2", "rad", "rad/s", "m/s/sqrt(s)", "rad/sqrt(s)"), strict=True))
-_BY_GRAVITY = ("attitude", "gyro_bias", "angle_random_walk")
-_NODES = 16  # a walk has a covariance with an edge, which fewer nodes miss by a percent
-_CANCELS = ROUNDING * 1e-2  # of a square: below it, its root is rounding
+BY_GRAVITY = ("attitude", "gyro_bias", "angle_random_walk")
+NODES = 16  # a walk has a covariance with an edge, which fewer nodes miss by a percent
+# The covariance of a position error over the aperture grows as this power of the aperture time.
+GROWS = {"accelerometer_bias": 4, "attitude": 4, "gyro_bias": 6, "velocity_random_walk": 3, "angle_random_walk": 5}
+CANCELS = ROUNDING * 1e-2  # of a square: below it, its root is rounding
 
 
 class RandomEffect(NamedTuple):
@@ -94,7 +96,7 @@ def random_errors(mission: Mission, geometry: BistaticGeometry) -> list[RandomEr
             geometry,
             mission.radar.wavelength,
             mission.collection.aperture_time,
-            count=_NODES,
+            count=NODES,
             has_direct_path=mission.has_direct_path,
         )
         for name, state in zip(PLATFORMS, states, strict=True):
@@ -120,7 +122,7 @@ def _of_imu(mission: Mission, name: str, state: PlatformState, exact: ExactRange
         largest = None if values is None else max(values)
         parts = tuple(value / largest for value in values) if values and largest else (1.0, 1.0, 1.0)
         directions = [
-            _scaled(_leak(axis) if kind in _BY_GRAVITY else axis, p) for axis, p in zip(axes, parts, strict=True)
+            _scaled(_leak(axis) if kind in BY_GRAVITY else axis, p) for axis, p in zip(axes, parts, strict=True)
         ]
         along = math.hypot(*(dot(state.look, direction) for direction in directions))
         row, heard = (
@@ -158,9 +160,9 @@ def _over_aperture(
     exact: ExactRanges, name: str, kind: str, directions: Sequence[Vector]
 ) -> tuple[float, float, float]:
     """Sigma of quadratic and of cubic phase of a unit over the exact paths [rad], and their covariance. [rad²]"""
-    by_node = _covariance(kind, exact.half)
+    by_node = covariance_at_nodes(kind, exact.half)
     sigmas = [math.sqrt(row[node]) for node, row in enumerate(by_node)]
-    scale = STANDARD_GRAVITY if kind in _BY_GRAVITY else 1.0
+    scale = STANDARD_GRAVITY if kind in BY_GRAVITY else 1.0
     squares, sizes = [0.0, 0.0, 0.0], [0.0, 0.0]  # of both phases, and their product
     for direction in directions:
         along = [list(map(mul, weights, exact.along(name, direction))) for weights in exact.phase_weights]
@@ -171,16 +173,16 @@ def _over_aperture(
             sizes[index] += math.fsum(map(abs, map(mul, weights, sigmas))) ** 2
     # What is left of terms that cancel exactly is rounding, and would make a limit out of nothing.
     quadratic, cubic = (
-        scale * math.sqrt(square) if square > _CANCELS * size else 0.0
+        scale * math.sqrt(square) if square > CANCELS * size else 0.0
         for square, size in zip(squares[:2], sizes, strict=True)
     )
     return quadratic, cubic, scale**2 * squares[2] if quadratic and cubic else 0.0
 
 
 @cache
-def _covariance(kind: str, half: float) -> tuple[tuple[float, ...], ...]:
+def covariance_at_nodes(kind: str, half: float) -> tuple[tuple[float, ...], ...]:
     """Covariance of the position error of a unit at the nodes, without gravity: zero at mid-aperture. [m²/unit²]"""
-    times = [node * half for node in evaluators.LEGENDRE_FITS[_NODES][0]]
+    times = [node * half for node in evaluators.LEGENDRE_FITS[NODES][0]]
     if kind in ("accelerometer_bias", "attitude", "gyro_bias"):
         order = 3 if kind == "gyro_bias" else 2
         history = [tau**order / math.factorial(order) for tau in times]

@@ -12,16 +12,16 @@ from bisar_budget import evaluators
 from bisar_budget.effects.tones import Parts, held, tone
 
 _TURNS = 24  # half turns of a tone within the aperture that are followed one by one
-_FAST = _TURNS * math.pi  # angle from which what turns with a tone is averaged
-_FIRST = 0.1  # angle below which a tone's parts are their first powers, to 4e-4 of the 3 % that lie there
+FAST = _TURNS * math.pi  # angle from which what turns with a tone is averaged
+FIRST = 0.1  # angle below which a tone's parts are their first powers, to 4e-4 of the 3 % that lie there
 _OCTAVE = 2.0
-_SAME = 1.000001  # of two edges, computed in two ways
-_NOTHING = 1e-6  # of the first edge: nothing of a tone's parts is below
-_FOLDED = 8  # intervals of sampling beyond which straight lines pass less than 1e-5 of a tone's power
-_ALIASES = 3  # tones folded from so many rates away are counted one by one, those beyond by an integral
+SAME = 1.000001  # of two edges, computed in two ways
+NOTHING = 1e-6  # of the first edge: nothing of a tone's parts is below
+FOLDED = 8  # intervals of sampling beyond which straight lines pass less than 1e-5 of a tone's power
+ALIASES = 3  # tones folded from so many rates away are counted one by one, those beyond by an integral
 
 # Nodes and weights of Gauss and Legendre on 0 … 1.
-_NODES = tuple((0.5 + 0.5 * node, weight) for node, weight in zip(*evaluators.LEGENDRE_FITS[6][:2], strict=True))
+NODES = tuple((0.5 + 0.5 * node, weight) for node, weight in zip(*evaluators.LEGENDRE_FITS[6][:2], strict=True))
 
 
 class Piece(NamedTuple):
@@ -56,10 +56,10 @@ def parts(pieces: Sequence[Piece], aperture_time: float) -> Parts:
     """
     scale, total = math.pi * aperture_time, Parts(0.0, 0.0, 0.0)
     for piece in pieces:
-        for low, high in _panels(piece.low, piece.high, _edges(aperture_time)):
-            if high * scale <= _FIRST * _SAME:
+        for low, high in panels(piece.low, piece.high, tone_edges(aperture_time)):
+            if high * scale <= FIRST * SAME:
                 found = _slow(piece, low, high, scale)
-            elif low * scale >= _FAST / _SAME:
+            elif low * scale >= FAST / SAME:
                 found = _fast(piece, low, high, scale)
             else:
                 found = _panel(piece.at, low, high, scale)
@@ -73,19 +73,16 @@ def synchronized_parts(pieces: Sequence[Piece], aperture_time: float, interval: 
     Straight lines pass sinc²(f·T_s) of a tone, and fold every tone that is m/T_s away on it: of a spectrum S they
     leave S·(1 − sinc²)² + sinc⁴·Σ S(|f + m/T_s|), m ≠ 0. The lines begin anywhere in the interval.
     """
-    end = max(piece.high for piece in pieces)
     rate = 1 / interval
-    edges = _exchange_edges(aperture_time, rate)
-    edges += [edge for piece in pieces for edge in (piece.low, piece.high)]
-    edges += [abs(n * rate + sign * end) for n in range(_FOLDED + 1) for sign in (1, -1)]  # where its images end
+    edges = [*exchange_edges(aperture_time, rate), *image_edges(pieces, rate)]
     scale, total = math.pi * aperture_time, Parts(0.0, 0.0, 0.0)
-    beyond = [_beyond(piece, rate) for piece in pieces]
+    beyond = [folded_from_beyond(piece, rate) for piece in pieces]
 
     def left(f: float) -> float:
         return _left(pieces, beyond, f, rate)
 
-    last = max(_FOLDED * rate, _FAST / scale)
-    for low, high in _panels(0.0, last, edges):
+    last = max(FOLDED * rate, FAST / scale)
+    for low, high in panels(0.0, last, edges):
         total = total.plus(_panel(left, low, high, scale))
     # Where straight lines pass nothing any more.
     for piece in pieces:
@@ -102,31 +99,31 @@ def _left(pieces: Sequence[Piece], beyond: Sequence[float], f: float, rate: floa
     total = 0.0
     for piece, far in zip(pieces, beyond, strict=True):
         own, aliases = 0.0, far
-        for n in range(-_ALIASES, _ALIASES + 1):
+        for n in range(-ALIASES, ALIASES + 1):
             at = abs(start + n * rate)
             if piece.low <= at < piece.high:
                 if n == nearest:
                     own = piece.at(at)
                 else:
                     aliases += piece.at(at)
-        if abs(nearest) > _ALIASES and piece.low <= f < piece.high:
+        if abs(nearest) > ALIASES and piece.low <= f < piece.high:
             own = piece.at(f)
         total += own * (1 - math.sqrt(passed)) ** 2 + passed * aliases
     return total
 
 
-def _beyond(piece: Piece, rate: float) -> float:
+def folded_from_beyond(piece: Piece, rate: float) -> float:
     """Sum of what is folded from farther away, as an integral; its first correction is that of the midpoint rule."""
-    low = max(piece.low, (_ALIASES + 0.5) * rate)
+    low = max(piece.low, (ALIASES + 0.5) * rate)
     if low >= piece.high:
         return 0.0
     rise = -piece.slope * piece.at(low) / low  # of the spectrum, at the integral's beginning
     return 2 * (piece.integral(low, piece.high) / rate + rise * rate / 24)
 
 
-def _exchange_edges(aperture_time: float, rate: float) -> list[float]:
+def exchange_edges(aperture_time: float, rate: float) -> list[float]:
     """Frequencies between which a tone's parts, and what straight lines pass, are smooth. [Hz]"""
-    edges = _edges(aperture_time) + [rate * n / 4 for n in range(1, 4 * _FOLDED + 1)]
+    edges = tone_edges(aperture_time) + [rate * n / 4 for n in range(1, 4 * FOLDED + 1)]
     octave = _TURNS / aperture_time
     while octave < rate / 4:
         edges.append(octave)
@@ -134,21 +131,28 @@ def _exchange_edges(aperture_time: float, rate: float) -> list[float]:
     return edges
 
 
-def _edges(aperture_time: float) -> list[float]:
+def image_edges(pieces: Sequence[Piece], rate: float) -> list[float]:
+    """Frequencies at which pieces of a spectrum begin and end, and where images of it end. [Hz]"""
+    end = max(piece.high for piece in pieces)
+    edges = [edge for piece in pieces for edge in (piece.low, piece.high)]
+    return edges + [abs(n * rate + sign * end) for n in range(FOLDED + 1) for sign in (1, -1)]
+
+
+def tone_edges(aperture_time: float) -> list[float]:
     """Frequencies between which a tone's parts are smooth. [Hz]"""
     scale = math.pi * aperture_time
-    edges = [_FIRST / scale * _OCTAVE**n for n in range(4)]
+    edges = [FIRST / scale * _OCTAVE**n for n in range(4)]
     return edges + [math.pi * n / scale for n in range(1, _TURNS + 1)]
 
 
-def _panels(low: float, high: float, edges: Sequence[float]) -> Iterator[tuple[float, float]]:
+def panels(low: float, high: float, edges: Sequence[float]) -> Iterator[tuple[float, float]]:
     """Neighbouring edges; of two that are the same, computed in two ways, one.
 
     Between the two a tone would be folded on 0 Hz, where a spectrum has no value.
     """
     kept = [low]
     for edge in sorted(edges):
-        if kept[-1] * _SAME < edge < high / _SAME:
+        if kept[-1] * SAME < edge < high / SAME:
             kept.append(edge)
     return pairwise([*kept, high])
 
@@ -156,9 +160,9 @@ def _panels(low: float, high: float, edges: Sequence[float]) -> Iterator[tuple[f
 def _panel(density: Callable[[float], float], low: float, high: float, scale: float) -> Parts:
     """Integrate between two edges, over logarithms: a panel may be long."""
     quadratic = cubic = left = 0.0
-    low = low or high * _NOTHING
-    is_fast, span = low * scale >= _FAST / _SAME, math.log(high / low)
-    for part, share in _NODES:
+    low = low or high * NOTHING
+    is_fast, span = low * scale >= FAST / SAME, math.log(high / low)
+    for part, share in NODES:
         f = low * math.exp(span * part)
         angle = f * scale
         if is_fast:
@@ -192,8 +196,8 @@ def _fast(piece: Piece, low: float, high: float, scale: float) -> Parts:
 def link_parts(aperture_time: float, interval: float) -> Parts:
     """Parts of samples of variance 1 with straight lines between: one-sided 2·T_s·sinc⁴(f·T_s), ⅔ in all."""
     rate, scale = 1 / interval, math.pi * aperture_time
-    edges = _exchange_edges(aperture_time, rate)
+    edges = exchange_edges(aperture_time, rate)
     total = Parts(0.0, 0.0, 0.0)
-    for low, high in _panels(0.0, _FOLDED * rate, edges):
+    for low, high in panels(0.0, FOLDED * rate, edges):
         total = total.plus(_panel(lambda f: 2 * interval * held(2 * math.pi * f * interval), low, high, scale))
     return total

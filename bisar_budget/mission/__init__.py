@@ -4,6 +4,7 @@
 __all__ = [
     "bounds",
     "changes",
+    "covariance",
     "instruments",
     "keys",
     "load",

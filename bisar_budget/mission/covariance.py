@@ -20,7 +20,7 @@ SIZE = 6
 # Matrices are written with finite digits. Six decimals of a correlation leave an element wrong by 5e-7 and, five
 # of them in a row, an eigenvalue by 2.5e-6 (Weyl).
 _ELEMENT_TOLERANCE = 1e-6
-_EIGENVALUE_TOLERANCE = 2.5e-6
+EIGENVALUE_TOLERANCE = 2.5e-6
 
 _AXIS = {name: index for names in FRAME_AXES.values() for index, name in enumerate(names)}
 _Matrix = tuple[tuple[float, ...], ...]
@@ -65,7 +65,7 @@ class Covariance(NamedTuple):
 
 
 def _problems(correlation: _Matrix) -> Iterator[Problem]:
-    if not exceed(correlation, -_EIGENVALUE_TOLERANCE):
+    if not exceed(correlation, -EIGENVALUE_TOLERANCE):
         smallest = min(eigensystem(correlation)[0])
         yield Problem(
             f"is not positive semi-definite: the correlation matrix has the eigenvalue {smallest:.3g}",

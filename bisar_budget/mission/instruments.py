@@ -154,8 +154,8 @@ class _PowerLawReader(Reader):
 
 Points = tuple[tuple[float, float], ...]
 FORMS = ("phase_noise", "allan_deviation", "power_law")
-_STEEPEST = 60.0  # dB a decade; noise of an oscillator falls by 40 at most
-_RISE = 20.0  # dB a decade; a mask that rises by more is a tone, or a slip
+STEEPEST = 60.0  # dB a decade; noise of an oscillator falls by 40 at most
+RISE = 20.0  # dB a decade; a mask that rises by more is a tone, or a slip
 
 
 Frequency = Annotated[float | None, Key(Quantity(units.FREQUENCY, gt=0, ge=1, le=1e15), "At which a mask is stated.")]
@@ -240,11 +240,11 @@ class Oscillator(NamedTuple):
             yield Problem("is missing", "accepted: the frequency at which the tones are stated", at=("frequency",))
         for (f, level), (g, next_level) in pairwise(values.get("phase_noise") or ()):
             slope = (next_level - level) / math.log10(g / f)
-            if slope < -_STEEPEST or slope > _RISE:
+            if slope < -STEEPEST or slope > RISE:
                 does = "rises" if slope > 0 else "falls"
                 yield Problem(
                     f"{does} by {abs(slope):.3g} dB a decade between {f:g} Hz and {g:g} Hz",
-                    f"accepted: a rise of at most {_RISE:g} and a fall of at most {_STEEPEST:g} dB a decade",
+                    f"accepted: a rise of at most {RISE:g} and a fall of at most {STEEPEST:g} dB a decade",
                     at=("phase_noise",),
                 )
 

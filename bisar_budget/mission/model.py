@@ -169,6 +169,9 @@ class Requirements(NamedTuple):
     ] = ()
 
 
+WHOLE = 1e-6  # by so much the sum of shares may differ from 1
+
+
 class Shares(NamedTuple):
     """Parts of one budget; they sum to 1."""
 
@@ -183,7 +186,7 @@ class Shares(NamedTuple):
         if not values.keys() >= set(Shares._fields):
             return
         total = sum(values[name] or 0.0 for name in Shares._fields)
-        if abs(total - 1) > 1e-6:
+        if abs(total - 1) > WHOLE:
             yield Problem(f"shares must sum to 1, these sum to {total:.6g}")
 
 

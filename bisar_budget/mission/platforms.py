@@ -40,10 +40,13 @@ if TYPE_CHECKING:
     from bisar_budget.mission.routes import OrbitSource, TrajectorySource
 
 STILL = 1e-6  # m/s; slower than this no platform flies an aperture
-_LEAST_BASELINE = 1.0  # m, between platforms of which one hears the other
-_FARTHEST_BY = 3  # times the least baseline, that they move by in half an aperture: so far a fit of 16 nodes is true
+LEAST_BASELINE = 1.0  # m, between platforms of which one hears the other
+FARTHEST_BY = 3  # times the least baseline, that they move by in half an aperture: so far a fit of 16 nodes is true
 
 SIZES = Triple(SIZE)
+# A 32nd of the way from one place to the next, the distance between is not smaller by as much as matters.
+BASELINE_PLACES = 65
+
 ALONG_SIGHT_OR_AXES = OneOf(lambda value: SIZES if isinstance(value, list) else SIZE, (SIZE, SIZES))
 
 
@@ -409,14 +412,14 @@ def _dives(platforms: Platforms, aperture_time: float) -> Iterator[Problem]:
 
 
 def _no_baseline(apart: PlatformState, half: float) -> Iterator[Problem]:
-    # A 32nd of the way from one place to the next, the distance between is not smaller by as much as matters.
-    least = min(norm(apart.at(half * part / 32)[0]) for part in range(-32, 33))
+    steps = BASELINE_PLACES // 2
+    least = min(norm(apart.at(half * part / steps)[0]) for part in range(-steps, steps + 1))
     way = apart.travelled(half)
-    if least < max(_LEAST_BASELINE, way / _FARTHEST_BY):
+    if least < max(LEAST_BASELINE, way / FARTHEST_BY):
         yield Problem(
             f"there is no direct path to follow: the platforms come within {least:.3g} m of each other, and move "
             f"{way:.3g} m against each other in half an aperture",
-            f"accepted: at least {_LEAST_BASELINE:g} m and a {_FARTHEST_BY}rd of that way, or linear",
+            f"accepted: at least {LEAST_BASELINE:g} m and a {FARTHEST_BY}rd of that way, or linear",
             at=("synchronization", "method"),
         )
 

@@ -1,0 +1,194 @@
+"""Rows of sensors and clocks in many cases: the arrays beside `budget.random_rows`."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bisar_budget.analysis.allocation import Split
+from bisar_budget.arrays.collections import Floats, Geometries, axes_of, dot
+from bisar_budget.arrays.instruments import ManyRandomErrors
+from bisar_budget.arrays.judgement import BOUND, Judging
+from bisar_budget.arrays.rows import REQUIREMENTS, Judged
+from bisar_budget.constants import ROUNDING
+from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.models import QUADRATIC
+from bisar_budget.effects.subject import subject
+from bisar_budget.mission.model import Mission
+
+_HELD = (QUADRATIC, "cubic_phase_error", "islr")  # requirements, in the order of what an error does
+
+
+class Limits(NamedTuple):
+    """What the errors of an owner are held to, each alone; as `Limits` of `budget.random_rows`. [rad]"""
+
+    quadratic: Any
+    cubic: Any
+    spread: Any
+
+
+class Spreads(NamedTuple):
+    """What spreads: row id, owner and phase variance, 0 where nothing does. [rad²]"""
+
+    row_id: str
+    owner: str
+    variance: Floats
+
+
+class RandomRows:
+    """Rows of the errors of sensors and clocks of many cases.
+
+    Parameters
+    ----------
+    judging : Judging
+        Of the cases.
+    mission : Mission
+        Some of its numbers are arrays (cases,).
+    geometries : Geometries
+        Of the mission.
+    errors : sequence of ManyRandomErrors
+        Of sensors and clocks.
+    held : mapping of str to (cases,)
+        Quadratic phase that each owner is held to, gain of autofocus included. [rad]
+    gain : (cases,)
+        Of autofocus.
+    islr : Split
+        Shares of the power that may spread.
+    """
+
+    def __init__(
+        self,
+        judging: Judging,
+        mission: Mission,
+        geometries: Geometries,
+        errors: Sequence[ManyRandomErrors],
+        held: Mapping[str, Floats],
+        gain: Floats,
+        islr: Split,
+    ) -> None:
+        self.judging, self.mission, self.geometries, self.errors = judging, mission, geometries, errors
+        self.held, self.gain, self.islr = held, gain, islr
+
+    def rows(self, gating: str) -> Iterator[Judged]:
+        """Rows of every error of a sensor or a clock, declared or not."""
+        other = "full" if gating == "published" else "published"
+        for error in self.errors:
+            yield self._row(error, gating, other)
+
+    def _spread_limit(self, owner: str, model: str) -> Any:
+        """Rms phase that an owner may spread; as `spread_limit`. [rad]"""
+        if self.mission.requirements.islr is None:
+            return None
+        power = 10 ** (np.asarray(self.mission.requirements.islr) / 10)
+        whole = np.sqrt(power) if model == "published" else np.sqrt(np.log1p(power))
+        return whole * np.sqrt(self.islr.of(owner))
+
+    def _sizes(self, error: ManyRandomErrors, model: str) -> Floats:
+        """Size at which an error reaches each requirement, (3, cases); infinite where it does not. [unit]"""
+        limits = (
+            self.held[error.subject.owner],
+            self.mission.requirements.cubic_phase_error,
+            self._spread_limit(error.subject.owner, model),
+        )
+        array = self.judging.array
+        per_unit = np.array([array(part) for part in error.effect(model)])
+        required = np.array([array(math.inf if limit is None else limit) for limit in limits])
+        return np.where(per_unit > 0, required / per_unit, math.inf)
+
+    def _row(self, error: ManyRandomErrors, gating: str, other: str) -> Judged:
+        sizes, mine, array = self._sizes(error, gating), error.effect(gating), self.judging.array
+        allowable = sizes.min(axis=0)
+        is_limited = np.isfinite(allowable)
+        binds = np.where(is_limited, sizes.argmin(axis=0), -1)
+        allowable = np.where(is_limited, allowable, math.nan)
+        binding = np.array([-1, *map(REQUIREMENTS.index, _HELD)], np.int8)[binds + 1]
+        if error.declared is None:
+            judged = self.judging.row(error.subject, None, allowable)
+        else:
+            size = array(error.declared)
+            qpe = array(mine.quadratic) * size
+            limit = self.held[error.subject.owner] / self.gain
+            within = np.where(binds == 0, size / allowable * self.gain, qpe / limit)
+            judged = self.judging.row(
+                error.subject,
+                size,
+                allowable,
+                doubt=size > self._sizes(error, other).min(axis=0) * BOUND,
+                without_autofocus=np.where((self.gain > 1) & (qpe > 0) & is_limited, within, 0.0),
+                is_info=self.mission.allocation.combine != "each",
+            )
+            judged = judged._replace(
+                qpe_published_rad=array(error.published.quadratic) * size, cubic_rad=array(mine.cubic) * size
+            )
+        judged = judged._replace(binding=binding)
+        return _in_decibel(judged) if error.unit == "dB" else judged
+
+    # ---------------------------------------------------------------- powers together
+    def islr_rows(self, gating: str) -> Iterator[Judged]:
+        """What all independent noise spreads, for each platform and the mission; none where only vibration does."""
+        if self.mission.requirements.islr is None or all(error.declared is None for error in self.errors):
+            return
+        owners = ["transmitter", "receiver", *(["clock"] if self.islr.clock is not None else []), "mission"]
+        other = "full" if gating == "published" else "published"
+        spreads = [*self._of_vibration(), *self._of_errors(gating)]
+        array = self.judging.array
+        for owner in owners:
+            members = [one.variance for one in spreads if owner == "mission" or self.islr.includes(one.owner, owner)]
+            variance = array(sum(members))
+            limit, by_other = (array(self._spread_limit(owner, model)) for model in (gating, other))
+            rms, what = np.sqrt(variance), subject(owner, "islr")
+            judged = self.judging.row(what, rms, limit, doubt=rms > by_other * BOUND)
+            if not self._has_wideband(owner):  # what is declared may spread nothing
+                judged = judged.where(variance == 0, self.judging.row(what, None, limit))
+            yield _as_islr(judged)
+
+    def _has_wideband(self, owner: str) -> bool:
+        owners = PLATFORMS if owner == "mission" else [name for name in PLATFORMS if name == owner]
+        return any(getattr(self.mission.platforms, name).motion_error.vibration.wideband for name in owners)
+
+    def _of_errors(self, model: str) -> Iterator[Spreads]:
+        for error in self.errors:
+            if error.declared is not None:
+                spread = self.judging.array(error.effect(model).spread * error.declared)
+                yield Spreads(error.subject.id, error.subject.owner, spread**2)
+
+    def _of_vibration(self) -> Iterator[Spreads]:
+        """What wideband vibration spreads, along the line of sight; as `along_line_of_sight`."""
+        mission = self.mission
+        sights = self.geometries.sights(has_direct_path=mission.has_direct_path)
+        for name, path, sight in zip(PLATFORMS, self.geometries.both, sights, strict=True):
+            wideband = getattr(mission.platforms, name).motion_error.vibration.wideband
+            if wideband is None:
+                continue
+            rms: Any = wideband.rms
+            if isinstance(rms, tuple):
+                along = [dot(axis, sight) for axis in axes_of(mission, name, path)]
+                floor = ROUNDING * np.sqrt(sum(one * one for one in along))
+                parts = [np.where(np.abs(one) > floor, one, 0.0) * size for one, size in zip(along, rms, strict=True)]
+                rms = np.sqrt(sum(part * part for part in parts))
+            elif mission.has_direct_path:
+                rms = rms * np.abs(dot(path.look, sight))
+            phase = self.judging.array(2 * math.pi * rms / mission.radar.wavelength)
+            yield Spreads(subject(name, "vibration", "wideband").id, name, phase**2)
+
+
+def _in_decibel(row: Judged) -> Judged:
+    """Write a row whose numbers are factors of amplitude in decibel; its utilization stays that of amplitudes."""
+    declared, allowable = (
+        np.where(column > 0, 20 * np.log10(column), math.nan) for column in (row.declared, row.allowable)
+    )
+    return row._replace(declared=declared, allowable=allowable)
+
+
+def _as_islr(row: Judged) -> Judged:
+    """Write rms phases as the ISLR that they add."""
+    declared, allowable = (_islr_db(column**2) for column in (row.declared, row.allowable))
+    binding = np.full_like(row.binding, REQUIREMENTS.index("islr"))
+    return row._replace(declared=declared, allowable=allowable, binding=binding, metric="islr")
+
+
+def _islr_db(variance: Floats) -> Floats:
+    """ISLR that noise of a phase variance adds; as `islr_db`. [dB]"""
+    level = 10 / math.log(10) * (variance + np.log(-np.expm1(-variance)))
+    return np.where(variance > 0, level, math.nan)
