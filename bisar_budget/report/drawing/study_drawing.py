@@ -55,13 +55,13 @@ def study_drawing(study: Study, key: str, title: str, description: str) -> str:
     canvas = Canvas()
     by_word = per_word(study.trade)
     if by_word is not None:
-        bottom = _curves_of_words(canvas, *by_word)
+        bottom = _curves_of_words(canvas, by_word[1])
     elif len(study.trade.axes) == 2:
         bottom = _map(canvas, study.trade)
     elif study.trade.axes[0].words:
         bottom = _bars(canvas, study.trade)
     else:
-        bottom = _curves(canvas, study)
+        bottom = _curves_of_rows(canvas, study)
     return canvas.document((_WIDTH, bottom + 4), f"{key} study", title, description, _style(study.trade.statuses))
 
 
@@ -227,22 +227,43 @@ def _swatch(canvas: Canvas, at: Point, status: str) -> None:
 
 
 # ---------------------------------------------------------------- one key
-def _curves(canvas: Canvas, study: Study) -> float:
-    """Utilizations over a number with the limit; behind them the status."""
+def _curves_of_rows(canvas: Canvas, study: Study) -> float:
+    """Utilizations of rows over a number; behind them the status."""
     trade = study.trade
     (axis,) = trade.axes
+    curves = [("worst row", "worst", np.asarray(trade.values["utilization"], float))]
+    curves += [(row, f"row{place}", of_row) for place, (row, of_row) in enumerate(study.rows.items())]
+    return _curves(canvas, axis, curves, "utilization [%]", trade)
+
+
+def _curves_of_words(canvas: Canvas, trades: Mapping[str, Trade]) -> float:
+    """The worst utilization over a number, a curve for each word."""
+    (axis,) = next(iter(trades.values())).axes
+    curves = [
+        (word, f"row{place}", np.asarray(trade.values["utilization"], float))
+        for place, (word, trade) in enumerate(trades.items())
+    ]
+    return _curves(canvas, axis, curves, "worst utilization [%]")
+
+
+def _curves(
+    canvas: Canvas,
+    axis: Axis,
+    curves: Sequence[tuple[str, str, NDArray[Any]]],
+    title: str,
+    behind: Trade | None = None,
+) -> float:
+    """Curves of utilization, each with its name and style, and their limit; `behind` gives the status behind them."""
     frame = Box(_LEFT, _TOP, _WIDTH - _RIGHT, _TOP + _HEIGHT)
     across = _scale_of(axis, frame.left, frame.right)
-    uses = trade.values["utilization"]
-    up = _scale_of_uses(np.concatenate([[1.0], uses, *study.rows.values()]), frame.bottom, frame.top)
-    for run in runs(axis, trade.values["status"]):
+    up = _scale_of_uses(np.concatenate([[1.0], *(uses for *_, uses in curves)]), frame.bottom, frame.top)
+    for run in () if behind is None else runs(axis, behind.values["status"]):
         canvas.boxes([Box(across.at(run.low), frame.top, across.at(run.high), frame.bottom)], f"is-{run.status}")
     canvas.lines([((frame.left, up.at(v)), (frame.right, up.at(v))) for v in up.ticks(26.0)], "grid")
-    entries = [_line(canvas, "worst row", "worst")]
-    _curve(canvas, frame, across, up, axis.values, uses, "worst")
-    for place, (row, of_row) in enumerate(study.rows.items()):
-        _curve(canvas, frame, across, up, axis.values, of_row, f"row{place}")
-        entries.append(_line(canvas, row, f"row{place}"))
+    entries = []
+    for name, style, uses in curves:
+        _curve(canvas, frame, across, up, axis.values, uses, style)
+        entries.append(_line(canvas, name, style))
     _limit(canvas, frame, up)
     entries.append(_line(canvas, "limit", "limit"))
     if axis.own is not None and axis.values[0] <= axis.own <= axis.values[-1]:
@@ -250,9 +271,9 @@ def _curves(canvas: Canvas, study: Study) -> float:
         canvas.lines([((x, frame.top), (x, frame.bottom))], "at")
         entries.append(_line(canvas, "this mission", "at"))
     _frame(canvas, frame)
-    _y_axis(canvas, frame, up, "utilization [%]")
+    _y_axis(canvas, frame, up, title)
     bottom = _x_axis(canvas, frame, axis, across)
-    return _legend(canvas, bottom, [*entries, *_swatches(canvas, trade.statuses)])
+    return _legend(canvas, bottom, [*entries, *_swatches(canvas, () if behind is None else behind.statuses)])
 
 
 def _curve(
@@ -313,30 +334,6 @@ def _bars(canvas: Canvas, trade: Trade) -> float:
 
 def _mark(canvas: Canvas, words: str) -> _Entry:
     return _Entry(words, lambda at: canvas.circle((at[0] + 13, at[1]), 5, "own"))
-
-
-def _curves_of_words(canvas: Canvas, words: Axis, trades: Mapping[str, Trade]) -> float:
-    """The worst utilization over a number, a curve for each word."""
-    (axis,) = next(iter(trades.values())).axes
-    frame = Box(_LEFT, _TOP, _WIDTH - _RIGHT, _TOP + _HEIGHT)
-    across = _scale_of(axis, frame.left, frame.right)
-    uses = [np.asarray(trade.values["utilization"], float) for trade in trades.values()]
-    up = _scale_of_uses(np.concatenate([[1.0], *uses]), frame.bottom, frame.top)
-    canvas.lines([((frame.left, up.at(v)), (frame.right, up.at(v))) for v in up.ticks(26.0)], "grid")
-    entries = []
-    for place, (word, of_word) in enumerate(zip(trades, uses, strict=True)):
-        _curve(canvas, frame, across, up, axis.values, of_word, f"row{place}")
-        entries.append(_line(canvas, word, f"row{place}"))
-    _limit(canvas, frame, up)
-    entries.append(_line(canvas, "limit", "limit"))
-    if axis.own is not None and axis.values[0] <= axis.own <= axis.values[-1]:
-        x = across.at(axis.own)
-        canvas.lines([((x, frame.top), (x, frame.bottom))], "at")
-        entries.append(_line(canvas, "this mission", "at"))
-    _frame(canvas, frame)
-    _y_axis(canvas, frame, up, "worst utilization [%]")
-    bottom = _x_axis(canvas, frame, axis, across)
-    return _legend(canvas, bottom, entries)
 
 
 # ---------------------------------------------------------------- two keys
