@@ -6,7 +6,7 @@ through exact ranges.
     OMP_NUM_THREADS=1 python benchmarks/draws.py [--against ../before] [--runs 5] [--shared 2]
 
 `--against` takes turns with another checkout. `--shared N` compares one process with `--scheduler local:N`, as
-commands, by the clock; the result has to be the same bytes.
+commands; the result has to be the same bytes.
 """
 
 import argparse
@@ -80,21 +80,23 @@ def in_one_process(runs: int, against: Path | None) -> None:
 
 
 def shared_out(workers: int) -> None:
-    """Commands in one process and with workers of their own, by the clock."""
-    print(f"seconds of a command in one process ÷ with --scheduler local:{workers}")
+    """Commands in one process and with workers of their own, by the clock and by processor time of all processes."""
+    print(f"a command in one process ÷ with --scheduler local:{workers}")
     for mission, draws in SHARED.items():
         line = [sys.executable, "-m", "bisar_budget", "check", f"specs/missions/{mission}.yaml"]
         line += ["--format", "json", "--monte-carlo", draws]
-        taken, output = [], []
+        taken, used, output = [], [], []
         for more in ([], ["--scheduler", f"local:{workers}"]):
-            began = time.perf_counter()
+            began, before = time.perf_counter(), os.times()
             done = subprocess.run([*line, *more], cwd=ROOT, capture_output=True, check=False)
+            after = os.times()
             taken.append(time.perf_counter() - began)
+            used.append(after.children_user + after.children_system - before.children_user - before.children_system)
             output.append(done.stdout)
         same = "same bytes" if output[0] == output[1] else "OTHER BYTES"
-        print(
-            f"  {mission:24} {draws:>5} draws {taken[0]:7.1f} ÷ {taken[1]:7.1f} = {taken[0] / taken[1]:.2f}  {same}"
-        )
+        print(f"  {mission:24} {draws} draws, {same}")
+        for what, (alone, shared) in (("clock", taken), ("processor", used)):
+            print(f"    {what:9} {alone:6.1f} s ÷ {shared:6.1f} s = {alone / shared:.2f}")
 
 
 if __name__ == "__main__":

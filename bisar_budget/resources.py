@@ -18,6 +18,10 @@ def resource(*parts: str) -> "Path":
     return installed if installed.exists() else package.parent.joinpath(*parts)
 
 
+# Device and inode of the files that `content` gave since a command began: no result may replace one.
+FILES_READ: set[tuple[int, int]] = set()
+
+
 class UnreadableError(Exception):
     """A file that cannot be read. The message begins with its name; `is_missing` where there is none of it."""
 
@@ -45,9 +49,11 @@ def content(file: str, most: int, called: str | None = None) -> bytes:
     """
     called = file if called is None else called
     try:
-        if not stat.S_ISREG(os.stat(file).st_mode):
+        found = os.stat(file)
+        if not stat.S_ISREG(found.st_mode):
             raise UnreadableError(f"{called} is no regular file")
         with open(file, "rb") as stream:
+            FILES_READ.add((found.st_dev, found.st_ino))
             return stream.read(most + 1)
     except OSError as error:
         is_missing = isinstance(error, FileNotFoundError | NotADirectoryError)

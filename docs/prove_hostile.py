@@ -1,31 +1,37 @@
-"""The long round of hostile use: fuzzed files through every reader and format, settings, processes, signals, limits.
+"""The long round of hostile use: fuzzed files through every reader, command and format, settings, signals, limits.
 
-    python docs/prove_hostile.py                        # 1 000 files, minutes
-    python docs/prove_hostile.py --files 100000 --write # hours; and record the result in docs/hostile.md
+    python docs/prove_hostile.py                # 1 000 files, minutes
+    python docs/prove_hostile.py --files 100000 --keep build/hostile.json --minutes 60  # a slice; again: the next
+    python docs/prove_hostile.py --files 100000 --keep build/hostile.json --write       # the rest, to docs/hostile.md
 
-Cases are those of `tests/fuzz.py`, by seed: `python -m tests.fuzz SEED` prints the file of one that is named here. In
-this process a file is loaded, checked by a model, written in every format, compared with the mission before it and
-explained. One file in fifty also goes through processes of its own. Any miss makes the exit code 1.
+Cases are those of `tests/fuzz.py`, by seed: `python -m tests.fuzz SEED` prints the file of one that is named here,
+`python -m tests.fuzz_commands SEED` what is asked of it. In this process a file is loaded, checked by a model,
+written in every format, compared with the mission before it and explained. Of one file in four a question is asked:
+`solve`, `sensitivity`, `sweep` or values by `--set`. Some also go through processes of their own. Any miss makes the
+exit code 1; what was missed is tried again by the next slice.
 """
 
 import argparse
 import csv
 import io
 import json
+import math
 import os
+import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 import tomllib
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from random import Random
+from tempfile import TemporaryDirectory
 from xml.etree import ElementTree
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
@@ -45,19 +51,32 @@ from bisar_budget.report.change.comparison import compare
 from bisar_budget.report.explain.explanation import explain
 from bisar_budget.settings import SettingsError, project_settings
 from tests.conftest import ROOT, TODAY
+from tests.formats.flown import SAMPLES
 from tests.fuzz import RAW, RUN, case, original, strict_settings
+from tests.fuzz_commands import MISSION, question
+from tests.hostile_commands import answered, imported, kept, on_paths
 from tests.recorded import record
 
 PAGE = Path(__file__).with_name("hostile.md")
+PATHS = ROOT / "specs" / "missions" / "paths"  # orbits that missions name
 COMMAND = [sys.executable, "-m", "bisar_budget"]
-HANG_S = 60  # the slowest case that is right takes a few seconds
-OWN_PROCESS = 50  # one file in so many
+HANG_S = 300  # of processor time; the slowest that is right is a question of 200 checks of half a second
+ASKED, OWN_PROCESS = 4, 200  # one file in so many
 LARGEST = 16 * MAX_BYTES  # of a report of one file
+LARGEST_PROCESS = 8 << 30  # bytes of address space; a case that is right takes some 100 MB of memory
 _DIFFERENCES: dict[str, Callable[..., str]] = {
     "text": partial(difference.as_text, tolerated=0.1, all_rows=True),
     "markdown": partial(difference.as_markdown, tolerated=0.1, all_rows=True),
     "json": lambda changes: difference.as_json("", changes, 0.1),
 }
+_TABLES = ("csv", "parquet", "nc")
+_VARY = ("--vary", "collection.aperture_time=1:6s:300")
+# Twelve parts, no array holds their column: they take a while.
+_SWEEP = (
+    str(ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml"),
+    *("--vary", "platforms.receiver.azimuth=40:60deg:60", "--vary", "collection.aperture_time=1:6s:40"),
+    *("--column", "receiver.velocity.x.islr_db", "--jobs", "2"),
+)
 Outcome = tuple[Counter[str], list[str]]  # cases by kind, and what was mishandled
 
 
@@ -69,29 +88,60 @@ def _hang(*_: object) -> None:
     raise _HangError
 
 
+@contextmanager
+def _watched(what: str, stage: Callable[[], str], missed: list[str]) -> Iterator[None]:
+    """Note what a case raises; it may take some processor time, and ten times as long on a busy machine."""
+    signal.signal(signal.SIGALRM, _hang)
+    signal.signal(signal.SIGPROF, _hang)
+    signal.setitimer(signal.ITIMER_PROF, HANG_S)
+    signal.alarm(10 * HANG_S)
+    try:
+        yield
+    except _HangError:
+        missed.append(f"{what}: {stage()}: hangs")
+    except Exception as error:
+        missed.append(f"{what}: {stage()}: {type(error).__name__}: {str(error)[:200]!r}")
+    finally:
+        signal.alarm(0)
+        signal.setitimer(signal.ITIMER_PROF, 0)
+
+
+def _strictly() -> None:
+    """In this process nothing that a library warns of goes by, and memory is bounded."""
+    import resource
+
+    resource.setrlimit(resource.RLIMIT_AS, (LARGEST_PROCESS, LARGEST_PROCESS))
+    warnings.simplefilter("error")
+    for kind in (DeprecationWarning, ResourceWarning):
+        warnings.filterwarnings("ignore", category=kind)
+
+
 def files(seeds: range) -> Outcome:
     """Feed the files of some seeds; the mission before each is the one to compare it with."""
-    warnings.simplefilter("error")  # in this process nothing a library warns of goes by
-    warnings.filterwarnings("ignore", category=DeprecationWarning)
-    signal.signal(signal.SIGALRM, _hang)
+    _strictly()
     tried, missed = Counter[str](), list[str]()
     before: MissionFindings | None = None
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, "m.yaml")
+    with TemporaryDirectory() as folder:
+        path = Path(folder, MISSION)
+        shutil.copytree(PATHS, Path(folder, "paths"))
         for seed in seeds:
             stage = ["load"]
-            signal.alarm(HANG_S)
-            try:
+            with _watched(f"seed {seed}", lambda stage=stage: stage[-1], missed):  # type: ignore[misc]
                 before = _file(seed, path, before, tried, stage, missed)
-            except _HangError:
-                missed.append(f"seed {seed}: {stage[-1]}: hangs")
-            except Exception as error:
-                missed.append(f"seed {seed}: {stage[-1]}: {type(error).__name__}: {str(error)[:200]!r}")
-            finally:
-                signal.alarm(0)
+            if seed % ASKED == 0:
+                with _watched(f"seed {seed}", lambda: "its question", missed):
+                    missed += [f"seed {seed}: {what}" for what in _answered(seed, path, tried)]
             if seed % OWN_PROCESS == 0:
                 missed += [f"seed {seed}: {what}" for what in _processes(seed, path, tried)]
     return tried, missed
+
+
+def _answered(seed: int, file: Path, tried: Counter[str]) -> Iterator[str]:
+    """Ask about the file of a seed, or, of every other one, about the mission that it was made from."""
+    mission = file.read_bytes() if seed // ASKED % 2 else original(Random(f"hostile {seed}")).encode()
+    with TemporaryDirectory() as folder:
+        shutil.copytree(PATHS, Path(folder, "paths"))
+        yield from answered(question(seed), mission, Path(folder), tried)
 
 
 def _file(
@@ -189,7 +239,12 @@ def _processes(seed: int, path: Path, tried: Counter[str]) -> Iterator[str]:
         tried["processes"] += 1
         try:
             done = subprocess.run(
-                [*COMMAND, *arguments], input=path.read_bytes(), capture_output=True, cwd=ROOT, timeout=HANG_S
+                [*COMMAND, *arguments],
+                input=path.read_bytes(),
+                capture_output=True,
+                cwd=path.parent,  # names in what comes from standard input start there
+                env={**os.environ, "PYTHONPATH": str(ROOT)},
+                timeout=10 * HANG_S,
             )
         except subprocess.TimeoutExpired:
             yield f"{arguments} hangs"
@@ -203,10 +258,35 @@ def _processes(seed: int, path: Path, tried: Counter[str]) -> Iterator[str]:
                 yield f"{arguments} writes a raw {found[0]!r}"
 
 
+def paths(seeds: range) -> Outcome:
+    """Feed missions that name orbits and logs, one of their files damaged."""
+    return _each(seeds, "paths", on_paths)
+
+
+def radar_files(seeds: range) -> Outcome:
+    """Feed damaged CPHD, CRSD and SICD files to `import`, and targets to what writes CPHD."""
+    return _each(seeds, "radar files", imported)
+
+
+def parts(seeds: range) -> Outcome:
+    """Go on from parts of a sweep of which one is damaged: the same table, or a message."""
+    return _each(seeds, "parts", kept)
+
+
+def _each(seeds: range, name: str, told: Callable[[int, Path, Counter[str]], Iterable[str]]) -> Outcome:
+    _strictly()
+    tried, missed = Counter[str](), list[str]()
+    for seed in seeds:
+        tried[name] += 1
+        with TemporaryDirectory() as folder, _watched(f"{name} {seed}", lambda: "in a command", missed):
+            missed += [f"{name} {seed}: {what}" for what in told(seed, Path(folder), tried)]
+    return tried, missed
+
+
 def settings(seeds: range) -> Outcome:
     """Feed settings that say `strict`: read, or refused, unless tomllib finds no such key or it names no tool."""
     tried, missed = Counter[str](), list[str]()
-    with tempfile.TemporaryDirectory() as folder:
+    with TemporaryDirectory() as folder:
         path = Path(folder, "pyproject.toml")
         for seed in seeds:
             tried["settings"] += 1
@@ -238,7 +318,7 @@ def signals(seeds: range) -> Outcome:
     missions = [str(path) for path in sorted((ROOT / "specs" / "missions").glob("*.yaml"))]
     for seed in seeds:
         random = Random(seed)
-        with tempfile.TemporaryDirectory() as folder:
+        with TemporaryDirectory() as folder:
             report = Path(folder, "report.html")
             report.write_text("old")
             arguments = random.choice(
@@ -246,6 +326,11 @@ def signals(seeds: range) -> Outcome:
                     ["check", *missions, "--report", str(report), "-o", str(Path(folder, "a.json"))],
                     ["verify", missions[2], "--only", "receiver.*", "--jobs", "2", "-o", str(report)],
                     ["simulate", missions[2], "--plot", str(Path(folder, "p.png"))],
+                    ["sensitivity", missions[0], "--plot", str(Path(folder, "p.svg")), "-o", str(report)],
+                    ["solve", *missions, "--for", "collection.aperture_time", "-o", str(report)],
+                    ["sweep", *_SWEEP, "-o", str(Path(folder, f"t.{random.choice(_TABLES)}"))],
+                    ["sweep", *_SWEEP, "-o", str(Path(folder, "t.csv")), "--resume"],
+                    ["import", str(SAMPLES / "example-cphd-1.0.1.xml"), "-o", str(report), "--force"],
                 )
             )
             number = random.choice((signal.SIGTERM, signal.SIGINT, signal.SIGHUP))
@@ -274,7 +359,7 @@ def signals(seeds: range) -> Outcome:
                 missed.append(f"signals {seed}: {errors[-300:]!r}")
             left = [path.name for path in Path(folder).iterdir() if path.name.startswith(".")]
             text = report.read_text(encoding="utf-8")
-            if left or not (text == "old" or text.rstrip().endswith(("</html>", "}", ".")) or "verify" in arguments):
+            if left or not (text == "old" or text.endswith("\n") or arguments[0] != "check"):
                 missed.append(f"signals {seed}: leaves {left}, {len(text)} characters of a report")
     return tried, missed
 
@@ -293,7 +378,7 @@ def limits(seeds: range) -> Outcome:
                 (resource.RLIMIT_FSIZE, random.randint(0, 20_000)),
             )
         )
-        with tempfile.TemporaryDirectory() as folder, open("/dev/full", "wb") as full:
+        with TemporaryDirectory() as folder, open("/dev/full", "wb") as full:
             report = Path(folder, "r.html")
             report.write_text("old")
             arguments = random.choice(
@@ -304,6 +389,17 @@ def limits(seeds: range) -> Outcome:
                     ["verify", mission, "--only", "timing.quadratic", "--jobs", random.choice("12")],
                     ["simulate", mission, "--plot", str(Path(folder, "p.svg"))],
                     ["diff", mission, mission],
+                    ["solve", mission, "--for", "collection.aperture_time"],
+                    ["sensitivity", mission, "--plot", str(Path(folder, "p.svg")), "--format", "json"],
+                    [
+                        "sweep",
+                        mission,
+                        *_VARY,
+                        "-o",
+                        str(Path(folder, random.choice(("t.csv", "t.parquet", "t.nc")))),
+                    ],
+                    ["sweep", mission, *_VARY, "-o", str(Path(folder, "t.csv")), "--resume", "--jobs", "2"],
+                    ["import", str(SAMPLES / "example-sicd-1.4.0.xml"), "-o", str(Path(folder, "m.yaml"))],
                     ["schema"],
                 )
             )
@@ -315,7 +411,7 @@ def limits(seeds: range) -> Outcome:
                     stdout=output,
                     stderr=subprocess.PIPE,
                     cwd=ROOT,
-                    timeout=5 * HANG_S,
+                    timeout=HANG_S,
                     preexec_fn=partial(resource.setrlimit, kind, (size, size)),
                     env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},
                 )
@@ -331,45 +427,82 @@ def limits(seeds: range) -> Outcome:
     return tried, missed
 
 
+Part = Callable[[range], Outcome]
+SHARES: dict[Part, int] = {settings: 10, paths: 20, radar_files: 50, parts: 200, signals: 500, limits: 500}
+SIZES: dict[Part, int] = {files: 100, settings: 500, paths: 50, radar_files: 50}
+Slices = dict[str, tuple[dict[str, int], list[str]]]  # outcomes by `part first..last`
+
+
+def run(counts: Mapping[Part, int], first: int, slices: Slices, seconds: float, processes: int) -> Iterator[str]:
+    """Run what is not in `slices`, or was missed there, and put it there; gives the name of each that is done.
+
+    Parts go side by side, so that the first slices have some of everything.
+    """
+    waiting = sorted(
+        (start / count, f"{part.__name__} {first + start}..{first + min(start + size, count) - 1}", part, start, size)
+        for part, count in counts.items()
+        for size in [SIZES.get(part, 5)]
+        for start in range(0, count, size)
+    )
+    end = time.monotonic() + seconds
+    left = iter([one for one in waiting if slices.get(one[1], ({}, ["not run"]))[1]])
+    with ProcessPoolExecutor(processes) as pool:
+        running: dict[Future[Outcome], str] = {}
+        while True:
+            while len(running) < processes and time.monotonic() < end and (one := next(left, None)):
+                _, name, part, start, size = one
+                running[pool.submit(part, range(first + start, first + min(start + size, counts[part])))] = name
+            if not running:
+                return
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                name = running.pop(future)
+                tried, missed = future.result()
+                slices[name] = (dict(tried), missed)
+                yield name
+
+
+def summary(counts: Mapping[Part, int], slices: Slices) -> list[str]:
+    """Cases tried by kind, and how many were mishandled; what of a part was not run is said."""
+    tried, missed = Counter[str](), 0
+    for some, wrong in slices.values():
+        tried.update(some)
+        missed += len(wrong)
+    lines = [f"{name:16} {count:9}" for name, count in tried.items()]
+    for part, count in counts.items():
+        done = tried[part.__name__.replace("_", " ")]
+        lines += [f"{part.__name__}: {count - done} of {count} not run yet"] * (done < count)
+    return [*lines, f"{'mishandled':16} {missed:9}"]
+
+
 def main() -> int:
     """Run it; 1 if anything was mishandled."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--files", type=int, default=1000)
-    parser.add_argument("--settings", type=int, help="default: a tenth of the files")
-    parser.add_argument("--signals", type=int, help="default: a hundredth of the files")
-    parser.add_argument("--limits", type=int, help="default: a hundredth of the files")
+    for part, share in SHARES.items():
+        parser.add_argument(f"--{part.__name__}", type=int, help=f"default: one for {share} files")
     parser.add_argument("--seed", type=int, default=0, help="first seed")
     parser.add_argument("--processes", type=int, default=min(2, os.cpu_count() or 1))
+    parser.add_argument("--minutes", type=float, default=math.inf, help="begin nothing new after them")
+    parser.add_argument("--keep", type=Path, metavar="FILE", help="keep results in FILE, and go on from those there")
     parser.add_argument("--write", action="store_true", help="record the result in docs/hostile.md")
     chosen = parser.parse_args()
-    counts = {
-        files: chosen.files,
-        settings: chosen.files // 10 if chosen.settings is None else chosen.settings,
-        signals: chosen.files // 100 if chosen.signals is None else chosen.signals,
-        limits: chosen.files // 100 if chosen.limits is None else chosen.limits,
-    }
-    tried, missed = Counter[str](), list[str]()
-    start = time.perf_counter()
-    with ProcessPoolExecutor(chosen.processes) as pool:
-        for part, count in counts.items():
-            seeds = range(chosen.seed, chosen.seed + count)
-            size = 100 if part in (files, settings) else 5
-            chunks = [seeds[first : first + size] for first in range(0, count, size)]
-            for some, wrong in pool.map(part, chunks):
-                tried += some
-                missed += wrong
-                for what in wrong:
-                    print(what, flush=True)
-            print(
-                f"{part.__name__}: {count}, mishandled so far {len(missed)} ({time.perf_counter() - start:.0f} s)",
-                flush=True,
-            )
-    lines = [f"{name:16} {count:9}" for name, count in tried.items()]
-    lines.append(f"{'mishandled':16} {len(missed):9}")
+    counts: dict[Part, int] = {files: chosen.files}
+    for part, share in SHARES.items():
+        asked = getattr(chosen, part.__name__)
+        counts[part] = chosen.files // share if asked is None else asked
+    slices: Slices = json.loads(chosen.keep.read_text()) if chosen.keep and chosen.keep.exists() else {}
+    for name in run(counts, chosen.seed, slices, 60 * chosen.minutes, chosen.processes):
+        for what in slices[name][1]:
+            print(what, flush=True)
+        if chosen.keep:
+            chosen.keep.parent.mkdir(parents=True, exist_ok=True)
+            chosen.keep.with_suffix(".new").write_text(json.dumps(slices))
+            chosen.keep.with_suffix(".new").replace(chosen.keep)
+    lines = summary(counts, slices)
     print("\n".join(lines))
     if chosen.write:
         record(PAGE, "long round", lines)
-    return 1 if missed else 0
+    return 1 if any(missed for _, missed in slices.values()) else 0
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
     python docs/prove_memory.py --missions 200            # records its result in docs/memory.md
     python docs/prove_memory.py --missions 8 --seed 500
+    python docs/prove_memory.py --slow                    # times of a short, slow mission, to docs/memory.md
 
 Missions have apertures from 1 µs to 60 s, limits from 40 MB to 1 GB, every image former, one or several targets with
 and without clutter, and images at one limit of `verify`; every other one goes without compiled kernels. What a
@@ -14,6 +15,7 @@ import json
 import math
 import subprocess
 import sys
+import time
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -119,6 +121,55 @@ def one(seed: int) -> None:
     print(json.dumps([held("VmHWM") - bare, said]), flush=True)
 
 
+SLOW = {
+    "radar": {"center_frequency": "1.3 GHz", "bandwidth": "1 GHz"},
+    "collection": {"aperture_time": "0.1 s"},
+    "platforms": {
+        "transmitter": {
+            "slant_range": "10 km",
+            "azimuth": "0 deg",
+            "elevation": "15 deg",
+            "speed": "5 m/s",
+            "motion_azimuth": "90 deg",
+            "motion_error": {"velocity": "1 mm/s"},
+        },
+        "receiver": {
+            "slant_range": "9 km",
+            "azimuth": "45 deg",
+            "elevation": "15 deg",
+            "speed": "5 m/s",
+            "motion_azimuth": "135 deg",
+        },
+    },
+}
+
+
+def seconds_of_slow(kind: str) -> None:
+    """Print the processor time of the image of the short, slow mission [s]; for a process of its own."""
+    if kind == "NumPy":
+        sys.modules["numba"] = sys.modules["finufft"] = None  # type: ignore[assignment]
+    from bisar_budget.simulate.point import simulate_point
+
+    simulate_point(parse_mission(mission_text(collection__aperture_time="0.5 s")))  # imports, compiles
+    began = time.process_time()
+    simulate_point(parse_mission(mission_text(**SLOW)))
+    print(time.process_time() - began)
+
+
+def slow() -> None:
+    """Compare compiled kernels with NumPy on the short, slow mission; exit with 1 if they take over twice as long."""
+    times = {}
+    for kind in ("compiled", "NumPy"):
+        command = [sys.executable, __file__, "--seconds-of-slow", kind]
+        runs = [float(subprocess.run(command, capture_output=True, text=True, check=True).stdout) for _ in range(2)]
+        times[kind] = min(runs)
+    ratio = times["compiled"] / times["NumPy"]
+    result = f"compiled {times['compiled']:.2f} s, NumPy {times['NumPy']:.2f} s: {ratio:.2f} times, 2 allowed"
+    print(result)
+    record(PAGE, "slow", [result])
+    sys.exit(1 if ratio > 2 else 0)
+
+
 def peak_of(seed: int, seconds: float) -> tuple[float | None, str]:
     """Peak above the bare process [B], None where it was ended first, and what came of the images."""
     command = [sys.executable, __file__, "--one", str(seed)]
@@ -144,11 +195,18 @@ def main() -> None:
     parser.add_argument("--missions", type=int, default=200)
     parser.add_argument("--seed", type=int, default=0, help="first seed")
     parser.add_argument("--seconds", type=float, default=60.0, help="after which a mission is ended")
+    parser.add_argument("--slow", action="store_true", help="compare times of a short, slow mission instead")
+    parser.add_argument("--seconds-of-slow", metavar="KIND", help=argparse.SUPPRESS)
     parser.add_argument("--one", type=int, metavar="SEED", help=argparse.SUPPRESS)
     asked = parser.parse_args()
     if asked.one is not None:
         one(asked.one)
         return
+    if asked.seconds_of_slow is not None:
+        seconds_of_slow(asked.seconds_of_slow)
+        return
+    if asked.slow:
+        slow()
     counts = {"formed": 0, "refused for memory": 0, "without image": 0, "ended": 0}
     beyond, worst = 0, 0.0
     for seed in range(asked.seed, asked.seed + asked.missions):

@@ -24,7 +24,7 @@ from tests.families import FAMILIES, mission_text
 RAW = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2066-\u2069]")
 RUN = re.compile(r"(?m)^\s*::|##\[|##vso\[")
 
-_TEXTS = (
+TEXTS = (
     "",
     " ",
     "~",
@@ -94,7 +94,7 @@ _TEXTS = (
     "\U000e0041",
     "\u2028",
 )
-_UNITS = (
+UNITS = (
     "m",
     "km",
     "m/s",
@@ -134,6 +134,7 @@ _WORDS = (
     "uniform",
     "taylor",
 )
+_LOADER = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 _BYTES = (
     b"\x00",
     b"\xff",
@@ -193,6 +194,11 @@ def _known() -> tuple[str, ...]:
     )
 
 
+def tree_of(text: str) -> Any:
+    """What a file says, as text."""
+    return yaml.load(text, _LOADER)
+
+
 def original(random: Random) -> str:
     """A mission that can be used."""
     if random.random() < 0.7:
@@ -200,7 +206,7 @@ def original(random: Random) -> str:
     text = mission_text(random.choice(FAMILIES), random.randrange(10_000))
     if random.random() < 0.5:
         return text
-    tree = yaml.load(text, yaml.BaseLoader)
+    tree = tree_of(text)
     _with_instruments(tree, random)
     return yaml.dump(tree, Dumper=_Plain, sort_keys=False, width=1000)
 
@@ -267,7 +273,7 @@ def case(seed: int) -> Case:
     if kind < 0.1:
         return _misspelt(text, random)
     if kind < 0.8:
-        tree = yaml.load(text, yaml.BaseLoader)
+        tree = tree_of(text)
         changes = (_scale, _section) if kind < 0.45 else _CHANGES  # many that can be used
         for _ in range(random.choice((1, 1, 1, 2, 3, 8))):
             _change(tree, random, changes)
@@ -276,7 +282,7 @@ def case(seed: int) -> Case:
             return Case(text.encode("utf-8", "surrogatepass"))
     data = text.encode("utf-8", "surrogatepass")
     for _ in range(random.choice((1, 1, 2, 4, 16))):
-        data = _damaged(data, random)
+        data = damaged(data, random)
     return Case(data)
 
 
@@ -294,25 +300,25 @@ class _Plain(yaml.SafeDumper):
         return True
 
 
-def _places(node: Any) -> Iterator[tuple[Any, Any]]:
+def places(node: Any) -> Iterator[tuple[Any, Any]]:
     """Every container with a key or index of it."""
     items = list(node.items()) if isinstance(node, dict) else list(enumerate(node)) if isinstance(node, list) else []
     for key, value in items:
         yield node, key
-        yield from _places(value)
+        yield from places(value)
 
 
 def _misspelt(text: str, random: Random) -> Case:
     """A key with one letter changed, in a section whose keys are known."""
-    tree = yaml.load(text, yaml.BaseLoader)
+    tree = tree_of(text)
     free = id(tree.get("requirement_ids"))
-    places = [
+    keys = [
         (node, key)
-        for node, key in _places(tree)
+        for node, key in places(tree)
         if isinstance(node, dict) and id(node) != free and not key[0].isdigit()  # 1 mHz for 1 kHz is no slip to find
     ]
-    node, key = random.choice(places)
-    known = {name for _, name in places}
+    node, key = random.choice(keys)
+    known = {name for _, name in keys}
     wrong = key
     while wrong in known:
         at = random.randrange(len(key))
@@ -325,7 +331,7 @@ def _misspelt(text: str, random: Random) -> Case:
 
 def _change(tree: Any, random: Random, changes: Sequence[Callable[..., None]]) -> None:
     """Change one place of the tree."""
-    node, key = random.choice(list(_places(tree)) or [(tree, None)])
+    node, key = random.choice(list(places(tree)) or [(tree, None)])
     if key is None:
         return
     random.choice(changes)(tree, node, key, random)
@@ -339,7 +345,7 @@ def _scale(tree: Any, node: Any, key: Any, random: Random) -> None:
     """A number of any size in place of one that was there, with its unit: most give a mission that can be used."""
     leaves = [
         (one, name)
-        for one, name in _places(tree)
+        for one, name in places(tree)
         if isinstance(one[name], str) and re.match(r"-?\d", one[name]) and name != "schema_version"
     ]
     for one, name in random.sample(leaves, min(len(leaves), random.choice((1, 1, 2, 5, 20)))):
@@ -357,13 +363,13 @@ def _delete(tree: Any, node: Any, key: Any, random: Random) -> None:
 
 
 def _swap(tree: Any, node: Any, key: Any, random: Random) -> None:
-    other, its_key = random.choice(list(_places(tree)))
+    other, its_key = random.choice(list(places(tree)))
     node[key], other[its_key] = json.loads(json.dumps([other[its_key], node[key]]))
 
 
 def _insert(tree: Any, node: Any, key: Any, random: Random) -> None:
     if isinstance(node, dict):
-        node[random.choice((*_TEXTS, "motion_error", "source", "waivers", "position"))] = _value(random)
+        node[random.choice((*TEXTS, "motion_error", "source", "waivers", "position"))] = _value(random)
     else:
         node.insert(key, _value(random))
 
@@ -395,7 +401,7 @@ def _section(tree: Any, node: Any, key: Any, random: Random) -> None:
         }
         for i in range(random.choice((1, 3, 30)))
     ]
-    ids = ("receiver.*", "*", "other.e1", "timing.quadratic", "nobody", "mission.*", random.choice(_TEXTS))
+    ids = ("receiver.*", "*", "other.e1", "timing.quadratic", "nobody", "mission.*", random.choice(TEXTS))
     waivers = [
         {"id": random.choice(ids), "until": random.choice(("2020-01-01", "2099-12-31")), "reason": "r"}
         for _ in range(random.choice((1, 3, 30)))
@@ -418,7 +424,7 @@ def _section(tree: Any, node: Any, key: Any, random: Random) -> None:
     choices: dict[str, Callable[[], Any]] = {
         "other_errors": lambda: tree.update(other_errors=errors),
         "waivers": lambda: tree.update(waivers=waivers),
-        "requirement_ids": lambda: tree.update(requirement_ids={one: random.choice(_TEXTS) for one in ids}),
+        "requirement_ids": lambda: tree.update(requirement_ids={one: random.choice(TEXTS) for one in ids}),
         "requirements": lambda: tree.update(
             requirements={
                 "quadratic_phase_error": f"{number} deg",
@@ -444,7 +450,7 @@ def _section(tree: Any, node: Any, key: Any, random: Random) -> None:
         "common": lambda: tree.update(
             common_motion_error={"position": f"{number} m", "velocity": f"{_number(random)} m/s"}
         ),
-        "name": lambda: tree.update(name=random.choice(_TEXTS), document={"number": random.choice(_TEXTS)}),
+        "name": lambda: tree.update(name=random.choice(TEXTS), document={"number": random.choice(TEXTS)}),
         "vibration": lambda: platform.update(motion_error={"vibration": vibration}),
         "covariance": lambda: platform.update(motion_error={"covariance": covariance}),
         "imu": lambda: platform.update(
@@ -453,7 +459,7 @@ def _section(tree: Any, node: Any, key: Any, random: Random) -> None:
                 "random": [
                     {"name": _value(random), "sigma": f"{_number(random)} m", "correlation_time": f"{number} s"}
                 ],
-                "sensor": random.choice(("stim300", "bva", random.choice(_TEXTS))),
+                "sensor": random.choice(("stim300", "bva", random.choice(TEXTS))),
             }
         ),
         "oscillator": lambda: platform.update(
@@ -487,14 +493,14 @@ def _number(random: Random) -> float:
 def _value(random: Random) -> Any:
     kind = random.random()
     if kind < 0.4:
-        return random.choice(_TEXTS)
+        return random.choice(TEXTS)
     if kind < 0.75:
-        return f"{_number(random)} {random.choice(_UNITS)}"
+        return f"{_number(random)} {random.choice(UNITS)}"
     if kind < 0.85:
         return random.choice(_WORDS)
     if kind < 0.95:
         return [_value(random) for _ in range(random.choice((0, 1, 3, 3, 6)))]
-    return {random.choice(_TEXTS): _value(random) for _ in range(random.choice((0, 1, 3)))}
+    return {random.choice(TEXTS): _value(random) for _ in range(random.choice((0, 1, 3)))}
 
 
 _CHANGES = (
@@ -514,7 +520,7 @@ _CHANGES = (
 )
 
 
-def _damaged(data: bytes, random: Random) -> bytes:
+def damaged(data: bytes, random: Random) -> bytes:
     """Change some bytes."""
     start = random.randrange(len(data) + 1)
     end = min(len(data), start + random.choice((1, 1, 4, 30)))
@@ -560,7 +566,7 @@ def strict_settings(seed: int) -> bytes:
         random.choice(("utf-8",) * 6 + ("utf-16", "utf-16-le"))
     )
     for _ in range(random.choice((0, 1, 2, 4)) if random.random() < 0.5 else 0):
-        data = _damaged(data, random)
+        data = damaged(data, random)
     return data
 
 

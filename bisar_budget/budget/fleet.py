@@ -14,7 +14,7 @@ from bisar_budget.budget.check import check_mission
 from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.findings.mission import MissionFindings, UnusableMission
 from bisar_budget.mission.load import load_mission
-from bisar_budget.resources import cores
+from bisar_budget.resources import FILES_READ, cores
 
 if TYPE_CHECKING:
     from bisar_budget.monte_carlo.draws import Share
@@ -87,11 +87,17 @@ def check_files(
     size = -(-len(files) // count)
     own, *others = (files[start : start + size] for start in range(0, len(files), size))
     with worker_pool(len(others)) as pool:
-        waiting = [pool.submit(_of, part, one) for part in others]
+        waiting = [pool.submit(_with_files_read, part, one) for part in others]
         kept = _of(own, one)
         for part in waiting:
-            kept += part.result()
+            found, files_read = part.result()
+            kept += found
+            FILES_READ.update(files_read)
     return kept
+
+
+def _with_files_read(files: Sequence[str], one: Callable[[str], Kept]) -> tuple[list[Kept], set[tuple[int, int]]]:
+    return _of(files, one), FILES_READ
 
 
 def _of(files: Sequence[str], one: Callable[[str], Kept]) -> list[Kept]:

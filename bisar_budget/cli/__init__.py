@@ -15,7 +15,7 @@ import click
 from bisar_budget import __version__
 from bisar_budget.cli.streams import EXIT_INTERRUPTED, EXIT_OUR_FAULT, complain, drop_output, fail
 from bisar_budget.faults import WorkerLostError, printable
-from bisar_budget.resources import docstring
+from bisar_budget.resources import FILES_READ, docstring
 
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
 # Each command to the module that has it, imported when it is asked for.
@@ -57,6 +57,7 @@ class _Commands(click.Group):
 
     def main(self, *args: Any, **kwargs: Any) -> Any:
         self.help = self.help or docstring(self.callback)
+        FILES_READ.clear()
         output = sys.stdout
         kwargs["standalone_mode"] = False  # click would exit with 1 on an interrupt or a broken pipe
         kwargs["prog_name"] = "bisar-budget"  # whatever name it was called by

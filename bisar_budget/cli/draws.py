@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bisar_budget.cli.keeping import LONG, lasting, progress_bar
 from bisar_budget.cli.streams import complain, fail
+from bisar_budget.cli.waiting import LONG, lasting, progress_bar
 from bisar_budget.constants import MAX_DRAWS, MAX_DRAWS_HERE
 from bisar_budget.faults import printable
 

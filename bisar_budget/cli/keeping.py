@@ -1,29 +1,22 @@
 """Sweeps that keep their parts until they are one table: those of a scheduler, and those that can be gone on with."""
 
-import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from datetime import date
-from io import StringIO
-from time import monotonic
 from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
 from bisar_budget.cli.streams import complain
+from bisar_budget.cli.waiting import progress_bar
 
 if TYPE_CHECKING:
-    from click._termui_impl import ProgressBar
-
     from bisar_budget.cluster.parts_folder import PartsFolder
     from bisar_budget.cluster.scheduler import Workers
     from bisar_budget.design.cases import Cases
     from bisar_budget.design.sweep import Asked, Chunks
     from bisar_budget.design.swept import Swept
     from bisar_budget.mission.model import Mission
-
-LONG = 60.0  # s; what takes longer is announced
-_MOMENT = 1.0  # s
 
 
 class Keeping(NamedTuple):
@@ -115,34 +108,3 @@ def keeping(output: str | None, scheduler: str | None, is_resumed: bool, jobs: i
         return
     with connected(scheduler, complain) as workers:
         yield Keeping(output, is_resumed, jobs, workers)
-
-
-def lasting(seconds: float) -> str:
-    """Say how long something takes."""
-    for unit, size in (("years", 365.25 * 86400), ("days", 86400), ("hours", 3600), ("minutes", 60)):
-        if seconds >= 2 * size:
-            return f"{seconds / size:.0f} {unit}"
-    return f"{max(seconds, 1):.0f} s"
-
-
-def progress_bar(total: int, label: str) -> "ProgressBar[int]":
-    """Bar with the time left on standard error, where somebody watches."""
-    watched = sys.stderr is not None and sys.stderr.isatty()
-    return click.progressbar(length=total, label=label, file=sys.stderr if watched else StringIO())
-
-
-@contextmanager
-def late_bar(label: str) -> Iterator[Callable[[int, int], None]]:
-    """Give what takes how many of how many are done; a bar shows it where that takes longer than a moment."""
-    began = monotonic()
-    with ExitStack() as ends:
-        bars: list[ProgressBar[int]] = []
-
-        def progress(done: int, total: int) -> None:
-            if not bars:
-                if monotonic() - began < _MOMENT:
-                    return
-                bars.append(ends.enter_context(progress_bar(total, label)))
-            bars[0].update(done - bars[0].pos)
-
-        yield progress

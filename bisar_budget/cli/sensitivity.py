@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import click
 
 from bisar_budget import __version__
-from bisar_budget.cli.keeping import late_bar
 from bisar_budget.cli.streams import (
     DATE,
     FILE,
@@ -25,6 +24,7 @@ from bisar_budget.cli.streams import (
     wants_color,
     write_file,
 )
+from bisar_budget.cli.waiting import watched_checks
 
 if TYPE_CHECKING:
     from bisar_budget.faults import SetValue
@@ -73,7 +73,7 @@ def sensitivity(
     found = []
     for mission in load_all(files, model, changes):
         try:
-            with late_bar("Changing numbers") as progress:
+            with watched_checks(mission.name) as progress:
                 found.append(asking.sensitivity(mission, row=row, model=model, today=day, progress=progress))
         except QuestionError as error:
             fail(f"{mission.file}: {error}")

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 import click
 
 from bisar_budget.cli.streams import FILE, SET, complain, deliver, fail, load_all, spare, write_file
-from bisar_budget.cli.verify import announce, faster, progress_bar
+from bisar_budget.cli.verify import faster
+from bisar_budget.cli.waiting import FORMING, foretell, progress_bar
 from bisar_budget.faults import changes_words, printable
 
 if TYPE_CHECKING:
@@ -82,16 +83,16 @@ def simulate(
     from bisar_budget.simulate.point import SimulationError, simulate_point
 
     try:
-        with progress_bar() as bar:
+        with progress_bar(1, FORMING) as bar:
 
             def progress(done: int, work: int) -> None:
                 bar.length = work
                 bar.update(done)
 
             def foreseen(seconds: float) -> None:
-                announce(
+                foretell(
                     seconds,
-                    printable(loaded.name),
+                    f"Forming the images of {printable(loaded.name)}",
                     "smaller errors, targets nearer to each other, no clutter and fewer collection.pulses take less"
                     + faster(),
                 )

@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Sequence
 from datetime import datetime
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -24,6 +24,7 @@ from bisar_budget.cli.streams import (
     spare,
     wants_color,
 )
+from bisar_budget.cli.waiting import FORMING, foretell, progress_bar, watched_checks
 
 if TYPE_CHECKING:
     from bisar_budget.design.compared import Comparison
@@ -108,16 +109,9 @@ def solve(
             if is_of_parts:
                 found = compare.compare_parts(mission, key, row=row, target=target, model=model, today=day)
             else:
-                found = solving.solve(
-                    mission,
-                    key,
-                    between=between,
-                    row=row,
-                    target=target,
-                    model=model,
-                    is_scale=is_scale,
-                    today=day,
-                )
+                asked: dict[str, Any] = {"between": between, "target": target, "is_scale": is_scale}
+                with watched_checks(mission.name) as progress:
+                    found = solving.solve(mission, key, **asked, row=row, model=model, today=day, progress=progress)
         except QuestionError as error:
             fail(f"{mission.file}: {error}")
         solved.append(_imaged(mission, found, model) if is_imaged else found)
@@ -132,12 +126,12 @@ def solve(
 
 def _imaged(mission: "Mission", found: "Solution | Comparison", model: str | None) -> "Solution | Comparison":
     """Add what images say of the solution."""
-    from bisar_budget.cli.verify import announce, faster, progress_bar
+    from bisar_budget.cli.verify import faster
     from bisar_budget.design.imaged import imaged, to_image
 
     asked = to_image(mission, found, model)
     if asked is None:
         return found
-    announce(asked.seconds, asked.row, "without --verify none is formed" + faster())
-    with progress_bar() as bar:
+    foretell(asked.seconds, f"Forming the images of {asked.row}", "without --verify none is formed" + faster())
+    with progress_bar(1, FORMING) as bar:
         return found._replace(imaged=imaged(asked, lambda row_id: bar.update(1)))

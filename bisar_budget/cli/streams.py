@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import click
 
 from bisar_budget.faults import printable
+from bisar_budget.resources import FILES_READ
 
 if TYPE_CHECKING:
     from click import ParamType as ParamType
@@ -137,10 +138,10 @@ def load_all(files: Sequence[str], model: str | None = None, changes: "Sequence[
 
 
 def spare(files: Sequence[str], targets: Iterable[str | None], folders: Iterable[str] = ()) -> None:
-    """Refuse to write over a mission, and to write two outputs to one file.
+    """Refuse to write over what is to be read, and to write two outputs to one file.
 
-    A mission may also be the file of standard input, and the output that of standard output. Nothing else may be in
-    `folders`, which an output fills with files of its own.
+    What is read may also be the file of standard input, and the output that of standard output. Nothing else may be
+    in `folders`, which an output fills with files of its own.
     """
     written: dict[str, str] = {}
     for target in [*targets, *folders]:
@@ -158,9 +159,9 @@ def spare(files: Sequence[str], targets: Iterable[str | None], folders: Iterable
     for file in files:
         for place, target in written.items():
             if _is_same(0 if file == "-" else file, place):
-                fail(f"{target} is a mission file; a report would replace it")
+                fail(f"{target} is to be read; a result would replace it")
         if file != "-" and _is_same(1, file):
-            fail(f"{file} is a mission file; standard output goes to it")
+            fail(f"{file} is to be read; standard output goes to it")
 
 
 def _place(path: str) -> str:
@@ -177,6 +178,15 @@ def _is_same(one: str | int, other: str) -> bool:
         return os.path.isfile(one) and os.path.samestat(os.stat(one), os.stat(other))
     except (OSError, ValueError):  # either is missing
         return False
+
+
+def _was_read(path: str) -> bool:
+    """Whether a path leads to a file that a mission, or the project, names: an orbit, a log, a part, a list."""
+    try:
+        found = os.stat(path)
+    except OSError:
+        return False
+    return (found.st_dev, found.st_ino) in FILES_READ
 
 
 def day_of_run() -> date:
@@ -311,6 +321,8 @@ def replacing(path: str) -> Iterator[str]:
     temporary = None
     try:
         target = os.path.realpath(path)
+        if _was_read(target):
+            fail(f"{path} was read by this command; a result would replace it")
         if os.path.exists(target) and not os.path.isfile(target):
             yield target
             return

@@ -6,8 +6,8 @@ from datetime import date
 import click
 
 from bisar_budget import __version__
-from bisar_budget.cli.keeping import progress_bar
 from bisar_budget.cli.streams import fail
+from bisar_budget.cli.waiting import progress_bar
 from bisar_budget.design.cases import Grid, grid
 from bisar_budget.design.quantities import QuestionError, tree_of
 from bisar_budget.design.sweep import sweep
@@ -107,6 +107,7 @@ def _study(
         rows=rows,
         cases=cases.count,
         complying=sum(name != "error" and not STATUS[name].fails for name in statuses),
+        unevaluated=statuses.count("not_evaluated"),
         missing=statuses.count("error"),
         day=today,
         model=model,

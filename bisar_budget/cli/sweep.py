@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from bisar_budget import __version__
-from bisar_budget.cli.keeping import LONG, Keeping, keeping, lasting, progress_bar
+from bisar_budget.cli.keeping import Keeping, keeping
 from bisar_budget.cli.streams import (
     DATE,
     FILE,
@@ -26,6 +26,7 @@ from bisar_budget.cli.streams import (
     spare,
     write_file,
 )
+from bisar_budget.cli.waiting import LONG, lasting, progress_bar
 from bisar_budget.faults import printable
 from bisar_budget.resources import cores
 
@@ -178,9 +179,13 @@ def _cases(mission: "Mission", varied: Sequence[str], cases_file: str | None, sa
         return cases.grid(tree, varied) if sample is None else cases.sample(tree, varied, sample)
     try:
         with open(cases_file, encoding="utf-8", newline="") as file:
-            text = file.read()
+            text = file.read(cases.LARGEST_TABLE + 1)
     except (OSError, ValueError) as error:  # ValueError: not UTF-8, a NUL in the name
         fail(f"{cases_file}: cannot be read: {getattr(error, 'strerror', None) or error}")
+    if len(text) > cases.LARGEST_TABLE:
+        fail(
+            f"{cases_file}: is larger than {cases.LARGEST_TABLE >> 20} MiB; accepted: up to {cases.MAX_VALUES} values"
+        )
     return cases.table(tree, text, cases_file)
 
 
@@ -199,7 +204,7 @@ class _Run:
     ) -> None:
         self.mission, self.cases, self.columns, self.model = mission, cases, columns, model
         self.day, self.jobs, self.kept = day, jobs, kept
-        self.done = self.by_case = self.complying = self.missing = 0
+        self.done = self.by_case = self.complying = self.unevaluated = self.missing = 0
 
     def swept(self, cases: "Cases", columns: Sequence[str]) -> "Swept":
         """Ask the engine."""
@@ -285,6 +290,7 @@ class _Run:
             for name in set(statuses):
                 times = statuses.count(name)
                 self.missing += times * (name == "error")
+                self.unevaluated += times * (name == "not_evaluated")
                 self.complying += times * (name != "error" and not STATUS[name].fails)
             self.done += part.stop - part.start
             self.by_case += part.by_case
@@ -320,6 +326,8 @@ class _Run:
         if self.done < self.cases.count:
             said[0] += f" of {self.cases.count}"
         said.append(f"{self.complying} comply ({_part(self.complying, self.done)})")
+        if self.unevaluated:
+            said.append(f"{self.unevaluated} of them not evaluated")
         if self.missing:
             said.append(f"{self.missing} without a mission")
         said.append(f"{_part(self.by_case, self.done)} checked one by one")

@@ -2,7 +2,6 @@
 
 import sys
 from collections.abc import Sequence
-from io import StringIO
 from typing import TYPE_CHECKING
 
 import click
@@ -22,14 +21,11 @@ from bisar_budget.cli.streams import (
     spare,
     wants_color,
 )
+from bisar_budget.cli.waiting import FORMING, foretell, progress_bar
 from bisar_budget.faults import printable
 from bisar_budget.resources import cores
 
-LONG = 60.0  # s; what takes longer is announced
-
 if TYPE_CHECKING:
-    from click._termui_impl import ProgressBar
-
     from bisar_budget.faults import SetValue
     from bisar_budget.findings.images import VerifiedMission
     from bisar_budget.mission.model import Mission
@@ -91,16 +87,9 @@ def verify_all(missions: "Sequence[Mission]", only: str, jobs: int | None) -> "l
         raise click.UsageError(f"--only {printable(only)}: no row with a limit matches; nothing was verified.")
     jobs = jobs or (1 if is_compiled() else cores())
     seconds = sum(seconds_to_verify(mission, only, jobs) for mission in missions)
-    announce(seconds, f"{total} rows", "--only looks at some of them" + faster(jobs))
-    with progress_bar(total) as bar:
+    foretell(seconds, f"Forming the images of {total} rows", "--only looks at some of them" + faster(jobs))
+    with progress_bar(total, FORMING) as bar:
         return [verify_mission(mission, only, jobs, lambda row_id: bar.update(1)) for mission in missions]
-
-
-def announce(seconds: float, what: str, advice: str) -> None:
-    """Say on standard error that images will take long, and what to change."""
-    if seconds > LONG:
-        duration = f"{seconds:.0f} s" if seconds < 2 * LONG else f"{seconds / 60:.0f} minutes"
-        complain(f"Forming the images of {what} will take about {duration}; {advice}.")
 
 
 def faster(jobs: int | None = None) -> str:
@@ -110,9 +99,3 @@ def faster(jobs: int | None = None) -> str:
     if not is_compiled():
         return ", and pip install 'bisar-budget[fast]' makes it tens of times faster"
     return f", --jobs {cores()} uses all cores" if jobs is not None and 1 < jobs < cores() else ""
-
-
-def progress_bar(total: int = 1) -> "ProgressBar[int]":
-    """Bar on standard error, where somebody watches."""
-    watched = sys.stderr is not None and sys.stderr.isatty()
-    return click.progressbar(length=total, label="Forming images", file=sys.stderr if watched else StringIO())

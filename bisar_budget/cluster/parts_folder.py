@@ -20,9 +20,11 @@ from bisar_budget.design.sweep import Asked, Chunks
 from bisar_budget.design.swept import Part, Values
 from bisar_budget.faults import changes_words
 from bisar_budget.mission.named import Named
+from bisar_budget.resources import UnreadableError, content
 
 FORMAT = "bisar-budget/sweep-parts/1"
 _MANIFEST = "manifest.json"
+_LARGEST_MANIFEST = 16 << 20  # bytes; names of rows and keys take a hundredth
 _WORDS = {
     "format": "the form of the parts",
     "version": "the version of bisar-budget",
@@ -100,7 +102,7 @@ def encoded(part: Part, mark: str) -> bytes:
     said = {"sweep": mark, "start": str(part.start), "stop": str(part.stop), "by_case": str(part.by_case)}
     table = pa.Table.from_arrays(arrays, names=list(part.values)).replace_schema_metadata(said)
     buffer = io.BytesIO()
-    pq.write_table(table, buffer)
+    pq.write_table(table, buffer, write_page_checksum=True)
     return buffer.getvalue()
 
 
@@ -142,11 +144,12 @@ class PartsFolder:
 
     def _manifest(self) -> dict[str, Any] | None:
         try:
-            with open(self._file(_MANIFEST), encoding="utf-8") as file:
-                found = json.load(file)
-        except FileNotFoundError:
-            return None
-        except ValueError:
+            found = json.loads(content(self._file(_MANIFEST), _LARGEST_MANIFEST))
+        except UnreadableError as error:
+            if error.is_missing:
+                return None
+            found = None
+        except (ValueError, RecursionError):
             found = None
         if not isinstance(found, dict):
             raise PartsError(f"{self._file(_MANIFEST)} is no manifest of parts; accepted: remove the folder")
@@ -162,6 +165,8 @@ class PartsFolder:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
+        if not os.path.isfile(self._file(_name(start))):  # a pipe would be waited for, and a device never ends
+            return False
         try:
             found = pq.read_metadata(self._file(_name(start)))
         except (OSError, pa.ArrowException):  # there is none, or a machine stopped before its disk had it
@@ -208,7 +213,7 @@ class PartsFolder:
         for start in starts:
             file = self._file(_name(start))
             try:
-                table = pq.ParquetFile(file).read(use_threads=False)
+                table = pq.ParquetFile(file, page_checksum_verification=True).read(use_threads=False)
             except (OSError, pa.ArrowException) as error:
                 raise PartsError(f"{file} cannot be read: {error}; the same command with --resume goes on") from None
             said = table.schema.metadata

@@ -21,6 +21,7 @@ Floats = NDArray[np.float64]
 Values = NDArray[np.float64] | NDArray[np.object_]  # numbers in SI, or words
 
 MAX_VALUES = 10_000_000  # of one key, and of all keys of a table: 80 MB
+LARGEST_TABLE = 256 << 20  # characters: of as many values, each of seventeen digits with sign and exponent
 _FAULTS = 20  # of a table that are said
 _STRETCHES, _GOLDEN = 100, (math.sqrt(5) - 1) / 2  # no step of a grid meets the same values again and again
 _DIGITS = 15  # decimal ones that a float always holds

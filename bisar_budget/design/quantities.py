@@ -169,6 +169,8 @@ def _found(tree: dict[str, Any], key: str) -> tuple[Reader, Any]:
         name, rest = next_name(value, parts)
         part, parts = (parts[0], parts[1:]) if name is None else (str(name), rest)
         inner = reader.below(part)
+        if inner is None and isinstance(value, str):
+            raise QuestionError(f"{shown(key)}: the file has {shown(value)!r} there, which has no {shown(part)!r}")
         if inner is None:
             known = f"; accepted: {', '.join(reader.keys)}" if isinstance(reader, Section) else ""
             hint = nearest_keys(key)

@@ -40,6 +40,7 @@ def solve(
     model: str | None = None,
     is_scale: bool = False,
     today: date,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Solution:
     """Find every value of a number of a mission at which its compliance begins or ends.
 
@@ -62,6 +63,8 @@ def solve(
         Solve for the factor that multiplies all errors below the key.
     today : date
         Day on which waivers are judged, UTC.
+    progress : callable, optional
+        Is told, after each value of the scan, how many are done, and how many there are.
 
     Returns
     -------
@@ -74,7 +77,7 @@ def solve(
         The question cannot be asked of this mission; says why.
     """
     question = _Question(mission, key, between, row, target, model, is_scale, today)
-    scanned = _scan(question.evaluate, question.places())
+    scanned = _scan(question.evaluate, question.places(), progress)
     crossings = tuple(
         question.crossing(low, high) for low, high in pairwise(scanned) if low.complies != high.complies
     )
@@ -207,9 +210,15 @@ class _Question:
         return {value: self.number.text(value) for value in values}
 
 
-def _scan(evaluate: Evaluate, places: Sequence[float]) -> list[State]:
+def _scan(
+    evaluate: Evaluate, places: Sequence[float], progress: Callable[[int, int], None] | None = None
+) -> list[State]:
     """Look at every place, and where the utilization turns without a change of compliance, at the turn."""
-    states = [evaluate(place) for place in places]
+    states = []
+    for done, place in enumerate(places, 1):
+        states.append(evaluate(place))
+        if progress is not None:
+            progress(done, len(places))
     found = list(states)
     turns = 0
     for before, here, after in zip(states, states[1:], states[2:], strict=False):

@@ -29,7 +29,7 @@ from bisar_budget.design.cases import Cases, words_of
 from bisar_budget.design.quantities import Choices, Number, QuestionError, number_of, tree_of
 from bisar_budget.design.swept import Column, Part, Swept, Values
 from bisar_budget.design.variation import ALIKE, Variation, breaking, standing
-from bisar_budget.faults import Fault, MissionError, SetValue
+from bisar_budget.faults import Fault, MissionError, SetValue, shown
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import RANK, STATUS
 from bisar_budget.mission.load import parse_mission
@@ -185,7 +185,9 @@ class Asked:
                 except MissionError as error:
                     of_word = [fault for fault in error.faults if fault.option == f"--set {choices.key}"]
                     if of_word:
-                        raise QuestionError(f"{choices.key}={word}: {_said(of_word[0])}") from None
+                        key = of_word[0].key
+                        said = f"{'' if key == choices.key else f'{key} '}{_said(of_word[0])}"
+                        raise QuestionError(f"{choices.key}={shown(word)}: {said}") from None
                     problems.add(f"{error.faults[0].key} {_said(error.faults[0])}")
                 else:
                     problems.add("")

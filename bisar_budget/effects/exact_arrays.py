@@ -16,6 +16,7 @@ Floats = NDArray[np.float64]
 
 NODES = 24  # of Gauss-Legendre quadrature; more change nothing where platforms travel less than their slant range
 _ITERATIONS = 50
+_WORKED_ON = 7  # arrays of all samples
 TOGETHER = 1 << 14  # positions of a platform: what is made of them stays in a cache
 _FOLLOWED = 8  # steps from no error on
 _HALVINGS = 6  # of a step that leads farther away
@@ -130,15 +131,19 @@ def column_effects(
     weights: Floats,
     wavelength_m: float,
     near: Floats | None = None,
+    room: Floats | None = None,
 ) -> ExactEffects:
     """As `located`, of n errors laid out for speed: a processor takes the same sample of several of them at once.
 
     `measured` are (3, samples, n), `clock_range` (samples, n) and `near` (2, n); of `measured` n may be 1.
-    All stay in a processor's cache if samples times n are some ten thousand.
+    All stay in a processor's cache if samples times n are some ten thousand. `room` is `room_for` so many, for who
+    asks again and again: the system takes longer to give it than it takes to fill it.
     """
+    if room is None:
+        room = room_for(clock_range.size)
     history = np.linalg.norm(actual[0], axis=-1) + np.linalg.norm(actual[1], axis=-1)
     recorded = history[:, None] + clock_range
-    found = _displaced(measured, recorded, weights, wavelength_m, near)
+    found = _displaced(measured, recorded, weights, wavelength_m, near, room)
     missed = ~found.found
     if not missed.any():
         return found
@@ -149,15 +154,26 @@ def column_effects(
         part = step / _FOLLOWED
         there = [own + part * (one - own) for one, own in zip(tracks, still, strict=True)]
         ahead = before * (step / (step - 1) if step > 1 else 1.0)
-        followed = _displaced((there[0], there[1]), history[:, None] + part * clock, weights, wavelength_m, ahead)
+        recorded = history[:, None] + part * clock
+        followed = _displaced((there[0], there[1]), recorded, weights, wavelength_m, ahead, room)
         before = followed.displacement.T  # NaN from the first step on that finds nothing
     for whole, later in zip(found, followed, strict=True):
         whole[missed] = later
     return found
 
 
+def room_for(count: int) -> Floats:
+    """Room to work on so many samples."""
+    return np.empty((_WORKED_ON, count))
+
+
 def _displaced(
-    tracks: tuple[Floats, Floats], recorded: Floats, weights: Floats, wavelength_m: float, near: Floats | None
+    tracks: tuple[Floats, Floats],
+    recorded: Floats,
+    weights: Floats,
+    wavelength_m: float,
+    near: Floats | None,
+    room: Floats,
 ) -> ExactEffects:
     """Newton's method for P₀ = P₁ = 0, a step halved where it leads away.
 
@@ -168,11 +184,11 @@ def _displaced(
     point, is_settled = np.zeros((2, total)), np.zeros(total, dtype=bool)
     alive: slice | NDArray[np.intp] = slice(None)  # views, as long as none is settled
     with np.errstate(all="ignore"):
-        parts, step, turn = _parts_and_step(tracks, recorded, weights, point)
+        parts, step, turn = _parts_and_step(tracks, recorded, weights, point, room)
         orientation = np.sign(turn)
         if near is not None:
             point[:] = near
-            parts, step, turn = _parts_and_step(tracks, recorded, weights, point)
+            parts, step, turn = _parts_and_step(tracks, recorded, weights, point, room)
         here, history, length = tracks, recorded, _lengths(step)
         for _ in range(_ITERATIONS):
             settled = length < _SETTLED_M + 1e-12 * _lengths(point[:, alive])
@@ -188,7 +204,7 @@ def _displaced(
             scale = np.ones_like(length)
             for _ in range(_HALVINGS):
                 ahead = point[:, alive] + scale * step[:, alive]
-                new_parts, new_step, new_turn = _parts_and_step(here, history, weights, ahead)
+                new_parts, new_step, new_turn = _parts_and_step(here, history, weights, ahead, room)
                 new_length = _lengths(new_step)
                 farther = ~(new_length < length)
                 if not farther.any():
@@ -216,22 +232,22 @@ def _lengths(vectors: Floats) -> Floats:
 
 
 def _parts_and_step(
-    tracks: tuple[Floats, Floats], history: Floats, weights: Floats, point: Floats
+    tracks: tuple[Floats, Floats], history: Floats, weights: Floats, point: Floats, room: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """Legendre parts of what remains at points (2, n), Newton's step there, and the turn of the gradients.
 
-    (4, n) [m], (2, n) [m], (n,) [-].
+    (4, n) [m], (2, n) [m], (n,) [-]. What is worked on goes into `room`.
     """
-    left = history.copy()
-    east, north = np.zeros_like(left), np.zeros_like(left)
-    x, y, distance, square = (np.empty_like(left) for _ in range(4))
+    left, east, north, x, y, distance, square = room[:, : history.size].reshape(_WORKED_ON, *history.shape)
+    left[:], east[:], north[:] = history, 0.0, 0.0
     for track in tracks:
         np.subtract(track[0], point[0], out=x)
         np.subtract(track[1], point[1], out=y)
         np.multiply(x, x, out=distance)
         np.multiply(y, y, out=square)
         distance += square
-        distance += track[2] ** 2
+        np.multiply(track[2], track[2], out=square)
+        distance += square
         np.sqrt(distance, out=distance)
         left -= distance
         x /= distance

@@ -64,7 +64,8 @@ class Study(NamedTuple):
     """A sweep that a report of the mission shows.
 
     `asked` is what stood behind each option; `rows` are the utilizations of the rows that are the worst anywhere,
-    over the one key that varies. Of `cases` `complying` break no requirement, and `missing` are no mission. `model`
+    over the one key that varies. Of `cases` `complying` break no requirement, `unevaluated` of them because
+    something could not be evaluated or nothing is declared, and `missing` are no mission. `model`
     is the one that an option put in place of the mission's own, `day` that on which waivers were judged.
     """
 
@@ -73,6 +74,7 @@ class Study(NamedTuple):
     rows: Mapping[str, NDArray[Any]]
     cases: int
     complying: int
+    unevaluated: int
     missing: int
     day: date
     model: str | None = None

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
 _SAMPLES = 201  # moments at which a polynomial of the file is taken; enough for one of any order there
 _SETTLING = 5  # rounds of a light time; each leaves v/c of what the one before left
+_FARTHEST_M = 4.1e8  # from the Earth's centre: what is farther is no place
 _COVERED = 0.02  # of the aperture, that pulses may lack at its ends
 
 
@@ -91,7 +92,10 @@ def import_collection(file: str, channel: str | None = None) -> Imported:
         raise MissingExtraError from None
     container = open_container(file)
     read: Callable[[Container, str | None], Imported] = _READERS[container.format.split()[0]]
-    return read(container, channel)
+    import numpy as np
+
+    with np.errstate(all="ignore"):  # what is no number in the end is refused
+        return read(container, channel)
 
 
 # ---------------------------------------------------------------------- CPHD
@@ -176,7 +180,7 @@ def _pulses_of_cphd(container: Container, vectors: "NDArray[Any]", parameters: E
         raise parameters.fault(f"is beyond the {len(vectors)} vectors", "RefVectorIndex")
     usable = np.isfinite(sent) & np.isfinite(received)
     for places in (transmitter, receiver, points):
-        usable &= np.isfinite(places).all(axis=1)
+        usable &= (np.abs(places) < _FARTHEST_M).all(axis=1)
     if not usable[reference]:
         raise parameters.fault("is a vector without times or places", "RefVectorIndex")
     x, y, z = (float(value) for value in points[reference])
@@ -318,7 +322,7 @@ def _pulses_of_crsd(
     begun, places, velocities, index = _fields(xml, vectors, "PVP", "RcvStart", "RcvPos", "RcvVel", "TxPulseIndex")
     sent, transmitter = _fields(xml, sends, "PPP", "TxTime", "TxPos")
     known = np.isfinite(index) & (index >= 0) & (index < len(sends)) & np.isfinite(begun)
-    known &= np.isfinite(places).all(axis=1) & np.isfinite(velocities).all(axis=1)
+    known &= (np.abs(places) < _FARTHEST_M).all(axis=1) & np.isfinite(velocities).all(axis=1)
     known[known] = (np.isfinite(sent) & np.isfinite(transmitter).all(axis=1))[index[known].astype(int)]
     reference = parameters.whole("RefVectorIndex")
     if reference >= len(vectors) or not known[reference]:

@@ -25,6 +25,7 @@ _ORBIT_WAYS = ("tle", "omm", "oem")
 class _Lines(Reader):
     """The two lines of an element set."""
 
+    is_word = True
     what = "[line 1, line 2]"
 
     def read(self, value: Any, path: tuple[Any, ...], report: Report) -> Any:

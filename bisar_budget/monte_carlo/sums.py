@@ -10,7 +10,14 @@ import numpy as np
 
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.effect import CLOCK_UNITS, PLATFORMS, ErrorSource
-from bisar_budget.effects.exact_arrays import TOGETHER, ExactEffects, column_effects, direct_path_clock, projection
+from bisar_budget.effects.exact_arrays import (
+    TOGETHER,
+    ExactEffects,
+    column_effects,
+    direct_path_clock,
+    projection,
+    room_for,
+)
 from bisar_budget.effects.exact_ranges import ExactRanges
 from bisar_budget.monte_carlo.variables import Floats, Judged, Variable
 
@@ -71,6 +78,7 @@ class Sums:
         self._exact: dict[tuple[str, ...], ExactEffects] = {}
         self._scaled = np.empty(size)
         self._square = np.empty(size)
+        self._room: Floats | None = None
 
     def clear(self) -> None:
         """Begin another block."""
@@ -156,18 +164,22 @@ class Sums:
             np.empty((self.size, 2)), np.empty(self.size), np.empty(self.size), np.empty(self.size, dtype=bool)
         )
         size = max(1, TOGETHER // len(times))
+        if self._room is None:
+            self._room, self._tracks = room_for(size * len(times)), np.empty((2, 3, len(times), size))
         for start in range(0, self.size, size):
-            some = slice(start, start + size)
-            transmitter, receiver = (
-                track.T[:, :, None] + powers @ motion[platform][..., some].swapaxes(0, 1)
-                for platform, track in enumerate(actual)
-            )
+            some = slice(start, min(start + size, self.size))
+            transmitter, receiver = self._tracks[..., : some.stop - start]
+            for platform, measured in enumerate((transmitter, receiver)):
+                np.matmul(powers, motion[platform][..., some].swapaxes(0, 1), out=measured)
+                measured += actual[platform].T[:, :, None]
             clock_range = clock_powers @ clock[:, some]
             if self.paths.has_direct_path:
                 clock_range = direct_path_clock(
                     *(np.moveaxis(one, 0, -1) for one in (transmitter, receiver)), *(one[:, None] for one in actual)
                 )
-            part = column_effects((transmitter, receiver), actual, clock_range, weights, self.paths.wavelength)
+            part = column_effects(
+                (transmitter, receiver), actual, clock_range, weights, self.paths.wavelength, None, self._room
+            )
             for whole, value in zip(found, part, strict=True):
                 whole[some] = value
         return found

@@ -22,6 +22,7 @@ from typing import NamedTuple
 import pytest
 from click.testing import CliRunner
 
+from bisar_budget.budget import fleet
 from bisar_budget.budget.check import check_mission
 from bisar_budget.cli import _end as end
 from bisar_budget.cli import cli
@@ -34,6 +35,8 @@ from bisar_budget.report import FORMATS, Style, render
 from bisar_budget.workers import worker_pool
 from tests.conftest import APART, ROOT, TODAY, findings, heed_signals, mission_text
 from tests.fuzz import RAW, RUN, case
+from tests.mission.test_path_files import satellite
+from tests.paths.orbit_files import TLE
 
 COMMAND = [sys.executable, "-m", "bisar_budget"]
 SMALL = {"collection__aperture_time": "1 s", "radar__bandwidth": "20 MHz"}  # an image of few pixels
@@ -353,7 +356,7 @@ class TestTargets:
         with mission.open("rb") as file:
             done = spawn("check", "-", "-o", mission, stdin=file)
         assert done.returncode == 2
-        assert b"is a mission file; a report would replace it" in done.stderr
+        assert b"is to be read; a result would replace it" in done.stderr
         assert mission.read_bytes() == before
 
     @pytest.mark.skipif(sys.platform == "win32", reason="needs inodes")
@@ -363,8 +366,8 @@ class TestTargets:
             (["--report", "r.md", "-o", "r.assets/1-geometry.svg"], b"is in the folder of a report's pictures"),
             (["--report", "r.md", "--report", "r.markdown"], b"two outputs would be written to one file"),
             (["r.assets/in.yaml", "--report", "r.md"], b"is in the folder of a report's pictures"),
-            (["-o", "link.json"], b"is a mission file; a report would replace it"),
-            (["-o", "hard.json"], b"is a mission file; a report would replace it"),
+            (["-o", "link.json"], b"is to be read; a result would replace it"),
+            (["-o", "hard.json"], b"is to be read; a result would replace it"),
         ],
     )
     def test_pictures_and_links_count(self, mission, arguments, message: bytes) -> None:
@@ -391,10 +394,45 @@ class TestTargets:
         assert run("check", mission, "--format", "github", env=summary).returncode == 2
         assert mission.read_bytes() == before
 
+    @pytest.mark.parametrize(
+        "arguments",
+        [
+            ["check", "m.yaml", "-o", "a.tle"],
+            ["check", "m.yaml", "m.yaml", "--format", "json", "-o", "./a.tle"],
+            ["diff", "m.yaml", "m.yaml", "-o", "linked"],
+        ],
+    )
+    def test_what_a_mission_names_is_no_target(self, tmp_path, arguments) -> None:
+        """A report replaced the orbit that the mission names."""
+        pytest.importorskip("sgp4")
+        error = {"platforms__transmitter": {"orbit": {"tle": "a.tle"}, "motion_error": {"velocity": "5 mm/s"}}}
+        (tmp_path / "m.yaml").write_text(satellite(**error))
+        (tmp_path / "a.tle").write_text(TLE)
+        (tmp_path / "linked").symlink_to("a.tle")
+        done = run(*arguments, cwd=tmp_path)
+        assert done.returncode == 2
+        assert b"was read by this command; a result would replace it" in done.stderr
+        assert (tmp_path / "a.tle").read_text() == TLE
+
+    def test_settings_and_what_another_process_read_are_no_targets(self, mission, monkeypatch) -> None:
+        settings = mission.parent / "pyproject.toml"
+        settings.write_text("[tool.bisar-budget]\n")
+        assert run("check", mission.name, "-o", settings.name, cwd=mission.parent).returncode == 2
+        assert settings.read_text() == "[tool.bisar-budget]\n"
+        monkeypatch.setattr(fleet, "MANY", 2)
+        monkeypatch.setattr(fleet, "cores", lambda: 2)
+        part = mission.with_name("part.yaml")
+        part.write_text("kind: oscillator\n")  # is read, and is no part
+        named = mission.with_name("n.yaml")
+        named.write_text(mission_text(platforms__receiver__oscillator={"sensor": "./part.yaml"}))
+        done = run("check", mission.name, named.name, "--format", "json", "-o", "part.yaml", cwd=mission.parent)
+        assert b"part.yaml was read by this command" in done.stderr
+        assert part.read_text() == "kind: oscillator\n"
+
     def test_diff_with_a_pattern_spares_what_it_matches(self, mission, tmp_path) -> None:
         done = run("diff", tmp_path / "*.yaml", "--base", "HEAD", "-o", mission)
         assert done.returncode == 2
-        assert b"is a mission file; a report would replace it" in done.stderr
+        assert b"is to be read; a result would replace it" in done.stderr
 
     def test_a_name_as_long_as_the_system_takes(self, mission, tmp_path) -> None:
         """The temporary file beside it had a longer one."""
@@ -430,6 +468,15 @@ class TestPlots:
         assert (plain.returncode, theirs.returncode) == (0, 0), plain.stderr + theirs.stderr
         assert (folder / "b.svg").read_bytes() == (folder / "a.svg").read_bytes()
         assert b"<dc:date>" not in (folder / "a.svg").read_bytes()
+
+    def test_every_drawing_sees_to_settings_of_matplotlib_first(self, folder) -> None:
+        """Bars were drawn with theirs: a backend that Matplotlib does not know ended in exit 3."""
+        text = mission_text(timing_error__quadratic=6e-13)
+        (folder / "n.yaml").write_text(text)
+        theirs = {"MPLBACKEND": "nonsense"}
+        done = spawn("sensitivity", "n.yaml", "--plot", "b.svg", cwd=folder, env=theirs)
+        assert (done.returncode, done.stderr) == (0, b"")
+        assert (folder / "b.svg").read_bytes().rstrip().endswith(b"</svg>")
 
     def test_an_archive_has_the_name_that_was_asked_for(self, folder) -> None:
         done = run("simulate", "m.yaml", "-o", "X.NPZ", cwd=folder)
@@ -642,6 +689,48 @@ class TestBounds:
         with pytest.raises(SettingsError, match=message) as caught:
             project_settings(str(tmp_path))
         assert len(str(caught.value)) < 1000
+
+    @pytest.mark.parametrize(
+        "question", [["solve", "--for", "collection.aperture_time"], ["sensitivity"]], ids=["solve", "sensitivity"]
+    )
+    def test_how_long_a_question_takes_is_said(self, monkeypatch, question) -> None:
+        """Each value is a whole check: of a mission that takes 0.6 s, minutes went by in silence."""
+        monkeypatch.setattr("bisar_budget.cli.waiting.LONG", 1e-9)
+        done = run(*question, SECTION_V)
+        assert done.returncode == 0
+        said = rb"Checking Rigling & Moses, Section V for \d+ values or more will take about .*; .*--model published"
+        assert re.match(said, done.stderr)
+        monkeypatch.setattr("bisar_budget.cli.waiting.LONG", 3600)
+        assert run(*question, SECTION_V).stderr == b""
+
+    def test_a_table_of_cases_without_end(self, tmp_path, monkeypatch) -> None:
+        """A device was read until memory ran out."""
+        from bisar_budget.design import cases
+
+        monkeypatch.setattr(cases, "LARGEST_TABLE", 1 << 20)
+        done = run("sweep", SECTION_V, "--cases", "/dev/zero")
+        assert (done.returncode, done.stderr) == (
+            2,
+            b"Error: /dev/zero: is larger than 1 MiB; accepted: up to 10000000 values\n",
+        )
+
+    @pytest.mark.skipif(sys.platform == "win32", reason="no such limit there")
+    @pytest.mark.parametrize("suffix", ["csv", "parquet", "nc"])
+    def test_tables_that_do_not_fit(self, tmp_path, suffix: str) -> None:
+        """The library of NetCDF raised what ended in exit 3."""
+        pytest.importorskip({"parquet": "pyarrow", "nc": "netCDF4"}.get(suffix, "csv"))
+        import resource
+
+        before = resource.getrlimit(resource.RLIMIT_FSIZE)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (2000, before[1]))
+        try:
+            cases = ("--vary", "collection.aperture_time=1:2s:99")
+            done = run("sweep", SECTION_V, *cases, "-o", tmp_path / f"t.{suffix}")
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        assert done.returncode == 2
+        assert b"cannot write" in done.stderr
+        assert list(tmp_path.iterdir()) == []
 
     def test_junit_of_two_thousand_missions(self) -> None:
         """Of the missions that come with the tool, which declare more than most."""

@@ -4,6 +4,7 @@ import json
 import math
 import os
 import socket
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from datetime import date
@@ -79,6 +80,31 @@ def test_only_whole_parts_of_the_sweep_are_there(tmp_path: Path) -> None:
     assert again.done == {0}
     with pytest.raises(PartsError, match=r"part-000000000010.parquet cannot be read"):
         list(again.parts([0, 10]))
+
+
+def test_a_bit_that_flipped_on_a_disk_is_seen(tmp_path: Path) -> None:
+    """Its value went into the table."""
+    folder = PartsFolder(str(tmp_path), {"a": 1}, is_resumed=False)
+    folder.put(Part(0, 2000, {"a": np.linspace(0, 1, 2000)}, 0))
+    (file,) = tmp_path.glob("part-*")
+    data = bytearray(file.read_bytes())
+    data[len(data) // 2] ^= 1
+    file.write_bytes(data)
+    with pytest.raises(PartsError, match=r"part-000000000000.parquet cannot be read"):
+        list(folder.parts([0]))
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs pipes and devices")
+def test_pipes_and_devices_are_no_parts(tmp_path: Path) -> None:
+    """A manifest without end took all memory, and a pipe was waited for."""
+    folder = PartsFolder(str(tmp_path), {"a": 1}, is_resumed=False)
+    os.mkfifo(tmp_path / "part-000000000000.parquet")
+    folder.find([0], lambda start: start + 1)
+    assert not folder.done
+    (tmp_path / "manifest.json").unlink()
+    (tmp_path / "manifest.json").symlink_to("/dev/zero")
+    with pytest.raises(PartsError, match="is no manifest of parts"):
+        PartsFolder(str(tmp_path), {"a": 1}, is_resumed=True)
 
 
 def test_what_somebody_else_put_there_stays(tmp_path: Path) -> None:

@@ -85,6 +85,8 @@ def test_a_rule_stands_in_for_shares() -> None:
     shares = {"allocation": {"split": {"transmitter": "0.5", "receiver": "0.5"}}}
     assert grid(shares, ["allocation.split=equal,balanced"]).axes[0].tolist() == ["equal", "balanced"]
     assert grid(shares, ["allocation.split.transmitter=0.4,0.5"]).axes[0].tolist() == [0.4, 0.5]
+    with pytest.raises(QuestionError, match="the file has 'equal' there, which has no 'transmitter'"):
+        grid({"allocation": {"split": "equal"}}, ["allocation.split.transmitter=0.4,0.5"])
 
 
 def test_a_list_of_parts_is_not_replaced_by_one() -> None:

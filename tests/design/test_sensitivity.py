@@ -12,7 +12,7 @@ import pytest
 
 from bisar_budget import evaluators
 from bisar_budget.budget.check import check_mission
-from bisar_budget.cli import keeping
+from bisar_budget.cli import waiting
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.design import sensitivity as asking
 from bisar_budget.design.quantities import QuestionError
@@ -279,11 +279,11 @@ class TestProgress:
         errors = StringIO()
         monkeypatch.setattr(errors, "isatty", lambda: is_watched)
         monkeypatch.setattr("sys.stderr", errors)
-        monkeypatch.setattr(keeping, "_MOMENT", moment)
-        with keeping.late_bar("Changing numbers") as progress:
+        monkeypatch.setattr(waiting, "_MOMENT", moment)
+        with waiting.watched_checks("Section V") as progress:
             for done in range(1, 4):
                 progress(done, 3)
-        assert ("Changing numbers" in errors.getvalue()) == (is_watched and moment == 0)
+        assert ("Checking values" in errors.getvalue()) == (is_watched and moment == 0)
         assert ("100%" in errors.getvalue()) == (is_watched and moment == 0)
 
 

@@ -592,6 +592,8 @@ class TestWords:
         ("text", "said"),
         [
             ("motion_error.sensor=stim30", "sensor=stim30: is no part of the catalogue.*'stim300'"),
+            ("motion_error.sensor=[stim300", r"sensor=\[stim300: is not valid YAML"),
+            ("orbit.tle=[a, b],[c, d]", "tle: no value of it makes a mission: .* mixes orbit"),
             ("motion_error.frame=track,ric", "frame=ric: the ric frame needs the scene's latitude"),
             ("trajectory.file=a.csv,b.csv", "file: no value of it makes a mission: .* mixes trajectory"),
         ],
@@ -600,6 +602,11 @@ class TestWords:
         mission = load_mission(str(MISSIONS / "rigling_moses_section_v.yaml"))
         with pytest.raises(QuestionError, match=said):
             sweep(mission, cases_of(tree_of(mission), [f"platforms.receiver.{text}"]), today=DAY)
+
+    def test_a_word_that_lacks_another_key_says_which(self) -> None:
+        mission = load_mission(str(MISSIONS / "rigling_moses_section_v.yaml"))
+        with pytest.raises(QuestionError, match=r"method=linear: synchronization\.\w+ is missing"):
+            sweep(mission, cases_of(tree_of(mission), ["synchronization.method=linear"]), today=DAY)
 
     def test_a_model_of_the_command_leaves_none_to_compare(self) -> None:
         mission = load_mission(str(MISSIONS / "rigling_moses_section_v.yaml"))

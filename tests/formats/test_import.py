@@ -596,3 +596,14 @@ def test_a_vector_that_is_elsewhere_is_said_or_refused(run, tmp_path, off, exit_
         "warning: places of the transmitter are" if exit_code == 0 else "a place of the transmitter is 49612 km from"
     )
     assert said in found.stderr
+
+
+@pytest.mark.parametrize("place", [1e200, -1e308, 1e10, math.inf, math.nan])
+def test_a_place_beyond_the_moon_is_none(run, tmp_path, place) -> None:
+    """NumPy warned of an overflow, and the pulse was left out in silence: its time lay outside of the dwell."""
+    tree = sample(BISTATIC)
+    pulses = flown.pulses_of_sample(tree)
+    pulses["TxPos"][50, 0] = place
+    found = run("import", written(tmp_path / "a.cphd", tree, pulses))
+    assert found.exit_code == 0
+    assert "without a pulse, a time or a place, and not used: 1 of 201 vectors" in found.stderr

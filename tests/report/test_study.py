@@ -203,11 +203,29 @@ def test_markdown_and_json(run, tmp_path: Path) -> None:
     assert "](r.assets/1-study.svg)" in text
     assert (tmp_path / "r.assets" / "1-study.svg").is_file()
     (mission,) = json.loads((tmp_path / "r.json").read_text(encoding="utf-8"))["missions"]
-    assert mission["sweep"] == {"vary": [f"{TIME}=1:2s:11"], "cases": 11, "comply": 8, "without_mission": 0}
+    assert mission["sweep"] == {
+        "vary": [f"{TIME}=1:2s:11"],
+        "cases": 11,
+        "comply": 8,
+        "not_evaluated": 0,
+        "without_mission": 0,
+    }
     assert "sweep" not in json.loads(run("check", SECTION_V, "--format", "json").stdout)["missions"][0]
     whole = run("check", SECTION_V, "--format", "markdown", "--sweep", f"{TIME}=1:2s:11").stdout
     assert "11 cases: 8 comply" in whole
-    assert "pass, transmitter.acceleration.x 32.7 % to 73.6 %" in whole  # in place of the drawing
+    assert "| 1 s to 1.5 s | pass |" in whole
+    assert "study.svg)" not in whole  # nothing can stand beside it
+
+
+def test_what_is_not_evaluated_complies_with_a_word_more(run, tmp_path: Path) -> None:
+    """A mission that declares nothing breaks nothing; that is no good news."""
+    mission = tmp_path / "m.yaml"
+    text = (ROOT / SECTION_V).read_text(encoding="utf-8")
+    mission.write_text(re.sub(r"(?m)^ +motion_error:.*\n(?: {6,}.*\n)*", "", text), encoding="utf-8")
+    page = reported(run, tmp_path, str(mission), f"{TIME}=1:2s:11")
+    assert "11 cases: 11 comply (100 %), 11 of these not evaluated." in read_page(page).text
+    swept = run("sweep", str(mission), "--vary", f"{TIME}=1:2s:11", "-o", str(tmp_path / "t.csv"))
+    assert "11 cases, 11 comply (100 %), 11 of them not evaluated, " in swept.stderr
 
 
 def test_several_missions_have_one_each(run, tmp_path: Path) -> None:

@@ -40,7 +40,6 @@ def written(found: MissionFindings, study: Study, file: str) -> Studied:
         command=_command(found, study, file),
         counts=counts,
         picture=Picture("study.svg", title, drawing),
-        description=description,
         stretches=tuple(stretches[:_MOST]),
         parts=tuple(parts[:_MOST]),
         parts_are=by_word[0].key if by_word else "Worst row",
@@ -72,6 +71,8 @@ def _value(axis: Axis, place: int) -> str:
 def _counts(study: Study) -> str:
     failing = study.cases - study.complying - study.missing
     said = [f"{study.cases} cases", f"{study.complying} comply ({percent(study.complying / study.cases)})"]
+    if study.unevaluated:
+        said.append(f"{study.unevaluated} of these not evaluated")
     if failing:
         said.append(f"{failing} break a requirement")
     if study.missing:

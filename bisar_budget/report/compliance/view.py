@@ -220,7 +220,6 @@ class Studied(NamedTuple):
     command: str
     counts: str
     picture: Picture
-    description: str
     stretches: tuple[Stretch, ...] = ()
     parts: tuple[StudyPart, ...] = ()
     parts_are: str = ""

@@ -202,7 +202,7 @@ def _legend(canvas: Canvas, top: float, entries: Sequence[_Entry]) -> float:
     x, y = _LEFT - 40, top + 20
     for entry in entries:
         words = _short(entry.words, _WIDTH - _LEFT)
-        width = 32 + 0.9 * text_width(words) + 14  # `small` is smaller
+        width = 32 + text_width(words) + 12
         if x + width > _WIDTH and x > _LEFT - 40:
             x, y = _LEFT - 40, y + LINE_HEIGHT + 3
         entry.mark((x, y - 4))
@@ -306,7 +306,7 @@ def _bars(canvas: Canvas, trade: Trade) -> float:
     bottom = _x_axis(canvas, frame, Axis("utilization", "%", np.zeros(1)), along)
     entries = [_line(canvas, "limit", "limit")]
     if axis.own is not None:
-        canvas.circle((frame.left, down.at(axis.own)), 5, "own")
+        canvas.circle((frame.left + 9, down.at(axis.own)), 5, "own")
         entries.append(_mark(canvas, "this mission"))
     return _legend(canvas, bottom, [*entries, *_swatches(canvas, trade.statuses)])
 

@@ -30,8 +30,6 @@ def figure(found: Sensitivity) -> Any:
 
     Dark is what a larger number does, light what a smaller one does; both are the same slope.
     """
-    from matplotlib.patches import Patch
-
     shown = found.shown[:MOST]
     page = new_figure(figsize=(9.5, 2.0 + _ROW * max(len(shown), 3)))
     panel = page.subplots()
@@ -50,6 +48,8 @@ def figure(found: Sensitivity) -> Any:
     panel.set_xlabel(f"change of the utilization, {percent(found.asked)} now [percentage points]")
     if not shown:
         panel.text(0.5, 0.5, "no number changes it", transform=panel.transAxes, ha="center")
+    from matplotlib.patches import Patch  # after `new_figure`: it sees to the settings of a user
+
     named = [Patch(color=grey, label=f"the number is {size}") for grey, size in zip(_GREYS, _SIZES, strict=True)]
     panel.legend(handles=named, loc="lower right", fontsize=9, frameon=False)
     what = f"row {found.row}" if found.row else f"worst utilization: {found.worst_row}"

@@ -144,6 +144,7 @@ def _study(study: "Study") -> dict[str, Any]:
         "vary": list(study.asked),
         "cases": study.cases,
         "comply": study.complying,
+        "not_evaluated": study.unevaluated,
         "without_mission": study.missing,
     }
 

@@ -24,19 +24,24 @@ def write(described: Described, parts: Iterable[Part], path: str) -> None:
     """Write a file; see `Writer`."""
     from netCDF4 import Dataset
 
-    with Dataset(path, "w", format="NETCDF4") as file:
-        file.Conventions = "CF-1.11"
-        file.setncatts({_TITLES.get(name, name): value for name, value in described.facts.items()})
-        shape = described.cases.shape or (described.cases.count,)
-        columns = _dimensions(file, described)
-        names = tuple(file.dimensions)
-        variables = [_Variable(file, column, names) for column in columns]
-        for part in parts:
-            values = described.values(part)
+    try:
+        with Dataset(path, "w", format="NETCDF4") as file:
+            file.Conventions = "CF-1.11"
+            file.setncatts({_TITLES.get(name, name): value for name, value in described.facts.items()})
+            shape = described.cases.shape or (described.cases.count,)
+            columns = _dimensions(file, described)
+            names = tuple(file.dimensions)
+            variables = [_Variable(file, column, names) for column in columns]
+            for part in parts:
+                values = described.values(part)
+                for variable in variables:
+                    variable.put(values[variable.column.name], part.start, part.stop, shape)
             for variable in variables:
-                variable.put(values[variable.column.name], part.start, part.stop, shape)
-        for variable in variables:
-            variable.close()
+                variable.close()
+    except RuntimeError as error:  # of the library: the disk is full, or a file may not become so large
+        if type(error) is not RuntimeError:  # what the parts ended with
+            raise
+        raise OSError(None, str(error)) from None
 
 
 def _dimensions(file: Any, described: Described) -> list[Column]:
@@ -83,10 +88,7 @@ class _Variable:
         for slab in slabs(start, stop, shape):
             sizes = [piece.stop - piece.start for piece in slab]
             end = begin + prod(sizes)
-            try:
-                self.variable[slab] = values[begin:end].reshape(sizes)
-            except RuntimeError as error:  # of the library: the disk is full
-                raise OSError(None, str(error)) from None
+            self.variable[slab] = values[begin:end].reshape(sizes)
             begin = end
 
     def close(self) -> None:

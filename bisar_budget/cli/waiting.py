@@ -1,0 +1,67 @@
+"""What takes long: said before, and seen to go on."""
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from io import StringIO
+from time import monotonic
+from typing import TYPE_CHECKING
+
+import click
+
+from bisar_budget.cli.streams import complain
+from bisar_budget.faults import printable
+
+if TYPE_CHECKING:
+    from click._termui_impl import ProgressBar
+
+LONG = 60.0  # s; what takes longer is announced
+FORMING = "Forming images"  # label of a bar
+_MOMENT = 1.0  # s
+
+
+def lasting(seconds: float) -> str:
+    """Say how long something takes."""
+    for unit, size in (("years", 365.25 * 86400), ("days", 86400), ("hours", 3600), ("minutes", 60)):
+        if seconds >= 2 * size:
+            return f"{seconds / size:.0f} {unit}"
+    return f"{max(seconds, 1):.0f} s"
+
+
+def foretell(seconds: float, doing: str, advice: str) -> None:
+    """Say on standard error that something will take long, and what to change."""
+    if seconds > LONG:
+        complain(f"{doing} will take about {lasting(seconds)}; {advice}.")
+
+
+def progress_bar(total: int, label: str) -> "ProgressBar[int]":
+    """Bar with the time left on standard error, where somebody watches."""
+    watched = sys.stderr is not None and sys.stderr.isatty()
+    return click.progressbar(length=total, label=label, file=sys.stderr if watched else StringIO())
+
+
+@contextmanager
+def watched_checks(name: str) -> Iterator[Callable[[int, int], None]]:
+    """Give what takes how many checks of a mission are done, and how many there will be.
+
+    The second tells how long all will take: the first imports what it needs. A bar shows them after a moment.
+    """
+    began = monotonic()
+    with ExitStack() as ends:
+        bars: list[ProgressBar[int]] = []
+        since = began
+
+        def progress(done: int, total: int) -> None:
+            nonlocal since
+            now = monotonic()
+            if done == 2:
+                doing = f"Checking {printable(name)} for {total} values or more"
+                foretell((now - since) * total, doing, "fewer declared errors and --model published take less")
+            since = now
+            if not bars:
+                if now - began < _MOMENT:
+                    return
+                bars.append(ends.enter_context(progress_bar(total, "Checking values")))
+            bars[0].update(done - bars[0].pos)
+
+        yield progress
