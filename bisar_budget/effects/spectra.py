@@ -133,7 +133,7 @@ def exchange_edges(aperture_time: float, rate: float) -> list[float]:
 
 def image_edges(pieces: Sequence[Piece], rate: float) -> list[float]:
     """Frequencies at which pieces of a spectrum begin and end, and where images of it end. [Hz]"""
-    end = max(piece.high for piece in pieces)
+    end = max((piece.high for piece in pieces), default=0.0)  # an oscillator may be stated to have no noise
     edges = [edge for piece in pieces for edge in (piece.low, piece.high)]
     return edges + [abs(n * rate + sign * end) for n in range(FOLDED + 1) for sign in (1, -1)]
 

@@ -283,10 +283,11 @@ def test_what_arrays_do_not_hold_is_checked_one_by_one() -> None:
     assert_as_checked(mission, cases, whole)
 
 
-_FIGURES = """
-synchronization: {error: 1 deg, interval: 0.3 s}
-requirements: {islr: -25 dB, pslr: -30 dB, quadratic_phase_error: 45 deg}
-allocation: {split: {transmitter: 0.3, receiver: 0.5, clock: 0.2}, combine: rss}
+_LINK = "{error: 1 deg, interval: 0.3 s}"
+_FIGURES = f"""
+synchronization: {_LINK}
+requirements: {{islr: -25 dB, pslr: -30 dB, quadratic_phase_error: 45 deg}}
+allocation: {{split: {{transmitter: 0.3, receiver: 0.5, clock: 0.2}}, combine: rss}}
 """
 
 
@@ -363,6 +364,18 @@ def test_figures_of_sensors_clocks_and_covariances_vary(axes) -> None:
     whole, by_case = swept(mission, cases, columns)
     assert by_case == list(whole["status"]).count("error")
     assert_as_checked(mission, cases, whole, columns)
+
+
+def test_an_oscillator_without_noise_may_be_synchronized() -> None:
+    """A power law of zeros has no spectrum; `check` ended in a traceback."""
+    changes = {"platforms.receiver.oscillator": "{power_law: {h0: 0}}", "synchronization": _LINK}
+    mission = parse_mission(mission_text(), "m.yaml", changes=[SetValue(*one) for one in changes.items()])
+    (row,) = (row for row in check_mission(mission, DAY).rows if row.id == "receiver.oscillator")
+    assert (row.qpe_full_rad, row.utilization) == (0, 0)
+    cases = grid(mission, collection__aperture_time=[1.0, 3.0])
+    whole, by_case = swept(mission, cases)
+    assert by_case == 0
+    assert_as_checked(mission, cases, whole)
 
 
 def test_cases_that_are_no_mission_are_rows_that_say_why() -> None:
