@@ -42,6 +42,7 @@ if TYPE_CHECKING:
 MAX_CASES = 100_000_000  # that are started without being asked twice: tens of gigabytes
 _MANY = 20_000  # cases from which on it is measured how long they will take
 _TRIAL = 0.3  # s; a shorter one is too short to measure
+_LARGER = 3  # times as many cases, the next trial
 _PLOTS, _TABLES = (".svg", ".png", ".pdf"), (".csv", ".parquet", ".nc")
 
 
@@ -228,19 +229,29 @@ class _Run:
 
     def _seconds(self) -> float:
         """Measure how long all cases will take, by some of them."""
+        tried = 100
+        self._trial(tried)  # it imports what it needs
+        before = self._trial(tried)[0]
+        while True:
+            tried *= _LARGER
+            seconds, alone = self._trial(tried)
+            if seconds > _TRIAL or _LARGER * tried > self.cases.count:
+                break
+            before = seconds
+        # Arrays take their time for few cases too, but not once more for each part of the cases.
+        each = max((seconds - before) / (tried - tried / _LARGER), seconds / tried / 10)
+        threads = self.kept.threads if self.kept and self.kept.workers else min(self.jobs, cores())
+        sharing = threads if alone > tried / 2 else 1  # processes: arrays are faster alone
+        return each * self.cases.count / sharing
+
+    def _trial(self, count: int) -> tuple[float, int]:
+        """Check some of the cases: how long they take, and how many are checked one by one."""
         from bisar_budget.design.cases import some_of
 
-        tried, is_warm = 100, False
-        while True:
-            parts = self.swept(some_of(self.cases, tried), self.columns).parts
-            began = perf_counter()
-            alone = sum(part.by_case for part in parts)
-            seconds = perf_counter() - began
-            if is_warm and (seconds > _TRIAL or 10 * tried > self.cases.count):
-                threads = self.kept.threads if self.kept and self.kept.workers else min(self.jobs, cores())
-                sharing = threads if alone > tried / 2 else 1  # processes: arrays are faster alone
-                return seconds * self.cases.count / tried / sharing
-            tried, is_warm = tried * (10 if is_warm else 1), True  # the first one imports what it needs
+        parts = self.swept(some_of(self.cases, count), self.columns).parts
+        began = perf_counter()
+        alone = sum(part.by_case for part in parts)
+        return perf_counter() - began, alone
 
     def write(self, output: str | None, plot: str | None, plot_column: str | None, is_polar: bool) -> None:
         """Check the cases, write the table as they come, then the plot, and say what was found."""
