@@ -293,6 +293,14 @@ class TestEncodings:
         assert len({done.stdout for done in outputs.values()}) == 1
         assert "Höhe" in outputs["ascii"].stdout.decode("utf-8").replace(r"\u00f6", "ö")
 
+    def test_a_table_of_cases_is_utf_8_too(self, tmp_path) -> None:
+        path = tmp_path / "m.yaml"
+        path.write_text(mission_text(name="Höhe φ 雷達", timing_error__quadratic=6e-13), encoding="utf-8")
+        asked = ("sweep", path, "--vary", "collection.aperture_time=1s")
+        tables = {run(*asked, encoding=encoding).stdout for encoding in ("utf-8", "ascii")}
+        assert len(tables) == 1
+        assert "Höhe φ 雷達" in tables.pop().decode("utf-8")
+
     def test_text_follows_the_terminal_and_escapes_what_it_lacks(self, tmp_path) -> None:
         path = tmp_path / "m.yaml"
         path.write_text(mission_text(name="Höhe φ"), encoding="utf-8")
@@ -534,6 +542,19 @@ class TestTerminal:
             ["init", f"m.yaml/{HOSTILE}"],
             ["init", "--name", HOSTILE, "-"],
             ["schema", "-o", f"m.yaml/{HOSTILE}"],
+            ["check", "m.yaml", "--set", HOSTILE],
+            ["check", "m.yaml", "--set", f"radar.bandwidth={HOSTILE}"],
+            ["solve", "m.yaml", "--for", HOSTILE],
+            ["solve", "m.yaml", "--for", "collection.aperture_time", "--between", HOSTILE],
+            ["sensitivity", "m.yaml", "--row", HOSTILE],
+            ["sweep", "m.yaml", "--vary", HOSTILE],
+            ["sweep", "m.yaml", "--vary", f"collection.aperture_time={HOSTILE}"],
+            ["sweep", "m.yaml", "--vary", "collection.aperture_time=1s", "--column", HOSTILE],
+            ["sweep", "m.yaml", "--vary", "collection.aperture_time=1s", "-o", f"m.yaml/{HOSTILE}.csv"],
+            ["sweep", "m.yaml", "--vary", "collection.aperture_time=1s", "-o", "t.csv", "--scheduler", HOSTILE],
+            ["sweep", "m.yaml", "--cases", HOSTILE],
+            ["sensors", HOSTILE],
+            ["import", HOSTILE],
         ],
         ids=lambda arguments: " ".join(arguments[:1] + arguments[-2:-1]).encode("ascii", "ignore").decode()[:40],
     )
