@@ -325,7 +325,7 @@ def montecarlo(runs: int) -> None:
 
     from bisar_budget.analysis.analysis import Analysis
     from bisar_budget.mission.load import parse_mission
-    from bisar_budget.monte_carlo.draws import _stream
+    from bisar_budget.monte_carlo.draws import _Stream
     from bisar_budget.monte_carlo.probability import _variables, monte_carlo
 
     motion = "{position: 1 m, velocity: 5 mm/s, acceleration: 20 ug}"
@@ -334,7 +334,7 @@ def montecarlo(runs: int) -> None:
     transmitter: {{position: [30 km, 0, 6 km], velocity: [50, 150, 0], motion_error: {motion}}},
     receiver: {{position: [6 km, 6 km, 2 km], velocity: [-40, 40, 0], motion_error: {motion}}}}},
     timing_error: {{constant: 5 ns, linear: 1e-11, quadratic: 1e-13, cubic: 1e-13}},
-    requirements: {{cubic_phase_error: 1e-2, location_error: 3 m}}}}"""
+    requirements: {{cubic_phase_error: 1e-2 rad, location_error: 3 m}}}}"""
     mission = parse_mission(text)
     n, seed = 1_000_000, 1
     analysis = Analysis(mission)
@@ -343,7 +343,11 @@ def montecarlo(runs: int) -> None:
     sizes = [abs(s.declared) for s in declared]
 
     def draw() -> list[np.ndarray]:
-        return [_stream(v, seed)(n) * size for v, size in zip(variables, sizes, strict=True)]
+        drawn = [np.empty(n) for _ in variables]
+        for variable, size, out in zip(variables, sizes, drawn, strict=True):
+            _Stream(variable, seed).fill(out)
+            out *= size
+        return drawn
 
     plane = analysis.full.plane
     of_transmitter = [s.owner == "transmitter" for s in declared]

@@ -13,7 +13,8 @@ ROUNDING = 1e-12
 MIN_GROUND_GRADIENT = 0.02  # |u_t + u_r| on the ground; below, range says nothing about the ground
 MIN_GRADIENT_ANGLE_DEG = 1.0  # between range and Doppler gradients on the ground
 
-MAX_DRAWS = 10**9  # of a Monte Carlo: minutes, and a probability known to 1e-6
+MAX_DRAWS_HERE = 10**9  # of a Monte Carlo on one machine: minutes, and a probability known to 3e-5
+MAX_DRAWS = 10**12  # shared out between many
 
 EARTH_GRAVITATIONAL_PARAMETER = 3.986004418e14  # m³/s², GM of WGS-84, atmosphere included
 EARTH_RADIUS = 6.371e6  # m, mean radius; how far the Earth's centre is below the scene

@@ -276,10 +276,10 @@ def _grown(platform: list[Floats], east: Floats, north: Floats) -> tuple[Floats,
     With it where the platform is seen from there, east and north, and how far. [m]
     """
     x, y, z, R, a, b, c = platform
-    a, b = a - east, b - north
-    u, v, w = x + a, y + b, z + c
-    distance = np.sqrt(u * u + v * v + w * w)
-    return ((x + u) * a + (y + v) * b + (z + w) * c) / (R + distance), u, v, distance
+    u, v = x + a, y + b
+    grown = a * (x + u) + b * (y + v) + c * (z + z + c) - 2 * u * east - 2 * v * north + (east * east + north * north)
+    distance = np.sqrt(R * R + grown)
+    return grown / (R + distance), u - east, v - north, distance
 
 
 def _of(arrays: Sequence[Floats], some: NDArray[Any]) -> list[Floats]:

@@ -8,7 +8,7 @@ import gc
 from collections.abc import Callable, Sequence
 from datetime import date
 from functools import partial
-from typing import TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.faults import MissionError, SetValue
@@ -16,10 +16,21 @@ from bisar_budget.findings.mission import MissionFindings, UnusableMission
 from bisar_budget.mission.load import load_mission
 from bisar_budget.resources import FILES_READ, cores
 
+if TYPE_CHECKING:
+    from bisar_budget.monte_carlo.draws import Share
+
 Found = MissionFindings | UnusableMission
 Kept = TypeVar("Kept")
 
 MANY = 200  # files from which a second process pays: starting one costs what checking fifty does
+
+
+class Draws(NamedTuple):
+    """Draws of a Monte Carlo that are asked for; as of `monte_carlo`, whose `share` is for one process."""
+
+    number: int
+    seed: int | None
+    share: "Share | None" = None
 
 
 def without_analysis(found: Found) -> Found:
@@ -39,7 +50,7 @@ def check_files(
     keep: Callable[[Found], Kept],
     *,
     is_brief: bool = False,
-    drawn: tuple[int, int | None] | None = None,
+    drawn: Draws | None = None,
     changes: Sequence[SetValue] = (),
 ) -> list[Kept]:
     """Check files, in their order; many are shared out between the cores.
@@ -56,8 +67,8 @@ def check_files(
         Makes of the findings about a file what is wanted of them, in the process that found them.
     is_brief : bool
         Leave out what a terminal does not show.
-    drawn : tuple, optional
-        Number of draws of a Monte Carlo, and their seed; None: no draws.
+    drawn : Draws, optional
+        Of a Monte Carlo; None: no draws.
     changes : sequence of SetValue
         Values in place of each file's.
 
@@ -68,7 +79,8 @@ def check_files(
     """
     one = partial(_kept, today=today, model=model, keep=keep, is_brief=is_brief, drawn=drawn, changes=changes)
     count = cores()
-    if len(files) < MANY or count == 1 or "-" in files or keep is whole:
+    is_shared = drawn is not None and drawn.share is not None
+    if len(files) < MANY or count == 1 or "-" in files or keep is whole or is_shared:
         return _of(files, one)
     from bisar_budget.workers import worker_pool
 
@@ -100,7 +112,7 @@ def _kept(
     model: str | None,
     keep: Callable[[Found], Kept],
     is_brief: bool,
-    drawn: tuple[int, int | None] | None,
+    drawn: Draws | None,
     changes: Sequence[SetValue],
 ) -> Kept:
     try:

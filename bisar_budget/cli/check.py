@@ -27,11 +27,12 @@ from bisar_budget.cli.streams import (
     wants_color,
     write_file,
 )
-from bisar_budget.constants import MAX_DRAWS
+from bisar_budget.constants import MAX_DRAWS, MAX_DRAWS_HERE
 from bisar_budget.faults import printable
 from bisar_budget.report import FORMATS
 
 if TYPE_CHECKING:
+    from bisar_budget.budget.fleet import Draws
     from bisar_budget.faults import SetValue
     from bisar_budget.findings.mission import MissionFindings, Option, Report, UnusableMission
     from bisar_budget.report import Style
@@ -93,7 +94,8 @@ class _Draws(ParamType[int]):
         except InvalidOperation:
             number = Decimal(0)
         if not (number.is_finite() and 1 <= number <= MAX_DRAWS and number == int(number)):
-            accepted = f"must be a whole number of draws from 1 to {MAX_DRAWS:,}, such as 100000 or 1e6"
+            most = f"{MAX_DRAWS_HERE:,}, or {MAX_DRAWS:,} with --scheduler"
+            accepted = f"must be a whole number of draws from 1 to {most}, such as 100000 or 1e6"
             self.fail(f"{printable(str(value))}: {accepted}.", param, ctx)
         return int(number)
 
@@ -169,6 +171,20 @@ class _Draws(ParamType[int]):
     metavar="S",
     help="Seed of --monte-carlo (default: simulation.seed of the mission file, else 1).",
 )
+@click.option(
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Draw on the workers of a Dask scheduler, tcp://HOST:PORT, or on local:N processes of its own. The result "
+    "is the same.",
+)
+@click.option(
+    "--sweep",
+    "swept",
+    multiple=True,
+    metavar="KEY=VALUES",
+    help="For html and markdown: also check other values, written as for sweep --vary, and draw what complies: one "
+    "key as curves, two as a map.",
+)
 @click.option("-q", "--quiet", is_flag=True, help="One line per mission.")
 @click.option("--all", "all_rows", is_flag=True, help="Show every row, also those that are not declared.")
 @click.option(
@@ -205,6 +221,8 @@ def check(
     verifying: bool,
     draws: int | None,
     seed: int | None,
+    scheduler: str | None,
+    swept: Sequence[str],
     quiet: bool,
     all_rows: bool,
     verbose: bool,
@@ -229,21 +247,30 @@ def check(
     given = click.get_current_context().get_parameter_source
     if seed is not None and draws is None and given("seed") is ParameterSource.COMMANDLINE:
         raise click.UsageError("--seed needs --monte-carlo N.")
+    if draws is not None or scheduler is not None:
+        from bisar_budget.cli.draws import check_draws
+
+        check_draws(draws, scheduler)
     if explain is not None:
-        if any(given(name) is ParameterSource.COMMANDLINE for name in ("format_name", "reports", "draws")):
+        excluded = ("format_name", "reports", "draws", "scheduler", "swept")
+        if any(given(name) is ParameterSource.COMMANDLINE for name in excluded):
             raise click.UsageError(
-                "--explain writes text; it cannot be combined with --format, --report or --monte-carlo."
+                "--explain writes text; it cannot be combined with --format, --report, --monte-carlo, --scheduler or "
+                "--sweep."
             )
         _explain(files, explain, today.date() if today else day_of_run(), model, output, changes)
         return
+    if swept:
+        from bisar_budget.cli.studies import check_options
+
+        check_options(swept, [format_name, *(name for _, name in written)])
     illustrated = any(FORMATS[name].is_illustrated for name in (format_name, *(name for _, name in written)))
-    drawn = None if draws is None else (draws, seed)
     day = today.date() if today else day_of_run()
     use_color = color == "always" or (color == "auto" and output is None and wants_color())
     verbosity = -1 if quiet else 1 if verbose else 0
     style = Style(color=use_color, verbosity=verbosity, root=_repository(), all_rows=all_rows, detail=detail)
     says_faults = format_name != "text" or output is not None or quiet or not is_terminal()
-    if FORMATS[format_name].is_piecewise and not (written or verifying or drawn):
+    if FORMATS[format_name].is_piecewise and not (written or verifying or draws):
         from bisar_budget.budget.fleet import check_files
 
         is_brief = format_name == "text" and verbosity <= 0 and not all_rows
@@ -254,8 +281,15 @@ def check(
         deliver(joined(format_name, pieces, __version__, style), output, format_name)
         statuses = {piece.status for piece in pieces}
     else:
-        report = check_all(files, day, model, verifying, illustrated, drawn, changes)
+        from bisar_budget.cli.draws import drawn_by
+
+        with drawn_by(scheduler, draws, seed, len(files)) as drawn:
+            report = check_all(files, day, model, verifying, illustrated, drawn, changes)
         judged_on = _given_day(today) or (day if _has_waivers(report.missions) else None)
+        if swept:
+            from bisar_budget.cli.studies import with_studies
+
+            report = report._replace(missions=tuple(with_studies(report.missions, swept, model, day)))
         report = report._replace(options=tuple(_options(judged_on)), day=judged_on)
         if says_faults:
             _say_faults(report.missions)
@@ -302,6 +336,9 @@ def _options(judged_on: date | None) -> "Iterator[Option]":
         elif name == "changes":
             if value:
                 yield Option("--set", ", ".join(f"{change.key}={change.text}" for change in value), origin)
+        elif name == "swept":
+            if value:
+                yield Option("--sweep", ", ".join(value), origin)
         elif name == "draws":
             yield Option("--monte-carlo", "no" if value is None else f"{value:,} draws", origin)
         elif name == "seed" and context.params["draws"] is not None:
@@ -323,12 +360,12 @@ def check_all(
     model: str | None,
     verifying: bool,
     illustrated: bool = False,
-    drawn: tuple[int, int | None] | None = None,
+    drawn: "Draws | None" = None,
     changes: "Sequence[SetValue]" = (),
 ) -> "Report":
     """Check every file; `verifying` adds verdicts of images. `illustrated` keeps the analyses, and the images.
 
-    `drawn` is the number of draws of a Monte Carlo and their seed, `changes` are values in place of the files'.
+    `drawn` are the draws of a Monte Carlo, `changes` are values in place of the files'.
     """
     from bisar_budget.budget.fleet import check_files, whole, without_analysis
     from bisar_budget.findings.mission import Report

@@ -2,9 +2,10 @@
 
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from datetime import date
 from io import StringIO
+from time import monotonic
 from typing import TYPE_CHECKING, NamedTuple
 
 import click
@@ -20,8 +21,10 @@ if TYPE_CHECKING:
     from bisar_budget.design.cases import Cases
     from bisar_budget.design.sweep import Asked, Chunks
     from bisar_budget.design.swept import Swept
-    from bisar_budget.design.watched import Watch
     from bisar_budget.mission.model import Mission
+
+LONG = 60.0  # s; what takes longer is announced
+_MOMENT = 1.0  # s
 
 
 class Keeping(NamedTuple):
@@ -46,10 +49,13 @@ class Keeping(NamedTuple):
         What ends it before leaves the parts, and says how to go on.
         """
         from bisar_budget.cluster.parts_folder import PartsFolder, manifest_of
+        from bisar_budget.design.cases import words_of
         from bisar_budget.design.sweep import Asked
+        from bisar_budget.faults import SetValue
         from bisar_budget.mission.named import named_by
 
-        mission, named = named_by(mission)
+        words = [SetValue(one.key, word) for one, words in words_of(cases) for word in words]
+        mission, named = named_by(mission, words)
         sent = named if self.workers else None  # processes here read the files themselves
         asked = Asked(mission, cases, columns=columns, model=model, today=today, named=sent)
         chunks = asked.chunks()
@@ -112,23 +118,51 @@ def keeping(output: str | None, scheduler: str | None, is_resumed: bool, jobs: i
         yield Keeping(output, is_resumed, jobs, workers)
 
 
-@contextmanager
-def watching(mission: "Mission") -> "Iterator[Watch]":
-    """Say of a question about a mission how long it will take if that is long, and show where it is."""
-    from bisar_budget.cli.verify import foretell
-    from bisar_budget.design.watched import Watch
-
-    with progress_bar(1, "Checking values") as bar:
-
-        def foreseen(seconds: float, count: int) -> None:
-            bar.length = count
-            doing = f"Checking {printable(mission.name)} for {count} values or more"
-            foretell(seconds, doing, "fewer declared errors and --model published take less")
-
-        yield Watch(foreseen, bar.update)
+def lasting(seconds: float) -> str:
+    """Say how long something takes."""
+    for unit, size in (("years", 365.25 * 86400), ("days", 86400), ("hours", 3600), ("minutes", 60)):
+        if seconds >= 2 * size:
+            return f"{seconds / size:.0f} {unit}"
+    return f"{max(seconds, 1):.0f} s"
 
 
 def progress_bar(total: int, label: str) -> "ProgressBar[int]":
     """Bar with the time left on standard error, where somebody watches."""
     watched = sys.stderr is not None and sys.stderr.isatty()
     return click.progressbar(length=total, label=label, file=sys.stderr if watched else StringIO())
+
+
+@contextmanager
+def late_bar(label: str) -> Iterator[Callable[[int, int], None]]:
+    """Give what takes how many of how many are done; a bar shows it where that takes longer than a moment."""
+    began = monotonic()
+    with ExitStack() as ends:
+        bars: list[ProgressBar[int]] = []
+
+        def progress(done: int, total: int) -> None:
+            if not bars:
+                if monotonic() - began < _MOMENT:
+                    return
+                bars.append(ends.enter_context(progress_bar(total, label)))
+            bars[0].update(done - bars[0].pos)
+
+        yield progress
+
+
+@contextmanager
+def watching(mission: "Mission", label: str) -> Iterator[Callable[[int, int], None]]:
+    """Give what takes how many values of how many are checked: says if all take long, and shows where it is."""
+    warm = 0.0
+    with late_bar(label) as shown:
+
+        def progress(done: int, total: int) -> None:
+            nonlocal warm
+            if done == 1:  # it imported what it needs
+                warm = monotonic()
+            elif done == 2 and (seconds := (monotonic() - warm) * total) > LONG:
+                doing = f"Checking {printable(mission.name)} for {total} values or more"
+                advice = "fewer declared errors and --model published take less"
+                complain(f"{doing} will take about {lasting(seconds)}; {advice}.")
+            shown(done, total)
+
+        yield progress

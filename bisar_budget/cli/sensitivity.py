@@ -51,7 +51,8 @@ def sensitivity(
 ) -> None:
     """Rank the numbers of a mission by what they do to its worst utilization.
 
-    Each number that the file states is changed by itself and the mission checked anew: by 1 % of it to both sides,
+    Each number that the file states, or takes from a part of the catalogue, is changed by itself and the mission
+    checked anew: by 1 % of it to both sides,
     directions and levels by a quarter of what is said, a degree or a decibel, places on the Earth by 1 % of the
     smaller slant range. With balanced shares a second table says what relaxing an error costs the others. Exit code:
     0, or 2 for wrong usage or an unusable mission file.
@@ -72,8 +73,8 @@ def sensitivity(
     found = []
     for mission in load_all(files, model, changes):
         try:
-            with watching(mission) as watch:
-                found.append(asking.sensitivity(mission, row=row, model=model, today=day, watch=watch))
+            with watching(mission, "Changing numbers") as progress:
+                found.append(asking.sensitivity(mission, row=row, model=model, today=day, progress=progress))
         except QuestionError as error:
             fail(f"{mission.file}: {error}")
     if plot is not None:

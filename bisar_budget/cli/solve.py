@@ -110,8 +110,8 @@ def solve(
                 found = compare.compare_parts(mission, key, row=row, target=target, model=model, today=day)
             else:
                 asked: dict[str, Any] = {"between": between, "target": target, "is_scale": is_scale}
-                with watching(mission) as watch:
-                    found = solving.solve(mission, key, **asked, row=row, model=model, today=day, watch=watch)
+                with watching(mission, "Checking values") as progress:
+                    found = solving.solve(mission, key, **asked, row=row, model=model, today=day, progress=progress)
         except QuestionError as error:
             fail(f"{mission.file}: {error}")
         solved.append(_imaged(mission, found, model) if is_imaged else found)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from bisar_budget import __version__
-from bisar_budget.cli.keeping import Keeping, keeping, progress_bar
+from bisar_budget.cli.keeping import LONG, Keeping, keeping, lasting, progress_bar
 from bisar_budget.cli.streams import (
     DATE,
     FILE,
@@ -40,7 +40,6 @@ if TYPE_CHECKING:
 
 MAX_CASES = 100_000_000  # that are started without being asked twice: tens of gigabytes
 _MANY = 20_000  # cases from which on it is measured how long they will take
-_LONG = 60.0  # s; what takes longer is announced
 _TRIAL = 0.3  # s; a shorter one is too short to measure
 _PLOTS, _TABLES = (".svg", ".png", ".pdf"), (".csv", ".parquet", ".nc")
 
@@ -53,7 +52,7 @@ _PLOTS, _TABLES = (".svg", ".png", ".pdf"), (".csv", ".parquet", ".nc")
     multiple=True,
     metavar="KEY=FROM:TO UNIT:COUNT",
     help="Values of a key, such as platforms.receiver.azimuth=0:180deg:181; with :log behind it in equal ratios. Or "
-    "a list, KEY=1,2,5 s. Repeatable: every combination is a case.",
+    "a list, KEY=1,2,5 s, also of words: allocation.model=published,full. Repeatable: every combination is a case.",
 )
 @click.option(
     "--cases",
@@ -118,7 +117,7 @@ def sweep(
     is_resumed: bool,
     force: bool,
 ) -> None:
-    """Check a mission for many values of its numbers: a table with one line for each case.
+    """Check a mission for many values of its keys: a table with one line for each case.
 
     It has what varied, resolutions, angles, the status, the worst row, its utilization, and the requirement that
     binds. Cases for which there is no mission, such as a platform below the ground, have the status error and a
@@ -204,7 +203,7 @@ class _Run:
     ) -> None:
         self.mission, self.cases, self.columns, self.model = mission, cases, columns, model
         self.day, self.jobs, self.kept = day, jobs, kept
-        self.done = self.by_case = self.complying = self.missing = 0
+        self.done = self.by_case = self.complying = self.unevaluated = self.missing = 0
 
     def swept(self, cases: "Cases", columns: Sequence[str]) -> "Swept":
         """Ask the engine."""
@@ -220,11 +219,11 @@ class _Run:
         seconds = self._seconds()
         if count > MAX_CASES and not force:
             fail(
-                f"{self.mission.file}: {count} cases will take about {_lasting(seconds)}; "
+                f"{self.mission.file}: {count} cases will take about {lasting(seconds)}; "
                 f"accepted: up to {MAX_CASES}, or more with --force"
             )
-        if seconds > _LONG:
-            complain(f"{count} cases will take about {_lasting(seconds)}.")
+        if seconds > LONG:
+            complain(f"{count} cases will take about {lasting(seconds)}.")
 
     def _seconds(self) -> float:
         """Measure how long all cases will take, by some of them."""
@@ -290,6 +289,7 @@ class _Run:
             for name in set(statuses):
                 times = statuses.count(name)
                 self.missing += times * (name == "error")
+                self.unevaluated += times * (name == "not_evaluated")
                 self.complying += times * (name != "error" and not STATUS[name].fails)
             self.done += part.stop - part.start
             self.by_case += part.by_case
@@ -306,7 +306,7 @@ class _Run:
 
         trade = gathered.trade(is_polar=is_polar)
         uses = {}
-        if len(trade.axes) == 1 and trade.column is None:
+        if len(trade.axes) == 1 and not trade.column:
             names = {f"{row}.utilization": row for row in rows_that_matter(trade)}
             swept = self.swept(self.cases, tuple(names))
             again = Gathered(Described(swept, self.cases, self.mission, __version__), tuple(names))
@@ -325,6 +325,8 @@ class _Run:
         if self.done < self.cases.count:
             said[0] += f" of {self.cases.count}"
         said.append(f"{self.complying} comply ({_part(self.complying, self.done)})")
+        if self.unevaluated:
+            said.append(f"{self.unevaluated} of them not evaluated")
         if self.missing:
             said.append(f"{self.missing} without a mission")
         said.append(f"{_part(self.by_case, self.done)} checked one by one")
@@ -336,11 +338,3 @@ def _part(some: int, of: int) -> str:
     if some in (0, of):
         return "100 %" if some else "0 %"
     return f"{min(max(100 * some / of, 0.1), 99.9):.3g} %"
-
-
-def _lasting(seconds: float) -> str:
-    """Say how long something takes."""
-    for unit, size in (("years", 365.25 * 86400), ("days", 86400), ("hours", 3600), ("minutes", 60)):
-        if seconds >= 2 * size:
-            return f"{seconds / size:.0f} {unit}"
-    return f"{max(seconds, 1):.0f} s"

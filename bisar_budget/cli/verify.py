@@ -98,14 +98,9 @@ def verify_all(missions: "Sequence[Mission]", only: str, jobs: int | None) -> "l
 
 def announce(seconds: float, what: str, advice: str) -> None:
     """Say on standard error that images will take long, and what to change."""
-    foretell(seconds, f"Forming the images of {what}", advice)
-
-
-def foretell(seconds: float, doing: str, advice: str) -> None:
-    """Say on standard error that something will take long, and what to change."""
     if seconds > LONG:
         duration = f"{seconds:.0f} s" if seconds < 2 * LONG else f"{seconds / 60:.0f} minutes"
-        complain(f"{doing} will take about {duration}; {advice}.")
+        complain(f"Forming the images of {what} will take about {duration}; {advice}.")
 
 
 def faster(jobs: int | None = None) -> str:

@@ -66,7 +66,7 @@ def manifest_of(asked: Asked, chunks: Chunks, named: Named) -> dict[str, Any]:
         "set": changes_words(question.changes),
         "model": mission.gating_model,
         "date": question.today.isoformat() if mission.waivers else "",  # the day decides about waivers alone
-        "cases": {"count": asked.cases.count, "keys": list(question.keys), "sha256": _hash_of(asked.cases)},
+        "cases": {"count": asked.cases.count, "keys": list(swept.varied), "sha256": _hash_of(asked.cases)},
         "chunks": chunks.size,
         "columns": [
             {"name": column.name, "unit": column.unit, "description": column.words} for column in swept.columns
@@ -78,7 +78,10 @@ def _hash_of(cases: Cases) -> str:
     """SHA-256 of what the cases are made from: the values of each key."""
     whole = sha256(repr((type(cases).__name__, cases.shape, cases.count)).encode())
     for values in cases.axes if isinstance(cases, Grid) else cases.columns if isinstance(cases, Table) else ():
-        whole.update(np.ascontiguousarray(values, "<f8").tobytes())
+        if values.dtype == object:  # words
+            whole.update(json.dumps(values.tolist()).encode())
+        else:
+            whole.update(np.ascontiguousarray(values, "<f8").tobytes())
     return whole.hexdigest()
 
 

@@ -1,7 +1,8 @@
-"""The workers of a Dask scheduler, which check the chunks of a sweep.
+"""The workers of a Dask scheduler, which check the chunks of a sweep, or make pieces of draws.
 
-A worker gets the question once, with the mission and all that it names, and then the cases of each chunk. Dask gives
-the chunks of a worker that is lost to others. A worker needs bisar-budget of the same version, nothing else.
+A worker gets what all of them are about once: the question of a sweep with the mission and all that it names, or what
+is drawn. Then it gets the cases of each chunk, or which draws to make. Dask gives the chunks of a worker that is lost
+to others. A worker needs bisar-budget of the same version, nothing else.
 """
 
 import asyncio
@@ -9,18 +10,21 @@ import logging
 import pickle
 import pydoc
 import re
+import signal
 import socket
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from queue import Empty, SimpleQueue
 from time import monotonic
-from typing import Any
+from typing import Any, NamedTuple
 from urllib.parse import urlsplit
 
 from bisar_budget import __version__
 from bisar_budget.cluster.parts_folder import encoded
 from bisar_budget.design.sweep import Asked, Chunks, Question, part_of
 from bisar_budget.faults import MissionError, printable
+from bisar_budget.monte_carlo.draws import Drawer, Drawing, Piece, Tally
 
 _ADDRESS = re.compile(r"(?:tcp|tls)://\S+:\d{1,5}", re.ASCII)
 _LOCAL = re.compile(r"local:([1-9]\d{0,2})", re.ASCII)
@@ -29,6 +33,14 @@ _PATIENCE = 5.0  # s for a connection
 _LOOK = 5.0  # s between two looks at who works
 _AHEAD = 4  # chunks for each thread of a worker that are given out at once
 _LEAST_AHEAD = 32
+
+
+class _Task(NamedTuple):
+    """One that a worker gets: `name` is the caller's, `about` that in messages."""
+
+    name: Any
+    about: str
+    arguments: tuple[Any, ...]
 
 
 class ClusterError(Exception):
@@ -82,19 +94,49 @@ def _client(address: str, ends: ExitStack) -> Any:
 
     cluster = None
     if match := _LOCAL.fullmatch(address):
-        cluster = LocalCluster(
-            n_workers=int(match[1]),
-            threads_per_worker=1,
-            dashboard_address="127.0.0.1:0",  # a port of its own: without one all would want 8787
-            silence_logs=logging.CRITICAL + 1,
-            preload=["bisar_budget.cluster.local_worker"],
-        )
-        ends.callback(_close, cluster, 10)
+        with _interrupts_later():
+            cluster = LocalCluster(
+                n_workers=int(match[1]),
+                threads_per_worker=1,
+                dashboard_address="127.0.0.1:0",  # a port of its own: without one all would want 8787
+                silence_logs=logging.CRITICAL + 1,
+                preload=["bisar_budget.cluster.local_worker"],
+            )
+            ends.callback(_close, cluster, 10)
     else:
         _greet(address)
     client = Client(cluster or address, timeout=_PATIENCE, set_as_default=False)
     ends.callback(_close, client, 2)
     return client
+
+
+@contextmanager
+def _interrupts_later() -> Iterator[None]:
+    """Hold Ctrl-C back while workers are started: half of a cluster cannot be closed.
+
+    A terminal sends it to them too. They and the thread that starts them have it blocked from the beginning, before
+    they could ignore it.
+    """
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or before is None:
+        yield
+        return
+    held: list[int] = []
+    signal.signal(signal.SIGINT, lambda number, _: held.append(number))
+    can_block = hasattr(signal, "pthread_sigmask")
+    if can_block:
+        from multiprocessing import resource_tracker
+
+        resource_tracker.ensure_running()  # else that thread would: it unblocks the signal there
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        if can_block:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        signal.signal(signal.SIGINT, before)
+        if held:
+            signal.raise_signal(signal.SIGINT)
 
 
 def _close(opened: Any, seconds: float) -> None:
@@ -165,36 +207,57 @@ class Workers:
     ) -> Iterator[tuple[int, bytes]]:
         """Check the chunks that begin at `starts`; gives each, encoded, when it is done, in any order.
 
+        Faults are those of `_done`.
+        """
+        tasks = (
+            _Task(start, f"cases {start} to {chunks.stop(start) - 1}", (mark, *asked.sent(chunks, start)))
+            for start in starts
+        )
+        return self._done(checked, asked.question, tasks)
+
+    def drawn(self, drawing: Drawing) -> Iterator[tuple[Piece, Tally]]:
+        """Make all pieces of the draws; gives each when it is done, in any order. Faults are those of `_done`."""
+        tasks = (
+            _Task(piece, f"draws {piece.start} to {piece.stop - 1} of {printable(drawing.name)}", (piece,))
+            for piece in drawing.pieces()
+        )
+        return self._done(tallied, drawing, tasks)
+
+    def _done(
+        self, function: Callable[..., Any], common: object, tasks: Iterable[_Task]
+    ) -> Iterator[tuple[Any, Any]]:
+        """Have workers call a function with what is common, the version, and the arguments of each task.
+
+        Gives the name of each task, and what came of it.
+
         Raises
         ------
         ClusterError
-            The scheduler went away, a chunk ended every worker that had it, or a worker cannot check it.
+            The scheduler went away, a task ended every worker that had it, or a worker cannot do it.
         RuntimeError
-            Checking raised; says what and where.
+            The function raised; says what and where.
         """
         finished: SimpleQueue[Any] = SimpleQueue()
-        # A task gives the question, not the client: Dask makes it again where a worker that has it is lost.
-        question = self.client.submit(pickle.loads, pickle.dumps(asked.question), pure=False)
-        pending: dict[str, tuple[Any, int]] = {}
-        left, next_look = iter(starts), 0.0
+        # A task gives what is common, not the client: Dask makes it again where a worker that has it is lost.
+        shared = self.client.submit(pickle.loads, pickle.dumps(common), pure=False)
+        pending: dict[str, tuple[Any, _Task]] = {}
+        left, next_look = iter(tasks), 0.0
         try:
             while True:
                 if monotonic() >= next_look:
                     ahead, next_look = self._look(), monotonic() + _LOOK
-                while len(pending) < ahead and (start := next(left, None)) is not None:
-                    future = self.client.submit(
-                        checked, question, __version__, mark, *asked.sent(chunks, start), pure=False
-                    )
-                    pending[future.key] = future, start
+                while len(pending) < ahead and (task := next(left, None)) is not None:
+                    future = self.client.submit(function, shared, __version__, *task.arguments, pure=False)
+                    pending[future.key] = future, task
                     future.add_done_callback(finished.put)
                 if not pending:
                     return
                 done = _taken(finished, max(next_look - monotonic(), 0.05))
-                for future, data in zip(done, self._fetched(done, pending, chunks), strict=True):
-                    yield pending.pop(future.key)[1], data
+                for future, data in zip(done, self._fetched(done, pending), strict=True):
+                    yield pending.pop(future.key)[1].name, data
         finally:
             with suppress(Exception):
-                self.client.cancel([question, *(future for future, _ in pending.values())])
+                self.client.cancel([shared, *(future for future, _ in pending.values())])
 
     def _look(self) -> int:
         """Chunks to give out at once; says it where nobody works."""
@@ -205,36 +268,35 @@ class Workers:
         self._is_told = not self.threads
         return max(_LEAST_AHEAD, _AHEAD * self.threads)
 
-    def _fetched(self, done: list[Any], pending: Mapping[str, tuple[Any, int]], chunks: Chunks) -> list[bytes]:
+    def _fetched(self, done: list[Any], pending: Mapping[str, tuple[Any, _Task]]) -> list[Any]:
         """Fetch what is done; Dask makes again what a worker took with it between done and fetched."""
         try:
-            data: list[bytes] = self.client.gather(done) if done else []
+            data: list[Any] = self.client.gather(done) if done else []
         except Exception as error:
             for future in done:
                 if future.status in ("error", "cancelled"):
-                    raise self._why(future, pending[future.key][1], chunks) from None
+                    raise self._why(future, pending[future.key][1].about) from None
             raise self._gone() from error
         return data
 
     def _gone(self) -> ClusterError:
         return ClusterError(f"--scheduler {self.address}: went away")
 
-    def _why(self, future: Any, start: int, chunks: Chunks) -> Exception:
+    def _why(self, future: Any, about: str) -> Exception:
         from distributed.scheduler import KilledWorker
 
         if future.status == "cancelled":  # with the connection
             return self._gone()
         error = future.exception()
-        cases = f"cases {start} to {chunks.stop(start) - 1}"
         if isinstance(error, UnlikeWorkerError):
             said = error.args[0]
-            return ClusterError(self._unlike(*said) if isinstance(said, tuple) else f"{cases}: {said}")
+            return ClusterError(self._unlike(*said) if isinstance(said, tuple) else f"{about}: {said}")
         if isinstance(error, KilledWorker):
             return ClusterError(
-                f"{cases} ended {error.allowed_failures + 1} workers, the last of them {error.last_worker.address}, "
+                f"{about} ended {error.allowed_failures + 1} workers, the last of them {error.last_worker.address}, "
                 "as when memory runs out"
             )
-        said = f"{cases}, on a worker: {type(error).__name__}: {_first_line(error)}"
+        said = f"{about}, on a worker: {type(error).__name__}: {_first_line(error)}"
         if isinstance(error, ImportError | MemoryError):
             return ClusterError(said)
         return RuntimeError(said)
@@ -246,15 +308,27 @@ class UnlikeWorkerError(Exception):
 
 def checked(question: Question, version: str, mark: str, start: int, stop: int, values: Mapping[str, Any]) -> bytes:
     """Check a chunk of cases on a worker."""
-    from distributed import get_worker
-
-    here = get_worker().address
-    if version != __version__:  # it came after the others were asked
-        raise UnlikeWorkerError((here, __version__))
+    here = _like(version)
     try:
         return encoded(part_of(question, start, stop, values), mark)
     except MissionError as error:
         raise UnlikeWorkerError(f"worker {here} cannot use the mission: {'; '.join(error.lines())}") from None
+
+
+def tallied(drawing: Drawing, version: str, piece: Piece) -> Tally:
+    """Make a piece of draws on a worker."""
+    _like(version)
+    return Drawer(drawing).tally(piece)
+
+
+def _like(version: str) -> str:
+    """Address of the worker; raises where it came after the others were asked, with another version."""
+    from distributed import get_worker
+
+    here: str = get_worker().address
+    if version != __version__:
+        raise UnlikeWorkerError((here, __version__))
+    return here
 
 
 def _taken(finished: "SimpleQueue[Any]", seconds: float) -> list[Any]:

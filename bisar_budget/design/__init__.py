@@ -13,5 +13,4 @@ __all__ = [
     "solve",
     "sweep",
     "swept",
-    "watched",
 ]

@@ -8,15 +8,17 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from bisar_budget.design.quantities import Number, QuestionError, number_of
+from bisar_budget.design.quantities import Choices, Number, QuestionError, Varied, choices_of, number_of
 from bisar_budget.faults import Fault, InvalidValueError, printable, shown
 from bisar_budget.mission.bounds import DIRECTION
 from bisar_budget.mission.changes import parts_of
+from bisar_budget.mission.readers import TextList
 from bisar_budget.units import Dimension, normal_unit, parse_quantity
 
 Floats = NDArray[np.float64]
+Values = NDArray[np.float64] | NDArray[np.object_]  # numbers in SI, or words
 
 MAX_VALUES = 10_000_000  # of one key, and of all keys of a table: 80 MB
 LARGEST_TABLE = 256 << 20  # characters: of as many values, each of seventeen digits with sign and exponent
@@ -26,6 +28,7 @@ _DIGITS = 15  # decimal ones that a float always holds
 _NUMBER = re.compile(r"^\s*[+-]?[\d.]*(?:[eE][+-]?\d+)?\s*", re.ASCII)
 _RANGE = "accepted: KEY=FROM:TO UNIT:COUNT, such as {key}=1:10 s:91, with :log behind it for equal ratios"
 _FORMS = "accepted: KEY=FROM:TO UNIT:COUNT or KEY=VALUE,VALUE,..., such as collection.aperture_time=1:10s:91"
+_WORDS = re.compile(r",(?![^\[]*\])")  # between words, not within a list of parts
 _LATIN = "accepted: latin:COUNT:SEED, such as latin:10000:1"
 _HEADER = re.compile(r"^([^\[\]\s]+(?:\[\d+\][^\[\]\s]*)*)\s*(?:\[([^\[\]]*)\])?$", re.ASCII)
 
@@ -37,8 +40,8 @@ class Cases(Protocol):
     """
 
     @property
-    def numbers(self) -> tuple[Number, ...]:
-        """The keys that vary, each with the unit that its values were given in."""
+    def varied(self) -> tuple[Varied, ...]:
+        """The keys that vary, numbers each with the unit that its values were given in."""
 
     @property
     def count(self) -> int:
@@ -48,16 +51,16 @@ class Cases(Protocol):
     def shape(self) -> tuple[int, ...] | None:
         """Number of values of each key of a grid."""
 
-    def values(self, start: int, stop: int) -> Mapping[str, Floats]:
-        """Value of each key, in SI, of some cases: (stop - start,) by the key."""
+    def values(self, start: int, stop: int) -> Mapping[str, Values]:
+        """Value of each key, in SI, or its words, of some cases: (stop - start,) by the key."""
 
 
 @dataclass(frozen=True, eq=False)
 class Grid:
     """Every combination of the values of each key; the last key is the fastest."""
 
-    numbers: tuple[Number, ...]
-    axes: tuple[Floats, ...]
+    varied: tuple[Varied, ...]
+    axes: tuple[Values, ...]
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -69,18 +72,18 @@ class Grid:
         """Number of cases; beyond what an array could hold too."""
         return math.prod(self.shape)
 
-    def values(self, start: int, stop: int) -> Mapping[str, Floats]:
-        """Value of each key, in SI, of some cases: (stop - start,) by the key."""
+    def values(self, start: int, stop: int) -> Mapping[str, Values]:
+        """Value of each key, in SI, or its words, of some cases: (stop - start,) by the key."""
         places = np.unravel_index(np.arange(start, stop), self.shape)
-        return {number.key: axis[place] for number, axis, place in zip(self.numbers, self.axes, places, strict=True)}
+        return {one.key: axis[place] for one, axis, place in zip(self.varied, self.axes, places, strict=True)}
 
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Cases of which each has a value of its own of every key: one column, in SI, for each."""
+    """Cases of which each has a value of its own of every key: one column, in SI, or words, for each."""
 
-    numbers: tuple[Number, ...]
-    columns: tuple[Floats, ...]
+    varied: tuple[Varied, ...]
+    columns: tuple[Values, ...]
     shape: None = None
 
     @property
@@ -88,9 +91,9 @@ class Table:
         """Number of cases."""
         return self.columns[0].size
 
-    def values(self, start: int, stop: int) -> Mapping[str, Floats]:
-        """Value of each key, in SI, of some cases: (stop - start,) by the key."""
-        return {number.key: column[start:stop] for number, column in zip(self.numbers, self.columns, strict=True)}
+    def values(self, start: int, stop: int) -> Mapping[str, Values]:
+        """Value of each key, in SI, or its words, of some cases: (stop - start,) by the key."""
+        return {one.key: column[start:stop] for one, column in zip(self.varied, self.columns, strict=True)}
 
 
 class TableError(QuestionError):
@@ -101,21 +104,30 @@ class TableError(QuestionError):
         super().__init__("\n".join(self.lines))
 
 
+class _AskedWords(NamedTuple):
+    """One `--vary` of a key that has words."""
+
+    option: str
+    varied: Choices
+    words: Values
+
+
 class _Asked(NamedTuple):
     """One `--vary`: the number, and its listed values in SI, or its ends, the text of its count and how it goes."""
 
     option: str
-    number: Number
+    varied: Number
     listed: tuple[float, ...] = ()
     ends: tuple[float, float] = (0.0, 0.0)
     size: str = ""
     is_log: bool = False
 
 
-def grid(tree: dict[str, Any], texts: Sequence[str]) -> Grid:
+def grid(tree: dict[str, Any], texts: Sequence[str], name: str = "--vary") -> Grid:
     """Read `KEY=FROM:TO UNIT:COUNT`, with `:log` behind it in equal ratios, or `KEY=VALUE,VALUE,...` of each option.
 
-    Ends belong to the range. Values are those that have as few digits in the unit given: 0:180deg:181 has 60 deg.
+    Keys that have no number take `KEY=WORD,WORD,...`. Ends belong to the range. Values are those that have as few
+    digits in the unit given: 0:180deg:181 has 60 deg.
 
     Parameters
     ----------
@@ -123,20 +135,26 @@ def grid(tree: dict[str, Any], texts: Sequence[str]) -> Grid:
         What the mission file says, as text.
     texts : sequence of str
         What stands behind each `--vary`; an end or a value without unit has that of the last.
+    name : str
+        Of the option, for messages.
 
     Raises
     ------
     QuestionError
         No such key, no number, no range, an empty or reversed one, values that the key cannot have, a key twice.
     """
-    numbers, axes = [], []
-    for asked in _all_asked(tree, texts):
-        numbers.append(asked.number)
+    varied: list[Varied] = []
+    axes: list[Values] = []
+    for asked in _all_asked(tree, texts, name):
+        varied.append(asked.varied)
+        if isinstance(asked, _AskedWords):
+            axes.append(asked.words)
+            continue
         if asked.listed:
             axes.append(np.array(asked.listed))
             continue
         if not asked.size:
-            raise QuestionError(f"{asked.option}: has no count of values; {_RANGE.format(key=asked.number.key)}")
+            raise QuestionError(f"{asked.option}: has no count of values; {_RANGE.format(key=asked.varied.key)}")
         count = _count(asked.size, f"{asked.option}: the count of values", 2, "; KEY=VALUE is a single value")
         if count > MAX_VALUES:
             raise QuestionError(
@@ -144,7 +162,67 @@ def grid(tree: dict[str, Any], texts: Sequence[str]) -> Grid:
                 "which are as many cases for each combination of the other keys"
             )
         axes.append(_spread(asked, np.arange(count) / (count - 1)))
-    return Grid(tuple(numbers), tuple(axes))
+    return Grid(tuple(varied), tuple(axes))
+
+
+def grid_of(tree: dict[str, Any], values: Mapping[str, ArrayLike]) -> Grid:
+    """Every combination of values that are at hand as arrays; the last key is the fastest.
+
+    Parameters
+    ----------
+    tree : dict
+        What the mission file says, as text.
+    values : mapping
+        Of each key its values: (n,) numbers in SI, or words. Whether a key can have a number is seen when the case is
+        checked.
+
+    Raises
+    ------
+    QuestionError
+        No such key, no number or word for it, no value.
+    """
+    varied, arrays = _at_hand(tree, values)
+    return Grid(varied, arrays)
+
+
+def table_of(tree: dict[str, Any], values: Mapping[str, ArrayLike]) -> Table:
+    """Cases of which each takes one value of every array; arguments and faults are those of `grid_of`.
+
+    Raises
+    ------
+    QuestionError
+        Also where arrays differ in length.
+    """
+    varied, arrays = _at_hand(tree, values)
+    if len({array.size for array in arrays}) > 1:
+        raise QuestionError(f"{', '.join(values)}: differ in length; accepted: one value of each for every case")
+    return Table(varied, arrays)
+
+
+def _at_hand(tree: dict[str, Any], values: Mapping[str, ArrayLike]) -> tuple[tuple[Varied, ...], tuple[Values, ...]]:
+    varied: list[Varied] = []
+    arrays: list[Values] = []
+    for key, given in values.items():
+        array = np.asarray(given)
+        if array.ndim != 1 or not array.size:
+            raise QuestionError(f"{key}: has values of the shape {array.shape}; accepted: (n,), n at least 1")
+        if array.dtype.kind in "US":
+            words = [str(word) for word in array.tolist()]
+            choices = choices_of(tree, key, words[0])
+            if choices is None:
+                number_of(tree, key)  # says it of what is neither
+                raise QuestionError(f"{key}: has words; accepted: numbers in SI")
+            for word in dict.fromkeys(words):
+                if problem := _wrong_word(choices, word):
+                    raise QuestionError(f"{key}: {problem}")
+            varied.append(choices)
+            arrays.append(np.array([*words, None], object)[:-1])
+        else:
+            varied.append(number_of(tree, key))
+            arrays.append(array.astype(float))
+    if not varied:
+        raise QuestionError(f"no key: nothing would vary; {_FORMS}")
+    return tuple(varied), tuple(arrays)
 
 
 def sample(tree: dict[str, Any], texts: Sequence[str], how: str) -> Table:
@@ -155,7 +233,7 @@ def sample(tree: dict[str, Any], texts: Sequence[str], how: str) -> Table:
     tree : dict
         What the mission file says, as text.
     texts : sequence of str
-        As for a grid; counts are not used, and a list of values is refused.
+        As for a grid; counts are not used, and a list of numbers is refused. Of words each is drawn as often.
     how : str
         `latin:COUNT:SEED`; the same seed gives the same cases.
 
@@ -171,40 +249,45 @@ def sample(tree: dict[str, Any], texts: Sequence[str], how: str) -> Table:
     if not (parts[1].isascii() and parts[1].isdigit() and len(parts[1]) <= 18):
         raise QuestionError(f"--sample {shown(how)}: the seed must be a whole number; {_LATIN}")
     rng = np.random.default_rng(int(parts[1]))
-    all_asked = list(_all_asked(tree, texts))
+    all_asked = list(_all_asked(tree, texts, "--vary"))
     if count * len(all_asked) > MAX_VALUES:
         most = MAX_VALUES // len(all_asked)
         raise QuestionError(
             f"--sample {shown(how)}: {count} cases of {len(all_asked)} keys do not fit into memory; accepted: up to "
             f"{most} cases. Samples of other seeds go on from there"
         )
-    columns = []
+    columns: list[Values] = []
     for asked in all_asked:
+        if isinstance(asked, _AskedWords):
+            columns.append(asked.words[rng.permutation(count) * asked.words.size // count])
+            continue
         if asked.listed:
-            raise QuestionError(f"{asked.option}: --sample draws from a range; {_RANGE.format(key=asked.number.key)}")
+            raise QuestionError(f"{asked.option}: --sample draws from a range; {_RANGE.format(key=asked.varied.key)}")
         columns.append(_spread(asked, (rng.permutation(count) + rng.random(count)) / count))
-    return Table(tuple(asked.number for asked in all_asked), tuple(columns))
+    return Table(tuple(asked.varied for asked in all_asked), tuple(columns))
 
 
-def _all_asked(tree: dict[str, Any], texts: Sequence[str]) -> Iterator[_Asked]:
+def _all_asked(tree: dict[str, Any], texts: Sequence[str], name: str) -> Iterator[_Asked | _AskedWords]:
     if not texts:
-        raise QuestionError(f"no --vary: nothing would vary; {_FORMS}")
+        raise QuestionError(f"no {name}: nothing would vary; {_FORMS}")
     seen: dict[tuple[str, ...], str] = {}
     for text in texts:
-        asked = _asked(tree, text)
-        parts = parts_of(asked.number.key)
+        asked = _asked(tree, text, name)
+        parts = parts_of(asked.varied.key)
         if parts in seen:
-            raise QuestionError(f"--vary {asked.number.key}: varies twice; accepted: each key once")
+            raise QuestionError(f"{name} {asked.varied.key}: varies twice; accepted: each key once")
         seen[parts] = text
         yield asked
 
 
-def _asked(tree: dict[str, Any], text: str) -> _Asked:
+def _asked(tree: dict[str, Any], text: str, name: str) -> _Asked | _AskedWords:
     """Read one option, and hold its values to the bounds of the key."""
     key, equals, given = (part.strip() for part in text.partition("="))
-    option = f"--vary {shown(text)}"
+    option = f"{name} {shown(text)}"
     if not (key and equals and given):
         raise QuestionError(f"{option}: does not say which values; {_FORMS}")
+    if (choices := choices_of(tree, key, given)) is not None:
+        return _AskedWords(option, choices, _words(option, choices, _WORDS.split(given)))
     number = number_of(tree, key)
     parts = [part.strip() for part in given.split(":")]
     if len(parts) == 1:
@@ -228,6 +311,30 @@ def _asked(tree: dict[str, Any], text: str) -> _Asked:
     if is_log and low <= 0:
         raise QuestionError(f"{option}: equal ratios begin above 0; accepted: FROM > 0, or no :log")
     return _Asked(option, number, (), (low, high), parts[2] if len(parts) == 3 else "", is_log)
+
+
+def _words(option: str, choices: Choices, texts: Sequence[str]) -> Values:
+    """Read words; names of parts and files are looked for when the mission is read with them."""
+    words = [text.strip() for text in texts]
+    for word in words:
+        if problem := _wrong_word(choices, word):
+            raise QuestionError(f"{option}: {problem}")
+    if len(set(words)) < len(words):
+        raise QuestionError(f"{option}: has a value twice; accepted: each once")
+    return np.array([*words, None], object)[:-1]  # words alone would be made a str array
+
+
+def _wrong_word(choices: Choices, word: str) -> str:
+    """What is wrong with a word; empty if nothing is, or if more than the word says it."""
+    if word.startswith("[") or isinstance(choices.reader, TextList):
+        return ""  # reading the mission says it
+    try:
+        choices.reader.leaf(word)
+    except InvalidValueError as error:
+        wrong = error.problem
+        said = "; ".join(filter(None, (wrong.problem, wrong.accepted)))
+        return f"{shown(word)!r} {said}" + (f". {wrong.hint}" if wrong.hint else "")
+    return ""
 
 
 def _read(option: str, number: Number, texts: Sequence[str]) -> tuple[Number, tuple[float, ...]]:
@@ -259,7 +366,7 @@ def _count(text: str, what: str, least: int, hint: str = "") -> int:
 def _spread(asked: _Asked, parts: Floats) -> Floats:
     """Values at parts of the way from one end to the other, both ends as they were given."""
     low, high = asked.ends
-    factor, divisor = _scale(asked.number)
+    factor, divisor = _scale(asked.varied)
     first, last = low / factor * divisor, high / factor * divisor
     given = first * (last / first) ** parts if asked.is_log else first + (last - first) * parts
     values = np.clip(_rounded(given) * factor / divisor, low, high)
@@ -276,8 +383,16 @@ def some_of(cases: Cases, count: int) -> Table:
     length = max(1, count // _STRETCHES)
     starts = [int((place * _GOLDEN + 0.5) % 1 * (cases.count - length)) for place in range(-(-count // length))]
     found = [cases.values(start, start + length) for start in starts]
-    columns = (np.concatenate([values[number.key] for values in found]) for number in cases.numbers)
-    return Table(cases.numbers, tuple(columns))
+    columns = (np.concatenate([values[one.key] for values in found]) for one in cases.varied)
+    return Table(cases.varied, tuple(columns))
+
+
+def words_of(cases: Cases) -> Iterator[tuple[Choices, list[str]]]:
+    """Keys that have words, and the words that occur."""
+    values = cases.axes if isinstance(cases, Grid) else cases.columns if isinstance(cases, Table) else ()
+    for one, words in zip(cases.varied, values, strict=True):
+        if isinstance(one, Choices):
+            yield one, list(dict.fromkeys(words.tolist()))
 
 
 def in_unit(number: Number, values: Floats) -> Floats:
@@ -300,8 +415,8 @@ def _rounded(values: Floats) -> Floats:
 def table(tree: dict[str, Any], text: str, file: str) -> Table:
     """Read a CSV of cases: a header `KEY [unit]` for each column, then one case in each line.
 
-    Lines that are empty or start with `#` are left out. A number alone needs no unit. Whether a value is one that the
-    key can have is seen when the case is checked.
+    Lines that are empty or start with `#` are left out. A number alone needs no unit, and words have none. Whether a
+    value is one that the key can have is seen when the case is checked; a word that is none is a fault.
 
     Parameters
     ----------
@@ -316,7 +431,7 @@ def table(tree: dict[str, Any], text: str, file: str) -> Table:
     ------
     TableError
         A header that is no key with a unit of it, a key twice, a line with too few or too many cells, a cell that is
-        no number, no case, too many; has every fault, up to twenty.
+        no number or none of the key's words, no case, too many; has every fault, up to twenty.
     """
     lines = (
         (place, line)
@@ -324,11 +439,12 @@ def table(tree: dict[str, Any], text: str, file: str) -> Table:
         if line.strip() and not line.lstrip().startswith("#")
     )
     place, header = next(lines, (1, ""))
-    numbers, scales = _headed(tree, header, place, file)
+    varied, scales = _headed(tree, header, place, file)
+    words: list[dict[str, int]] = [{} for _ in varied]  # of each column, with the number that stands for it
     given = array("d")
     faults: list[Fault] = []
     for place, line in lines:
-        row = _row(line, numbers, place)
+        row = _row(line, varied, words, place)
         if isinstance(row, Fault):
             faults.append(row)
             if len(faults) == _FAULTS:
@@ -342,10 +458,14 @@ def table(tree: dict[str, Any], text: str, file: str) -> Table:
         faults.append(Fault(place, 1, "", "the table has no case", accepted="accepted: lines below the header"))
     if faults:
         raise TableError(file, faults)
-    columns = np.array(given).reshape(-1, len(numbers)).T
-    return Table(
-        numbers, tuple(column * factor / divisor for column, (factor, divisor) in zip(columns, scales, strict=True))
-    )
+    columns = np.array(given).reshape(-1, len(varied)).T
+    values: list[Values] = []
+    for one, column, (factor, divisor), known in zip(varied, columns, scales, words, strict=True):
+        if isinstance(one, Choices):
+            values.append(np.array([*known, None], object)[column.astype(int)])
+        else:
+            values.append(column * factor / divisor)
+    return Table(varied, tuple(values))
 
 
 def _line_ends(text: str) -> str:
@@ -364,9 +484,9 @@ def _cells(line: str) -> Iterator[tuple[int, str]]:
 
 def _headed(
     tree: dict[str, Any], header: str, place: int, file: str
-) -> tuple[tuple[Number, ...], list[tuple[float, float]]]:
+) -> tuple[tuple[Varied, ...], list[tuple[float, float]]]:
     """Keys and units of the header."""
-    numbers: list[Number] = []
+    varied: list[Varied] = []
     scales: list[tuple[float, float]] = []
     faults: list[Fault] = []
     seen: set[tuple[str, ...]] = set()
@@ -376,8 +496,8 @@ def _headed(
         )
     for column, cell in _cells(header):
         try:
-            number = _column(tree, cell)
-            if parts_of(number.key) in seen:
+            one = _column(tree, cell)
+            if parts_of(one.key) in seen:
                 raise InvalidValueError("stands twice", "accepted: each key once")
         except InvalidValueError as error:
             wrong = error.problem
@@ -385,22 +505,26 @@ def _headed(
         except QuestionError as error:
             faults.append(Fault(place, column, "", str(error)))
         else:
-            seen.add(parts_of(number.key))
-            numbers.append(number)
-            scales.append(_scale(number))
+            seen.add(parts_of(one.key))
+            varied.append(one)
+            scales.append((1.0, 1.0) if isinstance(one, Choices) else _scale(one))
     if faults:
         raise TableError(file, faults[:_FAULTS])
-    return tuple(numbers), scales
+    return tuple(varied), scales
 
 
-def _column(tree: dict[str, Any], cell: str) -> Number:
-    """Number and unit of one cell of the header."""
+def _column(tree: dict[str, Any], cell: str) -> Varied:
+    """Number and unit of one cell of the header, or the key of words."""
     match = _HEADER.match(cell)
     if match is None:
         hint = "Cells are separated by commas" if ";" in cell or "\t" in cell else ""
         raise InvalidValueError("is no header of a column", "accepted: KEY [unit]", hint)
-    number = number_of(tree, match[1])
     unit = normal_unit((match[2] or "").strip())
+    if (choices := choices_of(tree, match[1], "")) is not None:
+        if unit:
+            raise InvalidValueError("has words, which have no unit", f"accepted: {match[1]}")
+        return choices
+    number = number_of(tree, match[1])
     if not unit and "" not in number.dimension.units:
         usual = number.dimension.usual or (number.dimension.si,)
         example = " or ".join(f"'{match[1]} [{one}]'" for one in usual)
@@ -411,22 +535,27 @@ def _column(tree: dict[str, Any], cell: str) -> Number:
     return number._replace(unit=_said_in(unit, number.dimension))
 
 
-def _row(line: str, numbers: Sequence[Number], place: int) -> list[float] | Fault:
-    """Numbers of a line, or what is wrong with it first."""
+def _row(line: str, varied: Sequence[Varied], words: Sequence[dict[str, int]], place: int) -> list[float] | Fault:
+    """Numbers of a line, or what is wrong with it first; of a word the number that stands for it in `words`."""
     texts = line.split(",")
-    if len(texts) != len(numbers):
-        behind = min(len(texts), len(numbers) + 1)
+    if len(texts) != len(varied):
+        behind = min(len(texts), len(varied) + 1)
         column = list(_cells(line))[behind - 1][0]
-        return Fault(place, column, "", f"has {len(texts)} cells", "", f"accepted: {len(numbers)}, as the header has")
+        return Fault(place, column, "", f"has {len(texts)} cells", "", f"accepted: {len(varied)}, as the header has")
     try:
-        if line.isascii() and "_" not in line:
+        if line.isascii() and "_" not in line and not any(isinstance(one, Choices) for one in varied):
             row = [float(text) for text in texts]
             if all(map(math.isfinite, row)):
                 return row
     except ValueError:
         pass
     row = []
-    for number, (column, cell) in zip(numbers, _cells(line), strict=True):
+    for number, known, (column, cell) in zip(varied, words, _cells(line), strict=True):
+        if isinstance(number, Choices):
+            if cell not in known and (problem := _wrong_word(number, cell)):
+                return Fault(place, column, number.key, problem)
+            row.append(float(known.setdefault(cell, len(known))))
+            continue
         try:
             row.append(parse_quantity(f"{cell} {number.unit}".rstrip(), number.dimension) if cell else math.nan)
         except InvalidValueError:
@@ -434,4 +563,5 @@ def _row(line: str, numbers: Sequence[Number], place: int) -> list[float] | Faul
         if not math.isfinite(row[-1]):
             accepted = f"accepted: a number of {number.unit}" if number.unit else "accepted: a number"
             return Fault(place, column, number.key, "is no number", shown(cell) or "nothing", accepted)
-    return [float(cell) for _, cell in _cells(line)]
+        row[-1] = float(cell)
+    return row

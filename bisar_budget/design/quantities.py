@@ -11,7 +11,7 @@ from bisar_budget.mission.bounds import DIRECTION, ELEVATION, LATITUDE
 from bisar_budget.mission.changes import apply_changes, next_name, parts_of
 from bisar_budget.mission.keys import nearest_keys
 from bisar_budget.mission.model import MISSION, Mission
-from bisar_budget.mission.readers import INVALID, Late, ListOf, OneOf, Quantity, Reader, Section, Triple
+from bisar_budget.mission.readers import INVALID, Late, ListOf, OneOf, Quantity, Reader, Section, TextList, Triple
 from bisar_budget.mission.tree import read_tree
 from bisar_budget.units import Dimension, parse_quantity
 
@@ -57,6 +57,21 @@ class Number(NamedTuple):
         return parse_quantity(text, self.dimension)
 
 
+class Choices(NamedTuple):
+    """A key that has a word instead of a number: a choice, a part of the catalogue, a file, a whole number.
+
+    `value` is what the file says; None if nothing, or a list or a section.
+    """
+
+    key: str
+    reader: Reader
+    value: str | None
+    unit: str = ""
+
+
+Varied = Number | Choices
+
+
 def tree_of(mission: Mission) -> dict[str, Any]:
     """What the file of a mission says with the options that changed it, as text."""
     tree = read_tree(mission.data or b"", mission.file)
@@ -91,10 +106,41 @@ def number_of(tree: dict[str, Any], key: str, of_all: str = "") -> Number:
     if isinstance(reader, Section):
         raise QuestionError(f"{key}: is a section; accepted: one of its keys, {', '.join(reader.keys)}")
     if not isinstance(reader, Quantity):
+        hint = ". sweep --vary compares what it can be" if reader.is_word else ""
         raise QuestionError(
-            f"{key}: is no number with a unit; accepted: one that is, such as collection.aperture_time"
+            f"{key}: is no number with a unit; accepted: one that is, such as collection.aperture_time{hint}"
         )
     return as_number(key, reader, value)
+
+
+def choices_of(tree: dict[str, Any], key: str, text: str) -> Choices | None:
+    """Find the key that a word can be given for; None where it has a number, or anything else.
+
+    Parameters
+    ----------
+    tree : dict
+        What the file says, as text.
+    key : str
+        Path of the key.
+    text : str
+        What is to be given: of shares of a budget the rule, of parts a list.
+
+    Raises
+    ------
+    QuestionError
+        No such key.
+    """
+    reader, value = _found(tree, key)
+    reader = form_of(reader, [] if text.startswith("[") else text)
+    if not reader.is_word:
+        return None
+    if isinstance(value, list) and not text.startswith("["):
+        first = f"{key}.0={text or 'NAME'}"
+        lists = f"{key}=[{', '.join([text.partition(',')[0] or 'NAME', *map(str, value[1:])])}],..."
+        raise QuestionError(
+            f"{key}: the file has a list of {len(value)}; accepted: {first} for its first, or lists, {lists}"
+        )
+    return Choices(key, reader, value if isinstance(value, str) else None)
 
 
 def as_number(key: str, reader: Quantity, value: Any) -> Number:
@@ -109,6 +155,12 @@ def as_number(key: str, reader: Quantity, value: Any) -> Number:
 
 def reader_of(tree: dict[str, Any], key: str) -> tuple[Reader, Any]:
     """Go down to a key: its reader, and what the file says there, None if nothing."""
+    reader, value = _found(tree, key)
+    return form_of(reader, value), value
+
+
+def _found(tree: dict[str, Any], key: str) -> tuple[Reader, Any]:
+    """Go down to a key: its reader, of whatever form, and what the file says there."""
     reader: Reader = MISSION
     value: Any = tree
     parts = parts_of(key)
@@ -117,13 +169,15 @@ def reader_of(tree: dict[str, Any], key: str) -> tuple[Reader, Any]:
         name, rest = next_name(value, parts)
         part, parts = (parts[0], parts[1:]) if name is None else (str(name), rest)
         inner = reader.below(part)
+        if inner is None and isinstance(value, str):
+            raise QuestionError(f"{shown(key)}: the file has {shown(value)!r} there, which has no {shown(part)!r}")
         if inner is None:
             known = f"; accepted: {', '.join(reader.keys)}" if isinstance(reader, Section) else ""
             hint = nearest_keys(key)
             raise QuestionError(
                 f"{shown(key)}: {shown(part)!r} is not a known key{known}{f'. {hint}' if hint else ''}"
             )
-        if isinstance(reader, ListOf | Triple):
+        if isinstance(reader, ListOf | TextList | Triple):
             listed = value if isinstance(value, list) else []
             if int(part) >= len(listed):
                 raise QuestionError(f"{key}: the list has {len(listed)} entries, and none has the number {part}")
@@ -131,7 +185,7 @@ def reader_of(tree: dict[str, Any], key: str) -> tuple[Reader, Any]:
         else:
             value = value.get(part) if isinstance(value, dict) else None
         reader, value = inner, None if value is INVALID else value
-    return form_of(reader, value), value
+    return reader, value
 
 
 def form_of(reader: Reader, value: Any) -> Reader:

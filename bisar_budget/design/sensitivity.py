@@ -1,7 +1,8 @@
 """What each number of a mission does to its worst utilization, by differences of whole checks."""
 
+import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import date
 from typing import NamedTuple
 
@@ -12,10 +13,11 @@ from bisar_budget.design.scaled import scaled
 from bisar_budget.design.slopes import Sensitivity, Slope
 from bisar_budget.design.stated import Skipped, Stated, stated_numbers
 from bisar_budget.design.variation import Variation, deciding_row, hold_to_decisions
-from bisar_budget.design.watched import Watch, watched
-from bisar_budget.faults import MissionError
+from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.findings.row import Row
+from bisar_budget.mission.load import folder_of
 from bisar_budget.mission.model import Mission
+from bisar_budget.mission.parts import PartError, finder_of, taken_figures
 
 _BREAKS = ("fail",)
 _NOTHING = 1e-9  # of a utilization: what rounding leaves of a check
@@ -27,9 +29,9 @@ def sensitivity(
     row: str | None = None,
     model: str | None = None,
     today: date,
-    watch: Watch | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Sensitivity:
-    """Find what each number that a mission file states does to the worst utilization.
+    """Find what each number that a mission file states, or takes from a part, does to the worst utilization.
 
     Each number is changed by itself, to both sides, and the mission is checked anew: no effect is left out. Numbers
     change by 1 % of themselves, directions by a degree, levels by a decibel, latitudes and longitudes by 1 % of the
@@ -45,8 +47,8 @@ def sensitivity(
         Gating model in place of the mission's own.
     today : date
         Day on which waivers are judged, UTC.
-    watch : Watch, optional
-        Who waits for it.
+    progress : callable, optional
+        Is told, after each number, how many are done, and how many there are.
 
     Returns
     -------
@@ -56,9 +58,9 @@ def sensitivity(
     Raises
     ------
     QuestionError
-        Nothing is declared or judged, or the row is not there.
+        Nothing is declared or judged, the row is not there, or a part cannot be read any more.
     """
-    variation = Variation(mission, model)
+    variation, of_parts = _stating_its_parts(Variation(mission, model))
     base = variation.read()
     found = check_mission(base, today, is_brief=True)
     hold_to_decisions([found], row)
@@ -69,8 +71,10 @@ def sensitivity(
     nearest = min(geometry.transmitter.slant_range, geometry.receiver.slant_range)
     numbers, skipped = stated_numbers(tree_of(variation.mission), nearest)
     slopes, unchanging = [], []
-    for number in watched(numbers, watch):
+    for done, number in enumerate(numbers, 1):
         slope = _Differences(variation, base, number, row, today).slope(at_file)
+        if progress is not None:
+            progress(done, len(numbers))
         if isinstance(slope, Skipped):
             skipped.append(slope)
         elif max(abs(slope.change), abs(slope.row_change or 0.0)) <= _NOTHING * max(
@@ -78,7 +82,7 @@ def sensitivity(
         ):
             unchanging.append(slope.key)
         else:
-            slopes.append(slope)
+            slopes.append(slope._replace(part=_part_of(slope.key, of_parts)))
     slopes.sort(key=lambda slope: -abs(slope.effect))
     balanced = is_balanced(base)
     return Sensitivity(
@@ -98,6 +102,23 @@ def sensitivity(
         relaxed=tuple(relaxed_errors(base, found, today)) if balanced else (),
         changes=mission.changes,
     )
+
+
+def _stating_its_parts(variation: Variation) -> tuple[Variation, Mapping[str, str]]:
+    """The same mission as if its file stated the figures that it takes from parts; the part by the key of each."""
+    mission = variation.read()
+    try:
+        taken = list(taken_figures(mission, finder_of(folder_of(mission.file))))
+    except PartError as error:
+        raise QuestionError(str(error)) from None
+    if not taken:
+        return variation, {}
+    stated = variation.read([SetValue(one.key, json.dumps(one.value)) for one in taken])
+    return Variation(stated, variation.model), {one.key: one.part for one in taken}
+
+
+def _part_of(key: str, of_parts: Mapping[str, str]) -> str:
+    return next((part for figure, part in of_parts.items() if f"{key}.".startswith(f"{figure}.")), "")
 
 
 class _Uses(NamedTuple):

@@ -17,7 +17,8 @@ class Slope(NamedTuple):
     differences over values `step` to either side, or, where there is no mission on one side, over two steps on the
     other (`difference`: central, forward, backward). `row_below` and `row_above` have the worst utilization at the
     smaller and the larger end of the difference, in magnitude; `is_mixed` is whether the row that has it at the value
-    itself uses less at an end: the change is then made of the slopes of two rows.
+    itself uses less at an end: the change is then made of the slopes of two rows. `part` is the part of the catalogue
+    that the number is taken from; empty if the file states it.
     """
 
     key: str
@@ -33,6 +34,12 @@ class Slope(NamedTuple):
     row_below: str
     row_above: str
     is_mixed: bool
+    part: str = ""
+
+    @property
+    def given(self) -> str:
+        """Its value as the file has it, and the part that it is from."""
+        return f"{self.text} ({self.part})" if self.part else self.text
 
     @property
     def effect(self) -> float:

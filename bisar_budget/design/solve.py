@@ -15,7 +15,6 @@ from bisar_budget.design.quantities import FACTOR, Number, QuestionError, Range,
 from bisar_budget.design.scaled import scaled
 from bisar_budget.design.solution import Crossing, Solution, State
 from bisar_budget.design.variation import Variation, breaking, hold_to_decisions, standing
-from bisar_budget.design.watched import Watch, watched
 from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.mission.model import Mission
@@ -29,6 +28,7 @@ _STEPS_TO_TURN = 20  # a golden section to 7e-5 of two places
 _TURNS = 16  # that are looked for
 
 Evaluate = Callable[[float], State]
+Progress = Callable[[int, int], None]
 
 
 def solve(
@@ -41,7 +41,7 @@ def solve(
     model: str | None = None,
     is_scale: bool = False,
     today: date,
-    watch: Watch | None = None,
+    progress: Progress | None = None,
 ) -> Solution:
     """Find every value of a number of a mission at which its compliance begins or ends.
 
@@ -64,8 +64,8 @@ def solve(
         Solve for the factor that multiplies all errors below the key.
     today : date
         Day on which waivers are judged, UTC.
-    watch : Watch, optional
-        Who waits for it.
+    progress : callable, optional
+        Is told, after each place of the range, how many are looked at, and how many there are.
 
     Returns
     -------
@@ -78,7 +78,7 @@ def solve(
         The question cannot be asked of this mission; says why.
     """
     question = _Question(mission, key, between, row, target, model, is_scale, today)
-    scanned = _scan(question.evaluate, question.places(), watch)
+    scanned = _scan(question.evaluate, question.places(), progress)
     crossings = tuple(
         question.crossing(low, high) for low, high in pairwise(scanned) if low.complies != high.complies
     )
@@ -211,9 +211,13 @@ class _Question:
         return {value: self.number.text(value) for value in values}
 
 
-def _scan(evaluate: Evaluate, places: Sequence[float], watch: Watch | None = None) -> list[State]:
+def _scan(evaluate: Evaluate, places: Sequence[float], progress: Progress | None = None) -> list[State]:
     """Look at every place, and where the utilization turns without a change of compliance, at the turn."""
-    states = [evaluate(place) for place in watched(places, watch)]
+    states = []
+    for done, place in enumerate(places, 1):
+        states.append(evaluate(place))
+        if progress is not None:
+            progress(done, len(places))
     found = list(states)
     turns = 0
     for before, here, after in zip(states, states[1:], states[2:], strict=False):

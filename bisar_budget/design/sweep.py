@@ -1,7 +1,8 @@
 """Check a mission in many cases: arrays of numbers in, columns of what `check` finds out.
 
 Cases that arrays hold are checked together (`arrays`), the others one by one as `check` does; the numbers are
-the same, and how many took the long way is said. Memory does not grow with the number of cases.
+the same, and how many took the long way is said. Where keys have words instead of numbers, the cases with the same
+words are those of one mission. Memory does not grow with the number of cases.
 """
 
 import math
@@ -22,11 +23,11 @@ from bisar_budget.arrays.judged import check_arrays, statuses
 from bisar_budget.arrays.rows import REQUIREMENTS
 from bisar_budget.budget.check import check_mission
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.design.cases import Cases
-from bisar_budget.design.quantities import Number, QuestionError, number_of, tree_of
+from bisar_budget.design.cases import Cases, words_of
+from bisar_budget.design.quantities import Choices, Number, QuestionError, number_of, tree_of
 from bisar_budget.design.swept import Column, Part, Swept, Values
 from bisar_budget.design.variation import ALIKE, Variation, breaking, standing
-from bisar_budget.faults import MissionError, SetValue
+from bisar_budget.faults import Fault, MissionError, SetValue, shown
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import RANK, STATUS
 from bisar_budget.mission.changes import parts_of
@@ -91,6 +92,11 @@ class _Field(NamedTuple):
     row: str
     field: str
 
+    @property
+    def is_text(self) -> bool:
+        """Whether it is no number."""
+        return self.field == "status"
+
 
 def sweep(
     mission: Mission,
@@ -148,32 +154,85 @@ class Asked:
         today: date,
         named: Named | None = None,
     ) -> None:
-        keys = tuple(number.key for number in cases.numbers)
+        choices = tuple(one.key for one in cases.varied if isinstance(one, Choices))
+        keys = tuple(one.key for one in cases.varied if one.key not in choices)
+        if model is not None and "allocation.model" in choices:
+            raise QuestionError("allocation.model: --model stands in for it; accepted: one of the two")
         self.question = Question(
-            mission.data, mission.file, mission.changes, keys, tuple(columns), model, today, named
+            mission.data, mission.file, mission.changes, keys, tuple(columns), model, today, choices, named
         )
         self.mission, self.cases, self.engine = mission, cases, Engine(self.question, mission)
-        for number in cases.numbers:
-            if number.value is None:  # the file may state its path in another way
+        missions = [self.engine.mission, *self._chosen()]
+        self.columns = tuple(self._columns(missions) if columns else ())
+        for number in cases.varied:
+            if isinstance(number, Number) and number.value is None:  # the file may state its path in another way
                 self.engine.hold_to_a_mission(number, cases)
+
+    def _chosen(self) -> Iterator[Mission]:
+        """The mission with each word alone, where there is one.
+
+        Raises
+        ------
+        QuestionError
+            A word is at fault by itself, such as a part that is not in the catalogue; or no word makes a mission.
+        """
+        for choices, words in words_of(self.cases):
+            problems = set()
+            for word in words:
+                try:
+                    chosen = self.engine.variation.read([SetValue(choices.key, word)])
+                except MissionError as error:
+                    of_word = [fault for fault in error.faults if fault.option == f"--set {choices.key}"]
+                    if of_word:
+                        key = of_word[0].key
+                        said = f"{'' if key == choices.key else f'{key} '}{_said(of_word[0])}"
+                        raise QuestionError(f"{choices.key}={shown(word)}: {said}") from None
+                    problems.add(f"{error.faults[0].key} {_said(error.faults[0])}")
+                else:
+                    problems.add("")
+                    yield chosen
+            if len(problems) == 1 and (problem := problems.pop()):
+                raise QuestionError(f"{choices.key}: no value of it makes a mission: {problem}")
+
+    def _columns(self, missions: Sequence[Mission]) -> Iterator[Column]:
+        """The columns that were asked for; a row is there if any of the missions has it."""
+        rows: dict[str, Row] = {}
+        for mission in missions:
+            rows = {row.id: row for row in check_mission(mission, self.question.today).rows} | rows
+        for one in self.engine.asked:
+            if one.field not in _FIELDS:
+                raise QuestionError(
+                    f"--column {one.name}: {one.field!r} is no field of a row; accepted: {', '.join(_FIELDS)}"
+                )
+            if one.row not in rows:
+                hint = did_you_mean(one.row, tuple(rows)) or "A check lists them."
+                raise QuestionError(f"--column {one.name}: no row has the id {one.row!r}. {hint}")
+            unit = rows[one.row].unit if one.field in _IN_UNIT else _UNITS.get(one.field, "")
+            yield Column(one.name, unit, _FIELDS[one.field].format(one.row), is_text=one.is_text)
 
     def swept(self, parts: Iterator[Part]) -> Swept:
         """The sweep that has these parts."""
-        varied = [Column(number.key, number.dimension.si, "Varies.") for number in self.cases.numbers]
+        varied = [
+            Column(one.key, "", "Varies.", is_text=True)
+            if isinstance(one, Choices)
+            else Column(one.key, one.dimension.si, "Varies.")
+            for one in self.cases.varied
+        ]
         return Swept(
             mission_name=self.mission.name,
             mission_sha256=sha256(self.mission.data).hexdigest(),
             varied=tuple(column.name for column in varied),
             shape=self.cases.shape,
             count=self.cases.count,
-            columns=(*varied, *GEOMETRY, *VERDICT, *self.engine.columns, REASON),
+            columns=(*varied, *GEOMETRY, *VERDICT, *self.columns, REASON),
             parts=parts,
         )
 
     def chunks(self) -> "Chunks":
         """How the cases are cut: into few where each is checked by itself, which some of them show."""
         count = self.cases.count
-        is_slow = bool(self.engine.not_held) or (count > _FEW and self._share_by_case() > _SLOW)
+        is_slow = bool(self.engine.not_held and not self.question.choices)
+        is_slow = is_slow or (count > _FEW and self._share_by_case() > _SLOW)
         return Chunks(count, _FEW if is_slow else _TOGETHER, is_slow)
 
     def _share_by_case(self) -> float:
@@ -181,7 +240,7 @@ class Asked:
         cases = self.cases
         places = np.linspace(0, cases.count - 1, _FEW).astype(int)
         some = [cases.values(place, place + 1) for place in places.tolist()]
-        values = {number.key: np.concatenate([one[number.key] for one in some]) for number in cases.numbers}
+        values = {one.key: np.concatenate([each[one.key] for each in some]) for one in cases.varied}
         return self.engine.part(0, _FEW, values).by_case / _FEW
 
     def shared_out(self, chunks: "Chunks", starts: Sequence[int], jobs: int) -> Iterator[Part]:
@@ -232,7 +291,10 @@ def _parts(asked: Asked, jobs: int) -> Iterator[Part]:
 
 
 class Question(NamedTuple):
-    """What a process needs to check cases of a mission; `named` where it cannot read what the mission names."""
+    """What a process needs to check cases of a mission; `named` where it cannot read what the mission names.
+
+    `keys` have numbers, `choices` words.
+    """
 
     data: bytes
     file: str
@@ -241,6 +303,7 @@ class Question(NamedTuple):
     columns: tuple[str, ...]
     model: str | None
     today: date
+    choices: tuple[str, ...] = ()
     named: Named | None = None
 
 
@@ -260,42 +323,36 @@ class Engine:
 
     def __init__(self, question: Question, mission: Mission) -> None:
         self.question, model = question, question.model
+        self.chosen: dict[tuple[str, ...], Engine | None] = {}  # by the words of its cases; None: see `_by_word`
         self.mission = mission if model is None else _gated(mission, model)
         self.variation = Variation(mission, model, question.named)
         tree = tree_of(mission)
         self.numbers = tuple(number_of(tree, key) for key in question.keys)
-        rows = {row.id: row for row in check_mission(self.mission, question.today).rows}
-        self.asked = [_field(name, rows) for name in question.columns]
-        self.subjects = {one.row: rows[one.row].subject for one in self.asked}
-        self.columns = tuple(
-            Column(
-                one.name,
-                rows[one.row].unit if one.field in _IN_UNIT else _UNITS.get(one.field, ""),
-                _FIELDS[one.field].format(one.row),
-                is_text=one.field == "status",
-            )
-            for one in self.asked
-        )
+        self.asked = [_Field(name, *_of_row(name)) for name in question.columns]
+        rows = {row.id: row for row in check_mission(self.mission, question.today).rows} if self.asked else {}
+        here = [one for one in self.asked if one.row in rows]
+        self.subjects = {one.row: rows[one.row].subject for one in here}
         self.not_held = not_held(self.mission, question.keys)
         # A brief check leaves out allowables of what is not declared, and those of the model that does not gate.
         self.is_brief = not any(
             one.field in ("allowable_published", "allowable_full")
             or (one.field in _IN_UNIT and rows[one.row].declared is None)
             or not rows[one.row].is_independent
-            for one in self.asked
+            for one in here
         )
         strange = [one.name for one in self.asked if one.field not in judged.FIELDS]
         self.not_held = self.not_held or next(iter(strange), "")
 
     def hold_to_a_mission(self, number: Number, cases: Cases) -> None:
         """Refuse a key that makes no mission at its first, middle and last value, for one reason."""
-        places = (0, cases.count // 2, cases.count - 1)
         problems = set()
-        for value in {float(cases.values(place, place + 1)[number.key][0]) for place in places}:
+        for place in {0, cases.count // 2, cases.count - 1}:
+            values = cases.values(place, place + 1)
+            words = [SetValue(key, values[key][0]) for key in self.question.choices]
             try:
-                self.variation.at({number: value})
+                self.variation.at({number: float(values[number.key][0])}, words)
             except MissionError as error:
-                problems.add(f"{error.faults[0].key} {error.faults[0].problem}; {error.faults[0].accepted}")
+                problems.add(f"{error.faults[0].key} {_said(error.faults[0])}")
             else:
                 return
         if len(problems) == 1:
@@ -304,17 +361,52 @@ class Engine:
     def part(self, start: int, stop: int, values: Mapping[str, Any]) -> Part:
         """Check cases `start` to `stop`, whose values are (stop - start,)."""
         cases = stop - start
-        found: dict[str, Values] = {
-            number.key: np.asarray(values[number.key], dtype=float) for number in self.numbers
-        }
-        for column in (*GEOMETRY, *VERDICT, *self.columns, REASON):
-            found[column.name] = np.full(cases, "", dtype=object) if column.is_text else np.full(cases, math.nan)
+        found: dict[str, Values] = {key: np.asarray(values[key], dtype=object) for key in self.question.choices}
+        found |= {number.key: np.asarray(values[number.key], dtype=float) for number in self.numbers}
+        columns = [(column.name, column.is_text) for column in (*GEOMETRY, *VERDICT, REASON)]
+        for name, is_text in (*columns, *((one.name, one.is_text) for one in self.asked)):
+            found[name] = np.full(cases, "", dtype=object) if is_text else np.full(cases, math.nan)
+        if self.question.choices:
+            return Part(start, stop, found, self._by_word(found))
         alone = np.ones(cases, dtype=bool)
         if not self.not_held:
             alone[:] = ~self._together(found)
         for place in np.flatnonzero(alone):
             self._by_itself(found, int(place))
         return Part(start, stop, found, int(alone.sum()))
+
+    # ---------------------------------------------------------------- one mission for the same words
+    def _by_word(self, found: dict[str, Values]) -> int:
+        """Check the cases of the same words as those of one mission; says how many were checked one by one."""
+        places: dict[tuple[str, ...], list[int]] = {}
+        for place, words in enumerate(zip(*(found[key].tolist() for key in self.question.choices), strict=True)):
+            places.setdefault(words, []).append(place)
+        by_case = 0
+        for words, some in places.items():
+            engine = self._with(words)
+            if engine is None:
+                for place in some:
+                    self._by_itself(found, place)
+                by_case += len(some)
+                continue
+            part = engine.part(0, len(some), {number.key: found[number.key][some] for number in self.numbers})
+            by_case += part.by_case
+            for name, of_some in part.values.items():
+                found[name][some] = of_some
+        return by_case
+
+    def _with(self, words: tuple[str, ...]) -> "Engine | None":
+        """The engine of the mission with these words; None if there is none, but may be with other numbers."""
+        if words not in self.chosen:
+            changes = [SetValue(*one) for one in zip(self.question.choices, words, strict=True)]
+            try:
+                mission = self.variation.read(changes)
+            except MissionError:
+                self.chosen[words] = None
+            else:
+                question = self.question._replace(changes=mission.changes, choices=())
+                self.chosen[words] = Engine(question, mission)
+        return self.chosen[words]
 
     # ---------------------------------------------------------------- together
     def _together(self, found: dict[str, Values]) -> NDArray[np.bool_]:
@@ -386,7 +478,8 @@ class Engine:
     def _by_itself(self, found: dict[str, Values], place: int) -> None:
         """Check one case as `check` does."""
         try:
-            case = self.variation.at({number: float(found[number.key][place]) for number in self.numbers})
+            words = [SetValue(key, found[key][place]) for key in self.question.choices]
+            case = self.variation.at({one: float(found[one.key][place]) for one in self.numbers}, words)
         except MissionError as error:
             fault = error.faults[0]
             found["status"][place], found["reason"][place] = "error", f"{fault.key}: {fault.problem}"
@@ -468,12 +561,13 @@ def _gated(mission: Mission, model: str) -> Mission:
     return mission._replace(allocation=mission.allocation._replace(model=model))
 
 
-def _field(name: str, rows: Mapping[str, Row]) -> _Field:
+def _of_row(name: str) -> tuple[str, str]:
+    """Row and field of a column."""
     row, _, field = name.rpartition(".")
-    if field not in _FIELDS:
-        raise QuestionError(f"--column {name}: {field!r} is no field of a row; accepted: {', '.join(_FIELDS)}")
-    if row not in rows:
-        raise QuestionError(
-            f"--column {name}: no row has the id {row!r}. {did_you_mean(row, tuple(rows)) or 'A check lists them.'}"
-        )
-    return _Field(name, row, field)
+    return row, field
+
+
+def _said(fault: Fault) -> str:
+    """What is wrong, and what would not be."""
+    said = "; ".join(filter(None, (fault.problem, fault.accepted)))
+    return f"{said}. {fault.hint}" if fault.hint and "Read with" not in fault.hint else said

@@ -46,11 +46,10 @@ class Variation:
         given = [change for change in self.mission.changes if parts_of(change.key) not in anew]
         return self.parse(self.mission.data, self.mission.file, self.model, changes=(*given, *changes))
 
-    def at(self, values: Mapping[Number, float]) -> Mission:
-        """Read the mission with other numbers, in SI; raises `MissionError`."""
-        return self.read(
-            [SetValue(one.key, f"{value!r} {one.dimension.si}".rstrip()) for one, value in values.items()]
-        )
+    def at(self, values: Mapping[Number, float], changes: Sequence[SetValue] = ()) -> Mission:
+        """Read the mission with other numbers, in SI, after other changes; raises `MissionError`."""
+        numbers = [SetValue(one.key, f"{value!r} {one.dimension.si}".rstrip()) for one, value in values.items()]
+        return self.read([*changes, *numbers])
 
 
 class Standing(NamedTuple):

@@ -42,6 +42,10 @@ Samples = Sequence[float]
 Track = list[tuple[float, float, float]]  # positions at the nodes
 
 
+_Ray = tuple[float, float, float, float, float]  # p, 2x̂, 2ŷ, R and R² of `ExactRanges._taken`
+_Node = tuple[float, _Ray, _Ray]
+
+
 class ExactPhases(NamedTuple):
     """Displacement east, north [m]; quadratic and cubic phase at the aperture edge, signed like β̃. [rad]
 
@@ -229,15 +233,20 @@ class ExactRanges:
         ]
         return {"transmitter": b, "receiver": [(-x, -y, -z) for x, y, z in b]}
 
-    def _heard(self, transmitter: Track, receiver: Track) -> list[float]:
+    def _heard(self, shifts: dict[str, Track]) -> list[float]:
         """What shifts of the platforms make of c·t̃ at the nodes where the direct path is the clock. [m]"""
-        found = []
-        tracks = zip(*self.tracks.values(), transmitter, receiver, self.baselines, strict=True)
-        for (x, y, z), (u, v, w), (a, b, c), (d, e, f), D in tracks:
-            a, b, c, x, y, z = a - d, b - e, c - f, x - u, y - v, z - w
-            i, j, k = x + a, y + b, z + c
-            found.append(((x + i) * a + (y + j) * b + (z + k) * c) / (D + sqrt(i * i + j * j + k * k)))
-        return found
+        apart = shifts.get("transmitter", self._still)
+        if "receiver" in shifts:
+            apart = [(a - x, b - y, c - z) for (a, b, c), (x, y, z) in zip(apart, shifts["receiver"], strict=True)]
+        return [
+            (p := a * (x + a) + b * (y + b) + c * (z + c)) / (D + sqrt(abs(D * D + p)))
+            for (a, b, c), (x, y, z), D in zip(apart, self._twice_apart, self.baselines, strict=True)
+        ]
+
+    @cached_property
+    def _twice_apart(self) -> Track:
+        tracks = zip(*self.tracks.values(), strict=True)
+        return [(2 * (x - u), 2 * (y - v), 2 * (z - w)) for (x, y, z), (u, v, w) in tracks]
 
     @cached_property
     def _known_along(self) -> dict[tuple[str, Vector], list[float]]:
@@ -326,33 +335,48 @@ class ExactRanges:
         does not, and beyond a line on which range and Doppler gradients are parallel: no error leads there from
         nothing.
         """
-        errors = list(errors)
-        clock, shifts = self._taken(errors)
-        turns = [(source, abs(size)) for source, size in errors if source.is_position and source.unit == "m/s"]
-        bend = sum(size * sum(map(source.moves, PLATFORMS)) for source, size in turns)
-        reach = self._reach if bend * self.half < self._bend else 0.0
-        return self._settled(clock, shifts, near, reach)
+        nodes, bend = self._taken(errors)
+        try:
+            return self._settled(nodes, near, self._reach if bend * self.half < self._bend else 0.0)
+        except ValueError:  # by rounding, the square of the range of a point that meets a platform was below zero
+            return None
 
-    def _taken(self, errors: Iterable[tuple[ErrorSource, float]]) -> tuple[Samples, list[Track]]:
-        """What errors add to the recorded ranges at the nodes [m], and how far off they take each platform to be."""
-        shifts, clock = dict.fromkeys(PLATFORMS, self._still), self._unheard
+    def _taken(self, errors: Iterable[tuple[ErrorSource, float]]) -> tuple[list[_Node], float]:
+        """What errors make of the nodes: metres added to the recorded ranges, and where they put platforms.
+
+        With the sum of the velocity errors of both [m/s].
+        A range R grows by p/(R + √(R² + p)) where d is added to its vector r, with p = d·(2r + d): that has no
+        rounding of the range itself. From a point at g = (east, north) it is p - 2r̂·g + |g|².
+        """
+        clock, bend = self._unheard, 0.0
+        shifts: dict[str, Track] = {}
         for source, size in errors:
             if source.is_position:
                 x, y, z = (size * part for part in source.direction)
                 powers = self.powers[source.unit]
+                shift = [(p * x, p * y, p * z) for p in powers]
                 for name in PLATFORMS:
                     if source.moves(name):
-                        shifts[name] = [
-                            (a + p * x, b + p * y, c + p * z)
-                            for (a, b, c), p in zip(shifts[name], powers, strict=True)
-                        ]
+                        bend += abs(size) if source.unit == "m/s" else 0.0
+                        shifts[name] = _sums(shifts[name], shift) if name in shifts else shift
             else:  # a clock, or a phase as such
                 shape = self.shape(source)
                 clock = [whole + size * metres for whole, metres in zip(clock, shape, strict=True)]
-        both = list(shifts.values())
         if self.has_direct_path:
-            clock = list(map(add, clock, self._heard(*both)))
-        return clock, both
+            clock = list(map(add, clock, self._heard(shifts)))
+        rays = self._rays | {name: self._rays_of(name, shift) for name, shift in shifts.items()}
+        return list(zip(clock, *rays.values(), strict=True)), bend
+
+    def _rays_of(self, name: str, shift: Track) -> list[_Ray]:
+        return [
+            (a * (x + x + a) + b * (y + y + b) + c * (z + z + c), 2 * (x + a), 2 * (y + b), R, R * R)
+            for (x, y, z), R, (a, b, c) in zip(self.tracks[name], self.ranges[name], shift, strict=True)
+        ]
+
+    @cached_property
+    def _rays(self) -> dict[str, list[_Ray]]:
+        """Where the platforms are at the nodes."""
+        return {name: self._rays_of(name, self._still) for name in PLATFORMS}
 
     @cached_property
     def _still(self) -> Track:
@@ -361,12 +385,6 @@ class ExactRanges:
     @cached_property
     def _unheard(self) -> list[float]:
         return [0.0] * len(self.times)
-
-    @cached_property
-    def _nodes(self) -> list[tuple[float, ...]]:
-        """Position and range of both platforms at each node."""
-        platforms = (zip(self.tracks[name], self.ranges[name], strict=True) for name in PLATFORMS)
-        return [(*t, R, *r, S) for (t, R), (r, S) in zip(*platforms, strict=True)]
 
     @cached_property
     def _reach(self) -> float:
@@ -380,17 +398,11 @@ class ExactRanges:
 
     def left_over(self, source: ErrorSource, size: float, place: GroundVector) -> list[float]:
         """Range error at the nodes that an error leaves at a ground point. [m]"""
-        clock, shifts = self._taken([(source, size)])
         east, north = place
-        left = []
-        for whole, (a, b, c), (d, e, f), (x, y, z, R, u, v, w, S) in zip(clock, *shifts, self._nodes, strict=True):
-            a, b, d, e = a - east, b - north, d - east, e - north
-            i, j, k, m, n, o = x + a, y + b, z + c, u + d, v + e, w + f
-            left.append(
-                whole
-                - ((x + i) * a + (y + j) * b + (z + k) * c) / (R + sqrt(i * i + j * j + k * k))
-                - ((u + m) * d + (v + n) * e + (w + o) * f) / (S + sqrt(m * m + n * n + o * o))
-            )
+        left, square = [], east * east + north * north
+        for whole, (P, x, y, R, RR), (Q, u, v, S, SS) in self._taken([(source, size)])[0]:
+            p, q = P - x * east - y * north + square, Q - u * east - v * north + square
+            left.append(whole - p / (R + sqrt(abs(RR + p))) - q / (S + sqrt(abs(SS + q))))
         return left
 
     def left_over_small(self, source: ErrorSource, size: float) -> list[float]:
@@ -456,40 +468,31 @@ class ExactRanges:
             return [SPEED_OF_LIGHT * tau**power for tau in self.times]
         return [(node * node - 1 / 3) / self.k for node in self.nodes]  # a quadratic that displaces nothing
 
-    def _settled(
-        self, clock: Samples, shifts: Sequence[Track], near: GroundVector, reach: float
-    ) -> ExactPhases | None:
-        """Newton's method for the point; with the slopes of the centre where it stays within reach of that.
-
-        `shifts` say how far off each platform is taken to be at the nodes. A range grows by
-        (|r̂|² - |r|²)/(|r| + |r̂|), where |r̂|² - |r|² = (r + r̂)·(r̂ - r): that has no rounding of the range itself.
-        """
+    def _settled(self, nodes: list[_Node], near: GroundVector, reach: float) -> ExactPhases | None:
+        """Newton's method for the point; with the slopes of the centre where it stays within reach of that."""
         east, north = near
         if math.hypot(east, north) < reach:
-            found = self._settled_near(clock, shifts, east, north)
+            found = self._settled_near(nodes, east, north)
             if found is not None:
                 return found
         value, slope, quadratic, cubic = self.fit
-        nodes, before = list(zip(clock, *shifts, self._nodes, strict=True)), math.inf
+        before = math.inf
         for _ in range(ITERATIONS):
             left, by_east, by_north, nearest = [], [], [], math.inf
-            for whole, (a, b, c), (d, e, f), (x, y, z, R, u, v, w, S) in nodes:
-                a, b, d, e = a - east, b - north, d - east, e - north
-                i, j, k, m, n, o = x + a, y + b, z + c, u + d, v + e, w + f
-                p, q = sqrt(i * i + j * j + k * k), sqrt(m * m + n * n + o * o)
+            square, twice_east, twice_north = east * east + north * north, 2 * east, 2 * north
+            for whole, (P, x, y, R, RR), (Q, u, v, S, SS) in nodes:
+                P, Q = P - x * east - y * north + square, Q - u * east - v * north + square
+                p, q = sqrt(RR + P), sqrt(SS + Q)
                 if p < nearest:
                     nearest = p
                 if q < nearest:
                     nearest = q
                 if not nearest:
                     return None
-                left.append(
-                    whole
-                    - ((x + i) * a + (y + j) * b + (z + k) * c) / (R + p)
-                    - ((u + m) * d + (v + n) * e + (w + o) * f) / (S + q)
-                )
-                by_east.append(i / p + m / q)
-                by_north.append(j / p + n / q)
+                left.append(whole - P / (R + p) - Q / (S + q))
+                p, q = p + p, q + q
+                by_east.append((x - twice_east) / p + (u - twice_east) / q)
+                by_north.append((y - twice_north) / p + (v - twice_north) / q)
             # A step of a metre adds by_east, by_north to what is left.
             a, b = sum(map(mul, value, by_east)), sum(map(mul, value, by_north))
             c, d = sum(map(mul, slope, by_east)), sum(map(mul, slope, by_north))
@@ -521,22 +524,16 @@ class ExactRanges:
             before = step
         return None
 
-    def _settled_near(self, clock: Samples, shifts: Sequence[Track], east: float, north: float) -> ExactPhases | None:
+    def _settled_near(self, nodes: list[_Node], east: float, north: float) -> ExactPhases | None:
         """Search with the slopes of the centre: a third of the work. None where it does not settle in a few steps."""
         (by_east, turn_east, quadratic_east, cubic_east), (by_north, turn_north, *rest) = self._gradient
         (quadratic_north, cubic_north), (value, slope, quadratic, cubic) = rest, self.fit
         determinant = by_east * turn_north - by_north * turn_east
-        nodes = list(zip(clock, *shifts, self._nodes, strict=True))
         for _ in range(FEW):
-            left = []
-            for whole, (a, b, c), (d, e, f), (x, y, z, R, u, v, w, S) in nodes:
-                a, b, d, e = a - east, b - north, d - east, e - north
-                i, j, k, m, n, o = x + a, y + b, z + c, u + d, v + e, w + f
-                left.append(
-                    whole
-                    - ((x + i) * a + (y + j) * b + (z + k) * c) / (R + sqrt(i * i + j * j + k * k))
-                    - ((u + m) * d + (v + n) * e + (w + o) * f) / (S + sqrt(m * m + n * n + o * o))
-                )
+            left, square = [], east * east + north * north
+            for whole, (P, x, y, R, RR), (Q, u, v, S, SS) in nodes:
+                p, q = P - x * east - y * north + square, Q - u * east - v * north + square
+                left.append(whole - p / (R + sqrt(RR + p)) - q / (S + sqrt(SS + q)))
             constant, linear = sum(map(mul, value, left)), sum(map(mul, slope, left))
             step_east = (by_north * linear - turn_north * constant) / determinant
             step_north = (turn_east * constant - by_east * linear) / determinant
@@ -559,6 +556,10 @@ def _track(state: PlatformState, times: Samples, east: float, north: float) -> T
     if state.bends:
         return [(p - east, q - north, r) for (p, q, r), _ in map(state.at, times)]
     return [(x + tau * (u + tau * a / 2), y + tau * (v + tau * b / 2), z + tau * (w + tau * c / 2)) for tau in times]
+
+
+def _sums(one: Track, other: Track) -> Track:
+    return [(a + x, b + y, c + z) for (a, b, c), (x, y, z) in zip(one, other, strict=True)]
 
 
 def _sum(weights: Samples, samples: Samples) -> float:

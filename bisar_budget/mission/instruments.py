@@ -15,6 +15,7 @@ from bisar_budget.mission.readers import (
     ListOf,
     Quantity,
     Reader,
+    Reference,
     Report,
     Section,
     Text,
@@ -213,7 +214,9 @@ class Oscillator(NamedTuple):
             "Tones of the oscillator, single sideband at its frequency: each makes paired echoes.",
         ),
     ] = ()
-    sensor: Annotated[str | None, Key(Text(), "A part of the catalogue, or a file; keys beside it override.")] = None
+    sensor: Annotated[
+        str | None, Key(Reference(), "A part of the catalogue, or a file; keys beside it override.")
+    ] = None
     source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
 
     @property

@@ -1,6 +1,7 @@
 """Every key of the mission file as a path, from the readers themselves: to find the one that somebody meant."""
 
 from collections.abc import Iterator
+from difflib import SequenceMatcher
 from functools import cache
 
 from bisar_budget.mission.readers import Late, ListOf, OneOf, Reader, Section, did_you_mean
@@ -36,5 +37,6 @@ def nearest_keys(key: str) -> str:
     last = key.rpartition(".")[2]
     same = [known for known in all_keys() if known.rpartition(".")[2] == last]
     if 0 < len(same) <= 4:
-        return f"Did you mean {' or '.join(map(repr, same))}?"
+        nearest_first = sorted(same, key=lambda known: -SequenceMatcher(None, key[:_FARTHEST], known).ratio())
+        return f"Did you mean {' or '.join(map(repr, nearest_first))}?"
     return did_you_mean(key[:_FARTHEST], all_keys())

@@ -1,10 +1,11 @@
 """What a mission names, read once and taken along: to processes on machines that do not have its files."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from hashlib import sha256
 from typing import NamedTuple
 
-from bisar_budget.faults import SetValue
+from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.mission.load import folder_of, parse_mission
 from bisar_budget.mission.model import Mission
 
@@ -33,13 +34,15 @@ class Named(NamedTuple):
         return whole.hexdigest()
 
 
-def named_by(mission: Mission) -> tuple[Mission, Named]:
+def named_by(mission: Mission, also: Sequence[SetValue] = ()) -> tuple[Mission, Named]:
     """Read a mission anew, and all that it names.
 
     Parameters
     ----------
     mission : Mission
         As loaded.
+    also : sequence of SetValue
+        Values that the mission may get: what it names with each of them is read too.
 
     Returns
     -------
@@ -69,5 +72,8 @@ def named_by(mission: Mission) -> tuple[Mission, Named]:
 
     again = parse_mission(mission.data, mission.file, None, beside, mission.changes, find)
     again = again._replace(allocation=mission.allocation)  # --model stands in for the file's own
+    for change in also:
+        with suppress(MissionError):  # there is none with it, which is said where it is asked for
+            parse_mission(mission.data, mission.file, None, beside, (*mission.changes, change), find)
     named = Named(tuple(sorted(paths.items())), tuple((name, *of) for name, of in sorted(parts.items())))
     return again, named

@@ -262,7 +262,7 @@ def _file_of(name: str, beside: str) -> str:
             if os.sep not in name and os.path.exists(file):
                 return file
     near = did_you_mean(name.lower(), tuple(catalogue(places)))
-    raise PartError(f"is no part of the catalogue; `bisar-budget sensors` lists them. {near}".rstrip())
+    raise PartError(f"is no part of the catalogue; `bisar-budget sensors` lists them{'. ' if near else ''}{near}")
 
 
 def with_parts(mission: Mission, beside: str, find: Find, report: Report) -> Any:
@@ -364,6 +364,43 @@ def _motion_of(error: MotionError, parts: Sequence[Part], path: KeyPath, report:
             continue
         of_parts |= {figure: evidence(part, figure) for figure in taken}
     return error._replace(of_parts=tuple(of_parts.items()))
+
+
+class TakenFigure(NamedTuple):
+    """A figure that a mission takes from a part: the key that could state it, what the part says, the part's name."""
+
+    key: str
+    value: Any
+    part: str
+
+
+def taken_figures(mission: Mission, find: Find) -> Iterator[TakenFigure]:
+    """Figures that a mission takes from parts, which `find` finds; it is the same mission if its file states them.
+
+    Values are text, or mappings and lists of text, as the file of the part has them.
+
+    Raises
+    ------
+    PartError
+        A part cannot be read any more.
+    """
+    for name, platform in zip(mission.platforms._fields, mission.platforms, strict=True):
+        error, oscillator = platform.motion_error, platform.oscillator
+        names = error.sensor if isinstance(error.sensor, tuple) else (error.sensor,) if error.sensor else ()
+        for each in names:
+            part, written = _parsed(*find(each))
+            inner = "imu." if part.kind == "imu" else ""
+            for figure in FIGURES[part.kind]:
+                if figure in written and dict(error.of_parts).get(figure) == evidence(part, figure):
+                    yield TakenFigure(f"platforms.{name}.motion_error.{inner}{figure}", written[figure], each)
+        if oscillator is not None and oscillator.sensor:
+            part, written = _parsed(*find(oscillator.sensor))
+            path = ("platforms", name, "oscillator", "frequency")
+            is_own = {"frequency": path in mission.places}
+            is_own |= {form: oscillator.source != evidence(part, form) for form in FORMS}
+            for figure in FIGURES["oscillator"]:
+                if figure in written and not is_own[figure]:
+                    yield TakenFigure(f"platforms.{name}.oscillator.{figure}", written[figure], oscillator.sensor)
 
 
 def _oscillator_of(oscillator: Oscillator, part: Part) -> Oscillator:

@@ -32,7 +32,7 @@ from bisar_budget.mission.bounds import (
     VELOCITY,
     VIBRATION_FREQUENCY,
 )
-from bisar_budget.mission.readers import Choice, Key, Late, ListOf, OneOf, Section, Text, TextList, Triple
+from bisar_budget.mission.readers import Choice, Key, Late, ListOf, OneOf, Reference, Section, Text, TextList, Triple
 
 if TYPE_CHECKING:
     from bisar_budget.mission.covariance import Covariance
@@ -73,7 +73,7 @@ class Vibration(NamedTuple):
     wideband: Annotated[Wideband | None, Key(Section(Wideband))] = None
 
 
-PART = Text()
+PART = Reference()
 PARTS = OneOf(lambda value: TextList() if isinstance(value, list) else PART, (PART, TextList()))
 
 

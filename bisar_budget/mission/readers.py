@@ -30,7 +30,9 @@ _UNPRINTABLE = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff\ufeff\u2
 
 
 class Reader:
-    """Reads one kind of value."""
+    """Reads one kind of value; `is_word` where that is a word or a whole number, of which several can be compared."""
+
+    is_word = False
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
         """Return the value, or `INVALID` after a report. Leaves say what is wrong by `InvalidValueError`."""
@@ -170,6 +172,12 @@ class Text(Reader):
         return {"type": "string", "minLength": 1}
 
 
+class Reference(Text):
+    """Name of a part or of a file, from which values come."""
+
+    is_word = True
+
+
 class Label(Text):
     """Text that may look like a number, such as the issue of a document."""
 
@@ -191,6 +199,8 @@ class Glob(Text):
 
 class Choice(Reader):
     """One of a few words; `refused` maps words that mean something elsewhere to why not here."""
+
+    is_word = True
 
     def __init__(self, *names: str, refused: Mapping[str, str] | None = None) -> None:
         self.names = names
@@ -234,7 +244,9 @@ class Words(Reader):
 
 
 class TextList(Reader):
-    """A list of a few texts, each once."""
+    """A list of the names of a few parts, each once."""
+
+    is_word = True
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
         """Read each text at its own place."""
@@ -248,6 +260,10 @@ class TextList(Reader):
                 return INVALID
         return INVALID if INVALID in texts else texts
 
+    def below(self, part: str) -> Reader | None:
+        """Give the reader of one name."""
+        return Reference() if is_place(part) else None
+
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Array of text."""
         return {"type": "array", "items": Text().schema(definitions), "minItems": 1, "maxItems": _FEW}
@@ -255,6 +271,8 @@ class TextList(Reader):
 
 class Whole(Reader):
     """A whole number within bounds."""
+
+    is_word = True
 
     def __init__(self, low: int, high: int) -> None:
         self.low, self.high = low, high

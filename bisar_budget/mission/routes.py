@@ -5,15 +5,27 @@ from typing import Annotated, Any, NamedTuple
 
 from bisar_budget import units
 from bisar_budget.faults import InvalidValueError, Problem
-from bisar_budget.mission.readers import INVALID, Choice, Key, OneOf, Quantity, Reader, Report, Section, Text, Whole
+from bisar_budget.mission.readers import (
+    INVALID,
+    Choice,
+    Key,
+    OneOf,
+    Quantity,
+    Reader,
+    Reference,
+    Report,
+    Section,
+    Whole,
+)
 
-_FILE = Text()
+_FILE = Reference()
 _ORBIT_WAYS = ("tle", "omm", "oem")
 
 
 class _Lines(Reader):
     """The two lines of an element set."""
 
+    is_word = True
     what = "[line 1, line 2]"
 
     def read(self, value: Any, path: tuple[Any, ...], report: Report) -> Any:
@@ -40,7 +52,7 @@ class OrbitSource(NamedTuple):
     ] = None
     omm: Annotated[str | None, Key(_FILE, "Orbit mean-elements message, XML, JSON or CSV; SGP4.")] = None
     oem: Annotated[str | None, Key(_FILE, "Orbit ephemeris message, text or XML; interpolated as it says.")] = None
-    object: Annotated[str | None, Key(Text(), "Name or catalogue number, where a file has several.")] = None
+    object: Annotated[str | None, Key(Reference(), "Name or catalogue number, where a file has several.")] = None
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
@@ -54,6 +66,7 @@ class OrbitSource(NamedTuple):
 class _Instant(Reader):
     """An instant of UTC."""
 
+    is_word = True
     what = "2026-06-01T05:20:31.250Z and the like"
 
     def leaf(self, value: Any) -> Any:

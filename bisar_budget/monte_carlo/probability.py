@@ -23,7 +23,8 @@ from bisar_budget.effects.effect import PLATFORMS, ErrorSource, ImagePlane
 from bisar_budget.findings.monte_carlo import MonteCarlo, Requirement
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
 from bisar_budget.mission.symmetric import eigensystem
-from bisar_budget.monte_carlo.draws import Judged, Variable, count
+from bisar_budget.monte_carlo.draws import Share, drawing_of, in_turn, joined
+from bisar_budget.monte_carlo.variables import Judged, Variable
 from bisar_budget.phrases import Note
 
 if TYPE_CHECKING:
@@ -39,7 +40,12 @@ _DIGITS = 9  # of sampled sigmas: further ones differ between processors, and me
 _ANGLES = 4096  # of a mean over a circle of a smooth function
 
 
-def monte_carlo(analysis: Analysis, draws: int, seed: int | None = None) -> MonteCarlo:
+def monte_carlo(
+    analysis: Analysis,
+    draws: int,
+    seed: int | None = None,
+    share: Share | None = None,
+) -> MonteCarlo:
     """Draw the declared errors of a mission and count how often each requirement holds.
 
     Parameters
@@ -50,6 +56,8 @@ def monte_carlo(analysis: Analysis, draws: int, seed: int | None = None) -> Mont
         From 1 to `MAX_DRAWS`; memory does not grow with it.
     seed : int, optional
         None: `simulation.seed` of the file. The same seed gives the same result.
+    share : callable, optional
+        Makes the pieces of the draws; None: one after the other, here. The result does not depend on who makes them.
 
     Raises
     ------
@@ -63,7 +71,8 @@ def monte_carlo(analysis: Analysis, draws: int, seed: int | None = None) -> Mont
         seed = (mission.simulation or Simulation()).seed
     variables = list(_variables(analysis))
     judged = list(_requirements(mission, analysis.allocation, variables))
-    counted = count(analysis, variables, judged, draws, seed)
+    drawing = drawing_of(analysis, variables, judged, draws, seed)
+    counted = joined((tally for _, tally in (share or in_turn)(drawing)), len(judged))
     predictions = _Predictions(analysis, variables)
     requirements = tuple(
         _requirement(one, holds, mean_square, draws, predictions)
@@ -79,8 +88,8 @@ def monte_carlo(analysis: Analysis, draws: int, seed: int | None = None) -> Mont
         probability=counted.all_hold / draws if judged else None,
         probability_low=low,
         probability_high=high,
-        is_exact=counted.is_exact,
-        notes=tuple(_notes(mission, analysis.stated, counted.is_exact)),
+        is_exact=drawing.is_exact,
+        notes=tuple(_notes(mission, analysis.stated, drawing.is_exact)),
     )
 
 

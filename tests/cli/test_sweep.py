@@ -181,7 +181,7 @@ def test_very_many_cases_are_started_only_by_force(run, tmp_path: Path) -> None:
     ("seconds", "words"), [(0.1, "1 s"), (119, "119 s"), (121, "2 minutes"), (9e3, "2 hours"), (1e6, "12 days")]
 )
 def test_how_long(seconds: float, words: str) -> None:
-    assert command._lasting(seconds) == words
+    assert command.lasting(seconds) == words
 
 
 def test_parts_of_a_whole() -> None:

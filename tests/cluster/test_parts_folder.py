@@ -7,6 +7,7 @@ import socket
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +16,13 @@ import pytest
 
 pytest.importorskip("pyarrow")
 
-from bisar_budget.cluster.parts_folder import PartsError, PartsFolder
+from bisar_budget.cluster.parts_folder import PartsError, PartsFolder, manifest_of, mark_of
+from bisar_budget.design.cases import grid
+from bisar_budget.design.quantities import tree_of
 from bisar_budget.design.sweep import Asked
 from bisar_budget.design.swept import Part
+from bisar_budget.mission.load import load_mission
+from bisar_budget.mission.named import Named
 from tests.conftest import ROOT
 
 SECTION_V = str(ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml")
@@ -41,6 +46,20 @@ def test_a_part_is_read_as_it_was_written(tmp_path: Path) -> None:
     assert part.values["b"].dtype == part.values["c"].dtype == object
     assert part.values["b"].tolist() == values["b"].tolist()
     assert part.values["c"].tolist() == values["c"].tolist()
+
+
+def test_words_of_cases_are_part_of_the_manifest() -> None:
+    """Parts of other words are not mixed in."""
+    mission = load_mission(SECTION_V)
+
+    def manifest(text: str) -> dict[str, Any]:
+        asked = Asked(mission, grid(tree_of(mission), [text, f"{TIME}=1,2s"]), today=date(2026, 1, 1))
+        return manifest_of(asked, asked.chunks(), Named())
+
+    one, other = manifest("allocation.model=published,full"), manifest("allocation.model=full,published")
+    assert one["cases"]["keys"] == ["allocation.model", TIME]
+    assert mark_of(one) != mark_of(other)
+    assert mark_of(one) == mark_of(manifest("allocation.model=published,full"))
 
 
 def test_only_whole_parts_of_the_sweep_are_there(tmp_path: Path) -> None:
@@ -146,9 +165,10 @@ def test_workers_start_beside_another_scheduler_of_dask(run, tmp_path) -> None:
     """A second one on a machine ended with: Port 8787 is already in use."""
     pytest.importorskip("distributed")
     output = tmp_path / "trade.csv"
-    with socket.socket() as taken, suppress(OSError):  # somebody else may have it
-        taken.bind(("", 8787))
-        taken.listen()
+    with socket.socket() as taken:
+        with suppress(OSError):  # somebody else may have it
+            taken.bind(("", 8787))
+            taken.listen()
         few = ("--vary", "collection.aperture_time=1:5s:3")
         assert run("sweep", SECTION_V, *few, "-o", str(output), "--scheduler", "local:1").exit_code == 0
     assert output.exists()

@@ -7,10 +7,10 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any
 
 import pytest
 from click.testing import CliRunner
@@ -23,6 +23,7 @@ from bisar_budget.cli import cli
 from bisar_budget.cluster import scheduler
 from bisar_budget.cluster.scheduler import ClusterError, UnlikeWorkerError, Workers
 from bisar_budget.design.sweep import Chunks
+from tests.cluster.conftest import Cluster, free_port, wait_until
 from tests.conftest import APART, ROOT, heed_signals
 
 MISSION = str(ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml")
@@ -33,66 +34,6 @@ ASKED = (
     *("--column", "receiver.velocity.x.islr_db", "--date", "2026-01-01"),
 )
 PARTS = 10
-
-
-class Cluster(NamedTuple):
-    """A scheduler and its workers, as processes."""
-
-    address: str
-    start_worker: Callable[..., "subprocess.Popen[bytes]"]
-    workers: list["subprocess.Popen[bytes]"]
-    joined: Callable[[], int]
-
-
-def free_port() -> int:
-    with socket.socket() as found:
-        found.bind(("127.0.0.1", 0))
-        port: int = found.getsockname()[1]
-    return port
-
-
-def wait_until(is_so: Callable[[], object], seconds: float = 60) -> None:
-    deadline = time.monotonic() + seconds
-    while not is_so():
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
-
-
-@pytest.fixture(scope="module")
-def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
-    folder = tmp_path_factory.mktemp("cluster")
-    log = (folder / "log").open("wb")
-    address = f"tcp://127.0.0.1:{free_port()}"
-    started: list[subprocess.Popen[bytes]] = []
-
-    def start(*line: str, path: str = "") -> "subprocess.Popen[bytes]":
-        environment = {
-            **os.environ,
-            "PYTHONPATH": os.pathsep.join(filter(None, (path, str(ROOT)))),
-            "OMP_NUM_THREADS": "1",
-        }
-        command = [sys.executable, "-W", "ignore", "-m", *line]
-        started.append(subprocess.Popen(command, env=environment, cwd=folder, stdout=log, stderr=log))
-        return started[-1]
-
-    def start_worker(path: str = "") -> "subprocess.Popen[bytes]":
-        options = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory", str(folder))
-        return start("distributed.cli.dask_worker", address, *options, path=path)
-
-    def joined() -> int:
-        return (folder / "log").read_bytes().count(b"Register worker")
-
-    port = address.rpartition(":")[2]
-    start("distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard")
-    try:
-        workers = [start_worker(), start_worker()]
-        wait_until(lambda: joined() >= 2)
-        yield Cluster(address, start_worker, workers, joined)
-    finally:
-        for process in reversed(started):
-            process.kill()
-            process.wait()
-        log.close()
 
 
 @pytest.fixture(scope="module")
@@ -127,9 +68,7 @@ def test_a_lost_worker_costs_only_its_chunks(cluster: Cluster, expected: bytes, 
         assert ended(process)[0] == 0
     assert output.read_bytes() == expected
     assert list(tmp_path.iterdir()) == [output]
-    there = cluster.joined()
-    cluster.workers.append(cluster.start_worker())
-    wait_until(lambda: cluster.joined() > there)
+    cluster.replace_worker()
 
 
 def test_what_is_done_when_a_sweep_is_ended_is_not_done_again(

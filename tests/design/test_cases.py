@@ -24,7 +24,7 @@ def axis(text: str) -> tuple[list[float], str]:
     """Values of one option in SI, and the unit that they are said in."""
     found = grid(TREE, [text])
     assert found.count == found.axes[0].size
-    return found.axes[0].tolist(), found.numbers[0].unit
+    return found.axes[0].tolist(), found.varied[0].unit
 
 
 def test_ends_belong_to_a_range_and_one_without_unit_has_that_of_the_other() -> None:
@@ -71,9 +71,48 @@ def test_more_cases_than_an_array_could_count() -> None:
     assert many.count == MAX_VALUES**2
 
 
+def test_words() -> None:
+    found = grid(TREE, ["allocation.model=full, published", f"{TIME}=1,2s"])
+    assert (found.shape, [one.unit for one in found.varied]) == ((2, 2), ["", "s"])
+    assert found.values(1, 3)["allocation.model"].tolist() == ["full", "published"]
+    lists = grid(TREE, ["platforms.receiver.motion_error.sensor=[stim300, mosaic-x5-rtk],stim300"])
+    assert lists.axes[0].tolist() == ["[stim300, mosaic-x5-rtk]", "stim300"]
+    assert grid(TREE, ["collection.pulses=256,512"]).axes[0].tolist() == ["256", "512"]
+
+
+def test_a_rule_stands_in_for_shares() -> None:
+    """The file has shares; what is asked decides the form that is read."""
+    shares = {"allocation": {"split": {"transmitter": "0.5", "receiver": "0.5"}}}
+    assert grid(shares, ["allocation.split=equal,balanced"]).axes[0].tolist() == ["equal", "balanced"]
+    assert grid(shares, ["allocation.split.transmitter=0.4,0.5"]).axes[0].tolist() == [0.4, 0.5]
+    with pytest.raises(QuestionError, match="the file has 'equal' there, which has no 'transmitter'"):
+        grid({"allocation": {"split": "equal"}}, ["allocation.split.transmitter=0.4,0.5"])
+
+
+def test_a_list_of_parts_is_not_replaced_by_one() -> None:
+    """The other part would be lost without a word."""
+    tree = {"platforms": {"receiver": {"motion_error": {"sensor": ["stim300", "mosaic-x5-rtk"]}}}}
+    key = "platforms.receiver.motion_error.sensor"
+    said = r"sensor\.0=hg1700,imx5 for its first, or lists, .*=\[hg1700, mosaic-x5-rtk\]"
+    with pytest.raises(QuestionError, match=said):
+        grid(tree, [f"{key}=hg1700,imx5"])
+    assert grid(tree, [f"{key}.0=hg1700,imx5"]).axes[0].tolist() == ["hg1700", "imx5"]
+    with pytest.raises(QuestionError, match="the list has 2 entries"):
+        grid(tree, [f"{key}.2=hg1700"])
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
+        (
+            "allocation.model=publishd,full",
+            "'publishd' is not a known choice; accepted: published, full",
+        ),
+        ("allocation.model=full,full", "has a value twice"),
+        ("allocation.model=full,", "'' is not a known choice"),
+        ("allocation.model=1:2:3", "'1:2:3' is not a known choice"),
+        ("collection.pulses=1,512", "'1' must be a whole number from 2"),
+        ("platforms.receiver.motion_error.sensor=,", "'' must not be empty"),
         (f"{TIME}", "does not say which values"),
         (f"{TIME}=", "does not say which values"),
         ("=1:2s:3", "does not say which values"),
@@ -144,9 +183,9 @@ def test_values_are_said_as_they_were_written(unit: str, value: float, digits: i
     assume(abs(parse_quantity(f"{text} {unit}", units.ANGLE)) <= 2 * math.pi)
     assume(not 0 < abs(float(text)) < 1e-300)  # such have fewer digits
     found = grid(TREE, [f"{AZIMUTH}={text} {unit}"])
-    assert in_unit(found.numbers[0], found.axes[0])[0] == pytest.approx(float(text), rel=5e-16)
+    assert in_unit(found.varied[0], found.axes[0])[0] == pytest.approx(float(text), rel=5e-16)
     if abs(float(text)) > 1e-9:
-        said = in_unit(found.numbers[0], found.axes[0])[0]
+        said = in_unit(found.varied[0], found.axes[0])[0]
         assert parse_quantity(f"{said.item()!r} {unit}", units.ANGLE) == found.axes[0][0]
 
 
@@ -176,6 +215,12 @@ class TestTables:
         assert values["radar.bandwidth"].tolist() == [150e6, 300e6]
         assert found.values(1, 2)[TIME].tolist() == [2.5]
 
+    def test_words(self) -> None:
+        text = f'allocation.model, {TIME} [ms]\nfull, 1000\n"published",2\nfull,3\n'
+        values = table(TREE, text, "c.csv").values(0, 3)
+        assert values["allocation.model"].tolist() == ["full", "published", "full"]
+        assert values[TIME].tolist() == [1, 0.002, 0.003]
+
     def test_a_value_that_the_key_cannot_have_is_a_case(self) -> None:
         assert table(TREE, f"{TIME} [s]\n-1\n", "c.csv").columns[0].tolist() == [-1]
 
@@ -202,6 +247,8 @@ class TestTables:
             (f"{TIME} [s],radar.bandwidth [Hz]\n1,\n", "c.csv:2:3: radar.bandwidth: is no number (got nothing)"),
             (f"{TIME} [s]\n1,2\n", "c.csv:2:3: has 2 cells; accepted: 1, as the header has"),
             (f"{TIME} [s],radar.bandwidth [Hz]\n1\n", "c.csv:2:1: has 1 cells; accepted: 2"),
+            ("allocation.model [s]\nfull\n", "c.csv:1:1: allocation.model [s]: has words, which have no unit"),
+            (f"{TIME} [s],allocation.model\n1,ful\n", "c.csv:2:3: allocation.model: 'ful' is not a known choice"),
         ],
     )
     def test_what_is_no_table(self, text: str, said: str) -> None:
@@ -248,6 +295,12 @@ class TestSamples:
     def test_parts_have_equal_ratios(self) -> None:
         column = self.drawn(log=":log").columns[0]
         assert sorted(np.floor(np.log10(column) * 50)) == list(range(50))
+
+    def test_each_word_is_drawn_as_often(self) -> None:
+        found = sample(TREE, [f"{TIME}=1:10s", "allocation.model=published,full,strictest"], "latin:60:1")
+        words = found.columns[1].tolist()
+        assert sorted(words) == ["full"] * 20 + ["published"] * 20 + ["strictest"] * 20
+        assert len(set(words[:10])) > 1  # not one after the other
 
     def test_the_seed_decides(self) -> None:
         first, same, other = (self.drawn(f"latin:50:{seed}").columns[0].tolist() for seed in (1, 1, 2))

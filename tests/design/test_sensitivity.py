@@ -5,12 +5,14 @@ import json
 import math
 from collections.abc import Callable
 from datetime import date
+from io import StringIO
 from pathlib import Path
 
 import pytest
 
 from bisar_budget import evaluators
 from bisar_budget.budget.check import check_mission
+from bisar_budget.cli import keeping
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.design import sensitivity as asking
 from bisar_budget.design.quantities import QuestionError
@@ -18,6 +20,8 @@ from bisar_budget.design.slopes import Sensitivity, Slope
 from bisar_budget.faults import SetValue
 from bisar_budget.mission.changes import read_changes
 from bisar_budget.mission.load import load_mission, parse_mission
+from bisar_budget.mission.model import names_parts
+from bisar_budget.mission.parts import finder_of, taken_figures
 from bisar_budget.report.drawing import tornado
 from tests.conftest import ROOT, mission_text
 
@@ -192,6 +196,95 @@ def test_levels_count_per_decibel() -> None:
 def test_a_covariance_counts_by_its_sigmas() -> None:
     by_key = slopes(ask(file=str(MISSIONS / "drones_same_gnss.yaml")))
     assert by_key["platforms.transmitter.motion_error.covariance"].text == "its sigmas"
+
+
+class TestParts:
+    """Figures of parts of the catalogue are numbers like those of the file."""
+
+    @pytest.mark.parametrize(
+        "name",
+        ["uav_stim300", "ocxo_free_running", "ocxo_direct_path", "tandem_x_synchronized", "sentinel1_fixed_receiver"],
+    )
+    def test_a_file_that_states_them_is_the_same_mission(self, name: str) -> None:
+        mission = load_mission(str(MISSIONS / f"{name}.yaml"))
+        taken = list(taken_figures(mission, finder_of(str(MISSIONS))))
+        assert bool(taken) == names_parts(mission)
+        changes = [SetValue(one.key, json.dumps(one.value)) for one in taken]
+        stated = parse_mission(mission.data, mission.file, changes=changes)
+        assert not list(taken_figures(stated, finder_of(str(MISSIONS))))
+        was, now = (check_mission(one, DAY) for one in (mission, stated))
+        assert [(row.id, row.declared, row.allowable, row.status) for row in was.rows] == [
+            (row.id, row.declared, row.allowable, row.status) for row in now.rows
+        ]
+
+    def test_a_slope_is_that_of_parts_with_other_figures(self, tmp_path: Path) -> None:
+        """Two parts whose files differ by 1 % to both sides of the catalogue's."""
+        text = (MISSIONS / "uav_stim300.yaml").read_text(encoding="utf-8")
+        part = (ROOT / "specs" / "sensors" / "stim300.yaml").read_text(encoding="utf-8")
+        uses = []
+        for factor in (0.99, 1.01):
+            walk = f"velocity_random_walk: {0.024 * factor} m/s/sqrt(h)"
+            changed = part.replace("velocity_random_walk: 0.024 m/s/sqrt(h)", walk)
+            assert changed != part
+            (tmp_path / "own.yaml").write_text(changed, encoding="utf-8")
+            file = tmp_path / "m.yaml"
+            file.write_text(text.replace("[stim300,", "[own.yaml,"), encoding="utf-8")
+            found = check_mission(load_mission(str(file)), DAY)
+            uses.append(
+                max(row.utilization or 0.0 for row in found.rows if row.id == "receiver.quadratic_phase_error")
+            )
+        slope = slopes(ask(file=str(MISSIONS / "uav_stim300.yaml")))[
+            "platforms.receiver.motion_error.imu.velocity_random_walk"
+        ]
+        assert slope.change == pytest.approx((uses[1] - uses[0]) / 2, rel=1e-6)
+        assert (slope.part, slope.text, slope.per_text) == ("stim300", "0.024 m/s/sqrt(h)", "1 %")
+
+    def test_what_the_file_states_itself_is_of_no_part(self) -> None:
+        found = slopes(ask(file=str(MISSIONS / "uav_stim300.yaml")))
+        assert found["platforms.receiver.motion_error.imu.attitude"].part == ""
+        key = "platforms.receiver.motion_error.velocity"
+        assert found[key].part == "mosaic-x5-rtk"
+        assert slopes(ask(f"{key}=2 cm/s", file=str(MISSIONS / "uav_stim300.yaml")))[key].part == ""
+
+    def test_every_point_of_a_mask_counts_per_decibel(self) -> None:
+        found = slopes(ask(file=str(MISSIONS / "ocxo_free_running.yaml")))
+        point = found["platforms.receiver.oscillator.phase_noise.1 Hz"]
+        assert (point.part, point.per_text) == ("ettus-gpsdo-ocxo", "1 dB")
+        assert point.change > 0
+
+    def test_the_table_and_json_name_the_part(self, run: Callable) -> None:
+        file = str(MISSIONS / "uav_stim300.yaml")
+        assert "0.03 m/s (mosaic-x5-rtk)" in run("sensitivity", file).stdout
+        (mission,) = json.loads(run("sensitivity", file, "--format", "json").stdout)["missions"]
+        parts = {number["key"]: number["part"] for number in mission["numbers"]}
+        assert parts["platforms.receiver.motion_error.velocity"] == "mosaic-x5-rtk"
+        assert parts["collection.aperture_time"] is None
+        assert mission["set"] == []  # nobody set the figures
+
+
+class TestProgress:
+    """What takes long is seen to go on, by who watches."""
+
+    def test_every_number_is_told(self) -> None:
+        told: list[tuple[int, int]] = []
+        found = ask(progress=lambda done, total: told.append((done, total)))
+        assert [done for done, _ in told] == list(range(1, len(told) + 1))
+        assert {total for _, total in told} == {len(told)}
+        assert len(told) >= len(found.slopes) + len(found.unchanging)
+
+    @pytest.mark.parametrize(("is_watched", "moment"), [(True, 0.0), (True, 60.0), (False, 0.0)])
+    def test_a_bar_is_for_a_terminal_and_for_what_takes_long(
+        self, is_watched: bool, moment: float, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        errors = StringIO()
+        monkeypatch.setattr(errors, "isatty", lambda: is_watched)
+        monkeypatch.setattr("sys.stderr", errors)
+        monkeypatch.setattr(keeping, "_MOMENT", moment)
+        with keeping.late_bar("Changing numbers") as progress:
+            for done in range(1, 4):
+                progress(done, 3)
+        assert ("Changing numbers" in errors.getvalue()) == (is_watched and moment == 0)
+        assert ("100%" in errors.getvalue()) == (is_watched and moment == 0)
 
 
 def test_what_is_no_number_is_listed() -> None:

@@ -3,6 +3,7 @@
 import math
 import re
 from datetime import date
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,8 +11,9 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.design.cases import Grid
-from bisar_budget.design.quantities import QuestionError, number_of
+from bisar_budget.design.cases import Grid, Table, sample
+from bisar_budget.design.cases import grid as cases_of
+from bisar_budget.design.quantities import QuestionError, number_of, tree_of
 from bisar_budget.design.sweep import sweep
 from bisar_budget.design.variation import breaking, standing
 from bisar_budget.faults import MissionError, SetValue
@@ -51,7 +53,7 @@ def assert_as_checked(mission, cases, whole, columns=(), model=None) -> None:
     for place in range(cases.count):
         values = {key: float(one[0]) for key, one in cases.values(place, place + 1).items()}
         changes = [
-            SetValue(number.key, f"{values[number.key]!r} {number.dimension.si}".rstrip()) for number in cases.numbers
+            SetValue(number.key, f"{values[number.key]!r} {number.dimension.si}".rstrip()) for number in cases.varied
         ]
         got = {name: column[place] for name, column in whole.items()}
         try:
@@ -131,7 +133,7 @@ def test_every_case_is_that_of_check(data, family, seed) -> None:
     axes = {}
     for key in data.draw(st.lists(st.sampled_from(sorted(_KEYS)), unique=True, min_size=1, max_size=2), label="keys"):
         try:
-            (number,) = grid(mission, **{key: [1.0]}).numbers
+            (number,) = grid(mission, **{key: [1.0]}).varied
         except QuestionError:
             continue
         if number.value:
@@ -338,3 +340,117 @@ def test_a_fixed_platform_has_no_direction_to_fly_in() -> None:
     assert list(whole["status"])[1] == "error"
     assert "motion_azimuth" in whole["reason"][1]
     assert_as_checked(mission, cases, whole)
+
+
+class TestWords:
+    """Keys that have words: the cases of each word are those of the file with it."""
+
+    @staticmethod
+    def as_checked(name: str, texts: list[str], columns: tuple[str, ...] = (), jobs: int = 1) -> tuple[Any, int]:
+        """Every case of a sweep held to a check of the mission that has its words and numbers."""
+        mission = load_mission(str(MISSIONS / f"{name}.yaml"))
+        cases = cases_of(tree_of(mission), texts)
+        whole, by_case = swept(mission, cases, columns, jobs=jobs)
+        for place in range(cases.count):
+            values = {key: one[0] for key, one in cases.values(place, place + 1).items()}
+            changes = [
+                SetValue(
+                    one.key, values[one.key] if one.unit == "" else f"{float(values[one.key])!r} {one.dimension.si}"
+                )
+                for one in cases.varied
+            ]
+            try:
+                case = parse_mission(mission.data, mission.file, changes=changes)
+            except MissionError as error:
+                assert whole["status"][place] == "error"
+                assert whole["reason"][place] == f"{error.faults[0].key}: {error.faults[0].problem}"
+                continue
+            found = check_mission(case, DAY, is_brief=not columns)
+            stands = standing(found, None, breaking("fail"))
+            assert (whole["status"][place], whole["worst_row"][place]) == (found.status, stands.row or ""), values
+            assert whole["utilization"][place] == pytest.approx(stands.utilization, rel=NEAR)
+            assert whole["reason"][place] == ""
+            rows = {row.id: row for row in found.rows}
+            for name in columns:
+                row_id, _, field = name.rpartition(".")
+                want = getattr(rows[row_id], field) if row_id in rows else None
+                assert whole[name][place] == pytest.approx(math.nan if want is None else want, rel=NEAR, nan_ok=True)
+        return whole, by_case
+
+    def test_models_and_rules_are_held_by_arrays(self) -> None:
+        texts = ["allocation.model=published,full,strictest", "allocation.combine=each,rss"]
+        texts.append("collection.aperture_time=0.5:3s:6")
+        whole, by_case = self.as_checked("one_stationary_spotlight", texts)
+        assert by_case == 0
+        assert len(set(zip(whole["status"], whole["worst_row"], strict=True))) > 2
+
+    def test_parts_of_the_catalogue(self) -> None:
+        """A row that only one part has is a column without a value for the other."""
+        texts = ["platforms.receiver.motion_error.sensor.0=stim300,adis16405", "collection.aperture_time=1,3s"]
+        mission = load_mission(str(MISSIONS / "uav_stim300.yaml"))
+        known = {row.id for row in check_mission(mission, DAY).rows}
+        columns = tuple(f"{row}.utilization" for row in sorted(known) if ".imu" in row or "random" in row)
+        assert columns
+        _, by_case = self.as_checked("uav_stim300", texts, columns)
+        assert by_case == 4
+
+    def test_a_row_of_one_word_alone_is_a_column(self) -> None:
+        """Without a part the mission has no row of inertial sensors."""
+        mission = load_mission(str(MISSIONS / "rigling_moses_section_v.yaml"))
+        key = "platforms.receiver.motion_error.sensor"
+        cases = cases_of(tree_of(mission), [f"{key}=stim300,mosaic-x5-rtk"])
+        (part,) = sweep(mission, cases, columns=["receiver.imu.accelerometer_bias.utilization"], today=DAY).parts
+        use = part.values["receiver.imu.accelerometer_bias.utilization"]
+        assert np.isfinite(use).tolist() == [True, False]
+
+    def test_words_and_numbers_in_a_sample(self) -> None:
+        mission = load_mission(str(MISSIONS / "one_stationary_spotlight.yaml"))
+        texts = ["collection.aperture_time=0.5:3s", "allocation.model=published,full"]
+        cases = sample(tree_of(mission), texts, "latin:20:1")
+        whole, by_case = swept(mission, cases)
+        assert by_case == 0
+        for model in ("published", "full"):
+            some = whole["allocation.model"] == model
+            number = tuple(one for one in cases.varied if one.unit)
+            alone, _ = swept(mission, Table(number, (cases.columns[0][some],)), model=model)
+            assert alone["utilization"].tolist() == whole["utilization"][some].tolist()
+
+    def test_processes_find_the_same(self) -> None:
+        texts = ["platforms.receiver.motion_error.sensor.0=stim300,imx5", "collection.aperture_time=1:3s:300"]
+        mission = load_mission(str(MISSIONS / "uav_stim300.yaml"))
+        cases = cases_of(tree_of(mission), texts)
+        alone, shared = swept(mission, cases)[0], swept(mission, cases, jobs=2)[0]
+        for name, column in alone.items():
+            assert column.tolist() == shared[name].tolist(), name
+
+    def test_words_that_make_a_mission_with_some_numbers(self) -> None:
+        """Opposite to each other the platforms resolve nothing, by whatever model."""
+        texts = ["allocation.model=published,full", "platforms.receiver.azimuth=45,180deg"]
+        whole, _ = self.as_checked("rigling_moses_section_v", texts)
+        assert (whole["status"] == "error").tolist() == [False, True, False, True]
+
+    @pytest.mark.parametrize(
+        ("text", "said"),
+        [
+            ("motion_error.sensor=stim30", "sensor=stim30: is no part of the catalogue.*'stim300'"),
+            ("motion_error.sensor=[stim300", r"sensor=\[stim300: is not valid YAML"),
+            ("orbit.tle=[a, b],[c, d]", "tle: no value of it makes a mission: .* mixes orbit"),
+            ("motion_error.frame=track,ric", "frame=ric: the ric frame needs the scene's latitude"),
+            ("trajectory.file=a.csv,b.csv", "file: no value of it makes a mission: .* mixes trajectory"),
+        ],
+    )
+    def test_what_no_number_can_mend_is_said_at_once(self, text: str, said: str) -> None:
+        mission = load_mission(str(MISSIONS / "rigling_moses_section_v.yaml"))
+        with pytest.raises(QuestionError, match=said):
+            sweep(mission, cases_of(tree_of(mission), [f"platforms.receiver.{text}"]), today=DAY)
+
+    def test_a_word_that_lacks_another_key_says_which(self) -> None:
+        mission = load_mission(str(MISSIONS / "rigling_moses_section_v.yaml"))
+        with pytest.raises(QuestionError, match=r"method=linear: synchronization\.\w+ is missing"):
+            sweep(mission, cases_of(tree_of(mission), ["synchronization.method=linear"]), today=DAY)
+
+    def test_a_model_of_the_command_leaves_none_to_compare(self) -> None:
+        mission = load_mission(str(MISSIONS / "rigling_moses_section_v.yaml"))
+        cases = cases_of(tree_of(mission), ["allocation.model=full"])
+        with pytest.raises(QuestionError, match="--model stands in for it"):
+            sweep(mission, cases, model="full", today=DAY)

@@ -75,7 +75,7 @@ def test_an_entry_is_added_behind_the_last() -> None:
             "--set radar.bandwith: is not a known key; accepted: center_frequency, bandwidth. Did",
         ),
         ("aperture_time=3 s", "Did you mean 'collection.aperture_time'?"),
-        ("reciever.azimuth=3deg", "'platforms.transmitter.azimuth' or 'platforms.receiver.azimuth'?"),
+        ("reciever.azimuth=3deg", "'platforms.receiver.azimuth' or 'platforms.transmitter.azimuth'?"),
         ("radar.bandwidth=", "--set radar.bandwidth: has no value. Give it one"),
         ("radar.bandwidth=~", "--set radar.bandwidth: has no value. Give it one"),
         ("radar.bandwidth=[1", "--set radar.bandwidth: is not valid YAML: "),

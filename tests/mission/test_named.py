@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bisar_budget.design.cases import grid
+from bisar_budget.design.cases import grid, words_of
 from bisar_budget.design.quantities import tree_of
 from bisar_budget.design.sweep import Asked, Question, part_of
+from bisar_budget.faults import SetValue
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.named import named_by
 from tests.conftest import ROOT
@@ -50,6 +51,24 @@ def test_cases_are_checked_without_the_files(missions: Path, name: str, paths: i
     assert "error" not in here.values["status"]
     for column, values in here.values.items():
         np.testing.assert_array_equal(there.values[column], values)
+
+
+def test_what_the_words_of_a_sweep_name_is_taken_along(missions: Path) -> None:
+    for name in ("one", "other"):
+        shutil.copy(ROOT / "specs" / "sensors" / "stim300.yaml", missions / f"{name}.yaml")
+    file = missions / "uav_stim300.yaml"
+    loaded = load_mission(str(file))
+    cases = grid(
+        tree_of(loaded), ["platforms.receiver.motion_error.sensor.0=one.yaml,other.yaml", "radar.bandwidth=50MHz"]
+    )
+    words = [SetValue(one.key, word) for one, several in words_of(cases) for word in several]
+    mission, named = named_by(loaded, [*words, SetValue("radar.bandwidth", "1 s")])
+    assert {"one.yaml", "other.yaml"} < {name for name, _, _ in named.parts}
+    asked = Asked(mission, cases, today=date(2026, 1, 1), named=named)
+    shutil.rmtree(missions)
+    there = part_of(Question(*asked.question[:-1], named._replace()), 0, 2, cases.values(0, 2))
+    assert "error" not in there.values["status"]
+    assert there.values["utilization"][0] == there.values["utilization"][1] > 0
 
 
 def test_the_hash_is_of_every_name_and_content(missions: Path) -> None:

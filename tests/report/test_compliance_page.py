@@ -8,10 +8,12 @@ import re
 import shutil
 import subprocess
 from collections.abc import Callable, Iterator
+from datetime import date
 from pathlib import Path
 
 import pytest
 
+from bisar_budget.cli.studies import with_studies
 from bisar_budget.findings.mission import Report, UnusableMission
 from bisar_budget.report import Style, render
 from tests.conftest import ROOT, findings
@@ -27,10 +29,28 @@ FLAGS = [
     "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
     "--disable-component-update", "--disable-sync", "--no-sandbox",
 ]  # fmt: skip
+MISSIONS = ROOT / "specs" / "missions"
 WIDTHS = (1280, 390)
 SCHEMES = ("light", "dark")
 LONG = "a-name-that-has-no-place-to-break-" * 4
+SENSOR, TIME = "platforms.receiver.motion_error.sensor.0", "collection.aperture_time"
+
+
+def studied() -> Report:
+    """Curves, a map, bars, curves of words and a map of words."""
+    asked = [
+        (SECTION_V, [f"{TIME}=1:9s:9"]),
+        (SECTION_V, [f"{TIME}=1:9s:9", "platforms.receiver.azimuth=0:180deg:9"]),
+        (MISSIONS / "uav_stim300.yaml", [f"{SENSOR}=stim300,adis16405,mti-g,hg1700"]),
+        (MISSIONS / "uav_stim300.yaml", [f"{SENSOR}=stim300,mti-g", f"{TIME}=1:5s:5"]),
+        (MISSIONS / "uav_stim300.yaml", ["allocation.model=published,full", "allocation.combine=each,sum,rss"]),
+    ]
+    missions = [with_studies([found_in(file)], texts, None, date(2026, 1, 1))[0] for file, texts in asked]
+    return Report("1.2.3", tuple(missions))
+
+
 REPORTS: dict[str, Callable[[], Report]] = {
+    "studies": studied,
     "section_v": lambda: Report("1.2.3", (found_in(SECTION_V),)),
     "images": lambda: Report("1.2.3", (illustrated(),)),
     "everything": lambda: Report(
@@ -105,9 +125,11 @@ def asked(page: "playwright.Page", options: dict[str, object]) -> dict[str, list
 @pytest.mark.parametrize(
     ("name", "width", "scheme"),
     [
-        *(("section_v", width, scheme) for width in WIDTHS for scheme in SCHEMES),
-        ("images", 390, "light"),
+        ("section_v", 390, "light"),
+        ("section_v", 1280, "dark"),
+        ("images", 1280, "light"),
         ("everything", 390, "dark"),
+        *(("studies", width, scheme) for width, scheme in zip(WIDTHS, SCHEMES, strict=True)),
     ],
 )
 def test_axe_finds_nothing_serious(show, name: str, width: int, scheme: str) -> None:

@@ -1,7 +1,9 @@
 """Files of cases, read with other people's readers: pandas' and Python's CSV, pyarrow, xarray."""
 
 import csv
+import sys
 from collections.abc import Iterator
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -10,13 +12,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bisar_budget.design.cases import Cases, grid, table
+from bisar_budget.design.cases import Cases, grid, grid_of, table, table_of
+from bisar_budget.design.quantities import QuestionError
+from bisar_budget.design.sweep import sweep
 from bisar_budget.design.swept import Column, Part, Swept, Values
 from bisar_budget.faults import SetValue
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.tree import read_tree
 from bisar_budget.report import tables
 from bisar_budget.report.tables import TABLES, MissingTablesError, writer_of
+from bisar_budget.report.tables.dataset import dataset
 from bisar_budget.report.tables.described import Described
 from bisar_budget.report.tables.netcdf import slabs
 from tests.conftest import ROOT
@@ -24,6 +29,7 @@ from tests.conftest import ROOT
 FILE = ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml"
 MISSION = load_mission(str(FILE), changes=[SetValue("radar.bandwidth", "150MHz")])
 TREE: dict[str, Any] = read_tree(FILE.read_bytes(), "m.yaml").root
+DAY = date(2026, 1, 1)
 TIME, AZIMUTH = "collection.aperture_time", "platforms.receiver.azimuth"
 GRID = grid(TREE, [f"{TIME}=1:2s:3", f"{AZIMUTH}=-30,60,90,180deg", "radar.bandwidth=100,200MHz"])
 TABLE = table(TREE, f"{TIME} [ms],{AZIMUTH} [deg]\n" + "".join(f"{100 * i},{i}\n" for i in range(1, 25)), "c.csv")
@@ -40,7 +46,7 @@ def swept(cases: Cases, size: int) -> Swept:
         "reason": np.array([f'case {n}, "bad"' if n % 3 == 2 else "" for n in number], object),
     }
     columns = (
-        *(Column(number.key, number.dimension.si, f"the key {number.key}") for number in cases.numbers),
+        *(Column(one.key, one.unit and "SI", f"the key {one.key}", not one.unit) for one in cases.varied),
         Column("utilization", "", "what is declared over what is allowed"),
         Column("status", "", "status of the mission", True),
         Column("worst_row", "", "row of the highest utilization", True),
@@ -52,7 +58,7 @@ def swept(cases: Cases, size: int) -> Swept:
             stop = min(start + size, 24)
             yield Part(start, stop, {name: values[start:stop] for name, values in found.items()}, 0)
 
-    keys = tuple(number.key for number in cases.numbers)
+    keys = tuple(number.key for number in cases.varied)
     return Swept("A =name", "ab" * 32, keys, cases.shape, 24, columns, parts())
 
 
@@ -156,6 +162,79 @@ def test_netcdf_of_a_table_has_a_dimension_of_cases(tmp_path: Path) -> None:
         assert dict(read.sizes) == {"case": 24}
         assert read[TIME].values.tolist() == [100.0 * n for n in range(1, 25)]
         assert read[TIME].attrs["units"] == "ms"
+
+
+def test_words_are_text_in_every_format(tmp_path: Path) -> None:
+    """And the axis of a grid in NetCDF; no one model has found all the cases."""
+    import pyarrow.parquet as pq
+    import xarray
+
+    cases = grid(TREE, [f"{TIME}=1:2s:8", "allocation.model=published,full,strictest"])
+    lines = written(".csv", cases, tmp_path).read_text(encoding="utf-8").splitlines()
+    assert "# model: varies" in lines
+    rows = list(csv.DictReader(lines[6:]))
+    assert [row["allocation.model"] for row in rows[:4]] == ["published", "full", "strictest", "published"]
+    again = table(TREE, "".join(",".join(line.split(",")[:2]) + "\n" for line in lines), "again.csv")
+    assert again.values(0, 24)["allocation.model"].tolist() == cases.values(0, 24)["allocation.model"].tolist()
+    read = pq.read_table(written(".parquet", cases, tmp_path))
+    assert read.column("allocation.model").to_pylist()[:3] == ["published", "full", "strictest"]
+    with xarray.open_dataset(written(".nc", cases, tmp_path)) as dataset:
+        assert dict(dataset.sizes) == {TIME: 8, "allocation.model": 3}
+        assert dataset["allocation.model"].values.tolist() == ["published", "full", "strictest"]
+        assert float(dataset["utilization"].sel({TIME: 1, "allocation.model": "full"})) == 1 / 7
+
+
+class TestDatasets:
+    """In memory, as xarray has them."""
+
+    def test_arrays_go_in_and_a_dataset_comes_out(self) -> None:
+        """By hand: the utilization goes with the square of the aperture time, 11.78 at 6 s."""
+        mission = load_mission(str(FILE))
+        times = np.linspace(1, 6, 11)
+        cases = grid_of(TREE, {"allocation.model": ["published", "full"], TIME: times})
+        found = dataset(
+            sweep(mission, cases, columns=("transmitter.acceleration.x.status",), today=DAY), cases, mission
+        )
+        assert dict(found.sizes) == {"allocation.model": 2, TIME: 11}
+        published = found["utilization"].sel({"allocation.model": "published"})
+        assert published.values == pytest.approx(11.78124183 * (times / 6) ** 2)
+        assert found[TIME].values == pytest.approx(times)
+        assert (found[TIME].attrs["units"], found["bistatic_angle"].attrs["units"]) == ("s", "rad")
+        assert found.sel({"allocation.model": "full", TIME: 6.0})["status"].item() == "fail"
+        assert found["transmitter.acceleration.x.status"].values[0].tolist() == found["status"].values[0].tolist()
+        assert found.attrs["format"] == "bisar-budget/sweep/1"
+
+    def test_pairs_of_values_are_cases(self) -> None:
+        mission = load_mission(str(FILE))
+        cases = table_of(TREE, {TIME: [1, 6], AZIMUTH: np.radians([45, 45])})
+        found = dataset(sweep(mission, cases, today=DAY), cases, mission)
+        assert dict(found.sizes) == {"case": 2}
+        assert found["utilization"].values == pytest.approx([11.78124183 / 36, 11.78124183])
+        assert found[AZIMUTH].values == pytest.approx([45, 45])  # in the unit of the file
+        assert found[AZIMUTH].attrs["units"] == "deg"
+
+    @pytest.mark.parametrize(
+        ("values", "said"),
+        [
+            ({TIME: [[1.0]]}, "has values of the shape (1, 1); accepted: (n,)"),
+            ({TIME: []}, "has values of the shape (0,)"),
+            ({TIME: ["1 s"]}, "has words; accepted: numbers in SI"),
+            ({"allocation.model": ["ful"]}, "'ful' is not a known choice"),
+            ({"allocation.model": [1.0]}, "is no number with a unit"),
+            ({"name": ["a"]}, "is no number with a unit"),
+            ({}, "nothing would vary"),
+            ({TIME: [1, 2], AZIMUTH: [1]}, "differ in length"),
+        ],
+    )
+    def test_arrays_that_are_no_cases(self, values: Any, said: str) -> None:
+        with pytest.raises(QuestionError) as error:
+            table_of(TREE, values)
+        assert said in str(error.value)
+
+    def test_without_xarray(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setitem(sys.modules, "xarray", None)
+        with pytest.raises(MissingTablesError, match="pip install xarray"):
+            dataset(sweep(MISSION, GRID, today=DAY), GRID, MISSION)
 
 
 @given(st.lists(st.integers(1, 5), min_size=1, max_size=4), st.data())

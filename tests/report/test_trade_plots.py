@@ -32,17 +32,17 @@ def trade(*texts: str, column: str | None = None, is_polar: bool = False) -> Tra
     """Utilization is the first key's SI value; above 1 it fails, below 0 there is no mission."""
     cases = grid(TREE, texts)
     values: dict[str, Any] = {**cases.values(0, cases.count)}
-    use = values[cases.numbers[0].key]
+    use = values[cases.varied[0].key]
     values["utilization"] = np.where(use < 0, np.nan, use)
     values["status"] = np.select([use < 0, use > 1], ["error", "fail"], "pass").astype(object)
     values["worst_row"] = np.select([use < 0, use > 2], ["", "second"], "first").astype(object)
     columns = (
-        *(Column(number.key, number.dimension.si, "varies") for number in cases.numbers),
+        *(Column(one.key, one.unit and "SI", "varies", is_text=not one.unit) for one in cases.varied),
         Column("utilization", "", "use"),
         Column("status", "", "status", True),
         Column("worst_row", "", "row", True),
     )
-    keys = tuple(number.key for number in cases.numbers)
+    keys = tuple(number.key for number in cases.varied)
     swept = Swept("m", "0" * 64, keys, cases.shape, cases.count, columns, iter(()))
     gathered = Gathered(Described(swept, cases, MISSION, "1"), column=column)
     middle = cases.count // 2
@@ -75,7 +75,7 @@ class TestWhatIsDrawn:
 
     def test_an_azimuth_comes_first_in_a_polar_map(self) -> None:
         shown = trade(f"{TIME}=1,2s", f"{AZIMUTH}=0:90deg:3", is_polar=True)
-        assert [axis.number.key for axis in shown.axes] == [AZIMUTH, TIME]
+        assert [axis.key for axis in shown.axes] == [AZIMUTH, TIME]
         assert shown.values["utilization"].tolist() == [[1, 2]] * 3
 
     @pytest.mark.parametrize(
@@ -199,6 +199,44 @@ class TestPlots:
         _, bar = figure.axes
         assert bar.get_ylabel() == "utilization"
 
+    def test_words_side_by_side(self) -> None:
+        """Nothing is between two words: bars, and the status of each on all of its room."""
+        shown = trade(f"{TIME}=0.5,1.5s")
+        axis = shown.axes[0]._replace(words=("one", "[two, three]"), values=np.arange(2.0), unit="", key="a.b")
+        shown = shown._replace(axes=(axis,))
+        panel = drawn(shown, rows={"receiver.velocity.x": np.array([0.1, 0.2])})
+        assert [tick.get_text() for tick in panel.get_xticklabels()] == ["one", "[two, three]"]
+        assert panel.get_xlim() == (-0.5, 1.5)
+        assert [bar.get_height() for bar in panel.containers[0]] == [50, 150]
+        (line,) = [line for line in panel.lines if line.get_label() == "receiver.velocity.x"]
+        assert (line.get_linewidth(), line.get_marker()) == (0, "o")
+        assert [(run.low, run.high) for run in runs(axis, shown.values["status"])] == [(-0.5, 0.5), (0.5, 1.5)]
+
+    def test_a_curve_for_each_word(self) -> None:
+        shown = trade(f"{TIME}=0.5:2.5s:5", "allocation.model=published,full")
+        shown.values["utilization"][:, 1] *= 2
+        panel = drawn(shown)
+        lines = {line.get_label(): list(line.get_ydata()) for line in panel.lines}
+        assert lines["published"] == [50, 100, 150, 200, 250]
+        assert lines["full"] == [100, 200, 300, 400, 500]
+        assert lines["limit"] == [100, 100]
+        assert panel.get_xlabel() == f"{TIME} [s]"
+        assert "full" in texts_of(panel)
+        assert "published model" not in texts_of(panel)  # none decides for all
+
+    def test_many_words_are_an_axis_of_a_map(self) -> None:
+        words = ",".join(str(number) for number in range(2, 11))
+        panel = drawn(trade(f"{TIME}=0.5:2.5s:5", f"collection.pulses={words}"))
+        assert [tick.get_text() for tick in panel.get_yticklabels()] == words.split(",")
+        assert panel.get_ylim() == (8.5, -0.5)  # the first above
+        assert "100 %" not in texts_of(panel)  # no line can go between words
+
+    def test_words_by_words_have_their_utilization_in_each_cell(self) -> None:
+        shown = trade(f"{TIME}=0.5,1.5s", "allocation.model=published,full")
+        axis = shown.axes[0]._replace(words=("a", "b"), values=np.arange(2.0))
+        panel = drawn(shown._replace(axes=(axis, shown.axes[1])))
+        assert [text.get_text() for text in panel.texts[1:]] == ["50 %\nfirst"] * 2 + ["150 %\nfirst"] * 2
+
     def test_a_polar_map_counts_azimuths_from_east(self) -> None:
         shown = trade(f"{AZIMUTH}=0:360deg:37", "platforms.receiver.slant_range=1:5km:5", is_polar=True)
         panel = drawn(shown, is_polar=True)
@@ -252,6 +290,7 @@ class TestPlots:
             True,
             "as a radius; accepted: values from 0",
         ),
+        ((f"{AZIMUTH}=1,2deg", "allocation.model=published,full"), True, "as a radius; accepted: a number"),
     ],
 )
 def test_what_cannot_be_drawn(texts: tuple[str, ...], is_polar: bool, said: str) -> None:

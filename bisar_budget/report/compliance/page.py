@@ -40,6 +40,7 @@ from bisar_budget.report.compliance.view import (
     Share,
     ShownImage,
     Source,
+    Studied,
     Undeclared,
 )
 from bisar_budget.report.drawing.drawings import geometry_elevation, geometry_plan
@@ -253,6 +254,7 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
         draws=_draws(found.monte_carlo),
         probabilities=tuple(_probabilities(found.monte_carlo)),
         draws_remarks=tuple(_draws_remarks(found.monte_carlo)),
+        study=studied(found, file),
     )
 
 
@@ -262,6 +264,15 @@ def drawings(found: MissionFindings) -> tuple[Picture, ...]:
         Picture("plan.svg", "Plan: the collection from above", geometry_plan(found)),
         Picture("elevation.svg", "Elevation: the collection from the side", geometry_elevation(found)),
     )
+
+
+def studied(found: MissionFindings, file: str) -> Studied | None:
+    """Write a sweep, where there is one; `file` is the name of the mission file that is shown."""
+    if found.study is None:
+        return None
+    from bisar_budget.report.compliance.study import written
+
+    return written(found, found.study, file)
 
 
 def illustrations(found: MissionFindings) -> tuple[Illustration, ...]:

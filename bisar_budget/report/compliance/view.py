@@ -188,6 +188,44 @@ class Illustration(NamedTuple):
     cuts: Picture
 
 
+class Stretch(NamedTuple):
+    """Neighbouring values of a sweep, or one word, with one status and one worst row.
+
+    `requirement` sets its limit; empty where the name of the row says it.
+    """
+
+    where: str
+    status: str
+    row: str
+    requirement: str
+    use: str
+
+
+class StudyPart(NamedTuple):
+    """Cases of a sweep over two keys that have a word or a worst row in common."""
+
+    name: str
+    cases: int
+    complying: int
+    use: str
+
+
+class Studied(NamedTuple):
+    """A sweep: its question, the command that gives its cases, what was found; of one key `stretches`, else `parts`.
+
+    `hidden` is how many of them are not listed.
+    """
+
+    question: str
+    command: str
+    counts: str
+    picture: Picture
+    stretches: tuple[Stretch, ...] = ()
+    parts: tuple[StudyPart, ...] = ()
+    parts_are: str = ""
+    hidden: int = 0
+
+
 class MissionPage(NamedTuple):
     """Everything about one mission; `faults` of an unusable one, which has nothing else but its head."""
 
@@ -236,10 +274,12 @@ class MissionPage(NamedTuple):
     draws: str = ""
     probabilities: tuple[Probability, ...] = ()
     draws_remarks: tuple[str, ...] = ()
+    study: Studied | None = None
 
     def has_annex(self, is_full: bool) -> bool:
-        """Whether there is more than the summary: everything, or images and draws that somebody asked for."""
-        return not self.faults and (is_full or self.evidence is not None or bool(self.draws))
+        """Whether there is more than the summary: everything, or images, draws, a sweep that somebody asked for."""
+        is_asked = self.evidence is not None or bool(self.draws) or self.study is not None
+        return not self.faults and (is_full or is_asked)
 
 
 class Compliance(NamedTuple):

@@ -133,6 +133,21 @@ class Canvas:
             xs, ys = zip(*points, strict=True)
             self.obstacles.append(Box(min(xs), min(ys), max(xs), max(ys)))
 
+    def lines(self, lines: Iterable[Segment], style: str) -> None:
+        """Draw many lines, each from a point to another, as one."""
+        data = "".join(f"M{_number(x)} {_number(y)}L{_number(u)} {_number(v)}" for (x, y), (u, v) in lines)
+        if data:
+            self._elements.append(f'<path class="{style}" d="{data}"/>')
+
+    def boxes(self, boxes: Iterable[Box], style: str) -> None:
+        """Fill many rectangles as one."""
+        data = "".join(
+            f"M{_number(box.left)} {_number(box.top)}H{_number(box.right)}V{_number(box.bottom)}H{_number(box.left)}Z"
+            for box in boxes
+        )
+        if data:
+            self._elements.append(f'<path class="{style}" d="{data}"/>')
+
     def circle(self, centre: Point, radius: float, style: str) -> None:
         """Draw a circle around a point."""
         x, y = centre
@@ -211,8 +226,11 @@ class Canvas:
                 cost += 2 + _CROSSED * math.dist(*part)
         return cost
 
-    def document(self, size: tuple[float, float], key: str, title: str, description: str) -> str:
-        """Return the drawing as SVG, with its name and the text that stands for it where it cannot be seen."""
+    def document(self, size: tuple[float, float], key: str, title: str, description: str, style: str = "") -> str:
+        """Return the drawing as SVG, with its name and the text that stands for it where it cannot be seen.
+
+        `style` are rules of this kind of drawing, beside those of all.
+        """
         name = "d" + sha256(key.encode("utf-8", "surrogatepass")).hexdigest()[:10]
         width, height = (_number(side) for side in size)
         body = "\n".join((*self._elements, *self._texts))
@@ -221,7 +239,7 @@ class Canvas:
             f'width="{width}" height="{height}" aria-labelledby="{name}-title" aria-describedby="{name}-desc">\n'
             f'<title id="{name}-title">{xml_text(title)}</title>\n'
             f'<desc id="{name}-desc">{xml_text(description)}</desc>\n'
-            f"<style>{STYLE}</style>\n{body}\n</svg>\n"
+            f"<style>{STYLE}{style}</style>\n{body}\n</svg>\n"
         )
 
 

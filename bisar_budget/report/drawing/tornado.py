@@ -60,4 +60,4 @@ def figure(found: Sensitivity) -> Any:
 
 def _label(slope: Slope) -> str:
     mark = " *" if slope.is_mixed else ""
-    return f"{printable(slope.key)} = {printable(slope.text)}, {slope.per_text}{mark}"
+    return f"{printable(slope.key)} = {printable(slope.given)}, {slope.per_text}{mark}"

@@ -1,9 +1,7 @@
 """Plots of a sweep: utilizations over one key, a map of statuses or of a column over two, also as seen from above."""
 
-import re
 from collections.abc import Mapping, Sequence
-from functools import cache
-from textwrap import fill
+from textwrap import fill, shorten
 from typing import Any
 
 import numpy as np
@@ -11,21 +9,23 @@ from numpy.typing import NDArray
 
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.status import STATUS
+from bisar_budget.findings.trade import Axis, Trade
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission
 from bisar_budget.report.drawing.figure import figure_file, new_figure
-from bisar_budget.report.drawing.trades import Axis, Trade, borders, regions, runs
-from bisar_budget.resources import resource
+from bisar_budget.report.drawing.tones import ROWS, has_no_mission, light, status_words, strengths, tone_of
+from bisar_budget.report.drawing.trades import borders, per_word, regions, runs
+from bisar_budget.report.words.sentences import percent
 
 _SIZE, _SQUARE = (9.5, 5.2), (8.4, 6.6)  # inches
 _HIGH = 3.0  # times the limit: above it utilizations are drawn in equal ratios
 _LEAST = 1e-3  # of the limit: what is smaller is not of interest there
-_PALETTE = ("transmitter", "receiver", "clock", "pass", "mission", "doubt", "reserve")
 _DASHES = ("-", "-", "-", "--", "--", "-.", ":")
 _TINTS = (0.8, 0.9, 0.65)  # part of white, of the first, second and third status of one colour
-_EMPTY = "reserve"
 _WORST = "#b9bfc6"
 _NAME, _LINE = 60, 95  # characters of a line above a drawing: a wider one would take its room
+_WORD, _ROOM = 40, 70  # characters of a word at an axis, and of all side by side
+_CELLS = 60  # of a map that have room for words of their own
 _FEW = 3  # rows without a name on a map that a legend names
 _LIMIT = {"color": "#1b1e22", "lw": 1.8}
 _SUBTITLE = {"fontsize": 8.5, "color": "#555b63"}
@@ -41,9 +41,11 @@ def drawn(trade: Trade, rows: Mapping[str, NDArray[Any]], mission: Mission, kind
 
 def figure(trade: Trade, rows: Mapping[str, NDArray[Any]], mission: Mission, *, is_polar: bool) -> Any:
     """Lay a sweep on a Matplotlib figure."""
-    page = new_figure(figsize=_SIZE if len(trade.axes) == 1 else _SQUARE)
+    page = new_figure(figsize=_SIZE if len(trade.axes) == 1 or per_word(trade) else _SQUARE)
     panel = page.add_subplot(projection="polar") if is_polar else page.add_subplot()
-    about = ", ".join(filter(None, (*trade.fixed, changes_words(mission.changes), f"{mission.gating_model} model")))
+    is_gating = any(axis.key == "allocation.model" for axis in trade.axes)
+    model = "" if is_gating else f"{mission.gating_model} model"
+    about = ", ".join(filter(None, (*trade.fixed, changes_words(mission.changes), model)))
     about = fill(about, _LINE, max_lines=3, placeholder=" ...")
     if is_polar:
         around, radius = trade.axes
@@ -65,8 +67,11 @@ def figure(trade: Trade, rows: Mapping[str, NDArray[Any]], mission: Mission, *, 
         parse_math=False,
         **_SUBTITLE,
     )
+    by_word = per_word(trade)
     if len(trade.axes) == 1:
         _curves(panel, trade, rows)
+    elif by_word is not None:
+        _curves_of_words(panel, *by_word)
     elif is_polar:
         _polar(page, panel, trade, mission)
     else:
@@ -79,7 +84,15 @@ def figure(trade: Trade, rows: Mapping[str, NDArray[Any]], mission: Mission, *, 
 
 
 def _scale(drawn: Any, axis: Axis) -> None:
-    """From the first value to the last, in equal ratios where the values are."""
+    """From the first value to the last, in equal ratios where the values are; words side by side."""
+    if axis.words:
+        names = [shorten(printable(word), _WORD, placeholder="...") for word in axis.words]
+        is_crowded = drawn.axis_name == "x" and sum(map(len, names)) > _ROOM
+        upright = {"rotation": 60, "ha": "right", "rotation_mode": "anchor"} if is_crowded else {}
+        drawn.set_ticks(axis.values, names, parse_math=False, **upright)
+        ends = (-0.5, axis.values[-1] + 0.5)
+        drawn.axes.set(**{f"{drawn.axis_name}lim": ends if drawn.axis_name == "x" else ends[::-1]})
+        return
     if axis.is_log:
         _in_ratios(drawn)
     drawn.axes.set(**{f"{drawn.axis_name}lim": (axis.values[0], axis.values[-1])})
@@ -95,32 +108,13 @@ def _in_ratios(drawn: Any) -> None:
     drawn.set_minor_formatter(NullFormatter())
 
 
-@cache
-def _tones() -> dict[str, str]:
-    """Colours of a report on white, by their name."""
-    light, _, _ = resource("templates", "report.css").read_text(encoding="utf-8").partition("}")
-    return dict(re.findall(r"--([\w-]+): (#[0-9a-f]{6})", light))
-
-
 def _fills(statuses: Sequence[str]) -> dict[str, str]:
     """Light colours of statuses; of those that share a colour, the worst has the strongest."""
     fills: dict[str, str] = {}
-    used: dict[str, int] = {}
-    for name in statuses:
-        tone = _EMPTY if _has_no_mission(name) else STATUS[name].color
-        part = _TINTS[min(used.get(tone, 0), len(_TINTS) - 1)]
-        used[tone] = used.get(tone, 0) + 1
-        color = [int(_tones()[tone][place : place + 2], 16) for place in (1, 3, 5)]
+    for name, part in strengths(statuses, _TINTS).items():
+        color = [int(light()[tone_of(name)][place : place + 2], 16) for place in (1, 3, 5)]
         fills[name] = "#" + "".join(f"{round(one + (255 - one) * part):02x}" for one in color)
     return fills
-
-
-def _has_no_mission(name: str) -> bool:
-    return STATUS[name].junit == "error"
-
-
-def _words(name: str) -> str:
-    return "no such mission" if _has_no_mission(name) else STATUS[name].words
 
 
 def _patches(statuses: Sequence[str]) -> list[Any]:
@@ -128,7 +122,7 @@ def _patches(statuses: Sequence[str]) -> list[Any]:
     from matplotlib.patches import Patch
 
     fills = _fills(statuses)
-    return [Patch(facecolor=fills[name], edgecolor="#c9ced4", label=_words(name)) for name in statuses]
+    return [Patch(facecolor=fills[name], edgecolor="#c9ced4", label=status_words(name)) for name in statuses]
 
 
 def _curves(panel: Any, trade: Trade, rows: Mapping[str, NDArray[Any]]) -> None:
@@ -137,19 +131,25 @@ def _curves(panel: Any, trade: Trade, rows: Mapping[str, NDArray[Any]]) -> None:
     fills = _fills(trade.statuses)
     for run in runs(axis, trade.values["status"]):
         panel.axvspan(run.low, run.high, facecolor=fills[run.status], lw=0, zorder=0)
-    marker = "." if axis.values.size <= 40 else ""
+    marker = "o" if axis.words else "." if axis.values.size <= 40 else ""
+    joined = {"lw": 0} if axis.words else {"lw": 1.8}  # there is nothing between two words
     lines = []
-    if trade.column is not None:
-        shown = trade.values[trade.column.name]
-        lines += panel.plot(axis.values, shown, color=_tones()["transmitter"], marker=marker, label=trade.column.name)
-        panel.set_ylabel(trade.column.heading)
+    if trade.column:
+        shown = trade.values[trade.column]
+        lines += panel.plot(
+            axis.values, shown, color=light()["transmitter"], marker=marker, label=trade.column, **joined
+        )
+        panel.set_ylabel(trade.heading)
     else:
         worst = 100 * trade.values["utilization"]
-        lines += panel.plot(axis.values, worst, color=_WORST, lw=6, solid_capstyle="butt", label="worst row")
-        for (row, use), tone, dashes in zip(rows.items(), _PALETTE, _DASHES, strict=False):
-            style = {"color": _tones()[tone], "ls": dashes, "marker": marker, "lw": 1.8}
+        if axis.words:
+            lines.append(panel.bar(axis.values, worst, color=_WORST, width=0.5, label="worst row"))
+        else:
+            lines += panel.plot(axis.values, worst, color=_WORST, lw=6, solid_capstyle="butt", label="worst row")
+        for (row, use), tone, dashes in zip(rows.items(), ROWS, _DASHES, strict=False):
+            style = {"color": light()[tone], "ls": dashes, "marker": marker, **joined}
             lines += panel.plot(axis.values, 100 * use, label=printable(row), **style)
-        lines.append(panel.axhline(100, color=_tones()["fail"], lw=1.4, ls=(0, (6, 3)), label="limit"))
+        lines.append(panel.axhline(100, color=light()["fail"], lw=1.4, ls=(0, (6, 3)), label="limit"))
         _scale_uses(panel, np.concatenate([[1.0], trade.values["utilization"], *rows.values()]))
         panel.set_ylabel("utilization [%]")
     panel.set_xlabel(axis.label)
@@ -163,6 +163,38 @@ def _curves(panel: Any, trade: Trade, rows: Mapping[str, NDArray[Any]]) -> None:
         frameon=False,
         fontsize=9,
         borderaxespad=0,
+    )
+
+
+def _curves_of_words(panel: Any, words: Axis, trades: Mapping[str, Trade]) -> None:
+    """Utilization, or a column, over a number: a curve for each word, with the limit."""
+    first = next(iter(trades.values()))
+    (axis,) = first.axes
+    marker = "." if axis.values.size <= 40 else ""
+    uses = []
+    for (word, trade), tone, dashes in zip(trades.items(), ROWS, _DASHES, strict=False):
+        shown = trade.values[trade.column] if trade.column else 100 * trade.values["utilization"]
+        uses.append(trade.values["utilization"])
+        name = shorten(printable(word), _WORD, placeholder="...")
+        panel.plot(axis.values, shown, color=light()[tone], ls=dashes, marker=marker, lw=1.8, label=name)
+    if first.column:
+        panel.set_ylabel(first.heading)
+    else:
+        panel.axhline(100, color=light()["fail"], lw=1.4, ls=(0, (6, 3)), label="limit")
+        _scale_uses(panel, np.concatenate([[1.0], *uses]))
+        panel.set_ylabel("utilization [%]")
+    panel.set_xlabel(axis.label)
+    _scale(panel.xaxis, axis)
+    panel.grid(color="#dddddd", lw=0.6)
+    panel.set_axisbelow(True)
+    panel.legend(
+        title=fill(words.key.replace(".", ". "), 30).replace(". ", "."),
+        loc="upper left",
+        bbox_to_anchor=(1.01, 1.0),
+        frameon=False,
+        fontsize=9,
+        borderaxespad=0,
+        alignment="left",
     )
 
 
@@ -180,13 +212,16 @@ def _map(page: Any, panel: Any, trade: Trade, *grid: NDArray[Any]) -> list[Any]:
     """Draw a map between edges, with lines and names at the middles of its cells; return what a legend says."""
     first_edges, second_edges, first, second = grid
     handles = _patches(trade.statuses)
-    if trade.column is None:
+    if not trade.column:
         _statuses(panel, trade, first_edges, second_edges)
-        handles += _what_binds(panel, trade, grid)
+        if all(axis.words for axis in trade.axes) and trade.values["status"].size <= _CELLS:
+            _in_cells(panel, trade)
+        else:
+            handles += _what_binds(panel, trade, grid)
     else:
         _heat(page, panel, trade, first_edges, second_edges)
-        handles = [patch for patch, name in zip(handles, trade.statuses, strict=True) if _has_no_mission(name)]
-    if _limit(panel, trade, first, second):
+        handles = [patch for patch, name in zip(handles, trade.statuses, strict=True) if has_no_mission(name)]
+    if not any(axis.words for axis in trade.axes) and _limit(panel, trade, first, second):
         handles.insert(0, panel.plot([], [], label="utilization 100 %", **_LIMIT)[0])
     return handles
 
@@ -204,6 +239,15 @@ def _statuses(panel: Any, trade: Trade, first: NDArray[Any], second: NDArray[Any
     colors = ListedColormap(list(_fills(names).values()))
     limits = {"vmin": -0.5, "vmax": len(names) - 0.5}
     panel.pcolormesh(first, second, codes.T, cmap=colors, shading="flat", rasterized=True, **limits)
+
+
+def _in_cells(panel: Any, trade: Trade) -> None:
+    """Write the utilization and the worst row into each cell of a map of words."""
+    room = int(110 / trade.values["status"].shape[0])  # characters of a cell
+    for place, use in np.ndenumerate(trade.values["utilization"]):
+        row = shorten(printable(str(trade.values["worst_row"][place])).replace(".", ". "), room, placeholder="...")
+        said = "\n".join(filter(None, (percent(float(use)) if np.isfinite(use) else "", row.replace(". ", "."))))
+        panel.text(*place, said, ha="center", va="center", fontsize=8.5, parse_math=False)
 
 
 def _what_binds(panel: Any, trade: Trade, grid: Sequence[NDArray[Any]]) -> list[Any]:
@@ -246,9 +290,7 @@ def _heat(page: Any, panel: Any, trade: Trade, first: NDArray[Any], second: NDAr
     """A column in colour, in equal ratios where it spans more than two decades."""
     from matplotlib.colors import LogNorm
 
-    column = trade.column
-    assert column is not None
-    shown = np.ma.masked_invalid(np.asarray(trade.values[column.name], float))
+    shown = np.ma.masked_invalid(np.asarray(trade.values[trade.column], float))
     is_log = shown.count() > 0 and shown.min() > 0 and shown.max() / shown.min() > 100
     mesh = panel.pcolormesh(
         first,
@@ -259,10 +301,10 @@ def _heat(page: Any, panel: Any, trade: Trade, first: NDArray[Any], second: NDAr
         rasterized=True,
         norm=LogNorm() if is_log else None,
     )
-    if any(map(_has_no_mission, trade.statuses)):
+    if any(map(has_no_mission, trade.statuses)):
         panel.set_facecolor(_fills(["error"])["error"])
     bar = page.colorbar(mesh, ax=panel, pad=0.1 if panel.name == "polar" else 0.02)
-    bar.set_label(column.heading, parse_math=False)
+    bar.set_label(trade.heading, parse_math=False)
 
 
 def _limit(panel: Any, trade: Trade, first: NDArray[Any], second: NDArray[Any]) -> bool:
@@ -285,13 +327,13 @@ def _polar(page: Any, panel: Any, trade: Trade, mission: Mission) -> None:
     An elevation is 90 deg in the middle: what is seen from above there stands over the scene.
     """
     around, radius = trade.axes
-    edges, middles = (values * _si(around) for values in (around.edges, around.values))
+    edges, middles = (values * around.scale for values in (around.edges, around.values))
     turn = middles[-1] - middles[0]
     if abs(turn - 2 * np.pi) < 1e-6:  # the first direction again: it needs no cell beyond
         edges[0], edges[-1] = middles[0], middles[-1]
     middle, rim = 0.0, radius.values[-1]
-    if radius.number.key.endswith(".elevation"):
-        middle, rim = np.pi / 2 / _si(radius), radius.values[0]
+    if radius.key.endswith(".elevation"):
+        middle, rim = np.pi / 2 / radius.scale, radius.values[0]
     handles = _map(page, panel, trade, edges, np.clip(radius.edges, *sorted((middle, rim))), middles, radius.values)
     panel.set_rlim(middle, rim)
     ticks = np.arange(0, 360, 45)
@@ -304,12 +346,6 @@ def _polar(page: Any, panel: Any, trade: Trade, mission: Mission) -> None:
     _legend(page, [*handles, *_other_platform(panel, around, mission.geometry)])
 
 
-def _si(axis: Axis) -> float:
-    """What one of an axis is in SI."""
-    factor, divisor = axis.number.dimension.scales[axis.number.unit]
-    return factor / divisor
-
-
 def _free(edges: NDArray[Any]) -> float:
     """Direction of the numbers of the radius, beside what is drawn where that is not the whole circle. [deg]"""
     return float(np.degrees(edges[0])) - 6 if edges[-1] - edges[0] < 1.9 * np.pi else 22.5
@@ -317,13 +353,13 @@ def _free(edges: NDArray[Any]) -> float:
 
 def _other_platform(panel: Any, around: Axis, geometry: BistaticGeometry) -> list[Any]:
     """Mark at the rim where the other platform stands; for a legend."""
-    names = [name for name in ("transmitter", "receiver") if f".{name}." in f".{around.number.key}"]
+    names = [name for name in ("transmitter", "receiver") if f".{name}." in f".{around.key}"]
     if len(names) != 1:
         return []
     other = "receiver" if names == ["transmitter"] else "transmitter"
     x, y, _ = getattr(geometry, other).position
     angle = np.arctan2(y, x)
-    style = {"marker": (3, 0, float(np.degrees(angle)) + 90), "ms": 12, "color": _tones()[other], "ls": "none"}
+    style = {"marker": (3, 0, float(np.degrees(angle)) + 90), "ms": 12, "color": light()[other], "ls": "none"}
     handles: list[Any] = panel.plot(
         angle, panel.get_ylim()[1], label=f"direction of the {other}", clip_on=False, **style
     )

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.design.cases import Cases, Floats, Grid
-from bisar_budget.design.quantities import Number, QuestionError
-from bisar_budget.design.swept import Column, Part
-from bisar_budget.findings.status import RANK
+from bisar_budget.design.quantities import Number, QuestionError, Varied
+from bisar_budget.design.swept import Part, Values
+from bisar_budget.findings.trade import Axis, Trade
 from bisar_budget.mission.bounds import DIRECTION
 from bisar_budget.report.tables.described import Described
 
@@ -22,46 +22,8 @@ _WIDE = 8.0  # a span of values above this is drawn in equal ratios
 _NEEDED = ("status", "worst_row", "utilization")
 
 
-class Axis(NamedTuple):
-    """A key that varies: its values, rising, in the unit that they were asked for in."""
-
-    number: Number
-    values: Floats
-    is_log: bool
-
-    @property
-    def label(self) -> str:
-        """Name and unit."""
-        return f"{self.number.key} [{self.number.unit}]" if self.number.unit else self.number.key
-
-    @property
-    def edges(self) -> Floats:
-        """Ends of the cells around the values, half way to the next: (n + 1,)."""
-        values = np.log(self.values) if self.is_log else self.values
-        middle = (values[1:] + values[:-1]) / 2
-        edges = np.concatenate(([2 * values[0] - middle[0]], middle, [2 * values[-1] - middle[-1]]))
-        return np.exp(edges) if self.is_log else edges
-
-
-class Trade(NamedTuple):
-    """A sweep over one or two keys: arrays with one axis for each, in the order of `axes`.
-
-    `column` is what a heat map shows; None where the status is shown. `fixed` are the keys with a single value.
-    """
-
-    axes: tuple[Axis, ...]
-    values: Mapping[str, NDArray[Any]]
-    column: Column | None
-    fixed: tuple[str, ...]
-
-    @property
-    def statuses(self) -> list[str]:
-        """Statuses that occur, worst first."""
-        return sorted(set(self.values["status"].ravel().tolist()), key=RANK.__getitem__)
-
-
 def check_plot(cases: Cases, *, is_polar: bool) -> None:
-    """Say why a sweep cannot be drawn.
+    """Say why `--plot` cannot draw a sweep.
 
     Raises
     ------
@@ -71,22 +33,29 @@ def check_plot(cases: Cases, *, is_polar: bool) -> None:
     accepted = "accepted: --vary of one key, or of two"
     if not isinstance(cases, Grid):
         raise QuestionError(f"--plot draws a grid; {accepted}. The cases of a table or a sample have no axes")
-    varying = [number for number, size in zip(cases.numbers, cases.shape, strict=True) if size > 1]
+    varying = varying_keys(cases)
     if not 1 <= len(varying) <= 2:
         raise QuestionError(f"--plot draws one axis or two, and {len(varying)} keys vary; {accepted}")
     if cases.count > MAX_CASES:
         raise QuestionError(f"--plot draws up to {MAX_CASES} cases, and there are {cases.count}")
     if not is_polar:
         return
-    if len(varying) != 2 or not any(number.reader is DIRECTION for number in varying):
+    if len(varying) != 2 or not any(one.reader is DIRECTION for one in varying):
         raise QuestionError("--polar draws a key over an azimuth; accepted: --vary of an azimuth and of another key")
-    other = next(number for number in varying if number is not _azimuth(varying))
-    if cases.axes[cases.numbers.index(other)].min() < 0:
+    other = next(one for one in varying if one is not _azimuth(varying))
+    if not isinstance(other, Number):
+        raise QuestionError(f"--polar draws {other.key} as a radius; accepted: a number")
+    if cases.axes[cases.varied.index(other)].min() < 0:
         raise QuestionError(f"--polar draws {other.key} as a radius; accepted: values from 0")
 
 
-def _azimuth(numbers: Sequence[Number]) -> Number:
-    return next(number for number in numbers if number.reader is DIRECTION)
+def varying_keys(cases: Grid) -> list[Varied]:
+    """Keys that have more than one value."""
+    return [one for one, size in zip(cases.varied, cases.shape, strict=True) if size > 1]
+
+
+def _azimuth(varied: Sequence[Varied]) -> Varied:
+    return next(one for one in varied if one.reader is DIRECTION)
 
 
 class Gathered:
@@ -99,7 +68,7 @@ class Gathered:
         if column is not None and (column not in columns or columns[column].is_text):
             known = [name for name, one in columns.items() if not one.is_text and name not in described.numbers]
             raise QuestionError(f"--plot-column {column}: is no column of numbers; accepted: {', '.join(known)}")
-        self.column = columns[column] if column is not None else None
+        self.column, self.heading = column or "", columns[column].heading if column is not None else ""
         self.names = dict.fromkeys((*_NEEDED, *names, *((column,) if column is not None else ())))
         self.found: dict[str, list[NDArray[Any]]] = {name: [] for name in self.names}
 
@@ -110,26 +79,39 @@ class Gathered:
 
     def trade(self, *, is_polar: bool = False) -> Trade:
         """Lay it out; the azimuth first in a polar map."""
-        axes = []
+        axes: list[Axis] = []
         varying, fixed, orders = [], [], []
-        for place, (number, values) in enumerate(zip(self.cases.numbers, self.cases.axes, strict=True)):
-            said = np.asarray(self.described.said(number.key, values), float)
-            order = np.argsort(said)
-            orders.append(order)
+        for place, (one, values) in enumerate(zip(self.cases.varied, self.cases.axes, strict=True)):
+            axis = self._axis(one, values)
+            orders.append(np.arange(values.size) if axis.words else np.argsort(axis.values))
             if values.size == 1:
-                fixed.append(f"{number.key} {said[0]:.6g} {number.unit}".rstrip())
+                fixed.append(
+                    f"{one.key} {axis.words[0] if axis.words else f'{axis.values[0]:.6g} {one.unit}'}".strip()
+                )
             else:
                 varying.append(place)
-                axes.append(Axis(number, said[order], _is_log(said[order])))
+                rising = axis.values[orders[-1]]
+                axes.append(axis._replace(values=rising, is_log=not axis.words and _is_log(rising)))
         sizes = [self.cases.shape[place] for place in varying]
         laid = {
             name: np.concatenate(pieces).reshape(self.cases.shape)[np.ix_(*orders)].reshape(sizes)
             for name, pieces in self.found.items()
         }
-        if is_polar and _azimuth([axis.number for axis in axes]) is not axes[0].number:
+        if is_polar and self.cases.varied[varying[0]].reader is not DIRECTION:
             axes.reverse()
             laid = {name: values.T for name, values in laid.items()}
-        return Trade(tuple(axes), laid, self.column, tuple(fixed))
+        return Trade(tuple(axes), laid, tuple(fixed), self.column, self.heading)
+
+    def _axis(self, one: Varied, values: Values) -> Axis:
+        """The axis of a key, its values in the order that they were given in."""
+        if not isinstance(one, Number):
+            words = tuple(values.tolist())
+            own = float(words.index(one.value)) if one.value in words else None
+            return Axis(one.key, "", np.arange(float(values.size)), words=words, own=own)
+        said = np.asarray(self.described.said(one.key, values), float)
+        factor, divisor = one.dimension.scales.get(one.unit) or (1.0, 1.0)
+        own = None if one.value is None else one.value / factor * divisor
+        return Axis(one.key, one.unit, said, scale=factor / divisor, own=own)
 
 
 def _is_log(values: Floats) -> bool:
@@ -138,6 +120,24 @@ def _is_log(values: Floats) -> bool:
         return False
     steps, ratios = np.diff(values), np.diff(np.log(values))
     return bool(ratios.std() / ratios.mean() < steps.std() / steps.mean())
+
+
+def per_word(trade: Trade) -> tuple[Axis, Mapping[str, Trade]] | None:
+    """A sweep over a number and a few words as one over the number for each word; None of any other.
+
+    The axis is that of the words.
+    """
+    with_words = [place for place, axis in enumerate(trade.axes) if axis.words]
+    if len(trade.axes) != 2 or len(with_words) != 1 or len(trade.axes[with_words[0]].words) > ROWS:
+        return None
+    (place,) = with_words
+    axis, other = trade.axes[place], trade.axes[1 - place]
+    return axis, {
+        word: trade._replace(
+            axes=(other,), values={name: values.take(number, place) for name, values in trade.values.items()}
+        )
+        for number, word in enumerate(axis.words)
+    }
 
 
 def rows_that_matter(trade: Trade) -> tuple[str, ...]:
@@ -155,9 +155,13 @@ class Run(NamedTuple):
 
 
 def runs(axis: Axis, statuses: NDArray[Any]) -> Iterator[Run]:
-    """Stretches of one axis with one status each; the first and the last end at the values themselves."""
+    """Stretches of one axis with one status each; the first and the last end at the values themselves.
+
+    Of words each has its room to both sides.
+    """
     edges = axis.edges
-    edges[0], edges[-1] = axis.values[0], axis.values[-1]
+    if not axis.words:
+        edges[0], edges[-1] = axis.values[0], axis.values[-1]
     starts = [0, *(np.flatnonzero(statuses[1:] != statuses[:-1]) + 1).tolist(), statuses.size]
     for start, stop in pairwise(starts):
         yield Run(str(statuses[start]), float(edges[start]), float(edges[stop]))

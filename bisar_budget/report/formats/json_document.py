@@ -14,6 +14,7 @@ from bisar_budget.report import Piece, Style
 
 if TYPE_CHECKING:
     from bisar_budget.findings.monte_carlo import MonteCarlo
+    from bisar_budget.findings.trade import Study
 
 FORMAT = "bisar-budget/check/1"
 
@@ -134,6 +135,17 @@ def _mission(mission: MissionFindings) -> dict[str, Any]:
         "errors": [],
         "monte_carlo": None if mission.monte_carlo is None else _monte_carlo(mission.monte_carlo),
         "verification": None if mission.verdicts is None else [verdict._asdict() for verdict in mission.verdicts],
+        **({} if mission.study is None else {"sweep": _study(mission.study)}),
+    }
+
+
+def _study(study: "Study") -> dict[str, Any]:
+    return {
+        "vary": list(study.asked),
+        "cases": study.cases,
+        "comply": study.complying,
+        "not_evaluated": study.unevaluated,
+        "without_mission": study.missing,
     }
 
 

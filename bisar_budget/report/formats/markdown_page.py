@@ -12,7 +12,7 @@ from bisar_budget.faults import printable
 from bisar_budget.findings.mission import MissionFindings, Report
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
-from bisar_budget.report.compliance.page import compliance, drawings, illustrations
+from bisar_budget.report.compliance.page import compliance, drawings, illustrations, studied
 from bisar_budget.report.compliance.view import Compliance, ShownImage
 from bisar_budget.report.explain import typeset
 from bisar_budget.report.explain.formulas import Sum, WorkedEquation
@@ -36,6 +36,7 @@ def render(report: Report, style: Style) -> str:
         general=_general,
         description=_description,
         chip=_chip,
+        command=_command,
     )
     return re.sub(r"\n{3,}", "\n\n", text).rstrip("\n") + "\n"
 
@@ -68,6 +69,8 @@ def pictures(report: Report, style: Style) -> Mapping[str, bytes]:
 
 def _pictures(mission: MissionFindings) -> Iterator[tuple[str, bytes]]:
     shown = illustrations(mission)
+    if (study := studied(mission, mission.file)) is not None:
+        yield study.picture.name, study.picture.svg.encode()
     yield from (
         (picture.name, picture.svg.encode()) for picture in (*drawings(mission), *(one.cuts for one in shown))
     )
@@ -105,6 +108,11 @@ def _chip(chip: ShownImage, path: str) -> Markup:
     return Markup('<img src="{}" alt="{}" width="{}" height="{}">').format(
         Markup(path), printable(chip.title), width, height
     )
+
+
+def _command(text: str) -> Markup:
+    """A command as code that is indented: no fence of its own can end it."""
+    return Markup("    {}").format(Markup(printable(text)))
 
 
 def _general(left: str, right: str) -> Markup:

@@ -55,6 +55,7 @@ def _slope(slope: Slope) -> dict[str, Any]:
         "worst_row_below": slope.row_below,
         "worst_row_above": slope.row_above,
         "is_mixed": slope.is_mixed,
+        "part": slope.part or None,
     }
 
 
@@ -109,7 +110,7 @@ def _table(found: Sensitivity) -> Iterator[str]:
         mixed = next((row for row in (slope.row_above, slope.row_below) if row != found.worst_row), "")
         note = f"({printable(mixed)})" if slope.is_mixed else ""
         rows.append(
-            [printable(slope.key), printable(slope.text), slope.per_text, _points(slope.change), *in_row, note]
+            [printable(slope.key), printable(slope.given), slope.per_text, _points(slope.change), *in_row, note]
         )
     yield from table(rows)
     yield ""

@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from bisar_budget.design.cases import Cases, in_unit
+from bisar_budget.design.quantities import Number
 from bisar_budget.design.swept import Column, Part, Swept, Values
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.mission.model import Mission
@@ -18,14 +19,14 @@ class Described:
 
     def __init__(self, swept: Swept, cases: Cases, mission: Mission, version: str) -> None:
         self.swept, self.cases = swept, cases
-        self.numbers = {number.key: number for number in cases.numbers}
+        self.numbers = {one.key: one for one in cases.varied if isinstance(one, Number)}
         changed = changes_words(mission.changes)
         self.facts = {
             "format": FORMAT,
             "mission": printable(swept.mission_name),
             "mission_sha256": swept.mission_sha256,
             **({"set": changed} if changed else {}),
-            "model": mission.gating_model,
+            "model": "varies" if "allocation.model" in swept.varied else mission.gating_model,
             "source": f"bisar-budget {version}",
         }
 

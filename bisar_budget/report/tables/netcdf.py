@@ -51,12 +51,12 @@ def _dimensions(file: Any, described: Described) -> list[Column]:
         file.createDimension("case", cases.count)
         return list(described.columns)
     by_name = {column.name: column for column in described.columns}
-    for number, axis in zip(cases.numbers, cases.axes, strict=True):
-        column = by_name.pop(number.key)
-        file.createDimension(number.key, axis.size)
-        variable = file.createVariable(number.key, "f8", (number.key,))
+    for one, axis in zip(cases.varied, cases.axes, strict=True):
+        column = by_name.pop(one.key)
+        file.createDimension(one.key, axis.size)
+        variable = file.createVariable(one.key, str if column.is_text else "f8", (one.key,))
         variable.setncatts(_attributes(column))
-        variable[:] = described.said(number.key, axis)
+        variable[:] = described.said(one.key, axis)
     return list(by_name.values())
 
 

@@ -1,0 +1,88 @@
+"""Draws of a Monte Carlo on their way: who makes them, how long they take, how far they are."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+import click
+
+from bisar_budget.cli.keeping import LONG, lasting, progress_bar
+from bisar_budget.cli.streams import complain, fail
+from bisar_budget.constants import MAX_DRAWS, MAX_DRAWS_HERE
+from bisar_budget.faults import printable
+
+if TYPE_CHECKING:
+    from bisar_budget.budget.fleet import Draws
+    from bisar_budget.monte_carlo.draws import Drawing, Piece, Tally
+
+_MANY = 1_000_000  # draws from which on it is measured how long they will take
+_TRIAL = 0.3  # s; a shorter one is too short to measure
+_FEW = 1 << 12  # draws of the first trial
+
+
+def check_draws(draws: int | None, scheduler: str | None) -> None:
+    """Refuse a scheduler that has nothing to draw, and more draws than are made without one."""
+    if scheduler is None:
+        if draws is not None and draws > MAX_DRAWS_HERE:
+            raise click.UsageError(
+                f"--monte-carlo {draws:,}: must be at most {MAX_DRAWS_HERE:,} draws; with --scheduler ADDRESS, whose "
+                f"workers share them, {MAX_DRAWS:,}."
+            )
+    elif draws is None:
+        raise click.UsageError(f"--scheduler {scheduler}: shares out draws, and needs --monte-carlo N.")
+
+
+@contextmanager
+def drawn_by(scheduler: str | None, draws: int | None, seed: int | None, files: int) -> "Iterator[Draws | None]":
+    """Say who makes the draws of so many files, the workers of a scheduler at hand; None where none are asked for."""
+    if draws is None:
+        yield None
+        return
+    from bisar_budget.budget.fleet import MANY, Draws
+    from bisar_budget.monte_carlo.draws import in_turn
+
+    if scheduler is None:  # files that processes share out draw for themselves
+        yield Draws(draws, seed, None if files >= MANY else _Watched(in_turn, lambda: 1))
+        return
+    from bisar_budget.cluster.scheduler import ClusterError, connected
+
+    try:
+        with connected(scheduler, complain) as workers:
+            yield Draws(draws, seed, _Watched(workers.drawn, lambda: workers.threads))
+    except ClusterError as error:
+        fail(str(error))
+
+
+class _Watched:
+    """Passes on the pieces of draws that `make` gives; says how long they will take, and how far they are."""
+
+    def __init__(
+        self, make: "Callable[[Drawing], Iterator[tuple[Piece, Tally]]]", threads: Callable[[], int]
+    ) -> None:
+        self._make, self._threads = make, threads
+
+    def __call__(self, drawing: "Drawing") -> "Iterator[tuple[Piece, Tally]]":
+        if drawing.draws > _MANY and drawing.judged:
+            seconds = _seconds(drawing) / max(self._threads(), 1)
+            if seconds > LONG:
+                complain(f"{drawing.draws:,} draws of {printable(drawing.name)} will take about {lasting(seconds)}.")
+        with progress_bar(drawing.draws, "Drawing errors") as bar:
+            for piece, tally in self._make(drawing):
+                yield piece, tally
+                bar.update(piece.stop - piece.start)
+
+
+def _seconds(drawing: "Drawing") -> float:
+    """Measure how long all draws will take in one thread, by some of them."""
+    from bisar_budget.monte_carlo.draws import Drawer, Piece
+
+    drawer, tried = Drawer(drawing), _FEW
+    drawer.tally(Piece(0, tried))  # it makes what the others find
+    while True:
+        began = perf_counter()
+        drawer.tally(Piece(0, tried))
+        seconds = perf_counter() - began
+        if seconds > _TRIAL or tried >= min(drawing.chunk, drawing.draws):
+            return seconds * drawing.draws / tried
+        tried *= 4

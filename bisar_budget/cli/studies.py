@@ -1,0 +1,114 @@
+"""Sweeps that reports of `check` show: `--sweep KEY=VALUES`."""
+
+from collections.abc import Callable, Sequence
+from datetime import date
+
+import click
+
+from bisar_budget import __version__
+from bisar_budget.cli.keeping import progress_bar
+from bisar_budget.cli.streams import fail
+from bisar_budget.design.cases import Grid, grid
+from bisar_budget.design.quantities import QuestionError, tree_of
+from bisar_budget.design.sweep import sweep
+from bisar_budget.findings.mission import MissionFindings, UnusableMission
+from bisar_budget.findings.status import STATUS
+from bisar_budget.findings.trade import Study
+from bisar_budget.mission.model import Mission
+from bisar_budget.report import FORMATS
+from bisar_budget.report.drawing.trades import Gathered, rows_that_matter, varying_keys
+from bisar_budget.report.tables.described import Described
+from bisar_budget.resources import cores
+
+MAX_CASES = 40_000  # of a page, which has no room for more
+_OPTION = "--sweep"
+
+
+def check_options(texts: Sequence[str], formats: Sequence[str]) -> None:
+    """Refuse a sweep that no report shows, and more keys than a drawing has axes."""
+    if not any(FORMATS[name].is_illustrated for name in formats):
+        raise click.UsageError(
+            "--sweep is shown in a compliance report; accepted: --report FILE.html or FILE.md, or --format html or "
+            "markdown. bisar-budget sweep writes tables and plots."
+        )
+    if len(texts) > 2:
+        raise click.UsageError(f"--sweep draws one key or two, and there are {len(texts)}.")
+
+
+def with_studies(
+    missions: Sequence[MissionFindings | UnusableMission], texts: Sequence[str], model: str | None, today: date
+) -> list[MissionFindings | UnusableMission]:
+    """Add to each mission that can be used what a sweep of it finds; exits where one cannot be asked."""
+    usable = [found.analysed().mission for found in missions if isinstance(found, MissionFindings)]
+    asked = {}
+    for mission in usable:
+        try:
+            asked[mission.file] = _cases(mission, texts)
+        except QuestionError as error:
+            fail(f"{mission.file}: {error}")
+    result: list[MissionFindings | UnusableMission] = []
+    with progress_bar(sum(cases.count for cases in asked.values()), "Checking cases") as bar:
+        for found in missions:
+            if isinstance(found, UnusableMission):
+                result.append(found)
+                continue
+            mission = found.analysed().mission
+            try:
+                study = _study(mission, asked[mission.file], texts, model, today, bar.update)
+            except QuestionError as error:
+                fail(f"{mission.file}: {error}")
+            result.append(found._replace(study=study))
+    return result
+
+
+def _cases(mission: Mission, texts: Sequence[str]) -> Grid:
+    """Read the cases, and hold them to what a page can show."""
+    cases = grid(tree_of(mission), texts, _OPTION)
+    for one, size in zip(cases.varied, cases.shape, strict=True):
+        if size < 2:
+            raise QuestionError(f"{_OPTION} {one.key}: has one value; accepted: several. --set puts in one")
+    if cases.count > MAX_CASES:
+        raise QuestionError(
+            f"{_OPTION}: {cases.count} cases; accepted: up to {MAX_CASES}, for which a page has room. bisar-budget "
+            "sweep checks more"
+        )
+    return cases
+
+
+def _study(
+    mission: Mission,
+    cases: Grid,
+    texts: Sequence[str],
+    model: str | None,
+    today: date,
+    advance: Callable[[int], None],
+) -> Study:
+    """Check all cases; over one key also the utilizations of the rows that are the worst somewhere."""
+
+    def gathered(columns: Sequence[str]) -> Gathered:
+        swept = sweep(mission, cases, columns=columns, model=model, today=today, jobs=cores())
+        found = Gathered(Described(swept, cases, mission, __version__), ("binding_requirement", *columns))
+        for part in swept.parts:
+            found.add(part)
+            if not columns:
+                advance(part.stop - part.start)
+        return found
+
+    trade = gathered(()).trade()
+    rows = {}
+    if len(varying_keys(cases)) == 1:
+        names = {f"{row}.utilization": row for row in rows_that_matter(trade)}
+        values = gathered(tuple(names)).trade().values if names else {}
+        rows = {row: values[name] for name, row in names.items()}
+    statuses = trade.values["status"].ravel().tolist()
+    return Study(
+        asked=tuple(texts),
+        trade=trade,
+        rows=rows,
+        cases=cases.count,
+        complying=sum(name != "error" and not STATUS[name].fails for name in statuses),
+        unevaluated=statuses.count("not_evaluated"),
+        missing=statuses.count("error"),
+        day=today,
+        model=model,
+    )

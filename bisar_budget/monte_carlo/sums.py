@@ -1,0 +1,194 @@
+"""What the errors of a block of draws do together: sums of effects, or exact ranges of the paths that they make.
+
+With `exact_arrays` the module of the budget that loads NumPy; `check` without `--monte-carlo` does not come here.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.effects.effect import CLOCK_UNITS, PLATFORMS, ErrorSource
+from bisar_budget.effects.exact_arrays import (
+    TOGETHER,
+    ExactEffects,
+    column_effects,
+    direct_path_clock,
+    projection,
+    room_for,
+)
+from bisar_budget.effects.exact_ranges import ExactRanges
+from bisar_budget.monte_carlo.variables import Floats, Judged, Variable
+
+_ORDER = {"m": 0, "m/s": 1, "m/s^2": 2}
+_CLOCK = {unit: power for power, unit in enumerate(CLOCK_UNITS.values())}
+
+
+class ExactPaths(NamedTuple):
+    """Actual paths of a collection: times (nodes,) [s], tracks of both platforms (nodes, 3) [m], wavelength [m]."""
+
+    times: Floats
+    tracks: tuple[Floats, Floats]
+    wavelength: float
+    has_direct_path: bool
+
+
+def paths_of(exact: ExactRanges) -> ExactPaths:
+    """Take from the exact ranges of a mission what draws need."""
+    tracks = (np.array(exact.tracks[PLATFORMS[0]]), np.array(exact.tracks[PLATFORMS[1]]))
+    return ExactPaths(np.array(exact.times), tracks, exact.wavelength, exact.has_direct_path)
+
+
+class Sums:
+    """Effects of one block of draws, added up: the quadratic phase by owner, all else for the mission.
+
+    By owner, if kept: `motion` is position, velocity and acceleration error of both platforms, (2, 3, 3, draws),
+    `clock` its coefficients (4, draws), `phase_alone` what is stated as a phase, quadratic and cubic (2, draws).
+
+    Parameters
+    ----------
+    paths : ExactPaths
+        For exact ranges.
+    variables, judged : sequences of Variable, Judged
+        What will be added, and what will be asked for.
+    size : int
+        Draws.
+    adds, keeps_motion : bool
+        Whether `square`, and whether `exact_square` will be asked for.
+    """
+
+    def __init__(
+        self,
+        paths: ExactPaths,
+        variables: Sequence[Variable],
+        judged: Sequence[Judged],
+        size: int,
+        *,
+        adds: bool,
+        keeps_motion: bool,
+    ) -> None:
+        self.paths, self.size, self.keeps_motion = paths, size, keeps_motion
+        wanted = {column for one in judged for column in one.columns}
+        self.phases = {variable.owner: np.zeros(size) for variable in variables} if adds else {}
+        self.totals = {column: np.zeros(size) for column in sorted(wanted - {0})} if adds else {}
+        self.motion: dict[str, Floats] = {}
+        self.clock: dict[str, Floats] = {}
+        self.phase_alone: dict[str, Floats] = {}
+        self._exact: dict[tuple[str, ...], ExactEffects] = {}
+        self._scaled = np.empty(size)
+        self._square = np.empty(size)
+        self._room: Floats | None = None
+
+    def clear(self) -> None:
+        """Begin another block."""
+        every: list[Mapping[Any, Floats]] = [self.phases, self.totals, self.motion, self.clock, self.phase_alone]
+        for one in (one for kept in every for one in kept.values()):
+            one.fill(0.0)
+        self._exact.clear()
+
+    def add(self, variable: Variable, drawn: Floats) -> None:
+        """Add one variable's draws, (draws,)."""
+        if self.phases:
+            for target, column in ((self.phases[variable.owner], 0), *((t, c) for c, t in self.totals.items())):
+                if variable.effects[column]:
+                    np.multiply(drawn, variable.effects[column], out=self._scaled)
+                    target += self._scaled
+        if self.keeps_motion:
+            for source, size in variable.parts:
+                self._add_motion(variable.owner, source, size, drawn)
+            if not variable.parts:
+                self._add_phases(variable.owner, variable.effects[:2], drawn)
+
+    def _add_motion(self, owner: str, source: ErrorSource, size: float, drawn: Floats) -> None:
+        if source.is_position:
+            motion = self._kept(self.motion, owner, (2, 3, 3))
+            for platform, name in enumerate(PLATFORMS):
+                if source.moves(name):
+                    for axis, component in enumerate(source.direction):
+                        if component:
+                            motion[platform, _ORDER[source.unit], axis] += size * component * drawn
+        elif source.owner == "clock":
+            self._kept(self.clock, owner, (4,))[_CLOCK[source.unit]] += size * drawn
+        else:
+            self._add_phases(owner, (size, 0.0), drawn)
+
+    def _add_phases(self, owner: str, phases: tuple[float, ...], drawn: Floats) -> None:
+        self._kept(self.phase_alone, owner, (2,))[:] += np.multiply.outer(phases, drawn)
+
+    def _kept(self, where: dict[str, Floats], owner: str, shape: tuple[int, ...]) -> Floats:
+        if owner not in where:
+            where[owner] = np.zeros((*shape, self.size))
+        return where[owner]
+
+    def square(self, judged: Judged) -> Floats:
+        """Square of what a requirement is about, (draws,); it stands until the next is asked for."""
+        square = self._square
+        if judged.columns == (0,):
+            square.fill(0.0)
+            for owner, phase in self.phases.items():
+                if owner in judged.owners:
+                    square += phase
+            square *= square
+            return square
+        first, *others = judged.columns
+        np.multiply(self.totals[first], self.totals[first], out=square)
+        for column in others:
+            np.multiply(self.totals[column], self.totals[column], out=self._scaled)
+            square += self._scaled
+        return square
+
+    def exact_square(self, judged: Judged) -> Floats:
+        """The same by exact ranges; not a number for a draw without an image."""
+        owners = judged.owners
+        if owners not in self._exact:
+            self._exact[owners] = self._by_exact_ranges(owners)
+        found = self._exact[owners]
+        quadratic, cubic = _sum(self.phase_alone, owners, np.zeros((2, 1)))
+        if judged.columns == (0,):
+            square: Floats = (found.quadratic + quadratic) ** 2
+        elif judged.columns == (1,):
+            square = (found.cubic + cubic) ** 2
+        else:
+            square = np.sum(found.displacement**2, axis=-1)
+        return square
+
+    def _by_exact_ranges(self, owners: tuple[str, ...]) -> ExactEffects:
+        times, actual = self.paths.times, self.paths.tracks
+        powers = np.stack((np.ones_like(times), times, times**2 / 2), axis=-1)  # of (22)
+        clock_powers = SPEED_OF_LIGHT * times[:, None] ** np.arange(4)
+        weights = projection(len(times))
+        motion = _sum(self.motion, owners, np.zeros((2, 3, 3, self.size)))
+        clock = _sum(self.clock, owners, np.zeros((4, self.size)))
+        found = ExactEffects(
+            np.empty((self.size, 2)), np.empty(self.size), np.empty(self.size), np.empty(self.size, dtype=bool)
+        )
+        size = max(1, TOGETHER // len(times))
+        if self._room is None:
+            self._room, self._tracks = room_for(size * len(times)), np.empty((2, 3, len(times), size))
+        for start in range(0, self.size, size):
+            some = slice(start, min(start + size, self.size))
+            transmitter, receiver = self._tracks[..., : some.stop - start]
+            for platform, measured in enumerate((transmitter, receiver)):
+                np.matmul(powers, motion[platform][..., some].swapaxes(0, 1), out=measured)
+                measured += actual[platform].T[:, :, None]
+            clock_range = clock_powers @ clock[:, some]
+            if self.paths.has_direct_path:
+                clock_range = direct_path_clock(
+                    *(np.moveaxis(one, 0, -1) for one in (transmitter, receiver)), *(one[:, None] for one in actual)
+                )
+            part = column_effects(
+                (transmitter, receiver), actual, clock_range, weights, self.paths.wavelength, None, self._room
+            )
+            for whole, value in zip(found, part, strict=True):
+                whole[some] = value
+        return found
+
+
+def _sum(parts: Mapping[str, Floats], owners: Sequence[str], nothing: Floats) -> Floats:
+    """What several owners have, added up."""
+    total = nothing
+    for owner in owners:
+        if owner in parts:
+            total = total + parts[owner]
+    return total

@@ -1,0 +1,137 @@
+"""What a compliance report says of a sweep: its question, its command, what complies where."""
+
+import math
+from collections.abc import Iterator
+from shlex import quote
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bisar_budget.faults import changes_words, printable
+from bisar_budget.findings.mission import MissionFindings
+from bisar_budget.findings.status import STATUS
+from bisar_budget.findings.trade import Axis, Study, Trade
+from bisar_budget.report.compliance.view import Picture, Stretch, Studied, StudyPart
+from bisar_budget.report.drawing.study_drawing import study_drawing
+from bisar_budget.report.drawing.trades import per_word
+from bisar_budget.report.words.sentences import BINDING_WORDS, percent
+
+_MOST = 20  # lines of a table
+_FEW = 6  # words that are listed in a sentence
+
+
+def written(found: MissionFindings, study: Study, file: str) -> Studied:
+    """Write a sweep of a mission; `file` is the name of the mission file that is shown."""
+    trade = study.trade
+    stretches = list(_stretches(trade)) if len(trade.axes) == 1 else []
+    parts = list(_parts(trade)) if len(trade.axes) == 2 else []
+    counts, question = _counts(study), _question(trade)
+    said = [
+        f"{one.where}: {STATUS[one.status].words}{f', {one.row} {one.use}' if one.row else ''}" for one in stretches
+    ]
+    said += [f"{one.name}: {one.complying} of {one.cases} comply" for one in parts]
+    description = f"{question} {counts} {'; '.join(said[:_MOST])}{' ...' if len(said) > _MOST else '.'}"
+    title = f"Trade study: {' and '.join(axis.key for axis in trade.axes)}"
+    drawing = study_drawing(study, found.file, f"{title}, {found.name}", description)
+    by_word = per_word(trade)
+    return Studied(
+        question=question,
+        command=_command(found, study, file),
+        counts=counts,
+        picture=Picture("study.svg", title, drawing),
+        stretches=tuple(stretches[:_MOST]),
+        parts=tuple(parts[:_MOST]),
+        parts_are=by_word[0].key if by_word else "Worst row",
+        hidden=max(len(stretches) + len(parts) - _MOST, 0),
+    )
+
+
+def _question(trade: Trade) -> str:
+    keys = [f"{printable(axis.key)}, {_values(axis)}" for axis in trade.axes]
+    if len(keys) == 2:
+        return f"Which combinations of {keys[0]}, and {keys[1]}, comply?"
+    return f"Which values of {keys[0]}, comply?"
+
+
+def _values(axis: Axis) -> str:
+    """Say which values an axis has."""
+    count = len(axis.values)
+    if axis.words:
+        listed = ", ".join(map(printable, axis.words[:_FEW]))
+        return f"{listed} and {count - _FEW} more" if count > _FEW else listed
+    steps = " in equal ratios" if axis.is_log else ""
+    return f"{count} values{steps} from {_value(axis, 0)} to {_value(axis, -1)}"
+
+
+def _value(axis: Axis, place: int) -> str:
+    return printable(axis.words[place]) if axis.words else f"{axis.values[place]:.5g} {axis.unit}".rstrip()
+
+
+def _counts(study: Study) -> str:
+    failing = study.cases - study.complying - study.missing
+    said = [f"{study.cases} cases", f"{study.complying} comply ({percent(study.complying / study.cases)})"]
+    if study.unevaluated:
+        said.append(f"{study.unevaluated} of these not evaluated")
+    if failing:
+        said.append(f"{failing} break a requirement")
+    if study.missing:
+        said.append(f"{study.missing} {'are' if study.missing > 1 else 'is'} no mission")
+    return f"{said[0]}: {', '.join(said[1:])}."
+
+
+def _command(found: MissionFindings, study: Study, file: str) -> str:
+    """The command that gives the cases as a table, and a plot."""
+    analysed = found.analysed().mission
+    words = ["bisar-budget sweep", quote(printable(file))]
+    words += [f"--vary {quote(printable(text))}" for text in study.asked]
+    words += [changes_words(found.changes)] if found.changes else []
+    words += [f"--model {study.model}"] if study.model else []
+    words += [f"--date {study.day}"] if analysed.waivers else []
+    return " ".join([*words, "-o study.csv --plot study.svg"])
+
+
+def _stretches(trade: Trade) -> Iterator[Stretch]:
+    """Values in their order, neighbours with one status and one worst row as one; each word by itself."""
+    (axis,) = trade.axes
+    status, rows, uses = (trade.values[name] for name in ("status", "worst_row", "utilization"))
+    start, count = 0, len(axis.values)
+    for place in range(1, count + 1):
+        is_same = place < count and not axis.words
+        if is_same and (status[place], rows[place]) == (status[start], rows[start]):
+            continue
+        where = _value(axis, start)
+        if place - 1 > start:
+            where += f" to {_value(axis, place - 1)}"
+        binding = str(trade.values["binding_requirement"][start])
+        said = "" if str(rows[start]).endswith(binding) else BINDING_WORDS.get(binding, binding.replace("_", " "))
+        yield Stretch(where, str(status[start]), str(rows[start]), said, _uses(uses[start:place]))
+        start = place
+
+
+def _uses(uses: NDArray[Any]) -> str:
+    """Utilizations from the lowest to the highest."""
+    known = sorted(float(use) for use in uses if math.isfinite(use))
+    if not known:
+        return "–"
+    low, high = percent(known[0]), percent(known[-1])
+    return low if low == high else f"{low} to {high}"
+
+
+def _parts(trade: Trade) -> Iterator[StudyPart]:
+    """Of each word, or else of each row that is the worst somewhere, how many cases comply; the most cases first."""
+    status = trade.values["status"].ravel()
+    complies = np.array([name != "error" and not STATUS[name].fails for name in status.tolist()])
+    by_word = per_word(trade)
+    if by_word is not None:
+        for word, of_word in by_word[1].items():
+            names = of_word.values["status"].tolist()
+            complying = sum(name != "error" and not STATUS[name].fails for name in names)
+            yield StudyPart(printable(word), len(names), complying, _uses(of_word.values["utilization"]))
+        return
+    rows = trade.values["worst_row"].ravel()
+    names, counts = np.unique(rows[rows != ""].astype(str), return_counts=True)
+    for place in np.argsort(-counts, kind="stable").tolist():
+        is_of = rows == names[place]
+        uses = trade.values["utilization"].ravel()[is_of]
+        yield StudyPart(str(names[place]), int(counts[place]), int(complies[is_of].sum()), _uses(uses))
