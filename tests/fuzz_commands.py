@@ -71,7 +71,7 @@ def question(seed: int) -> Question:
     """What is asked about the file of a seed of `tests.fuzz.case`."""
     keys = _keys_of(original(Random(f"hostile {seed}")))
     random = Random(f"question {seed}")
-    ask = random.choice((_sweep, _sweep, _sweep, _solve, _sensitivity, _set))
+    ask = random.choice((_sweep, _sweep, _sweep, _solve, _sensitivity, _set, _trade))
     arguments, files = ask(random, keys)
     if ask is not _set and random.random() < 0.2:
         arguments += ("--set", _assignment(random, keys))
@@ -222,6 +222,13 @@ def _sensitivity(random: Random, keys: Mapping[str, str]) -> tuple[tuple[str, ..
     arguments += ("--row", random.choice(_ROWS)) if random.random() < 0.3 else ()
     arguments += ("--plot", "p.svg") if random.random() < 0.05 else ()
     return arguments + (("--format", "json") if random.random() < 0.5 else ("-o", "o.txt")), {}
+
+
+def _trade(random: Random, keys: Mapping[str, str]) -> tuple[tuple[str, ...], dict[str, bytes]]:
+    """A trade study of a report."""
+    sweeps = [_varied(random, keys) for _ in range(random.choice((1, 1, 2)))]
+    formats = ("--format", random.choice(("html", "markdown", "json")))
+    return ("check", MISSION, *(part for one in sweeps for part in ("--sweep", one)), *formats), {}
 
 
 def _set(random: Random, keys: Mapping[str, str]) -> tuple[tuple[str, ...], dict[str, bytes]]:

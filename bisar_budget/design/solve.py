@@ -28,6 +28,7 @@ _STEPS_TO_TURN = 20  # a golden section to 7e-5 of two places
 _TURNS = 16  # that are looked for
 
 Evaluate = Callable[[float], State]
+Progress = Callable[[int, int], None]
 
 
 def solve(
@@ -40,7 +41,7 @@ def solve(
     model: str | None = None,
     is_scale: bool = False,
     today: date,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> Solution:
     """Find every value of a number of a mission at which its compliance begins or ends.
 
@@ -210,9 +211,7 @@ class _Question:
         return {value: self.number.text(value) for value in values}
 
 
-def _scan(
-    evaluate: Evaluate, places: Sequence[float], progress: Callable[[int, int], None] | None = None
-) -> list[State]:
+def _scan(evaluate: Evaluate, places: Sequence[float], progress: Progress | None = None) -> list[State]:
     """Look at every place, and where the utilization turns without a change of compliance, at the turn."""
     states = []
     for done, place in enumerate(places, 1):

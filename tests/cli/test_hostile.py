@@ -32,6 +32,7 @@ from bisar_budget.findings.mission import Report
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.tree import MAX_FAULTS
 from bisar_budget.report import FORMATS, Style, render
+from bisar_budget.report.drawing import point_plot
 from bisar_budget.workers import worker_pool
 from tests.conftest import APART, ROOT, TODAY, findings, heed_signals, mission_text
 from tests.fuzz import RAW, RUN, case
@@ -109,6 +110,12 @@ def until(condition, seconds: float = 60.0) -> bool:
 class TestWorkers:
     """Signals left workers and a resource tracker behind, which held standard output."""
 
+    @pytest.fixture
+    def plain(self, tmp_path) -> dict[str, str]:
+        """Variables of a process without compiled kernels: three processes start in half the time."""
+        (tmp_path / "numba.py").write_text("raise ImportError")
+        return {**os.environ, "PYTHONPATH": str(tmp_path)}
+
     def start(self, **options) -> tuple[subprocess.Popen, set[int]]:
         process = subprocess.Popen(
             [*COMMAND, "verify", str(SECTION_V), "--jobs", "2"], cwd=ROOT, preexec_fn=heed_signals, **options
@@ -127,8 +134,9 @@ class TestWorkers:
             (signal.SIGKILL, -signal.SIGKILL),
         ],
     )
-    def test_no_signal_leaves_one(self, number: int, code: int) -> None:
-        process, workers = self.start(stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    def test_no_signal_leaves_one(self, plain, number: int, code: int) -> None:
+        environment = os.environ if number == signal.SIGTERM else plain
+        process, workers = self.start(stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment)
         process.send_signal(number)
         output, errors = process.communicate(timeout=60)  # ends when nobody holds the pipes
         assert process.returncode == code
@@ -154,8 +162,8 @@ class TestWorkers:
             interrupted()
         assert not those_that_keep_python()
 
-    def test_a_killed_worker_is_said(self) -> None:
-        process, workers = self.start(stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    def test_a_killed_worker_is_said(self, plain) -> None:
+        process, workers = self.start(stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=plain)
         lines = {pid: Path(f"/proc/{pid}/cmdline").read_bytes() for pid in workers}
         os.kill(next(pid for pid, line in lines.items() if b"spawn_main" in line), signal.SIGKILL)
         output, errors = process.communicate(timeout=60)
@@ -199,6 +207,7 @@ class TestInterrupted:
     def test_images(self, folder, monkeypatch, option: str, name: str) -> None:
         report = folder / "reports" / name
         report.write_text("old")
+        monkeypatch.setattr(point_plot, "drawn", lambda *given: b"a sheet")  # what is in it does not matter here
         chmod = os.chmod
         monkeypatch.setattr(os, "chmod", lambda *given: (os.kill(os.getpid(), signal.SIGTERM), chmod(*given)))
         before = signal.signal(signal.SIGTERM, end)
@@ -284,6 +293,14 @@ class TestEncodings:
         assert len({done.stdout for done in outputs.values()}) == 1
         assert "Höhe" in outputs["ascii"].stdout.decode("utf-8").replace(r"\u00f6", "ö")
 
+    def test_a_table_of_cases_is_utf_8_too(self, tmp_path) -> None:
+        path = tmp_path / "m.yaml"
+        path.write_text(mission_text(name="Höhe φ 雷達", timing_error__quadratic=6e-13), encoding="utf-8")
+        asked = ("sweep", path, "--vary", "collection.aperture_time=1s")
+        tables = {run(*asked, encoding=encoding).stdout for encoding in ("utf-8", "ascii")}
+        assert len(tables) == 1
+        assert "Höhe φ 雷達" in tables.pop().decode("utf-8")
+
     def test_text_follows_the_terminal_and_escapes_what_it_lacks(self, tmp_path) -> None:
         path = tmp_path / "m.yaml"
         path.write_text(mission_text(name="Höhe φ"), encoding="utf-8")
@@ -308,7 +325,7 @@ class TestOutputs:
     @pytest.mark.parametrize(
         ("arguments", "code"), [(["--help"], 0), (["--version"], 0), (["schema"], 2), (["--nonsense"], 2)]
     )
-    @pytest.mark.parametrize("closed", [[1], [2], [1, 2], [0, 1, 2]])
+    @pytest.mark.parametrize("closed", [[1], [2], [0, 1, 2]])
     def test_closed_streams_are_no_fault_of_the_tool(self, arguments, code: int, closed) -> None:
         """A usage error went to standard output where standard error was closed."""
         script = f"exec {' '.join(COMMAND)} {' '.join(arguments)} {' '.join(f'{number}>&-' for number in closed)}"
@@ -525,6 +542,19 @@ class TestTerminal:
             ["init", f"m.yaml/{HOSTILE}"],
             ["init", "--name", HOSTILE, "-"],
             ["schema", "-o", f"m.yaml/{HOSTILE}"],
+            ["check", "m.yaml", "--set", HOSTILE],
+            ["check", "m.yaml", "--set", f"radar.bandwidth={HOSTILE}"],
+            ["solve", "m.yaml", "--for", HOSTILE],
+            ["solve", "m.yaml", "--for", "collection.aperture_time", "--between", HOSTILE],
+            ["sensitivity", "m.yaml", "--row", HOSTILE],
+            ["sweep", "m.yaml", "--vary", HOSTILE],
+            ["sweep", "m.yaml", "--vary", f"collection.aperture_time={HOSTILE}"],
+            ["sweep", "m.yaml", "--vary", "collection.aperture_time=1s", "--column", HOSTILE],
+            ["sweep", "m.yaml", "--vary", "collection.aperture_time=1s", "-o", f"m.yaml/{HOSTILE}.csv"],
+            ["sweep", "m.yaml", "--vary", "collection.aperture_time=1s", "-o", "t.csv", "--scheduler", HOSTILE],
+            ["sweep", "m.yaml", "--cases", HOSTILE],
+            ["sensors", HOSTILE],
+            ["import", HOSTILE],
         ],
         ids=lambda arguments: " ".join(arguments[:1] + arguments[-2:-1]).encode("ascii", "ignore").decode()[:40],
     )
@@ -756,7 +786,7 @@ def starts_with(count: int) -> bool:
 
 class TestSystem:
     @pytest.mark.skipif(sys.platform == "win32", reason="no such limit there")
-    @pytest.mark.parametrize("count", [4, 5, 6, 9, 12])
+    @pytest.mark.parametrize("count", [5, 6, 9])  # the long round has all up to 24
     @pytest.mark.parametrize(
         "arguments",
         [
