@@ -233,7 +233,7 @@ class TestDatasets:
 
     def test_without_xarray(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setitem(sys.modules, "xarray", None)
-        with pytest.raises(MissingTablesError, match="pip install xarray"):
+        with pytest.raises(MissingTablesError, match="needs xarray.*tables"):
             dataset(sweep(MISSION, GRID, today=DAY), GRID, MISSION)
 
 

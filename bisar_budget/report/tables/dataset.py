@@ -42,7 +42,7 @@ def dataset(swept: Swept, cases: Cases, mission: Mission) -> "Dataset":
         from xarray import Dataset
     except ImportError:
         raise MissingTablesError(
-            "a dataset needs xarray, which is not installed; pip install xarray brings it"
+            "a dataset needs xarray, which is not installed; pip install 'bisar-budget[tables]' brings it"
         ) from None
     described = Described(swept, cases, mission, __version__)
     parts = [described.values(part) for part in swept.parts]
