@@ -233,7 +233,7 @@ class TestDatasets:
 
     def test_without_xarray(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setitem(sys.modules, "xarray", None)
-        with pytest.raises(MissingTablesError, match="needs xarray.*tables"):
+        with pytest.raises(MissingTablesError, match=r"needs xarray.*tables"):
             dataset(sweep(MISSION, GRID, today=DAY), GRID, MISSION)
 
 
