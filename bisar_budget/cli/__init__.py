@@ -72,7 +72,9 @@ class _Commands(click.Group):
             error.show(message)
             complain(message.getvalue().rstrip("\n"))
             sys.exit(error.exit_code)
-        except (click.Abort, KeyboardInterrupt):
+        except (click.Abort, KeyboardInterrupt) as error:
+            if isinstance(error.__cause__, EOFError):  # Click takes it for Ctrl-D, and nothing here asks a question
+                _own_fault(error.__cause__)
             sys.exit(EXIT_INTERRUPTED)
         except OSError as error:
             if error.errno in _NO_ROOM:

@@ -70,7 +70,7 @@ class TestOutputs:
         path.write_text(mission_text())
         result = run("check", path, option, path)
         assert result.exit_code == 2
-        assert "a report would replace it" in result.stderr
+        assert "a result would replace it" in result.stderr
         assert path.read_text() == mission_text()
 
     def test_a_name_that_is_not_utf_8_leaves_no_temporary_file(self, mission, tmp_path) -> None:

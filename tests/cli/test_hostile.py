@@ -174,6 +174,18 @@ class TestWorkers:
         assert until(lambda: not any(map(is_running, workers)), 20)
 
 
+def test_a_fault_of_ours_is_no_interrupt(monkeypatch) -> None:
+    """An EOFError, as of a module cut off, ended in 130 without a word: Click takes it for Ctrl-D."""
+
+    def cut_off(*_: object) -> None:
+        raise EOFError("marshal data too short")
+
+    monkeypatch.setattr("bisar_budget.cli.sweep.load_all", cut_off)
+    done = run("sweep", SECTION_V, "--vary", "collection.aperture_time=1:2s:3")
+    assert done.returncode == 3
+    assert b"EOFError: marshal data too short" in done.stderr
+
+
 @pytest.mark.skipif(not hasattr(signal, "SIGTERM") or sys.platform == "win32", reason="needs POSIX signals")
 class TestInterrupted:
     """A signal comes while the temporary file is written, wherever that is."""
@@ -746,8 +758,12 @@ class TestBounds:
 
     @pytest.mark.skipif(sys.platform == "win32", reason="no such limit there")
     @pytest.mark.parametrize("suffix", ["csv", "parquet", "nc"])
-    def test_tables_that_do_not_fit(self, tmp_path, suffix: str) -> None:
-        """The library of NetCDF raised what ended in exit 3."""
+    def test_tables_that_do_not_fit(self, tmp_path, monkeypatch, suffix: str) -> None:
+        """The library of NetCDF raised what ended in exit 3.
+
+        Python would leave compiled modules that are cut off, for later ones to read.
+        """
+        monkeypatch.setattr(sys, "dont_write_bytecode", True)
         pytest.importorskip({"parquet": "pyarrow", "nc": "netCDF4"}.get(suffix, "csv"))
         import resource
 

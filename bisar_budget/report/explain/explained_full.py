@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.constants import ROUNDING
 from bisar_budget.effects.effect import ErrorSource
 from bisar_budget.effects.exact_ranges import ExactRanges
 from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
@@ -31,8 +32,13 @@ class Left:
             self.ranges = self.exact.left_over_small(source, size)
             return
         found = full.at(source, size)
-        self.place = None if found is None else found.displacement
-        self.ranges = [] if found is None else self.exact.left_over(source, size, found.displacement)
+        if found is None:
+            self.place, self.ranges = None, []
+            return
+        whole = abs(size) * max(map(abs, self.exact.range_error(source))) + math.hypot(*found.displacement)
+        east, north = _without_rounding(found.displacement, whole)
+        self.place = (east, north)
+        self.ranges = _without_rounding(self.exact.left_over(source, size, found.displacement), whole)
 
     def phase(self, which: int) -> float:
         """Quadratic or cubic phase at the aperture edge, signed. [rad]"""
@@ -46,6 +52,11 @@ class Left:
         return Sum(
             f"{symbol} = 2*π/{number(self.exact.wavelength)}*({terms}) = {with_unit(self.phase(which), 'rad')}"
         )
+
+
+def _without_rounding(values: Sequence[float], whole: float) -> list[float]:
+    """Values with 0 for what rounding leaves of differences of a size."""
+    return [value if abs(value) > ROUNDING * whole else 0.0 for value in values]
 
 
 def worse(analysis: Analysis, source: ErrorSource, size: float, which: int = _QUADRATIC) -> Left:
