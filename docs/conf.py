@@ -48,4 +48,4 @@ napoleon_use_rtype = False
 
 nitpicky = True
 # Types in docstrings are words of NumPy, or names that have no page here.
-nitpick_ignore_regex = [("py:class", ".*"), ("py:exc", "MissionError|QuestionError|TableError")]
+nitpick_ignore_regex = [("py:class", ".*"), ("py:exc", "MissingTablesError|MissionError|QuestionError|TableError")]
