@@ -80,7 +80,8 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     written = {}
     for name, report in REPORTS.items():
         written[name] = folder / f"{name}.html"
-        written[name].write_text(render("html", report(), Style(detail="full")), encoding="utf-8")
+        style = Style(detail="summary" if name == "studies" else "full")  # of studies, no row's formulas once more
+        written[name].write_text(render("html", report(), style), encoding="utf-8")
     return written
 
 
@@ -180,7 +181,7 @@ def test_dark_is_dark_and_light_is_light(show) -> None:
     assert brightness["dark"] < 40
 
 
-@pytest.mark.parametrize("name", REPORTS)
+@pytest.mark.parametrize("name", [name for name in REPORTS if name != "studies"])
 def test_mathml_has_height(show, name: str) -> None:
     sizes = show(name).evaluate(
         """[...document.querySelectorAll("math")].map(e => {
@@ -242,21 +243,23 @@ def test_prints_to_a4_in_light_colours(show, name: str, scheme: str) -> None:
 EXAMPLES = sorted((ROOT / "specs" / "missions").glob("*.yaml"))
 
 
-@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
-def test_the_summary_of_a_mission_prints_to_four_pages(browser, path: Path) -> None:
-    """By every model: the longest is printed; if it takes all four, the others too, which may break otherwise."""
-    summaries = [
-        render("html", Report("1.2.3", (found_in(path, model),)), Style())
-        for model in ("published", "full", "strictest")
+def test_the_summary_of_a_mission_prints_to_four_pages(browser) -> None:
+    """Of each example by every model the longest; of these the eight that are longest."""
+    longest = [
+        max(
+            (
+                render("html", Report("1.2.3", (found_in(path, model),)), Style())
+                for model in ("published", "full", "strictest")
+            ),
+            key=len,
+        )
+        for path in EXAMPLES
     ]
-    for summary in sorted(summaries, key=len, reverse=True):
+    for summary in sorted(longest, key=len)[-8:]:
         page = browser.new_page()
         page.set_content(summary)
-        pages = pages_of(page.pdf(prefer_css_page_size=True))
+        assert 1 <= pages_of(page.pdf(prefer_css_page_size=True)) <= 4
         page.close()
-        assert 1 <= pages <= 4
-        if pages < 4:
-            break
 
 
 def test_pages_carry_mission_document_hash_and_number(browser, tmp_path: Path) -> None:
