@@ -138,6 +138,9 @@ def _value(tree: Tree, change: SetValue, path: KeyPath) -> Any:
     except yaml.reader.ReaderError as error:
         tree.fault(None, path, f"is not text: {error.reason}")
         return INVALID
+    except UnicodeEncodeError:  # an argument of other bytes, which Python keeps as surrogates
+        tree.fault(None, path, "is not text: its bytes are not UTF-8", given=shown(change.text))
+        return INVALID
     return value
 
 

@@ -82,6 +82,7 @@ def test_an_entry_is_added_behind_the_last() -> None:
         ("radar.bandwidth=*x", "--set radar.bandwidth: is an alias (*); write the value out"),
         ("radar.bandwidth=!!float 3", "--set radar.bandwidth: carries a YAML tag"),
         ("radar.bandwidth=1 MHz\n---\n2 MHz", "--set radar.bandwidth: has a second YAML document"),
+        ("name=a\udcff", "--set name: is not text: its bytes are not UTF-8 (got a\\udcff)"),
         ("radar=3", "--set radar: must be a mapping of keys to values (got 3)"),
         ("radar.bandwidth.x=3", "--set radar.bandwidth.x: radar.bandwidth: has no keys (got 300 MHz)"),
         ("radar={center_frequency: 1 GHz}", "--set radar: radar.bandwidth: is missing"),
