@@ -180,10 +180,12 @@ def _file(
                 ElementTree.fromstring(content)
     if not isinstance(found, MissionFindings):
         return before
+    earlier = found if before is None else before
+    own = hostile.data + (earlier.mission.data or b"")
     for name, write in _DIFFERENCES.items():
         stage.append(f"diff {name}")
-        changes = [compare(found if before is None else before, found)]
-        missed += [f"seed {seed}: diff {name}: {what}" for what in _wrong(harmless(write(changes), name), name)]
+        text = harmless(write([compare(earlier, found)]), name)
+        missed += [f"seed {seed}: diff {name}: {what}" for what in _wrong(text, name, own)]
         tried["comparisons"] += 1
     for row in random.sample(found.rows, 2):
         stage.append(f"explain {row.id}")
