@@ -399,7 +399,8 @@ class ManyExactRanges:
             step_north = (c * constant - a * linear) / determinant
             east, north = east + step_east, north + step_north
             step, k = step_east * step_east + step_north * step_north, self.k[of]
-            is_done = k * step < scalar.UNSEEN_RAD * nearest
+            is_apart = nearest >= scalar.MEETS * self.nearest[of]
+            is_done = is_apart & (k * step < scalar.UNSEEN_RAD * nearest)
             phases = (
                 k * (quadratic + quadratic_east * step_east + quadratic_north * step_north),
                 k * (cubic + cubic_east * step_east + cubic_north * step_north),
@@ -407,7 +408,7 @@ class ManyExactRanges:
             is_right = is_done & (determinant * self.determinant[of] > 0)
             turn = determinant / (self.determinant[of] * self.half[of])
             self._keep(found, alive, of, is_right, east, north, phases, turn)
-            going = np.flatnonzero(~is_done & (step < scalar.SHRINKS * before) & (nearest > 0))
+            going = np.flatnonzero(~is_done & (step < scalar.SHRINKS * before) & is_apart)
             if not going.size:
                 return
             alive, of, east, north, before = alive[going], of[going], east[going], north[going], step[going]

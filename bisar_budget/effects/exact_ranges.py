@@ -28,6 +28,7 @@ from bisar_budget.phrases import NOTHING
 # 1e-6 of themselves; beyond the last, 16 nodes are right to 1e-3 at 1.25.
 NODES = ((0.1, 6), (0.5, 10), (math.inf, 16))
 ITERATIONS = 40
+MEETS = 1e-5  # of the nearest range; of a platform that is nearer, rounding decides in which direction it is seen
 NEAR = 0.003  # of the nearest slant range; a point so near to the centre has slopes that differ by no more
 SKEWED = 0.01  # the same over the sine between the gradients, where they are near to parallel
 BENT = 0.05  # of what Doppler turns by at the centre: velocity errors turn it by less, or its slopes are others
@@ -476,7 +477,7 @@ class ExactRanges:
             if found is not None:
                 return found
         value, slope, quadratic, cubic = self.fit
-        before = math.inf
+        before, meets = math.inf, MEETS * self.nearest
         for _ in range(ITERATIONS):
             left, by_east, by_north, nearest = [], [], [], math.inf
             square, twice_east, twice_north = east * east + north * north, 2 * east, 2 * north
@@ -487,7 +488,7 @@ class ExactRanges:
                     nearest = p
                 if q < nearest:
                     nearest = q
-                if not nearest:
+                if nearest < meets:
                     return None
                 left.append(whole - P / (R + p) - Q / (S + q))
                 p, q = p + p, q + q

@@ -117,3 +117,21 @@ def test_phases_have_no_rounding_of_the_ranges() -> None:
     assert np.abs(phases[0]).max() > 1e-3
     line = phases[0] + np.linspace(0, 1, 10)[:, None] * (phases[-1] - phases[0])
     assert np.abs(phases - line).max() < 1e-10  # a second order of (1e-5)² of the phases
+
+
+@pytest.mark.parametrize(("part", "is_found"), [(1.0, False), (1 - 1e-7, False), (0.9, True)])
+def test_a_point_that_meets_a_platform_has_no_image(part: float, is_found: bool) -> None:
+    """Rounding gave the platform a direction in which it was seen from there, so that a search could settle."""
+    for place in range(40):
+        position = (3000 + place * 0.1, 1000, 4000 + place * 0.37)
+        still = {"position": list(position), "velocity": [0, 0, 0], "motion_error": {"position": 1}}
+        moving = {"slant_range": 9000, "azimuth": 1.2, "elevation": 0.6, "speed": 50, "motion_azimuth": 2.5}
+        platforms = {"transmitter": still, "receiver": {**moving, "motion_error": {"velocity": 0.01}}}
+        analysis = Analysis(parse_mission(mission_text(platforms=platforms)))
+        sources = {source.id: source for source in analysis.sources}
+        errors = [
+            (sources[f"transmitter.position.{axis}"], -part * size)
+            for axis, size in zip("xyz", position, strict=True)
+        ]
+        nobody = analysis.exact.phases(errors) is None
+        assert nobody != is_found
