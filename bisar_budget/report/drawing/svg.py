@@ -64,9 +64,10 @@ class Box(NamedTuple):
 
     def covered_by(self, other: "Box") -> float:
         """Area shared with another. [px²]"""
-        width = min(self.right, other.right) - max(self.left, other.left)
-        height = min(self.bottom, other.bottom) - max(self.top, other.top)
-        return width * height if width > 0 and height > 0 else 0.0
+        left, top, right, bottom = self
+        if other.left >= right or other.right <= left or other.top >= bottom or other.bottom <= top:
+            return 0.0  # most are far apart
+        return (min(right, other.right) - max(left, other.left)) * (min(bottom, other.bottom) - max(top, other.top))
 
     def holds(self, point: Point) -> bool:
         """Say whether a point lies inside."""
@@ -219,9 +220,12 @@ class Canvas:
         if outside > 0:
             return _OUTSIDE + outside * _COVERED
         cost = math.fsum(_overlap(box, obstacle) for obstacle in self.obstacles)
+        left, top, right, bottom = box
         for (x, y), (u, v) in self.segments:
-            if (x < box.left and u < box.left) or (x > box.right and u > box.right):
+            if (x < left and u < left) or (x > right and u > right):
                 continue  # most lines are far away
+            if (y < top and v < top) or (y > bottom and v > bottom):
+                continue
             if (part := box.clipped(((x, y), (u, v)))) is not None:
                 cost += 2 + _CROSSED * math.dist(*part)
         return cost
