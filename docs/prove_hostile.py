@@ -6,9 +6,9 @@
 
 Cases are those of `tests/fuzz.py`, by seed: `python -m tests.fuzz SEED` prints the file of one that is named here,
 `python -m tests.fuzz_commands SEED` what is asked of it. In this process a file is loaded, checked by a model,
-written in every format, compared with the mission before it and explained. Of one file in four a question is asked:
-`solve`, `sensitivity`, `sweep` or values by `--set`. Some also go through processes of their own. Any miss makes the
-exit code 1; what was missed is tried again by the next slice.
+written in every format, compared with the mission before it, explained, swept and solved. Of one in eight more is
+asked: `sensitivity`, values by `--set`, a trade study. Some also go through processes of their own. Any miss makes
+the exit code 1; what was missed is tried again by the next slice.
 """
 
 import argparse
@@ -54,7 +54,7 @@ from bisar_budget.settings import SettingsError, project_settings
 from tests.conftest import ROOT, TODAY
 from tests.formats.flown import SAMPLES
 from tests.fuzz import RAW, RUN, case, original, strict_settings
-from tests.fuzz_commands import MISSION, question
+from tests.fuzz_commands import MISSION, questions
 from tests.hostile_commands import answered, imported, kept, on_paths
 from tests.recorded import record
 
@@ -62,7 +62,7 @@ PAGE = Path(__file__).with_name("hostile.md")
 PATHS = ROOT / "specs" / "missions" / "paths"  # orbits that missions name
 COMMAND = [sys.executable, "-m", "bisar_budget"]
 HANG_S = 300  # of processor time; the slowest that is right is a question of 200 checks of half a second
-ASKED, OWN_PROCESS = 4, 200  # one file in so many
+ORIGINAL, OWN_PROCESS = 16, 200  # one file in so many
 LARGEST = 16 * MAX_BYTES  # of a report of one file
 _WORD = re.compile(r"\w+")  # what a file says, a report may: `nan` and `inf` as Python writes them
 LARGEST_PROCESS = 8 << 30  # bytes of address space; a case that is right takes some 100 MB of memory
@@ -130,20 +130,21 @@ def files(seeds: range) -> Outcome:
             stage = ["load"]
             with _watched(f"seed {seed}", lambda stage=stage: stage[-1], missed):  # type: ignore[misc]
                 before = _file(seed, path, before, tried, stage, missed)
-            if seed % ASKED == 0:
-                with _watched(f"seed {seed}", lambda: "its question", missed):
-                    missed += [f"seed {seed}: {what}" for what in _answered(seed, path, tried)]
+            with _watched(f"seed {seed}", lambda: "its questions", missed):
+                missed += [f"seed {seed}: {what}" for what in _answered(seed, path, tried)]
             if seed % OWN_PROCESS == 0:
                 missed += [f"seed {seed}: {what}" for what in _processes(seed, path, tried)]
     return tried, missed
 
 
 def _answered(seed: int, file: Path, tried: Counter[str]) -> Iterator[str]:
-    """Ask about the file of a seed, or, of every other one, about the mission that it was made from."""
-    mission = file.read_bytes() if seed // ASKED % 2 else original(Random(f"hostile {seed}")).encode()
-    with TemporaryDirectory() as folder:
-        shutil.copytree(PATHS, Path(folder, "paths"))
-        yield from answered(question(seed), mission, Path(folder), tried)
+    """Ask about the file of a seed; at times a third question is about the mission that it was made from."""
+    for number, asked in enumerate(questions(seed)):
+        is_made_from = number == 2 and seed % ORIGINAL == 0
+        mission = original(Random(f"hostile {seed}")).encode() if is_made_from else file.read_bytes()
+        with TemporaryDirectory() as folder:
+            shutil.copytree(PATHS, Path(folder, "paths"))
+            yield from answered(asked, mission, Path(folder), tried)
 
 
 def _file(

@@ -1,6 +1,6 @@
 """Arguments, tables, orbits, logs, radar files and parts as nobody should write them, for `docs/prove_hostile.py`.
 
-    python -m tests.fuzz_commands 17     # the command line of a question, the same each time
+    python -m tests.fuzz_commands 17     # the command lines of the questions, the same each time
 
 What is asked starts from a key and a number of a mission, and is changed in what it says or in its characters. Files
 are good ones, damaged.
@@ -9,7 +9,7 @@ are good ones, damaged.
 import re
 import shlex
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from random import Random
@@ -67,17 +67,17 @@ class Question(NamedTuple):
     files: Mapping[str, bytes]
 
 
-def question(seed: int) -> Question:
-    """What is asked about the file of a seed of `tests.fuzz.case`."""
+def questions(seed: int) -> Iterator[Question]:
+    """What is asked about the file of a seed of `tests.fuzz.case`: a sweep, a crossing, of some something else."""
     keys = _keys_of(original(Random(f"hostile {seed}")))
     random = Random(f"question {seed}")
-    ask = random.choice((_sweep, _sweep, _sweep, _solve, _sensitivity, _set, _trade))
-    arguments, files = ask(random, keys)
-    if ask is not _set and random.random() < 0.2:
-        arguments += ("--set", _assignment(random, keys))
-    if random.random() < 0.1:
-        arguments += ("--model", random.choice((*("published", "full", "strictest") * 4, random.choice(TEXTS))))
-    return Question((*arguments, "--date", TODAY.isoformat()), files)
+    for ask in (_sweep, _solve, *((random.choice((_sweep, _sensitivity, _set, _trade)),) * (seed % 8 == 0))):
+        arguments, files = ask(random, keys)
+        if ask is not _set and random.random() < 0.2:
+            arguments += ("--set", _assignment(random, keys))
+        if random.random() < 0.1:
+            arguments += ("--model", random.choice((*("published", "full", "strictest") * 4, random.choice(TEXTS))))
+        yield Question((*arguments, "--date", TODAY.isoformat()), files)
 
 
 def _keys_of(text: str) -> dict[str, str]:
@@ -347,7 +347,7 @@ def _flipped(data: bytes, random: Random) -> bytes:
 
 
 if __name__ == "__main__":
-    asked = question(int(sys.argv[1]))
-    print(shlex.join(["bisar-budget", *asked.arguments]))
-    for name, content in asked.files.items():
-        print(f"# {name}:\n{content.decode('utf-8', 'backslashreplace')}")
+    for asked in questions(int(sys.argv[1])):
+        print(shlex.join(["bisar-budget", *asked.arguments]))
+        for name, content in asked.files.items():
+            print(f"# {name}:\n{content.decode('utf-8', 'backslashreplace')}")

@@ -54,13 +54,14 @@ def wrong(done: Result, arguments: tuple[str, ...]) -> Iterator[str]:
 
 def answered(asked: Question, mission: bytes, folder: Path, tried: Counter[str]) -> Iterator[str]:
     """Ask a question about a mission, in a folder that has what it names."""
-    tried["questions"] += 1
+    kind = asked.arguments[0] if asked.arguments[0] in ("sweep", "solve") else "other questions"
+    tried[kind] += 1
     given = {folder / name: data for name, data in {MISSION: mission, **asked.files}.items()}
     for path, data in given.items():
         path.write_bytes(data)
     before = set(folder.iterdir())
     done = told(asked.arguments, folder)
-    tried["answers"] += done.exit_code != 2
+    tried[f"{kind} answered"] += done.exit_code != 2
     yield from wrong(done, asked.arguments)
     if any(path.read_bytes() != data for path, data in given.items()):
         yield f"{asked.arguments} changes what it read"
