@@ -1,7 +1,8 @@
 """Solve a mission for one of its numbers: every value at which compliance begins or ends.
 
 The range is looked at in places, and between two places where compliance differs, the border is bracketed. Where the
-worst utilization turns between places, the turn is looked for first: compliance may change there and back.
+worst utilization turns between places, the turn is looked for first: compliance may change there and back. What
+arrays hold is checked together, as a sweep does; what is said of a crossing or a nearest miss is what `check` says.
 """
 
 import math
@@ -10,11 +11,15 @@ from contextlib import suppress
 from datetime import date
 from itertools import pairwise
 
+import numpy as np
+
 from bisar_budget.budget.check import check_mission
 from bisar_budget.design.quantities import FACTOR, Number, QuestionError, Range, number_of, range_of, tree_of
 from bisar_budget.design.scaled import scaled
 from bisar_budget.design.solution import Crossing, Solution, State
-from bisar_budget.design.variation import Variation, breaking, hold_to_decisions, standing
+from bisar_budget.design.sweep import GEOMETRY, REASON, VERDICT, Engine
+from bisar_budget.design.sweep import Question as Cases
+from bisar_budget.design.variation import ALIKE, Variation, breaking, hold_to_decisions, standing
 from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.mission.model import Mission
@@ -23,11 +28,11 @@ _OF_ALL = ", or --scale for all of them"
 PLACES = 65  # of a range
 PLACES_OF_CIRCLE = 181  # every 2 degrees: geometry changes fast where gradients are nearly parallel
 _NARROW = 2e-7  # of the value, between the two sides of a crossing before they are written
-_GOLDEN = (math.sqrt(5) - 1) / 2
-_STEPS_TO_TURN = 20  # a golden section to 7e-5 of two places
+_TO_TURN = 7e-5  # of two places, around a turn
 _TURNS = 16  # that are looked for
+_AT_ONCE = 15  # values of a section that arrays check in less time than one by one takes for one
 
-Evaluate = Callable[[float], State]
+Look = Callable[[Sequence[float]], list[State]]
 Progress = Callable[[int, int], None]
 
 
@@ -78,14 +83,14 @@ def solve(
         The question cannot be asked of this mission; says why.
     """
     question = _Question(mission, key, between, row, target, model, is_scale, today)
-    scanned = _scan(question.evaluate, question.places(), progress)
+    scanned = question.scanned(progress)
     crossings = tuple(
         question.crossing(low, high) for low, high in pairwise(scanned) if low.complies != high.complies
     )
     missions = [state for state in scanned if not state.reason]
     if not missions:
         raise QuestionError(f"{key}: no value of the range makes a mission. {scanned[0].reason}")
-    nearest = _nearest(missions)
+    nearest = question.evaluate(_nearest(missions).value)
     return Solution(
         file=mission.file,
         name=mission.name,
@@ -101,7 +106,7 @@ def solve(
         given=question.given,
         crossings=crossings,
         nearest=nearest,
-        is_constant=len({(state.row, state.utilization) for state in missions}) == 1,
+        is_constant=_is_constant(missions),
         skipped=sum(bool(state.reason) for state in scanned),
         changes=mission.changes,
         texts=question.texts(crossings, nearest),
@@ -109,14 +114,25 @@ def solve(
 
 
 def _nearest(states: Sequence[State]) -> State:
-    """Of places that all comply the one with the least left, of others the one that lacks the least."""
+    """Of places that all comply the first with the least left, of others the first that lacks the least."""
     if all(state.complies for state in states):
-        return max(states, key=lambda state: state.utilization or 0.0)
-    return min(states, key=lambda state: math.inf if state.utilization is None else state.utilization)
+        uses = [state.utilization or 0.0 for state in states]
+        highest = max(uses)
+        return next(state for state, use in zip(states, uses, strict=True) if use >= highest - ALIKE * highest)
+    uses = [math.inf if state.utilization is None else state.utilization for state in states]
+    lowest = min(uses)
+    return next(state for state, use in zip(states, uses, strict=True) if use <= lowest * (1 + ALIKE))
+
+
+def _is_constant(states: Sequence[State]) -> bool:
+    """Whether one row decides, with one utilization but for rounding."""
+    uses = [state.utilization for state in states if state.utilization is not None]
+    is_alike = not uses or max(uses) - min(uses) <= ALIKE * max(uses)
+    return is_alike and len(uses) in (0, len(states)) and len({state.row for state in states}) == 1
 
 
 class _Question:
-    """One mission and one number of it; `evaluate` is all that the search sees."""
+    """One mission and one number of it."""
 
     def __init__(
         self,
@@ -142,6 +158,18 @@ class _Question:
         found = check_mission(self.base, today)
         hold_to_decisions([found, *self._at_the_end()], row)
         self.given = None if self.number.value is None else self._state(self.number.value, found)
+        self.engine = self._engine(found, target)
+        # With a scene's radius arrays check many values sooner than `check` checks one.
+        self.at_once = _AT_ONCE if self.engine and self.base.scene.radius is not None else 1
+
+    def _engine(self, found: MissionFindings, target: str) -> Engine | None:
+        """What checks many values together; None where no array holds them."""
+        if self.is_scale or (self.row is not None and all(row.id != self.row for row in found.rows)):
+            return None
+        mission, model = self.variation.mission, self.variation.model
+        asked = Cases(mission.data, mission.file, mission.changes, (self.key,), (), model, self.today)
+        engine = Engine(asked._replace(row=self.row, target=target), mission)
+        return None if engine.not_held else engine
 
     def _at_the_end(self) -> Iterator[MissionFindings]:
         """Findings at the end of the range: the number may be an error that the file does not declare."""
@@ -162,6 +190,36 @@ class _Question:
             return scaled(self.base, self.key, value)
         return self.variation.at({self.number: value})
 
+    def scanned(self, progress: Progress | None) -> list[State]:
+        """Look at every place of the range, and where the utilization turns."""
+        places = self.places()
+        if self.engine is not None:
+            return _with_turns(self.states(places), self.states, self.at_once)
+        states = []
+        for done, place in enumerate(places, 1):
+            states.append(self.evaluate(place))
+            if progress is not None:
+                progress(done, len(places))
+        return _with_turns(states, self.states)
+
+    def states(self, values: Sequence[float]) -> list[State]:
+        """Check the mission with each of some values."""
+        if self.engine is None or len(values) < _AT_ONCE:
+            return [self.evaluate(value) for value in values]
+        found = self.engine.part(0, len(values), {self.key: np.array(values)}).values
+        columns = (*VERDICT, *GEOMETRY[:2], REASON)
+        lines = zip(values, *(found[column.name].tolist() for column in columns), strict=True)
+        return [self._of_line(*line) for line in lines]
+
+    def _of_line(
+        self, value: float, status: str, row: str, use: float, bound_by: str, range_m: float, cross_m: float, why: str
+    ) -> State:
+        """State of a value by the columns of a sweep."""
+        if why:
+            return State(value, complies=False, status=status, reason=why)
+        complies, utilization = status not in self.breaks, None if math.isnan(use) else use
+        return State(value, complies, status, row or None, bound_by or None, utilization, range_m, cross_m)
+
     def evaluate(self, value: float, *, is_brief: bool = True) -> State:
         """Check the mission with another value."""
         try:
@@ -179,11 +237,11 @@ class _Question:
         is_upper = low.complies
         least = 1e-9 * (self.range.high - self.range.low)  # around 0, where no part of the value is small
         while high.value - low.value > _NARROW * max(abs(low.value), abs(high.value), least):
-            middle = (low.value + high.value) / 2
-            if not low.value < middle < high.value:
+            section = _between(low.value, high.value, self.at_once)
+            if not low.value < section[0] <= section[-1] < high.value:
                 break
-            state = self.evaluate(middle)
-            low, high = (state, high) if state.complies == low.complies else (low, state)
+            states = (low, *self.states(section), high)
+            low, high = next(pair for pair in pairwise(states) if pair[0].complies != pair[1].complies)
         texts = [self.number.text(low.value, is_up=False), self.number.text(high.value, is_up=True)]
         below, above = (self._checked(text) for text in texts)
         is_verified = below.complies == low.complies and above.complies == high.complies
@@ -211,36 +269,46 @@ class _Question:
         return {value: self.number.text(value) for value in values}
 
 
-def _scan(evaluate: Evaluate, places: Sequence[float], progress: Progress | None = None) -> list[State]:
-    """Look at every place, and where the utilization turns without a change of compliance, at the turn."""
-    states = []
-    for done, place in enumerate(places, 1):
-        states.append(evaluate(place))
-        if progress is not None:
-            progress(done, len(places))
+def _with_turns(states: Sequence[State], look: Look, at_once: int = 1) -> list[State]:
+    """Add, where the utilization turns between places without a change of compliance, a place that differs in it."""
     found = list(states)
     turns = 0
     for before, here, after in zip(states, states[1:], states[2:], strict=False):
         uses = [state.utilization for state in (before, here, after)]
         if not before.complies == here.complies == after.complies or any(use is None for use in uses):
             continue
-        sign = 1.0 if here.complies else -1.0  # of what complies the highest may not, of the rest the lowest may
-        first, middle, last = (sign * use for use in uses if use is not None)
-        if first <= middle >= last and (first < middle or last < middle) and turns < _TURNS:
+        first, middle, last = (_sign(here) * use for use in uses if use is not None)
+        slack = ALIKE * abs(middle)  # a turn that rounding makes is none
+        is_turn = max(first, last) <= middle + slack and min(first, last) < middle - slack
+        if is_turn and turns < _TURNS:
             turns += 1
-            if (turned := _turn(evaluate, before.value, after.value, here, sign)) is not None:
+            if (turned := _turn(look, before.value, after.value, here, at_once)) is not None:
                 found.append(turned)
     return sorted(found, key=lambda state: state.value)
 
 
-def _turn(evaluate: Evaluate, low: float, high: float, here: State, sign: float) -> State | None:
+def _sign(state: State) -> float:
+    """Of what complies the highest utilization may not, of the rest the lowest may."""
+    return 1.0 if state.complies else -1.0
+
+
+def _turn(look: Look, low: float, high: float, here: State, at_once: int) -> State | None:
     """Where the utilization turns between two places, the first value whose compliance differs; None if none does."""
-    for _ in range(_STEPS_TO_TURN):
-        left, right = (evaluate(high - _GOLDEN * (high - low)), evaluate(low + _GOLDEN * (high - low)))
-        for state in (left, right):
+    least = _TO_TURN * (high - low)
+    while high - low > least:
+        section = _between(low, high, max(3, at_once))
+        states = look(section)
+        for state in states:
             if state.complies != here.complies and not state.reason:
                 return state
-        if left.utilization is None or right.utilization is None:
+        uses = [_sign(here) * state.utilization for state in states if state.utilization is not None]
+        if len(uses) < len(states):
             return None
-        low, high = (low, right.value) if sign * left.utilization > sign * right.utilization else (left.value, high)
+        top, ends = uses.index(max(uses)), (low, *section, high)
+        low, high = ends[top], ends[top + 2]
     return None
+
+
+def _between(low: float, high: float, count: int) -> list[float]:
+    """Values between two others, as far from each other as from these."""
+    return [low + (high - low) * number / (count + 1) for number in range(1, count + 1)]

@@ -7,7 +7,7 @@ words are those of one mission. Memory does not grow with the number of cases.
 
 import math
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from datetime import date
 from functools import lru_cache, partial
 from hashlib import sha256
@@ -41,7 +41,6 @@ from bisar_budget.workers import worker_pool
 if TYPE_CHECKING:
     from concurrent.futures import Future
 
-_BREAKS = breaking("fail")
 _SLOW = 1 / 8  # of cases that are checked one by one, from which processes share them out
 _MANY = 8  # parts, from which processes of their own are worth their start
 _TOGETHER = 8192  # cases of a part: their arrays stay in a processor's cache
@@ -294,7 +293,8 @@ def _parts(asked: Asked, jobs: int) -> Iterator[Part]:
 class Question(NamedTuple):
     """What a process needs to check cases of a mission; `named` where it cannot read what the mission names.
 
-    `keys` have numbers, `choices` words.
+    `keys` have numbers, `choices` words. `row` and `target` are those of `standing` and `breaking`: the row that is
+    judged instead of the mission, one of its rows; and what must not happen.
     """
 
     data: bytes
@@ -306,6 +306,8 @@ class Question(NamedTuple):
     today: date
     choices: tuple[str, ...] = ()
     named: Named | None = None
+    row: str | None = None
+    target: str = "fail"
 
 
 @lru_cache(maxsize=1)
@@ -450,8 +452,10 @@ class Engine:
                 partial(self._one, found, some),
                 is_brief=self.is_brief,
             )
-        sure = ~checked.is_left_out
-        to, rows = some[sure], {row.subject.id: row for row in checked.rows}
+        sure, rows = ~checked.is_left_out, {row.subject.id: row for row in checked.rows}
+        if self.question.row not in (None, *rows):
+            return np.zeros(some.size, dtype=bool)
+        to = some[sure]
         geometry = (
             geometries.range_resolution(mission.radar.bandwidth, SPEED_OF_LIGHT),
             geometries.cross_range_resolution(mission.radar.wavelength, mission.collection.aperture_time),
@@ -460,7 +464,7 @@ class Engine:
         )
         for column, number in zip(GEOMETRY, geometry, strict=True):
             found[column.name][to] = np.broadcast_to(number, some.shape)[sure]
-        for name, of_verdict in _verdict(checked).items():
+        for name, of_verdict in _verdict(checked, self.question.row, breaking(self.question.target)).items():
             found[name][to] = of_verdict[sure]
         for one in self.asked:
             if one.row in rows:
@@ -502,7 +506,7 @@ class Engine:
         )
         for column, number in zip(GEOMETRY, numbers_found, strict=True):
             found[column.name][place] = number
-        stands = standing(checked, None, _BREAKS)
+        stands = standing(checked, self.question.row, breaking(self.question.target))
         found["status"][place] = stands.status
         if stands.row is not None:
             found["worst_row"][place], found["binding_requirement"][place] = stands.row, stands.requirement
@@ -516,19 +520,21 @@ class Engine:
             found[one.name][place] = math.nan if value is None else value
 
 
-def _verdict(checked: judged.Checked) -> dict[str, Any]:
+def _verdict(checked: judged.Checked, row_id: str | None, breaks: Container[str]) -> dict[str, Any]:
     """Status, worst row, utilization and requirement of each case; as `standing`."""
     names = list(STATUS)
-    gates = np.array([STATUS[name].gates for name in names])
     judged = np.array([STATUS[name].is_judged and name != "waived" for name in names])
-    fails = np.array([STATUS[name].fails for name in names])
-    best = RANK["pass"]
-    codes = np.array([row.status for row in checked.rows])
-    status = np.minimum(np.where(gates[codes], codes, best).min(axis=0), checked.floor)
-    rows = [row for row in checked.rows if not row.never_fails]
-    codes = np.array([row.status for row in rows])
-    use = np.array([np.nan_to_num(row.utilization, nan=-1.0, posinf=math.inf) for row in rows])
-    decides = np.where(fails[codes].any(axis=0), fails[codes], judged[codes])
+    does_break = np.array([name in breaks for name in names])
+    rows = [one for one in checked.rows if row_id in (None, one.subject.id)]
+    codes = np.array([one.status for one in rows])
+    if row_id is None:
+        gates = np.array([STATUS[name].gates for name in names])
+        status = np.minimum(np.where(gates[codes], codes, RANK["pass"]).min(axis=0), checked.floor)
+    else:
+        status = codes[0]
+    may_decide = np.array([[not one.never_fails or "warn" in breaks] for one in rows])
+    decides = may_decide & judged[codes] & (does_break[codes] | ~does_break[status])
+    use = np.array([np.nan_to_num(one.utilization, nan=-1.0, posinf=math.inf) for one in rows])
     use = np.where(decides, use, -2.0)
     highest = use.max(axis=0)
     worst = (use >= highest - ALIKE * np.abs(highest)).argmax(axis=0)

@@ -2,9 +2,10 @@
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import date
 from itertools import pairwise
+from typing import Any
 
 import pytest
 
@@ -129,7 +130,8 @@ def test_where_there_is_no_mission_is_a_border_too() -> None:
     assert "look vectors cancel" in found.crossings[0].outside.reason
 
 
-def test_a_pair_of_crossings_between_two_places_is_found() -> None:
+@pytest.mark.parametrize("at_once", [1, 15])
+def test_a_pair_of_crossings_between_two_places_is_found(at_once: int) -> None:
     """Places are 0.0625 apart; between two of them the utilization crosses its limit, and 0.004 on again."""
 
     def dips(value: float) -> State:
@@ -142,9 +144,80 @@ def test_a_pair_of_crossings_between_two_places_is_found() -> None:
 
     places = [index / 16 for index in range(17)]
     for evaluate in (dips, bumps):
+
+        def look(values: Sequence[float], evaluate: Callable[[float], State] = evaluate) -> list[State]:
+            return [evaluate(value) for value in values]
+
         assert len({evaluate(place).complies for place in places}) == 1
-        scanned = solving._scan(evaluate, places)
+        scanned = solving._with_turns([evaluate(place) for place in places], look, at_once)
         assert sum(one.complies != other.complies for one, other in pairwise(scanned)) == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "more"),
+    [
+        ("rigling_moses_section_v", "collection.aperture_time", {}),
+        ("rigling_moses_section_v", "collection.aperture_time", {"target": "warn", "model": "strictest"}),
+        ("rigling_moses_section_v_autofocus", "autofocus.n_pull", {"target": "warn"}),
+        (
+            "rigling_moses_section_v",
+            "platforms.transmitter.motion_error.acceleration.0",
+            {"row": "transmitter.acceleration.x"},
+        ),
+        ("uav_stim300", "collection.aperture_time", {"row": "receiver.quadratic_phase_error", "target": "warn"}),
+        ("drones_same_gnss", "radar.bandwidth", {}),
+        ("one_stationary_spotlight", "platforms.receiver.azimuth", {}),
+    ],
+)
+def test_arrays_find_what_checks_find(name: str, key: str, more: dict[str, str], monkeypatch) -> None:
+    file = str(MISSIONS / f"{name}.yaml")
+    looked: list[int] = []
+    part = solving.Engine.part
+
+    def counted(self: Any, start: int, stop: int, values: Any) -> Any:
+        looked.append(stop - start)
+        return part(self, start, stop, values)
+
+    monkeypatch.setattr(solving.Engine, "part", counted)
+    together = solve(key, file=file, **more)
+    assert looked
+    monkeypatch.setattr(solving._Question, "_engine", lambda *_: None)
+    assert_alike(together, solve(key, file=file, **more))
+
+
+def assert_alike(found: Solution, other: Solution) -> None:
+    """Two searches of one mission: the same crossings within their brackets, bound by the same rows."""
+    assert found._replace(crossings=(), texts={}, nearest=found.given) == other._replace(
+        crossings=(), texts={}, nearest=found.given
+    )
+    assert found.nearest == other.nearest
+    for crossing, same in zip(found.crossings, other.crossings, strict=True):
+        assert crossing.is_upper == same.is_upper
+        for side, of_same in ((crossing.inside, same.inside), (crossing.outside, same.outside)):
+            assert side.value == pytest.approx(of_same.value, rel=1e-6)
+            assert (side.status, side.row, side.requirement) == (of_same.status, of_same.row, of_same.requirement)
+
+
+def test_a_scene_is_searched_by_arrays(monkeypatch) -> None:
+    """A check of its edge takes as long as an array of many; `check` is asked for what is said alone."""
+    text = mission_text(
+        scene__radius="300 m",
+        platforms__receiver__motion_error={"velocity": ["5 mm/s", 0, 0]},
+        allocation__model="full",
+    )
+    mission = parse_mission(text, "m.yaml")
+    checks: list[object] = []
+    check = solving.check_mission
+    monkeypatch.setattr(
+        solving, "check_mission", lambda *given, **more: checks.append(given) or check(*given, **more)
+    )
+    found = solving.solve(mission, "platforms.receiver.motion_error.velocity.0", today=DAY)
+    assert len(checks) < 8
+    monkeypatch.setattr(solving._Question, "_engine", lambda *_: None)
+    monkeypatch.setattr(solving, "PLACES", 9)
+    other = solving.solve(mission, "platforms.receiver.motion_error.velocity.0", today=DAY)
+    assert other.crossings
+    assert_alike(found, other._replace(nearest=found.nearest))
 
 
 def test_scaling_multiplies_what_an_error_is_sized_by() -> None:
