@@ -49,14 +49,15 @@ def watched_checks(name: str) -> Iterator[Callable[[int, int], None]]:
     began = monotonic()
     with ExitStack() as ends:
         bars: list[ProgressBar[int]] = []
-        since = began
+        since, calls = began, 0
 
         def progress(done: int, total: int) -> None:
-            nonlocal since
-            now = monotonic()
-            if done == 2:
-                doing = f"Checking {printable(name)} for {total} values or more"
-                foretell((now - since) * total, doing, "fewer declared errors and --model published take less")
+            nonlocal since, calls
+            now, calls = monotonic(), calls + 1
+            if calls == 2:
+                left = total - done + 2
+                doing = f"Checking {printable(name)} for {left} values or more"
+                foretell((now - since) * left, doing, "fewer declared errors and --model published take less")
             since = now
             if not bars:
                 if now - began < _MOMENT:

@@ -17,8 +17,7 @@ from bisar_budget.budget.check import check_mission
 from bisar_budget.design.quantities import FACTOR, Number, QuestionError, Range, number_of, range_of, tree_of
 from bisar_budget.design.scaled import scaled
 from bisar_budget.design.solution import Crossing, Solution, State
-from bisar_budget.design.sweep import GEOMETRY, REASON, VERDICT, Engine
-from bisar_budget.design.sweep import Question as Cases
+from bisar_budget.design.sweep import GEOMETRY, REASON, VERDICT, Engine, Progress, Question, unseen
 from bisar_budget.design.variation import ALIKE, Variation, breaking, hold_to_decisions, standing
 from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.findings.mission import MissionFindings
@@ -33,7 +32,6 @@ _TURNS = 16  # that are looked for
 _AT_ONCE = 15  # values of a section that arrays check in less time than one by one takes for one
 
 Look = Callable[[Sequence[float]], list[State]]
-Progress = Callable[[int, int], None]
 
 
 def solve(
@@ -46,7 +44,7 @@ def solve(
     model: str | None = None,
     is_scale: bool = False,
     today: date,
-    progress: Progress | None = None,
+    progress: Progress = unseen,
 ) -> Solution:
     """Find every value of a number of a mission at which its compliance begins or ends.
 
@@ -70,7 +68,7 @@ def solve(
     today : date
         Day on which waivers are judged, UTC.
     progress : callable, optional
-        Is told, after each value of the scan, how many are done, and how many there are.
+        Is told, after each value of the scan that is checked by itself, how many are done, and how many there are.
 
     Returns
     -------
@@ -82,34 +80,32 @@ def solve(
     QuestionError
         The question cannot be asked of this mission; says why.
     """
-    question = _Question(mission, key, between, row, target, model, is_scale, today)
-    scanned = question.scanned(progress)
-    crossings = tuple(
-        question.crossing(low, high) for low, high in pairwise(scanned) if low.complies != high.complies
-    )
+    search = _Search(mission, key, between, row, target, model, is_scale, today)
+    scanned = search.scanned(progress)
+    crossings = tuple(search.crossing(low, high) for low, high in pairwise(scanned) if low.complies != high.complies)
     missions = [state for state in scanned if not state.reason]
     if not missions:
         raise QuestionError(f"{key}: no value of the range makes a mission. {scanned[0].reason}")
-    nearest = question.evaluate(_nearest(missions).value)
+    nearest = search.evaluate(_nearest(missions).value)
     return Solution(
         file=mission.file,
         name=mission.name,
         key=key,
-        unit=question.number.dimension.si,
+        unit=search.number.dimension.si,
         is_scale=is_scale,
         target=target,
         row=row,
-        model=question.base.gating_model,
-        low=question.range.low,
-        high=question.range.high,
-        is_circle=question.range.is_circle,
-        given=question.given,
+        model=search.base.gating_model,
+        low=search.range.low,
+        high=search.range.high,
+        is_circle=search.range.is_circle,
+        given=search.given,
         crossings=crossings,
         nearest=nearest,
         is_constant=_is_constant(missions),
         skipped=sum(bool(state.reason) for state in scanned),
         changes=mission.changes,
-        texts=question.texts(crossings, nearest),
+        texts=search.texts(crossings, nearest),
     )
 
 
@@ -117,21 +113,25 @@ def _nearest(states: Sequence[State]) -> State:
     """Of places that all comply the first with the least left, of others the first that lacks the least."""
     if all(state.complies for state in states):
         uses = [state.utilization or 0.0 for state in states]
-        highest = max(uses)
-        return next(state for state, use in zip(states, uses, strict=True) if use >= highest - ALIKE * highest)
-    uses = [math.inf if state.utilization is None else state.utilization for state in states]
-    lowest = min(uses)
-    return next(state for state, use in zip(states, uses, strict=True) if use <= lowest * (1 + ALIKE))
+        decides = max(uses)
+    else:
+        uses = [math.inf if state.utilization is None else state.utilization for state in states]
+        decides = min(uses)
+    return next(state for state, use in zip(states, uses, strict=True) if _is_alike(use, decides))
 
 
 def _is_constant(states: Sequence[State]) -> bool:
-    """Whether one row decides, with one utilization but for rounding."""
-    uses = [state.utilization for state in states if state.utilization is not None]
-    is_alike = not uses or max(uses) - min(uses) <= ALIKE * max(uses)
-    return is_alike and len(uses) in (0, len(states)) and len({state.row for state in states}) == 1
+    """Whether one row decides, with one utilization."""
+    first, *others = states
+    return all(state.row == first.row and _is_alike(state.utilization, first.utilization) for state in others)
 
 
-class _Question:
+def _is_alike(one: float | None, other: float | None) -> bool:
+    """Whether two utilizations are one, but for rounding."""
+    return one == other or (one is not None and other is not None and math.isclose(one, other, rel_tol=ALIKE))
+
+
+class _Search:
     """One mission and one number of it."""
 
     def __init__(
@@ -167,8 +167,8 @@ class _Question:
         if self.is_scale or (self.row is not None and all(row.id != self.row for row in found.rows)):
             return None
         mission, model = self.variation.mission, self.variation.model
-        asked = Cases(mission.data, mission.file, mission.changes, (self.key,), (), model, self.today)
-        engine = Engine(asked._replace(row=self.row, target=target), mission)
+        question = Question(mission.data, mission.file, mission.changes, (self.key,), (), model, self.today)
+        engine = Engine(question._replace(row=self.row, target=target), mission)
         return None if engine.not_held else engine
 
     def _at_the_end(self) -> Iterator[MissionFindings]:
@@ -190,23 +190,20 @@ class _Question:
             return scaled(self.base, self.key, value)
         return self.variation.at({self.number: value})
 
-    def scanned(self, progress: Progress | None) -> list[State]:
+    def scanned(self, progress: Progress) -> list[State]:
         """Look at every place of the range, and where the utilization turns."""
         places = self.places()
-        if self.engine is not None:
-            return _with_turns(self.states(places), self.states, self.at_once)
-        states = []
-        for done, place in enumerate(places, 1):
-            states.append(self.evaluate(place))
-            if progress is not None:
-                progress(done, len(places))
-        return _with_turns(states, self.states)
+        return _with_turns(self.states(places, progress), self.states, self.at_once)
 
-    def states(self, values: Sequence[float]) -> list[State]:
+    def states(self, values: Sequence[float], progress: Progress = unseen) -> list[State]:
         """Check the mission with each of some values."""
         if self.engine is None or len(values) < _AT_ONCE:
-            return [self.evaluate(value) for value in values]
-        found = self.engine.part(0, len(values), {self.key: np.array(values)}).values
+            states = []
+            for done, value in enumerate(values, 1):
+                states.append(self.evaluate(value))
+                progress(done, len(values))
+            return states
+        found = self.engine.part(0, len(values), {self.key: np.array(values)}, progress).values
         columns = (*VERDICT, *GEOMETRY[:2], REASON)
         lines = zip(values, *(found[column.name].tolist() for column in columns), strict=True)
         return [self._of_line(*line) for line in lines]
@@ -278,9 +275,8 @@ def _with_turns(states: Sequence[State], look: Look, at_once: int = 1) -> list[S
         if not before.complies == here.complies == after.complies or any(use is None for use in uses):
             continue
         first, middle, last = (_sign(here) * use for use in uses if use is not None)
-        slack = ALIKE * abs(middle)  # a turn that rounding makes is none
-        is_turn = max(first, last) <= middle + slack and min(first, last) < middle - slack
-        if is_turn and turns < _TURNS:
+        ends = [end for end in (first, last) if not _is_alike(end, middle)]  # a turn that rounding makes is none
+        if ends and max(ends) < middle and turns < _TURNS:
             turns += 1
             if (turned := _turn(look, before.value, after.value, here, at_once)) is not None:
                 found.append(turned)

@@ -7,7 +7,7 @@ words are those of one mission. Memory does not grow with the number of cases.
 
 import math
 from collections import deque
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from datetime import date
 from functools import lru_cache, partial
 from hashlib import sha256
@@ -45,6 +45,13 @@ _SLOW = 1 / 8  # of cases that are checked one by one, from which processes shar
 _MANY = 8  # parts, from which processes of their own are worth their start
 _TOGETHER = 8192  # cases of a part: their arrays stay in a processor's cache
 _FEW = 64  # cases of a part where each is checked by itself
+
+Progress = Callable[[int, int], None]
+
+
+def unseen(done: int, of: int) -> None:
+    """Progress that nobody looks at."""
+
 
 GEOMETRY = (
     Column("range_resolution", "m", "Peak to first null along the bistatic look direction, on the ground."),
@@ -116,7 +123,7 @@ def sweep(
     cases : Cases
         Which keys vary, and their values.
     columns : sequence of str
-        Further columns, `ROW.FIELD`, such as `receiver.acceleration.x.allowable`.
+        Further columns, `ROW.FIELD`, such as `receiver.acceleration.x.allowable`; one named twice is there once.
     model : str, optional
         Gating model in place of the mission's own.
     today : date
@@ -158,8 +165,9 @@ class Asked:
         keys = tuple(one.key for one in cases.varied if one.key not in choices)
         if model is not None and "allocation.model" in choices:
             raise QuestionError("allocation.model: --model stands in for it; accepted: one of the two")
+        each = tuple(dict.fromkeys(columns))  # Parquet could not be read with a column twice
         self.question = Question(
-            mission.data, mission.file, mission.changes, keys, tuple(columns), model, today, choices, named
+            mission.data, mission.file, mission.changes, keys, each, model, today, choices, named
         )
         self.mission, self.cases, self.engine = mission, cases, Engine(self.question, mission)
         missions = [self.engine.mission, *self._chosen()]
@@ -361,8 +369,11 @@ class Engine:
         if len(problems) == 1:
             raise QuestionError(f"{number.key}: no value of it makes a mission: {problems.pop()}")
 
-    def part(self, start: int, stop: int, values: Mapping[str, Any]) -> Part:
-        """Check cases `start` to `stop`, whose values are (stop - start,)."""
+    def part(self, start: int, stop: int, values: Mapping[str, Any], progress: Progress = unseen) -> Part:
+        """Check cases `start` to `stop`, whose values are (stop - start,).
+
+        `progress` is told, after each that is checked by itself, how many are done, and how many there are.
+        """
         cases = stop - start
         found: dict[str, Values] = {key: np.asarray(values[key], dtype=object) for key in self.question.choices}
         found |= {number.key: np.asarray(values[number.key], dtype=float) for number in self.numbers}
@@ -374,9 +385,11 @@ class Engine:
         alone = np.ones(cases, dtype=bool)
         if not self.not_held:
             alone[:] = ~self._together(found)
-        for place in np.flatnonzero(alone):
+        by_case = int(alone.sum())
+        for done, place in enumerate(np.flatnonzero(alone), cases - by_case + 1):
             self._by_itself(found, int(place))
-        return Part(start, stop, found, int(alone.sum()))
+            progress(done, cases)
+        return Part(start, stop, found, by_case)
 
     # ---------------------------------------------------------------- one mission for the same words
     def _by_word(self, found: dict[str, Values]) -> int:

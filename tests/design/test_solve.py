@@ -174,14 +174,14 @@ def test_arrays_find_what_checks_find(name: str, key: str, more: dict[str, str],
     looked: list[int] = []
     part = solving.Engine.part
 
-    def counted(self: Any, start: int, stop: int, values: Any) -> Any:
+    def counted(self: Any, start: int, stop: int, *given: Any) -> Any:
         looked.append(stop - start)
-        return part(self, start, stop, values)
+        return part(self, start, stop, *given)
 
     monkeypatch.setattr(solving.Engine, "part", counted)
     together = solve(key, file=file, **more)
     assert looked
-    monkeypatch.setattr(solving._Question, "_engine", lambda *_: None)
+    monkeypatch.setattr(solving._Search, "_engine", lambda *_: None)
     assert_alike(together, solve(key, file=file, **more))
 
 
@@ -213,7 +213,7 @@ def test_a_scene_is_searched_by_arrays(monkeypatch) -> None:
     )
     found = solving.solve(mission, "platforms.receiver.motion_error.velocity.0", today=DAY)
     assert len(checks) < 8
-    monkeypatch.setattr(solving._Question, "_engine", lambda *_: None)
+    monkeypatch.setattr(solving._Search, "_engine", lambda *_: None)
     monkeypatch.setattr(solving, "PLACES", 9)
     other = solving.solve(mission, "platforms.receiver.motion_error.velocity.0", today=DAY)
     assert other.crossings

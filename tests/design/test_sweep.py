@@ -482,6 +482,14 @@ def test_columns_that_are_not_there(column, says) -> None:
     assert says in str(error.value)
 
 
+def test_a_column_that_is_named_twice_is_there_once() -> None:
+    """A Parquet file had it twice, which its readers refuse."""
+    mission = load_mission(str(MISSIONS / "rigling_moses_section_v.yaml"))
+    names = ["transmitter.acceleration.x.margin", "timing.linear.margin", "transmitter.acceleration.x.margin"]
+    found = sweep(mission, grid(mission, collection__aperture_time=[1.0]), columns=names, today=DAY)
+    assert [one.name for one in found.columns if one.name.endswith("margin")] == names[:2]
+
+
 def test_a_key_that_makes_no_mission_whatever_its_value_is_refused() -> None:
     """A map of 16 471 errors came of an azimuth beside a position."""
     mission = load_mission(str(MISSIONS / "uav_pair_l_band.yaml"))
