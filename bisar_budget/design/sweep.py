@@ -465,9 +465,11 @@ class Engine:
                 partial(self._one, found, some),
                 is_brief=self.is_brief,
             )
-        sure, rows = ~checked.is_left_out, {row.subject.id: row for row in checked.rows}
-        if self.question.row not in (None, *rows):
-            return np.zeros(some.size, dtype=bool)
+            rows = {row.subject.id: row for row in checked.rows}
+            if self.question.row not in (None, *rows):
+                return np.zeros(some.size, dtype=bool)
+            verdict = _verdict(checked, self.question.row, breaking(self.question.target))
+        sure = ~checked.is_left_out
         to = some[sure]
         geometry = (
             geometries.range_resolution(mission.radar.bandwidth, SPEED_OF_LIGHT),
@@ -477,7 +479,7 @@ class Engine:
         )
         for column, number in zip(GEOMETRY, geometry, strict=True):
             found[column.name][to] = np.broadcast_to(number, some.shape)[sure]
-        for name, of_verdict in _verdict(checked, self.question.row, breaking(self.question.target)).items():
+        for name, of_verdict in verdict.items():
             found[name][to] = of_verdict[sure]
         for one in self.asked:
             if one.row in rows:

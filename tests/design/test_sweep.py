@@ -24,6 +24,7 @@ from bisar_budget.mission.tree import read_tree
 from tests.conftest import ROOT, mission_text
 from tests.families import FAMILIES
 from tests.families import mission_text as of_family
+from tests.fuzz import case
 
 MISSIONS = ROOT / "specs" / "missions"
 DAY = date(2026, 1, 1)
@@ -480,6 +481,15 @@ def test_columns_that_are_not_there(column, says) -> None:
     with pytest.raises(QuestionError, match="--column") as error:
         sweep(mission, grid(mission, collection__aperture_time=[1.0]), columns=[column], today=DAY)
     assert says in str(error.value)
+
+
+def test_a_case_that_arrays_leave_to_check_warns_of_nothing() -> None:
+    """Its limit was not searched for, and 0 so far: a utilization without end was subtracted from itself."""
+    mission = parse_mission(case(14899).data, "m.yaml")
+    cases = grid(mission, platforms__transmitter__motion_error__position__1=[-67161.18843750001])
+    whole, by_case = swept(mission, cases)
+    assert by_case == 1
+    assert_as_checked(mission, cases, whole)
 
 
 def test_a_column_that_is_named_twice_is_there_once() -> None:
