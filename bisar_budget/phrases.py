@@ -1,4 +1,6 @@
-"""Every sentence that a finding may carry, in one place: a note is data, and its words are written here.
+"""Every sentence that a row may carry, in one place: a note is data, and its words are written here.
+
+Those of verdicts stand in `verify.reasons`, those of a mission file's warnings in `budget.file_warnings`.
 
 A function writes one sentence. Its name is the note's code, its arguments are what the note is made of: numbers in SI
 and radians, ids of rows, names.
@@ -40,7 +42,8 @@ CODES: dict[str, str] = {}  # of every sentence, with what it is said of
 _NO_GAIN = "autofocus gain does not apply"
 
 
-def _phrase(sentence: Callable[P, str]) -> Callable[P, Note]:
+def phrase(sentence: Callable[P, str]) -> Callable[P, Note]:
+    """Make what a function writes a note, and its name the code."""
     code = sentence.__name__.replace("_", "-")
     CODES[code] = sentence.__doc__ or ""
 
@@ -63,83 +66,83 @@ def _level(db: float, rounding: str = "nearest") -> str:
 
 
 # ---------------------------------------------------------------------- how a row stands
-@_phrase
+@phrase
 def over_the_limit_without_autofocus(times: float) -> str:
     """Of a row that passes with autofocus."""
     return f"{times:.3g} times the limit without autofocus"
 
 
-@_phrase
+@phrase
 def near_the_limit_with_autofocus(utilization: float) -> str:
     """Of a row that passes with autofocus."""
     return f"uses {100 * utilization:.3g} % of the limit with autofocus"
 
 
-@_phrase
+@phrase
 def above_warn_above(warn_above: float) -> str:
     """Of a row that passes."""
     return f"above {100 * warn_above:g} % of the limit"
 
 
-@_phrase
+@phrase
 def aggregate_decides(combine: str) -> str:
     """Of a single error under a sum."""
     return f"combine is {combine}: the aggregate decides"
 
 
-@_phrase
+@phrase
 def stated_along_other_axes(axes: Sequence[str]) -> str:
     """Of rows along the scene's axes."""
     return f"the file states this error along other axes ({', '.join(axes)}): those rows decide"
 
 
-@_phrase
+@phrase
 def no_requirement() -> str:
     """Of an aggregate that nothing is asked of."""
     return "no requirement in the file: computed, not judged"
 
 
-@_phrase
+@phrase
 def no_requirement_of(metric: str) -> str:
     """Of a vibration, or a tone."""
     return f"no requirements.{metric} to hold it to"
 
 
-@_phrase
+@phrase
 def not_declared_as_required(key: str) -> str:
     """Of an error that the file should declare."""
     return f"the file has no {key}, which requirements.declare asks for"
 
 
 # ---------------------------------------------------------------------- over the limit
-@_phrase
+@phrase
 def quadratic_phase_over(phase: float, limit: float, equation: str = "") -> str:
     """Of one error. [rad]"""
     text = f"QPE {_size(phase, 'rad')}, {format_limit(limit, 'rad')} allowed"
     return f"{text} ({equation})" if equation else text
 
 
-@_phrase
+@phrase
 def cubic_phase_over(phase: float, limit: float, equation: str = "") -> str:
     """Of one error. [rad]"""
     text = f"cubic phase {_size(phase, 'rad')}, {format_limit(limit, 'rad')} allowed"
     return f"{text} ({equation}); {_NO_GAIN}" if equation else f"{text}; {_NO_GAIN}"
 
 
-@_phrase
+@phrase
 def no_gain() -> str:
     """Of a cubic phase."""
     return _NO_GAIN
 
 
-@_phrase
+@phrase
 def location_over(moved: float | None, limit: float, equation: str) -> str:
     """Of one error; None: there is no image of it. [m]"""
     where = "out of sight" if moved is None else f"by {format_quantity(moved, 'm')}"
     return f"moves the image {where}, {format_limit(limit, 'm')} allowed ({equation})"
 
 
-@_phrase
+@phrase
 def aggregate_over(
     what: str, size: float, limit: float, unit: str, row_id: str, largest: float, extrapolated: str = ""
 ) -> str:
@@ -151,13 +154,13 @@ def aggregate_over(
     return f"{text} ({extrapolated})" if extrapolated else text
 
 
-@_phrase
+@phrase
 def one_total() -> str:
     """Of a sum beyond the pull-in range."""
     return "autofocus corrects one total, not each error separately"
 
 
-@_phrase
+@phrase
 def all_together_over(what: str, size: float, limit: float, unit: str) -> str:
     """Of errors that are judged one by one."""
     return (
@@ -166,26 +169,26 @@ def all_together_over(what: str, size: float, limit: float, unit: str) -> str:
     )
 
 
-@_phrase
+@phrase
 def edge_over() -> str:
     """Of the scene's edge."""
     return "quadratic phase at the scene's edge and at its centre differ by more than the total budget"
 
 
-@_phrase
+@phrase
 def passes_from(n_pull: float) -> str:
     """Of an error that autofocus could correct."""
     return f"passes with autofocus from n_pull {n_pull:g}"
 
 
-@_phrase
+@phrase
 def beyond_autofocus(n_pull: str, allowed: str) -> str:
     """Of an error that no autofocus corrects; rounded numbers, what allows so much before its own."""
     return f"no autofocus corrects this: N_pull would have to be {n_pull}, {allowed}"
 
 
 # ---------------------------------------------------------------------- what the other model says
-@_phrase
+@phrase
 def other_model_fails(model: str, size: float, limit: float, unit: str, what: str = "", equation: str = "") -> str:
     """Of a row, or an aggregate, that the gating model passes."""
     text = f"the {model} model says fail: {what}".rstrip()
@@ -193,152 +196,152 @@ def other_model_fails(model: str, size: float, limit: float, unit: str, what: st
     return f"{text} ({equation})" if equation else text
 
 
-@_phrase
+@phrase
 def other_model_is_beyond(model: str, phase: float, limit: float, unit: str) -> str:
     """Of the pull-in range."""
     return f"the {model} model says beyond it: QPE {_size(phase, unit)}, {format_limit(limit, unit)} allowed"
 
 
-@_phrase
+@phrase
 def other_model_allows(model: str, limit: float, unit: str) -> str:
     """Of a vibration, a tone, or a power."""
     return f"the {model} model says fail: {format_quantity(limit, unit, 3, 'down')} allowed"
 
 
-@_phrase
+@phrase
 def other_model_spreads(model: str, level_db: float) -> str:
     """Of noise."""
     return f"the {model} model says fail: it spreads {_level(level_db)}"
 
 
-@_phrase
+@phrase
 def wrong_height_defocuses() -> str:
     """Why the full model fails the terrain."""
     return "a bistatic image defocuses on a wrong height"
 
 
-@_phrase
+@phrase
 def position_defocuses() -> str:
     """Why the full model fails a position."""
     return "the line of sight turns over a position error, and its displacement defocuses"
 
 
-@_phrase
+@phrase
 def displacement_defocuses() -> str:
     """Why the full model fails a clock or another phase."""
     return "the displaced response has a quadratic phase of its own"
 
 
-@_phrase
+@phrase
 def turning_defocuses() -> str:
     """Why the full model fails a velocity or an acceleration."""
     return "the line of sight turns, and the displaced response has a quadratic phase of its own"
 
 
 # ---------------------------------------------------------------------- no limit, no value
-@_phrase
+@phrase
 def no_quadratic_term_of_position() -> str:
     """Of a position, by the published model."""
     return "no quadratic term: a position error moves the image (Table I)"
 
 
-@_phrase
+@phrase
 def no_component(cause: str, axis: str) -> str:
     """Of a velocity or an acceleration, by the published model."""
     return f"no quadratic term: the platform's {cause} has no component along {axis}"
 
 
-@_phrase
+@phrase
 def no_common_component(cause: str, axis: str) -> str:
     """Of an error that both platforms share, by the published model."""
     return f"no quadratic term: the platforms' {cause} have no component along {axis}, or cancel"
 
 
-@_phrase
+@phrase
 def no_quadratic_term_of_clock(term: str) -> str:
     """Of a clock, by the published model."""
     return f"no quadratic term: the clock's {term} term has another order (Table I row 1)"
 
 
-@_phrase
+@phrase
 def no_quadratic_term_of_height() -> str:
     """Of the terrain, by the published model."""
     return "no quadratic term: to the published model a height error moves the image"
 
 
-@_phrase
+@phrase
 def no_size_reaches_the_limit() -> str:
     """Of a motion error, by the full model."""
     return "no error up to a tenth of the slant range reaches the limit"
 
 
-@_phrase
+@phrase
 def no_quadratic_phase() -> str:
     """Of a clock, by the full model."""
     return "no quadratic phase"
 
 
-@_phrase
+@phrase
 def clock_is_heard() -> str:
     """Of a clock under a direct path."""
     return "the direct path is the clock: a timing error has no effect"
 
 
-@_phrase
+@phrase
 def oscillators_drop_out() -> str:
     """Of an oscillator under a direct path."""
     return "the direct path is the receiver's clock: oscillators drop out"
 
 
-@_phrase
+@phrase
 def no_phase_noise() -> str:
     """Of an oscillator without any."""
     return "no phase noise"
 
 
-@_phrase
+@phrase
 def across_the_line_of_sight() -> str:
     """Of a sensor."""
     return "the line of sight has no part in it: no phase"
 
 
-@_phrase
+@phrase
 def nothing_spreads() -> str:
     """Of a clock's error that does nothing."""
     return "no quadratic phase, no cubic phase and nothing that spreads"
 
 
-@_phrase
+@phrase
 def no_requirement_limits(effects: Sequence[str]) -> str:
     """Of a sensor or a clock whose effects are not required."""
     return f"no requirement limits its {' and '.join(effects)}"
 
 
-@_phrase
+@phrase
 def same_all_over_the_scene() -> str:
     """Of the scene's edge, by the published model."""
     return "to the published model an error is the same all over the scene"
 
 
-@_phrase
+@phrase
 def no_ground_point() -> str:
     """Of an aggregate that has no value."""
     return "a declared error leaves no ground point with its range history"
 
 
-@_phrase
+@phrase
 def no_image() -> str:
     """Of the scene's edge."""
     return "a declared error leaves no ground point with its range history: there is no image"
 
 
-@_phrase
+@phrase
 def no_image_to_place() -> str:
     """Of the location."""
     return "with a declared error no ground point has the recorded range history: there is no image"
 
 
-@_phrase
+@phrase
 def no_displacement(degrees: float) -> str:
     """Of an image plane whose gradients are nearly parallel. [deg]"""
     return (
@@ -347,124 +350,124 @@ def no_displacement(degrees: float) -> str:
     )
 
 
-@_phrase
+@phrase
 def no_image_at_the_edge(azimuth_deg: float, why: str) -> str:
     """Of a place of the scene's edge."""
     return f"no image at the scene's edge, azimuth {azimuth_deg:.0f} deg: {why}"
 
 
-@_phrase
+@phrase
 def platform_at_the_edge(distance: float) -> str:
     """Of a place of the scene's edge. [m]"""
     return f"a platform is within {distance:g} m of it"
 
 
-@_phrase
+@phrase
 def gradients_become_parallel() -> str:
     """Of a place of the scene's edge."""
     return "on the way there range and Doppler gradients become parallel"
 
 
 # ---------------------------------------------------------------------- the scene
-@_phrase
+@phrase
 def same_at_the_edge() -> str:
     """Of a scene over which nothing changes."""
     return "the declared errors have the same quadratic phase at the edge and at the centre"
 
 
-@_phrase
+@phrase
 def largest_at_the_edge(azimuth_deg: float, radius: float) -> str:
     """Where the scene's edge differs most."""
     return f"largest between the centre and azimuth {azimuth_deg:.0f} deg, {format_quantity(radius, 'm')} away"
 
 
-@_phrase
+@phrase
 def one_correction_serves(how_far: str, total: float) -> str:
     """Within which radius one autofocus correction serves. [rad]"""
     return f"one autofocus correction serves {how_far}, by the total of {format_limit(total, 'rad')}"
 
 
-@_phrase
+@phrase
 def over_at_the_edge(row_id: str, phase: float, limit: float) -> str:
     """Of an error that is inside its limit at the centre. [rad]"""
     return f"{row_id} is {phase:.3g} rad at the scene's edge, {format_limit(limit, 'rad')} allowed"
 
 
 # ---------------------------------------------------------------------- what a value rests on
-@_phrase
+@phrase
 def held_to_the_total(owners: str) -> str:
     """Of an error of both platforms, or of none."""
     return f"held to the total budget: it belongs to {owners}"
 
 
-@_phrase
+@phrase
 def counted_as_one(group: str) -> str:
     """Of a covariance in a root-sum-square."""
     return f"the errors of {group} count as one, the root of gᵀCg"
 
 
-@_phrase
+@phrase
 def correlations_unused(group: str) -> str:
     """Of a covariance in a sum."""
     return f"a sum uses no correlations: each error of {group} counts with its own sigma, all at their worst"
 
 
-@_phrase
+@phrase
 def one_point_of_allan_deviation() -> str:
     """Of an oscillator."""
     return "one point of an Allan deviation tells no kind of noise: it is the worst for this aperture"
 
 
-@_phrase
+@phrase
 def flicker_is_assumed() -> str:
     """Of an oscillator."""
     return "an Allan deviation does not tell white from flicker phase noise: flicker is assumed"
 
 
-@_phrase
+@phrase
 def allan_deviation_begins(time: float) -> str:
     """Of an oscillator. [s]"""
     return f"the Allan deviation begins at {time:g} s; down to the aperture time its power law continues"
 
 
-@_phrase
+@phrase
 def allan_deviation_ends(time: float) -> str:
     """Of an oscillator. [s]"""
     return f"the Allan deviation ends at {time:g} s; up to the aperture time its power law continues"
 
 
-@_phrase
+@phrase
 def mask_begins(frequency: float, slope: float) -> str:
     """Of an oscillator. [Hz]"""
     return f"the mask begins at {frequency:g} Hz; below, it continues as f^-{slope:.3g}"
 
 
-@_phrase
+@phrase
 def power_law_fits(misfit: float) -> str:
     """Of an oscillator."""
     return f"the power law fits the Allan deviation to {100 * misfit:.2g} %"
 
 
-@_phrase
+@phrase
 def left_by_exchanges(interval: float) -> str:
     """Of an oscillator. [s]"""
     return f"only what synchronisation every {format_quantity(interval, 's')} leaves of it counts"
 
 
-@_phrase
+@phrase
 def another_for_each_pulse() -> str:
     """Of the error of a link."""
     return "the error is another one for each pulse: all of it spreads"
 
 
 # ---------------------------------------------------------------------- noise and tones
-@_phrase
+@phrase
 def spreads_too_much(level_db: float, limit_db: float) -> str:
     """Of noise."""
     return f"spreads {_level(level_db)}, {_level(limit_db, 'down')} allowed"
 
 
-@_phrase
+@phrase
 def noise_spreads_too_much(level_db: float, limit_db: float, row_id: str, largest_db: float) -> str:
     """Of all noise together."""
     return (
@@ -473,45 +476,45 @@ def noise_spreads_too_much(level_db: float, limit_db: float, row_id: str, larges
     )
 
 
-@_phrase
+@phrase
 def echoes_over(level_db: float, limit_db: float) -> str:
     """Of a tone."""
     return f"paired echoes of {_level(level_db)}, {_level(limit_db, 'down')} allowed"
 
 
-@_phrase
+@phrase
 def echoes_on_the_mainlobe(cycles: float, least: float) -> str:
     """Of a slow tone."""
     return f"{cycles:.3g} cycles per aperture: below {least:g} its echoes lie on the mainlobe"
 
 
-@_phrase
+@phrase
 def tone_lies(frequency: float, cells: float) -> str:
     """Of a tone. [Hz]"""
     return f"at {format_quantity(frequency, 'Hz')}, {cells:.3g} cells from the response"
 
 
 # ---------------------------------------------------------------------- vibration
-@_phrase
+@phrase
 def share_of_power_over(metric: str, rule: str) -> str:
     """Of a vibration."""
     what = "paired echoes" if metric == "pslr" else "power spread"
     return f"{what} above the platform's share of {metric.upper()} ({rule})"
 
 
-@_phrase
+@phrase
 def slow_quadratic_phase_over(phase: float, limit: float) -> str:
     """Of a vibration below a cycle per aperture. [rad]"""
     return f"QPE {phase:.3g} rad in the worst phase, {format_limit(limit, 'rad')} allowed"
 
 
-@_phrase
+@phrase
 def slow_cubic_phase_over(phase: float, limit: float) -> str:
     """Of a vibration below a cycle per aperture. [rad]"""
     return f"cubic phase {phase:.3g} rad in the worst phase, {format_limit(limit, 'rad')} allowed; {_NO_GAIN}"
 
 
-@_phrase
+@phrase
 def slower_than_a_cycle(cycles: float, quadratic: float, cubic: float) -> str:
     """Of a vibration. [rad]"""
     return (
@@ -528,7 +531,7 @@ def _in_the_worst_phase(quadratic: float, limit: float, cubic: float, cubic_limi
     return text if cubic_limit is None else f"{text}, {format_limit(cubic_limit, 'rad')} allowed"
 
 
-@_phrase
+@phrase
 def slower_than_three_cycles(
     cycles: float, quadratic: float, limit: float, cubic: float, cubic_limit: float | None
 ) -> str:
@@ -539,13 +542,13 @@ def slower_than_three_cycles(
     )
 
 
-@_phrase
+@phrase
 def phase_of_vibration_over(quadratic: float, limit: float, cubic: float, cubic_limit: float | None) -> str:
     """Of a vibration below three cycles per aperture. [rad]"""
     return f"also {_in_the_worst_phase(quadratic, limit, cubic, cubic_limit)}"
 
 
-@_phrase
+@phrase
 def lines_together(entries: str, band: str, apart: float, amplitude: float) -> str:
     """Of lines of one platform whose echoes add. [m]"""
     return (
@@ -554,7 +557,7 @@ def lines_together(entries: str, band: str, apart: float, amplitude: float) -> s
     )
 
 
-@_phrase
+@phrase
 def both_platforms_vibrate(other: str, apart: float, level_db: float, is_more: bool, required_db: float) -> str:
     """Of lines of both platforms whose echoes add."""
     return (
@@ -563,20 +566,20 @@ def both_platforms_vibrate(other: str, apart: float, level_db: float, is_more: b
     )
 
 
-@_phrase
+@phrase
 def published_rule_is_exact() -> str:
     """Of a limit of a vibration."""
     return "the published rule is that of first principles, to 0.01 dB"
 
 
-@_phrase
+@phrase
 def published_rule_is_off(margin_db: float) -> str:
     """Of a limit of a vibration."""
     side = "inside" if margin_db >= 0 else "beyond"
     return f"the published rule is {abs(margin_db):.2f} dB {side} first principles"
 
 
-@_phrase
+@phrase
 def seen_of_vibration(stated: str, along: float, has_direct_path: bool) -> str:
     """Of a vibration that the line of sight sees a part of. [m]"""
     where = "in the range less the direct path" if has_direct_path else "along the line of sight"
@@ -584,50 +587,50 @@ def seen_of_vibration(stated: str, along: float, has_direct_path: bool) -> str:
 
 
 # ---------------------------------------------------------------------- images
-@_phrase
+@phrase
 def autofocus_refuted() -> str:
     """Of a row that passes with autofocus."""
     return "passes only with autofocus, and the image at that limit shows that autofocus fails"
 
 
-@_phrase
+@phrase
 def location_refuted() -> str:
     """Of the location."""
     return "the image is not where the gating model puts it"
 
 
-@_phrase
+@phrase
 def limit_refuted(times: float) -> str:
     """Of a row that passes."""
     return f"inside the limit, but {times:.3g} times what the image allows"
 
 
-@_phrase
+@phrase
 def optimistic_limit(shown: str) -> str:
     """Of a limit that an image refutes."""
     return f"optimistic limit: {shown}"
 
 
-@_phrase
+@phrase
 def optimistic_limit_with_autofocus(shown: str) -> str:
     """Of a limit with autofocus that an image refutes."""
     return f"optimistic limit with autofocus: {shown}"
 
 
-@_phrase
+@phrase
 def images_formed(conditions: str) -> str:
     """Of a mission with images."""
     return f"images: {conditions}"
 
 
 # ---------------------------------------------------------------------- the collection
-@_phrase
+@phrase
 def path_curves(platform: str) -> str:
     """Of a collection."""
     return f"the {platform}'s path curves: the published model takes it for straight, the full model does not"
 
 
-@_phrase
+@phrase
 def sight_turns(platform: str, half_turn: float) -> str:
     """Of a collection. [rad]"""
     return (
@@ -636,7 +639,7 @@ def sight_turns(platform: str, half_turn: float) -> str:
     )
 
 
-@_phrase
+@phrase
 def direct_path_is_the_clock() -> str:
     """Of a collection."""
     return (
@@ -645,7 +648,7 @@ def direct_path_is_the_clock() -> str:
     )
 
 
-@_phrase
+@phrase
 def range_cells_are_coarse(phase: float, shown_percent: float) -> str:
     """Of a collection. [rad]"""
     return (
@@ -655,57 +658,57 @@ def range_cells_are_coarse(phase: float, shown_percent: float) -> str:
     )
 
 
-@_phrase
+@phrase
 def keys_not_used(keys: Sequence[str]) -> str:
     """Of a mission file."""
     return f"not used by this check: {', '.join(keys)}"
 
 
 # ---------------------------------------------------------------------- draws
-@_phrase
+@phrase
 def drawn_through_exact_ranges() -> str:
     """Of Monte Carlo."""
     return "every draw goes through exact ranges: the declared errors are too large for sums of their effects"
 
 
-@_phrase
+@phrase
 def drawn_by_the_full_model(model: str) -> str:
     """Of Monte Carlo."""
     return f"drawn by the full model; the rows are judged by allocation.model, {model}"
 
 
-@_phrase
+@phrase
 def drawn_all_at_once() -> str:
     """Of Monte Carlo."""
     return "a draw is the sum of all errors at once; the rows are judged one by one, allocation.combine being each"
 
 
-@_phrase
+@phrase
 def drawn_as_bounds(row_ids: Sequence[str]) -> str:
     """Of Monte Carlo."""
     return f"{', '.join(row_ids)}: drawn as plus or minus the declared value, which has no distribution"
 
 
-@_phrase
+@phrase
 def vibration_is_not_drawn() -> str:
     """Of Monte Carlo."""
     return "vibration is not drawn; the phase of a slow vibration is not included"
 
 
-@_phrase
+@phrase
 def mean_power_is_not_drawn() -> str:
     """Of Monte Carlo."""
     return "what sensors and clocks spread is a mean power: ISLR is not drawn"
 
 
-@_phrase
+@phrase
 def drawn_without_coverage() -> str:
     """Of Monte Carlo."""
     return "the coverage factor is in sum and rss, not in the draws"
 
 
 # ---------------------------------------------------------------------- waivers
-@_phrase
+@phrase
 def waived(line: int | None, until: date, reason: str, is_expired: bool) -> str:
     """Of a row that fails."""
     return f"{'expired ' if is_expired else ''}waiver of line {line}, until {until}: {reason}"

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from datetime import date
 from typing import TYPE_CHECKING, NamedTuple
 
-from bisar_budget import phrases
+from bisar_budget import file_warnings, phrases
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.aggregates import aggregate_rows
@@ -186,27 +186,20 @@ def _of_instruments(analysis: Analysis) -> Iterator[FileWarning]:
     mission, sync = analysis.mission, analysis.mission.synchronization
     T = mission.collection.aperture_time
     if sync is not None and not sync.is_direct_path and (sync.interval or 0.0) > T:
-        yield FileWarning(
-            line=mission.line(("synchronization", "interval")),
-            message=f"synchronization.interval: pulses are exchanged less than once in an aperture of {T:g} s; "
-            "straight lines between them may make the phase worse than it is without",
-        )
+        line = mission.line(("synchronization", "interval"))
+        yield FileWarning(line=line, message=file_warnings.exchanges_are_rare(T))
     for error in analysis.random:
         if error.warning:
             yield FileWarning(line=mission.line(error.path), message=error.warning)
         declared = error.subject.axis == "accelerometer_bias" and error.declared is not None
         if declared and getattr(mission.platforms, error.owner).motion_error.acceleration is not None:
-            key = f"platforms.{error.owner}.motion_error"
-            yield FileWarning(
-                line=mission.line(error.path),
-                message=f"{key}: acceleration and the accelerometer bias are both stated; they add",
-            )
+            yield FileWarning(line=mission.line(error.path), message=file_warnings.stated_twice(error.owner))
 
 
 def _changed(mission: Mission) -> Iterator[FileWarning]:
     """Say that another mission was checked than the file has."""
     if mission.changes:
-        message = f"checked is not the mission of the file: {changes_words(mission.changes)}"
+        message = file_warnings.another_mission(changes_words(mission.changes))
         yield FileWarning(line=None, message=message, is_of_options=True)
 
 
@@ -214,24 +207,19 @@ def _unknown_requirement_ids(mission: Mission, rows: Sequence[Row]) -> Iterator[
     known = {row.id for row in rows} if mission.requirement_ids else set()
     for row_id in mission.requirement_ids:
         if row_id not in known:
-            yield FileWarning(
-                line=mission.line(("requirement_ids", row_id)),
-                message=f"requirement_ids: {row_id} is the id of no row",
-            )
+            line = mission.line(("requirement_ids", row_id))
+            yield FileWarning(line=line, message=file_warnings.id_of_no_row(row_id))
 
 
 def _overruled_model(mission: Mission) -> Iterator[FileWarning]:
     if mission.gating_model != mission.allocation.model:
-        yield FileWarning(
-            line=mission.line(("synchronization", "method")),
-            message=f"allocation.model {mission.allocation.model}: the published model does not know the direct "
-            "path; the full model gates",
-        )
+        line = mission.line(("synchronization", "method"))
+        yield FileWarning(line=line, message=file_warnings.full_model_gates(mission.allocation.model))
 
 
 def _nothing_declared(rows: Sequence[Row]) -> Iterator[FileWarning]:
     if all(row.status == "not_declared" for row in rows):
-        yield FileWarning(line=None, message="no error is declared: nothing was judged")
+        yield FileWarning(line=None, message=file_warnings.nothing_declared())
 
 
 def _unused_correlations(mission: Mission) -> Iterator[FileWarning]:
@@ -260,7 +248,7 @@ def _doubtful_paths(mission: Mission) -> Iterator[FileWarning]:
     for name, path in _paths(mission):
         for doubt in path.doubts:
             place = mission.line(("platforms", name, getattr(mission.platforms, name).way))
-            yield FileWarning(line=place, message=f"platforms.{name}: {doubt}", is_doubt=True)
+            yield FileWarning(line=place, message=file_warnings.path_is_doubtful(name, doubt), is_doubt=True)
 
 
 def _unused_keys(mission: Mission) -> Iterator[Note]:

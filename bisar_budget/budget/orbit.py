@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from bisar_budget import file_warnings
 from bisar_budget.constants import EARTH_GRAVITATIONAL_PARAMETER, EARTH_RADIUS
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.faults import KeyPath
@@ -74,19 +75,7 @@ def straight_orbits(mission: Mission) -> Iterator[FileWarning]:
         axes = mission.scene.axes
         if axes is not None:
             acceleration = free_fall(axes, platform.state)
-            how = "(gravity of a point mass, less what the Earth's rotation adds)"
         else:
             acceleration = orbital_acceleration(platform.state.position)
-            how = (
-                "(towards the Earth's centre; the Earth's rotation changes it by up to 1.1 m/s^2, which needs the "
-                "latitude)"
-            )
-        parts = ", ".join(f"{part + 0.0:.3f} m/s^2" for part in acceleration)
-        yield FileWarning(
-            line=mission.line(("platforms", name, *key)),
-            message=(
-                f"platforms.{name}: {speed / 1e3:.3g} km/s is the speed of a satellite, and the path is straight. "
-                f"A circular orbit has acceleration: [{parts}] {how}"
-            ),
-            is_doubt=True,
-        )
+        message = file_warnings.satellite_flies_straight(name, speed, acceleration, axes is not None)
+        yield FileWarning(line=mission.line(("platforms", name, *key)), message=message, is_doubt=True)

@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from bisar_budget import phrases
+from bisar_budget import file_warnings, phrases
 from bisar_budget.findings.mission import FileWarning, Resolution
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import Note
@@ -80,21 +80,11 @@ def pull_in_caps(mission: Mission, resolution: Resolution) -> Iterator[FileWarni
     limit = caps(mission)
     ratio = limit.walk / (2 * WALK_CELLS)
     if n_pull > limit.walk:
-        yield FileWarning(
-            line=line,
-            message=(
-                f"autofocus.n_pull: an error of {n_pull:g}π rad walks over {n_pull / ratio / 2:.3g} range cells; "
-                f"correction along one dimension then costs over 0.6 dB; half a cell is n_pull {ratio:.4g}, f0/B"
-            ),
-        )
+        message = file_warnings.walks_over_range_cells(n_pull, n_pull / ratio / 2, ratio)
+        yield FileWarning(line=line, message=message)
     radius = mission.scene.radius
     smear = 4 * n_pull * resolution.cross_range
     if radius is not None and limit.scene is not None and n_pull > limit.scene:
-        yield FileWarning(
-            line=line,
-            message=(
-                f"autofocus.n_pull: an error of {n_pull:g}π rad smears a point over {format_quantity(smear, 'm')}; "
-                f"{algorithm} needs {ROOM[algorithm]:g} times that. A scene of "
-                f"{format_quantity(2 * radius, 'm')} across holds n_pull {_down(limit.scene)}"
-            ),
-        )
+        held = _down(limit.scene)
+        message = file_warnings.smears_beyond_the_scene(n_pull, smear, algorithm, ROOM[algorithm], radius, held)
+        yield FileWarning(line=line, message=message)

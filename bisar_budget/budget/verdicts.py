@@ -1,6 +1,6 @@
 """What follows from images for the rows of a check, and which of the images are worth showing."""
 
-from bisar_budget import phrases
+from bisar_budget import file_warnings, phrases
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.findings.mission import FileWarning, MissionFindings
@@ -23,7 +23,7 @@ def with_verdicts(findings: MissionFindings, verified: VerifiedMission) -> Missi
     judged = tuple(_with_verdict(row, by_id[row.id]) if row.id in by_id else row for row in findings.rows)
     known = {row.id for row in findings.rows}
     warnings = tuple(
-        FileWarning(line=None, message=f"{verdict.id}: {phrases.optimistic_limit(_shown(verdict))}")
+        FileWarning(line=None, message=file_warnings.limit_is_optimistic(verdict.id, _shown(verdict)))
         for verdict in rows
         if verdict.id not in known and verdict.verdict == "optimistic"
     )

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from datetime import date
 from fnmatch import translate
 
+from bisar_budget import file_warnings
 from bisar_budget.findings.mission import FileWarning
 from bisar_budget.findings.row import AppliedWaiver, Row
 from bisar_budget.mission.model import Mission
@@ -46,15 +47,11 @@ def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> tuple[l
         else:
             holding = dict.fromkeys(failing, applied) | holding
         if not named:
-            warnings.append(FileWarning(line=line, message=f"waiver {waiver.id}: matches no row"))
+            warnings.append(FileWarning(line=line, message=file_warnings.waiver_matches_nothing(waiver.id)))
         elif len(named) == len(rows):
-            warnings.append(
-                FileWarning(line=line, message=f"waiver {waiver.id}: names every row and would hide any new failure")
-            )
+            warnings.append(FileWarning(line=line, message=file_warnings.waiver_matches_everything(waiver.id)))
         elif not failing:
-            warnings.append(
-                FileWarning(line=line, message=f"waiver {waiver.id}: not used: no row that it names fails")
-            )
+            warnings.append(FileWarning(line=line, message=file_warnings.waiver_not_used(waiver.id)))
     last: dict[int, AppliedWaiver] = {}
     for applied, failing in sorted(over, key=lambda one: one[0].until):
         last |= dict.fromkeys(failing, applied)

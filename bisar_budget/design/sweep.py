@@ -321,7 +321,7 @@ class Question(NamedTuple):
 @lru_cache(maxsize=1)
 def _engine(question: Question) -> "Engine":
     parse = parse_mission if question.named is None else question.named.parse
-    return Engine(question, parse(question.data, question.file, changes=question.changes))
+    return Engine(question, parse(question.data, question.file, question.model, changes=question.changes))
 
 
 def part_of(question: Question, start: int, stop: int, values: Mapping[str, Any]) -> Part:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from bisar_budget import phrases
+from bisar_budget import file_warnings, phrases
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.effects.random_errors import RandomEffect, RandomError
@@ -32,7 +32,7 @@ def _of_oscillator(mission: Mission, name: str, oscillator: Oscillator, sync: Sy
     T, factor = mission.collection.aperture_time, mission.allocation.coverage_factor
     noise = noise_of(oscillator, mission.radar.center_frequency, T)
     notes = [note for note in (noise.extrapolated, *noise.notes) if note]
-    no_limit, warning = phrases.no_phase_noise(), ""
+    no_limit, warning = phrases.no_phase_noise(), phrases.NOTHING
     if sync is not None and sync.is_direct_path:
         found, no_limit, notes = Parts(0.0, 0.0, 0.0), phrases.oscillators_drop_out(), []
     else:
@@ -43,9 +43,7 @@ def _of_oscillator(mission: Mission, name: str, oscillator: Oscillator, sync: Sy
             found = parts(noise.pieces, T)
     key = ("platforms", name, "oscillator")
     if noise.misfit > _MISFIT:
-        warning = (
-            f"{'.'.join(key)}: no power law fits the Allan deviation; the fit is off by {100 * noise.misfit:.3g} %"
-        )
+        warning = file_warnings.no_power_law_fits(".".join(key), noise.misfit)
     elif noise.misfit > 0.005:
         notes.append(phrases.power_law_fits(noise.misfit))
     quadratic, cubic, spread = map(math.sqrt, found)

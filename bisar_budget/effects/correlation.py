@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
-from bisar_budget import phrases
+from bisar_budget import file_warnings, phrases
 from bisar_budget.effects.combine import combine_displacements, combine_phases
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource
 from bisar_budget.effects.subject import subject
@@ -109,16 +109,15 @@ def correlation_notes(rule: str, groups: Sequence[Correlated]) -> tuple[Note, ..
     return tuple(phrases.correlations_unused(group.id) for group in groups)
 
 
-def unused_correlations(mission: Mission) -> Iterator[tuple[Place | None, str]]:
+def unused_correlations(mission: Mission) -> Iterator[tuple[Place | None, Note]]:
     """Warn of correlations that no row and no aggregate looks at: line and message."""
     if mission.allocation.combine != "each":
         return
     for name in PLATFORMS:
         error: MotionError = getattr(mission.platforms, name).motion_error
         if error.covariance is not None and error.covariance.has_correlations():
-            message = "correlations are not used where each error is judged alone; combine: rss uses them"
             line = mission.line(("platforms", name, "motion_error", "covariance"))
-            yield line, f"platforms.{name}.motion_error.covariance: {message}"
+            yield line, file_warnings.correlations_not_used(name)
 
 
 def likely_error(group: Correlated, members: Sequence[ErrorSource]) -> tuple[float, ...]:

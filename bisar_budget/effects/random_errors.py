@@ -67,7 +67,7 @@ class RandomError(NamedTuple):
     no_limit: Note = phrases.nothing_spreads()
     notes: tuple[Note, ...] = ()
     extrapolated: Note = NOTHING
-    warning: str = ""
+    warning: Note = NOTHING
 
     @property
     def id(self) -> str:

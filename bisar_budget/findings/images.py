@@ -6,8 +6,10 @@ the bistatic look direction φ_b, y′ across it, counter-clockwise.
 
 from typing import NamedTuple
 
+from bisar_budget import file_warnings
 from bisar_budget.faults import SetValue
 from bisar_budget.geometry import GroundVector
+from bisar_budget.phrases import NOTHING, Note
 
 FLOOR_DB = -40.0  # of the error-free peak: black in a chip
 
@@ -54,8 +56,8 @@ class Verdict(NamedTuple):
     refocused_loss_db: float | None = None
     verdict: str = "not_evaluated"
     verdict_autofocus: str | None = None
-    reason: str | None = None
-    reason_autofocus: str | None = None
+    reason: Note | None = None
+    reason_autofocus: Note | None = None
 
 
 class VerifiedMission(NamedTuple):
@@ -82,12 +84,11 @@ class VerifiedMission(NamedTuple):
         return "not_evaluated" if self.doubt else "pass"
 
     @property
-    def doubt(self) -> str:
+    def doubt(self) -> Note:
         """Say that no limit got a verdict; empty if one did."""
         if any({row.verdict, row.verdict_autofocus} - {"not_evaluated", None} for row in self.rows):
-            return ""
-        rows = f"{len(self.rows)} row{'s' if len(self.rows) != 1 else ''}"
-        return f"nothing was verified: {rows} with a limit, and no image gave a verdict on any"
+            return NOTHING
+        return file_warnings.nothing_verified(len(self.rows))
 
 
 class PointImage(NamedTuple):

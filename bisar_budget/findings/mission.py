@@ -28,7 +28,7 @@ class FileWarning(NamedTuple):
     """
 
     line: int | None
-    message: str
+    message: Note
     is_doubt: bool = False
     is_of_options: bool = False
 

@@ -70,10 +70,10 @@ def named_by(mission: Mission, also: Sequence[SetValue] = ()) -> tuple[Mission, 
         parts[name] = found(name)
         return parts[name]
 
-    again = parse_mission(mission.data, mission.file, None, beside, mission.changes, find)
-    again = again._replace(allocation=mission.allocation)  # --model stands in for the file's own
+    model = mission.allocation.model  # --model may stand in for one of the file that is none
+    again = parse_mission(mission.data, mission.file, model, beside, mission.changes, find)
     for change in also:
         with suppress(MissionError):  # there is none with it, which is said where it is asked for
-            parse_mission(mission.data, mission.file, None, beside, (*mission.changes, change), find)
+            parse_mission(mission.data, mission.file, model, beside, (*mission.changes, change), find)
     named = Named(tuple(sorted(paths.items())), tuple((name, *of) for name, of in sorted(parts.items())))
     return again, named

@@ -6,7 +6,7 @@ import numpy as np
 
 from bisar_budget.findings.images import Verdict
 from bisar_budget.geometry import GroundVector
-from bisar_budget.units import format_quantity
+from bisar_budget.verify import reasons
 from bisar_budget.verify.phase_cases import moved, predicted, published_displacement
 from bisar_budget.verify.shift import measured_shift
 from bisar_budget.verify.study import Sizes, Study
@@ -24,12 +24,14 @@ def location(study: Study, requirement: float) -> Verdict:
     blank = Verdict(id="mission.location_error", model=study.model, boundary_error=requirement, unit="m")
     sizes = [(s, s.declared or 0.0) for s in study.declared]
     if not sizes:
-        return blank._replace(reason="no error that moves the image is declared")
+        return blank._replace(reason=reasons.nothing_moves_the_image())
     rule = "the full model" if study.is_full else "(25)"
     try:
         scale = _scale(study, sizes, requirement)
         if scale is None:
-            return blank._replace(reason=study.plane.degeneracy or f"the declared errors move nothing by {rule}")
+            degeneracy = study.plane.degeneracy
+            why = reasons.displacement_degenerates(degeneracy) if degeneracy else reasons.errors_move_nothing(rule)
+            return blank._replace(reason=why)
         said = _places(study, sizes, scale)
         errors = study.together(sizes, scale)
         effect = study.collection.effect(errors)
@@ -37,7 +39,7 @@ def location(study: Study, requirement: float) -> Verdict:
         reading = study.read(errors, effect, *chips)
         shift = measured_shift(*chips, reading)
     except (ValueError, np.linalg.LinAlgError) as error:
-        return blank._replace(reason=f"no image: {error}")
+        return blank._replace(reason=reasons.no_image_formed(str(error)))
     assert said is not None
     measured = moved(effect.displacement, shift.displacement)
     seen = [("all of them together", said, measured)]
@@ -54,13 +56,10 @@ def location(study: Study, requirement: float) -> Verdict:
         # What exact ranges predict is the middle of the chip, whose lines and columns are those of range and Doppler.
         along, across = abs(shift.pixels[0]), abs(shift.pixels[1])
         verdict = "confirmed" if max(along, across) <= HALF_PIXEL else "optimistic"
-    reason = f"{rule} and the image differ by {along:.2g} and {across:.2g} pixels along x' and y'"
+    reason = reasons.places_differ(rule, along, across)
     if verdict != "confirmed":
         who, by_rule, is_at = farthest
-        reason += (
-            f"; {who}: {_placed(by_rule)} by {rule}, {_placed(is_at)} by exact ranges and image: "
-            f"{rule} does not say where the image goes"
-        )
+        reason = reason.then(reasons.rule_misplaces(who, rule, by_rule, is_at))
     return blank._replace(
         **predicted(effect),
         displacement_published_m=published_displacement(study, sizes, scale),
@@ -128,8 +127,3 @@ def _is_shorter(study: Study, said: GroundVector, is_at: GroundVector) -> bool:
     part = (is_at[0] * said[0] + is_at[1] * said[1]) / length**2
     on_line = (part * said[0], part * said[1])
     return -1 <= part <= 1 and max(_pixels_apart(study, on_line, is_at)) <= HALF_PIXEL
-
-
-def _placed(place: GroundVector) -> str:
-    east, north = (format_quantity(part + 0.0, "m", 4) for part in place)
-    return f"{east} east, {north} north"

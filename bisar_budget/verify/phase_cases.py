@@ -13,11 +13,12 @@ from bisar_budget.effects.models import CUBIC
 from bisar_budget.effects.vibration_lines import Line
 from bisar_budget.findings.images import Verdict
 from bisar_budget.geometry import GroundVector
+from bisar_budget.phrases import Note
 from bisar_budget.simulate.collection import CELLS, MAX_CELLS, OVERSAMPLING, RANGE_CELLS, Chip, Errors
 from bisar_budget.simulate.exact import ExactEffect, NoGroundPointError
 from bisar_budget.simulate.impulse_response import highest, impulse_response
 from bisar_budget.simulate.phase_history import PathError, PathSinusoid
-from bisar_budget.units import format_limit, format_quantity
+from bisar_budget.verify import reasons
 from bisar_budget.verify.aperture_reading import READ_CELLS, ApertureReading
 from bisar_budget.verify.shift import measured_shift
 from bisar_budget.verify.study import Sizes, Study
@@ -67,7 +68,7 @@ def slow_vibration(study: Study, row_id: str, name: str, line: Line) -> Verdict:
         **_of_response(chip, reference, effect, reading),
         measured_qpe_rad=measured,
         verdict=compare(measured / budget - 1, TOLERANCE),
-        reason="in the worst phase of the vibration",
+        reason=reasons.in_its_worst_phase(),
     )
 
 
@@ -90,7 +91,7 @@ def _bound_elsewhere(study: Study, source: ErrorSource) -> Verdict:
             budget_rad=requirements.cubic_phase_error,
             measured_cubic_rad=abs(reading.cubic),
             verdict=compare(abs(reading.cubic) / requirements.cubic_phase_error - 1, TOLERANCE),
-            reason="bound by the cubic phase",
+            reason=reasons.bound_by_the_cubic_phase(),
         )
     shift = measured_shift(*chips, reading)
     measured = moved(effect.displacement, shift.displacement)
@@ -101,10 +102,7 @@ def _bound_elsewhere(study: Study, source: ErrorSource) -> Verdict:
     return blank._replace(
         measured_displacement_m=measured,
         verdict=verdict,
-        reason=None
-        if verdict == "confirmed"
-        else f"bound by the location: the image moves by {format_quantity(math.hypot(*measured), 'm', 4)}, "
-        f"{format_quantity(required, 'm', 4)} allowed",
+        reason=None if verdict == "confirmed" else reasons.image_moves(math.hypot(*measured), required),
     )
 
 
@@ -113,10 +111,10 @@ def total(study: Study, row_id: str, owner: str) -> Verdict:
     budget = study.allocation.qpe_limit(owner)
     blank = Verdict(id=row_id, model=study.model, boundary_error=budget, unit="rad", budget_rad=budget)
     if study.mission.allocation.combine != "sum":
-        return blank._replace(reason="a root-sum-square speaks of many flights, an image shows one")
+        return blank._replace(reason=reasons.root_sum_square_is_of_many_flights())
     sizes = study.summed(study.members(owner), budget)
     if not sizes:
-        return blank._replace(reason="no declared error has a quadratic phase")
+        return blank._replace(reason=reasons.no_quadratic_phase_declared())
     return _judged(study, blank, sizes)
 
 
@@ -129,7 +127,7 @@ def other(study: Study, source: ErrorSource) -> Verdict:
         boundary_error=budget,
         unit=source.unit,
         budget_rad=budget,
-        reason="stated as a phase: there is no motion to form an image of",
+        reason=reasons.phase_without_motion(),
     )
 
 
@@ -139,7 +137,7 @@ def edge(study: Study) -> Verdict:
     blank = Verdict(
         id="mission.spatial_variance", model=study.model, boundary_error=budget, unit="rad", budget_rad=budget
     )
-    return blank._replace(reason="the difference of two places of the scene: images are formed of its centre")
+    return blank._replace(reason=reasons.images_are_of_the_centre())
 
 
 def cubic(study: Study, requirement: float) -> Verdict:
@@ -153,10 +151,10 @@ def cubic(study: Study, requirement: float) -> Verdict:
     )
     sizes = [(s, s.declared or 0.0) for s in study.declared]
     if not sizes:
-        return blank._replace(reason="no error with a motion is declared")
+        return blank._replace(reason=reasons.no_motion_declared())
     by_model = abs(math.fsum((s.full if study.is_full else s.effect).cubic * size for s, size in sizes))
     if not by_model:
-        return blank._replace(reason=f"no declared error has a cubic phase by the {study.model} model")
+        return blank._replace(reason=reasons.no_cubic_phase_declared(study.model))
     try:
         scale = requirement / by_model
         if study.is_full:
@@ -183,7 +181,7 @@ def pull_in(study: Study, n_pull: float) -> Verdict:
     found = refocused(study, [(clock, phase / abs(clock.effect.qpe))], budget)
     verdict = str(found["verdict_autofocus"])
     bound = radar.center_frequency / radar.bandwidth
-    reason = f"range walk of {walk:.2g} cells; it stays within half a cell up to n_pull {bound:.3g}, f0/B"
+    reason = reasons.range_walk(walk, bound)
     if verdict == "confirmed" and walk > HALF_CELL:
         verdict = "optimistic"
     return blank._replace(
@@ -199,7 +197,7 @@ def refocused(study: Study, sizes: Sizes, budget: float) -> dict[str, Any]:
         room = ROOM[study.mission.autofocus.algorithm]
         smear = study.spread(errors, effect).smear
         if room * smear > MAX_CELLS:
-            reason = f"autofocus needs a patch of {room * smear:.0f} cells, at most {MAX_CELLS} are formed"
+            reason = reasons.patch_too_large(room * smear, MAX_CELLS)
             return {"verdict_autofocus": "not_evaluated", "reason_autofocus": reason}
         across = math.ceil(2 * study.shared_lines(errors, effect) / OVERSAMPLING) + _PEAK_CELLS
         chip, reference = study.chips(errors, effect, min(RANGE_CELLS, across), room)
@@ -208,15 +206,13 @@ def refocused(study: Study, sizes: Sizes, budget: float) -> dict[str, Any]:
         peaks = [highest(one.image) for one in (reference, focused)]
         loss = 20 * math.log10(peaks[0] / peaks[1])
     except (ValueError, np.linalg.LinAlgError) as error:
-        return {"verdict_autofocus": "not_evaluated", "reason_autofocus": f"no image: {error}"}
+        return {"verdict_autofocus": "not_evaluated", "reason_autofocus": reasons.no_image_formed(str(error))}
     is_met = residual <= budget * (1 + TOLERANCE)
     return {
         "measured_residual_qpe_rad": residual,
         "refocused_loss_db": loss,
         "verdict_autofocus": "confirmed" if is_met else "optimistic",
-        "reason_autofocus": None
-        if is_met
-        else f"autofocus leaves {residual:.3g} rad, {format_limit(budget, 'rad')} allowed",
+        "reason_autofocus": None if is_met else reasons.autofocus_leaves(residual, budget),
     }
 
 
@@ -248,9 +244,9 @@ def _without_image(study: Study, blank: Verdict, error: ValueError | np.linalg.L
     if isinstance(error, NoGroundPointError) and not study.is_full:
         return blank._replace(
             verdict="optimistic",
-            reason="at the limit no ground point has the recorded range history: the point has no image",
+            reason=reasons.no_image_at_the_limit(),
         )
-    return blank._replace(reason=f"no image: {error}")
+    return blank._replace(reason=reasons.no_image_formed(str(error)))
 
 
 def moved(place: GroundVector, by: GroundVector) -> GroundVector:
@@ -302,11 +298,13 @@ def _judged(study: Study, blank: Verdict, sizes: Sizes) -> Verdict:
         displacement_full_m=effect.displacement,
         smear_azimuth_published_rad=(study.geometry.look_azimuth + math.pi / 2) % math.pi,
         verdict=verdict,
-        reason="; ".join(filter(None, (remark, _remark(study, reading.coverage)))) or None,
+        reason=_both(remark, _remark(study, reading.coverage)),
     )
 
 
-def _through_the_limit(inside: float | None, measured: float, beyond: float | None, budget: float) -> tuple[str, str]:
+def _through_the_limit(
+    inside: float | None, measured: float, beyond: float | None, budget: float
+) -> tuple[str, Note | None]:
     """Verdict on a phase at a limit, measured inside and beyond it where images are formed, and what is unusual.
 
     A limit promises that no smaller error has more phase. Where the phase falls towards it, the larger one counts,
@@ -317,10 +315,13 @@ def _through_the_limit(inside: float | None, measured: float, beyond: float | No
     if inside is not None and falls_inside:
         verdict = compare(inside / budget - 1, 0.0)
     if not falls_inside and (beyond is None or beyond > measured):
-        return verdict, ""
+        return verdict, None
     places = ((inside, f" at {INSIDE:g} of the limit"), (measured, " at it"), (beyond, f" at {BEYOND:g}"))
-    shown = ", ".join(f"{phase:.4g} rad{where}" for phase, where in places if phase is not None)
-    return verdict, f"the phase of the image does not grow with the error: {shown}"
+    return verdict, reasons.phase_does_not_grow([(phase, where) for phase, where in places if phase is not None])
+
+
+def _both(first: Note | None, second: Note | None) -> Note | None:
+    return first.then(second or "") if first else second
 
 
 def _of_response(chip: Chip, reference: Chip, effect: ExactEffect, reading: ApertureReading) -> dict[str, Any]:
@@ -356,16 +357,13 @@ def _phase(study: Study, sizes: Sizes, scale: float) -> float | None:
         return None
 
 
-def _remark(study: Study, coverage: float) -> str | None:
+def _remark(study: Study, coverage: float) -> Note | None:
     """Say what of the image is unusual: a smear beyond the patch, or range cells that absorb phase."""
     if coverage < 0.9:
-        return f"the smear leaves the patch, which holds {100 * coverage:.0f} % of the aperture"
+        return reasons.smear_leaves_the_patch(coverage)
     cell = phase_across_a_cell(study.analysis)
     if cell > COARSE_CELL_RAD:
-        return (
-            f"range cells are coarse: points a cell apart differ by {cell:.3g} rad, so that the response also moves "
-            "along range. The phase is that at the displaced point"
-        )
+        return reasons.range_cells_absorb_phase(cell)
     return None
 
 

@@ -24,6 +24,7 @@ from bisar_budget.mission.model import Simulation
 from bisar_budget.simulate.collection import Errors
 from bisar_budget.simulate.phase_history import SMOOTH, Course, Floats, PathError, PathSinusoid
 from bisar_budget.simulate.realisations import clock_seconds, correlation_time, phase_courses, position_courses
+from bisar_budget.verify import reasons
 from bisar_budget.verify.phase_cases import TOLERANCE, compare
 from bisar_budget.verify.study import Study
 from bisar_budget.verify.vibration_cases import TOLERANCE_DB, echo
@@ -99,7 +100,7 @@ def _phase(study: Study, blank: Verdict, error: RandomError, binding: str, rng: 
             drawn.append(effect.cubic if is_cubic else effect.quadratic)
             seen.append(reading.cubic if is_cubic else reading.quadratic)
     except (ValueError, np.linalg.LinAlgError) as fault:
-        return blank._replace(budget_rad=budget, reason=f"no image of a time series: {fault}")
+        return blank._replace(budget_rad=budget, reason=reasons.no_image_of_a_time_series(str(fault)))
     # How much of a phase images show: readings over exact ranges, the large ones counting more.
     shown = float(np.dot(drawn, seen) / np.dot(drawn, drawn))
     measured = predicted * shown
@@ -107,8 +108,7 @@ def _phase(study: Study, blank: Verdict, error: RandomError, binding: str, rng: 
     verdict = blank._replace(
         budget_rad=budget,
         verdict=compare(measured / budget - 1, tolerance),
-        reason=f"one sigma of {draws} time series{_times(factor)}, {_IMAGES} of them in images"
-        + (", bound by the cubic phase" if is_cubic else ""),
+        reason=reasons.sigma_of_time_series(draws, factor, _IMAGES, is_cubic),
     )
     if is_cubic:
         return verdict._replace(measured_cubic_rad=measured, predicted_cubic_rad=predicted)
@@ -118,10 +118,6 @@ def _phase(study: Study, blank: Verdict, error: RandomError, binding: str, rng: 
 def _stream(study: Study, row_id: str) -> np.random.Generator:
     """Draws of a row, its own whatever else is verified."""
     return np.random.default_rng([(study.mission.simulation or Simulation()).seed, *row_id.encode()])
-
-
-def _times(factor: float) -> str:
-    return "" if factor == 1 else f" times the coverage factor {factor:g}"
 
 
 def _sigma(study: Study, error: RandomError, rng: np.random.Generator, is_cubic: bool) -> tuple[float, int]:
@@ -186,7 +182,7 @@ def verify_islr(study: Study, of: Subject) -> Verdict:
     powers = spread_powers(study.analysis, study.allocation, of.owner, model)
     total = math.fsum(power for _, power in powers)
     if not total:
-        return blank._replace(reason="nothing that spreads is declared")
+        return blank._replace(reason=reasons.no_spread_declared())
     scale = limit / math.sqrt(total)
     random = {error.id: error for error in study.analysis.random}
     declared = [random[row_id] for row_id, _ in powers if row_id in random]
@@ -229,5 +225,5 @@ def _power(
         measured_db=level,
         measured_db_error=10 / math.log(10) * spread / mean,
         verdict=verdict,
-        reason=f"mean power that {_POWER_DRAWS} time series spread",
+        reason=reasons.mean_power_of_time_series(_POWER_DRAWS),
     )

@@ -23,10 +23,12 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.simulate.collection import CELLS, Errors, PointCollection
 from bisar_budget.simulate.impulse_response import upsampled
 from bisar_budget.simulate.phase_history import PathError, PathSinusoid, cell_centres
+from bisar_budget.verify import reasons
 
 TOLERANCE_DB = 0.5
 
 _FINE = 8  # interpolation of a cut before its peak is read
+_SEEN_WALK = 0.3  # range cells, from which a smear is said
 _WIDEBAND_RUNS = 32
 _UNDECLARED_CYCLES = 10  # of a vibration per aperture, where the file gives no frequency
 
@@ -96,8 +98,8 @@ def _sinusoidal(
     frequency = _UNDECLARED_CYCLES / collection.aperture_time if declared is None else declared
     sinusoids = {name: (PathSinusoid(amplitude=size, frequency=frequency),) for name, size in limits.items()}
     who = "one platform alone" if len(limits) == 1 else "both platforms in phase"
-    assumed = ", a frequency assumed: the file declares no vibration" if declared is None else ""
-    return echo(collection, _blank(row_id, model, limits, requirement_db), sinusoids, who, assumed)
+    blank = _blank(row_id, model, limits, requirement_db)
+    return echo(collection, blank, sinusoids, who, is_assumed=declared is None)
 
 
 def _near(
@@ -114,7 +116,7 @@ def _near(
     cycles = [line.frequency * collection.aperture_time for line in lines]
     worst = worst_phases([line.amplitude for line in lines], cycles)
     if not worst.amplitude:
-        return blank._replace(reason="the lines have no amplitude")
+        return blank._replace(reason=reasons.lines_without_amplitude())
     scale = limits[name] / worst.amplitude
     sinusoids = tuple(
         PathSinusoid(scale * line.amplitude, line.frequency, 0.0 if sinc(worst.cycles - n) >= 0 else math.pi)
@@ -128,13 +130,14 @@ def echo(
     blank: Verdict,
     sinusoids: Mapping[str, tuple[PathSinusoid, ...]],
     who: str,
-    assumed: str = "",
+    *,
+    is_assumed: bool = False,
 ) -> Verdict:
     """Measure the paired echoes of sinusoids against the requirement of a verdict that is yet blank."""
     every = [sinusoid.frequency * collection.aperture_time for those in sinusoids.values() for sinusoid in those]
     slowest, cycles = min(every), max(every)
     if slowest < 3:
-        return blank._replace(reason=f"{slowest:.3g} cycles per aperture: below three the echoes lie on the mainlobe")
+        return blank._replace(reason=reasons.echoes_on_the_peak(slowest))
     cells = 2 * math.ceil(min(cycles, 1e6)) + CELLS
     errors = Errors()
     for name, those in sinusoids.items():
@@ -143,16 +146,15 @@ def echo(
         clean = collection.chip((0.0, 0.0), Errors(), cells=cells).cut
         echo = collection.chip((0.0, 0.0), errors, cells=cells).cut - clean
     except ValueError as error:
-        return blank._replace(reason=f"{cycles:.3g} cycles per aperture: {error}")
+        return blank._replace(reason=reasons.no_image_of_a_vibration(cycles, str(error)))
     # An echo keeps its range while a scatterer at its place would walk by one wavelength per cycle.
     walk = cycles * collection.radar.bandwidth / collection.radar.center_frequency
-    smeared = f", smeared over {walk:.2g} range cells" if walk > 0.3 else ""
     peaks = [float(np.abs(upsampled(cut, _FINE)).max()) for cut in (echo, clean)]
     level = 20 * math.log10(peaks[0] / peaks[1])
     return blank._replace(
         measured_db=level,
         verdict=_compare(level - (blank.requirement_db or 0.0)),
-        reason=f"echoes of {who}, at {cycles:.3g} cells from the peak{smeared}{assumed}",
+        reason=reasons.echoes_measured(who, cycles, walk if walk > _SEEN_WALK else None, is_assumed),
     )
 
 
@@ -197,10 +199,10 @@ def _wideband(
         return float(np.mean(ratios)), float(np.std(ratios, ddof=1) / math.sqrt(_WIDEBAND_RUNS))
 
     mean, spread = added(is_common=False)
-    reason = "power added by one platform alone"
+    reason = reasons.power_of_one_platform()
     if len(limits) == 2:
         common = 10 * math.log10(added(is_common=True)[0])
-        reason = f"power added by both platforms, independent; the same motion of both adds {common:.1f} dB"
+        reason = reasons.power_of_both_platforms(common)
     level = 10 * math.log10(mean)
     return _blank(row_id, model, limits, requirement_db)._replace(
         measured_db=level,

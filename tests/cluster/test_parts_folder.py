@@ -23,7 +23,7 @@ from bisar_budget.design.sweep import Asked
 from bisar_budget.design.swept import Part
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.named import Named
-from tests.conftest import ROOT
+from tests.conftest import ROOT, mission_text
 
 SECTION_V = str(ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml")
 TIME = "collection.aperture_time"
@@ -159,6 +159,19 @@ def test_a_sweep_goes_on_with_what_is_not_done(run, ended, monkeypatch: pytest.M
     assert run("sweep", SECTION_V, *ASKED, "-o", f"{output}.plain.csv").exit_code == 0
     assert output.read_bytes() == Path(f"{output}.plain.csv").read_bytes()
     assert not os.path.exists(f"{output}.parts")
+
+
+def test_a_model_of_the_file_that_is_none_is_not_asked_for(run, tmp_path) -> None:
+    """With `--model` a check passes it by; going on from parts read it again."""
+    mission = tmp_path / "m.yaml"
+    mission.write_text(mission_text(allocation__model="fool", timing_error__linear="1 ppb"))
+    asked = ("sweep", str(mission), "--vary", f"{TIME}=1:2s:3", "--date", "2026-01-01", "--model", "full")
+    plain, kept, shared = (tmp_path / f"{name}.csv" for name in ("plain", "kept", "shared"))
+    assert run(*asked, "-o", str(plain)).exit_code == 0
+    for output, more in ((kept, ["--resume"]), (shared, ["--scheduler", "local:1"])):
+        found = run(*asked, "-o", str(output), *more)
+        assert found.exit_code == 0, found.stderr
+        assert output.read_bytes() == plain.read_bytes()
 
 
 def test_workers_start_beside_another_scheduler_of_dask(run, tmp_path) -> None:

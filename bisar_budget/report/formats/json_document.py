@@ -6,13 +6,14 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from bisar_budget.analysis.allocation import Split
-from bisar_budget.findings.mission import MissionFindings, UnusableMission
+from bisar_budget.findings.mission import FileWarning, MissionFindings, UnusableMission
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import worst
 from bisar_budget.geometry import PlatformState
 from bisar_budget.report import Piece, Style
 
 if TYPE_CHECKING:
+    from bisar_budget.findings.images import Verdict
     from bisar_budget.findings.monte_carlo import MonteCarlo
     from bisar_budget.findings.trade import Study
 
@@ -130,11 +131,12 @@ def _mission(mission: MissionFindings) -> dict[str, Any]:
         },
         "summary": mission.summary,
         "rows": [_row(row) for row in mission.rows],
-        "warnings": [{"line": warning.line, "message": warning.message} for warning in mission.warnings],
+        "warnings": [_warning(warning) for warning in mission.warnings],
         "notes": mission.notes,
+        "note_codes": [note.code for note in mission.notes],
         "errors": [],
         "monte_carlo": None if mission.monte_carlo is None else _monte_carlo(mission.monte_carlo),
-        "verification": None if mission.verdicts is None else [verdict._asdict() for verdict in mission.verdicts],
+        "verification": None if mission.verdicts is None else [verdict_item(one) for one in mission.verdicts],
         **({} if mission.study is None else {"sweep": _study(mission.study)}),
     }
 
@@ -147,6 +149,16 @@ def _study(study: "Study") -> dict[str, Any]:
         "not_evaluated": study.unevaluated,
         "without_mission": study.missing,
     }
+
+
+def _warning(warning: FileWarning) -> dict[str, Any]:
+    return {"line": warning.line, "message": warning.message, "code": warning.message.code}
+
+
+def verdict_item(verdict: "Verdict") -> dict[str, Any]:
+    """Write what images say of a limit, with the codes of the reasons."""
+    reasons = {"reason_code": verdict.reason, "reason_autofocus_code": verdict.reason_autofocus}
+    return verdict._asdict() | {name: None if reason is None else reason.code for name, reason in reasons.items()}
 
 
 def _row(row: Row) -> dict[str, Any]:

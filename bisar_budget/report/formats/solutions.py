@@ -9,6 +9,7 @@ from bisar_budget.design.solution import Crossing, Imaged, Solution, State
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
+from bisar_budget.report.formats.json_document import verdict_item
 from bisar_budget.report.words.layout import table, wrapped
 from bisar_budget.report.words.sentences import percent
 from bisar_budget.units import format_quantity
@@ -63,7 +64,7 @@ def _imaged(found: Imaged | None) -> dict[str, Any] | None:
         "verdict": "not_evaluated" if found.verdict is None else found.verdict.verdict,
         "verdict_autofocus": None if found.verdict is None else found.verdict.verdict_autofocus,
         "reason": found.reason or None,
-        "image": None if found.verdict is None else found.verdict._asdict(),
+        "image": None if found.verdict is None else verdict_item(found.verdict),
     }
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.report import Style
+from bisar_budget.report.formats.json_document import verdict_item
 from bisar_budget.report.words.layout import table, wrapped, wrapped_counts
 from bisar_budget.units import format_limit, format_quantity
 
@@ -33,7 +34,7 @@ def as_json(version: str, missions: Sequence[VerifiedMission]) -> str:
                 "status": mission.status,
                 "set": [change._asdict() for change in mission.changes],
                 "conditions": mission.conditions,
-                "rows": [row._asdict() for row in mission.rows],
+                "rows": [verdict_item(row) for row in mission.rows],
             }
             for mission in missions
         ],
