@@ -52,25 +52,25 @@ class Keeping(NamedTuple):
         asked = Asked(mission, cases, columns=columns, model=model, today=today, named=sent)
         chunks = asked.chunks()
         manifest = manifest_of(asked, chunks, named)
-        folder = PartsFolder(f"{self.output}.parts", manifest, is_resumed=self.is_resumed)
-        try:
-            if self.is_resumed:
-                folder.find(chunks.starts, chunks.stop)
-                if folder.done:
-                    complain(f"{folder.path} has {len(folder.done)} of {len(chunks.starts)} parts.")
-            with progress_bar(cases.count, "Checking cases") as bar:
-                bar.update(sum(chunks.stop(start) - start for start in folder.done))
-                left = [start for start in chunks.starts if start not in folder.done]
-                self._find(asked, chunks, left, folder, bar.update)
-            yield asked.swept(folder.parts(chunks.starts))
-        except BaseException:
-            dated = f" --date {today}" if manifest["date"] else ""
-            complain(
-                f"{folder.path} keeps {len(folder.done)} of {len(chunks.starts)} parts; the same command with "
-                f"--resume{dated} goes on from there."
-            )
-            raise
-        folder.remove()
+        with PartsFolder(f"{self.output}.parts", manifest, is_resumed=self.is_resumed) as folder:
+            try:
+                if self.is_resumed:
+                    folder.find(chunks.starts, chunks.stop)
+                    if folder.done:
+                        complain(f"{folder.path} has {len(folder.done)} of {len(chunks.starts)} parts.")
+                with progress_bar(cases.count, "Checking cases") as bar:
+                    bar.update(sum(chunks.stop(start) - start for start in folder.done))
+                    left = [start for start in chunks.starts if start not in folder.done]
+                    self._find(asked, chunks, left, folder, bar.update)
+                yield asked.swept(folder.parts(chunks.starts))
+            except BaseException:
+                dated = f" --date {today}" if manifest["date"] else ""
+                complain(
+                    f"{folder.path} keeps {len(folder.done)} of {len(chunks.starts)} parts; the same command with "
+                    f"--resume{dated} goes on from there."
+                )
+                raise
+            folder.remove()
 
     def _find(
         self,

@@ -107,7 +107,7 @@ def encoded(part: Part, mark: str) -> bytes:
 
 
 class PartsFolder:
-    """The parts of one sweep; `done` are the first cases of those that are there.
+    """The parts of one sweep; `done` are the first cases of those that are there. One command at a time has it.
 
     Parameters
     ----------
@@ -121,26 +121,52 @@ class PartsFolder:
     Raises
     ------
     PartsError
-        Parts are there and should not be, or are of another sweep; the folder cannot be written.
+        Parts are there and should not be, or are of another sweep; the folder cannot be written, or another command
+        has it.
     """
 
     def __init__(self, path: str, manifest: Mapping[str, Any], *, is_resumed: bool) -> None:
-        self.path, self.mark = path, mark_of(manifest)
+        self.path, self.mark, self.done = path, mark_of(manifest), set[int]()
         try:
-            there = self._manifest()
-            if there is not None and not is_resumed:
-                raise PartsError(
-                    f"{path} has parts of a sweep that was not finished; accepted: --resume to go on from them, "
-                    "or remove the folder"
-                )
-            if there is not None and mark_of(there) != self.mark:
-                raise PartsError(f"{path} is of another sweep: {_differences(there, manifest)}")
             os.makedirs(path, exist_ok=True)
-            if there is None:
-                self._write(_MANIFEST, (json.dumps(manifest, indent=2) + "\n").encode())
+            self._lock = _locked(path)
         except OSError as error:
             raise PartsError(f"cannot write {path}: {error.strerror or error}") from None
-        self.done: set[int] = set()
+        try:
+            self._begin(manifest, is_resumed)
+        except OSError as error:
+            self.close()
+            raise PartsError(f"cannot write {path}: {error.strerror or error}") from None
+        except BaseException:
+            self.close()
+            raise
+
+    def _begin(self, manifest: Mapping[str, Any], is_resumed: bool) -> None:
+        """Hold what is there to the manifest, or write it."""
+        there = self._manifest()
+        if there is not None and not is_resumed:
+            raise PartsError(
+                f"{self.path} has parts of a sweep that was not finished; accepted: --resume to go on from them, "
+                "or remove the folder"
+            )
+        if there is not None and mark_of(there) != self.mark:
+            raise PartsError(f"{self.path} is of another sweep: {_differences(there, manifest)}")
+        if there is None:
+            self._write(_MANIFEST, (json.dumps(manifest, indent=2) + "\n").encode())
+
+    def __enter__(self) -> "PartsFolder":
+        """Keep the folder to this command."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Let another command have it."""
+        self.close()
+
+    def close(self) -> None:
+        """Let another command have the folder."""
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
 
     def _manifest(self) -> dict[str, Any] | None:
         try:
@@ -230,6 +256,30 @@ class PartsFolder:
 
     def _file(self, name: str) -> str:
         return os.path.join(self.path, name)
+
+
+def _locked(path: str) -> int | None:
+    """Lock a folder for this process, until it closes what is returned or ends; None where no lock can be had.
+
+    Raises
+    ------
+    PartsError
+        Another command has it.
+    """
+    try:
+        import fcntl
+    except ImportError:  # Windows
+        return None
+    folder = os.open(path, os.O_RDONLY)
+    try:
+        fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(folder)
+        raise PartsError(f"another command works on {path}; accepted: wait for it, or another output") from None
+    except OSError:  # a file system without locks
+        os.close(folder)
+        return None
+    return folder
 
 
 def _name(start: int) -> str:

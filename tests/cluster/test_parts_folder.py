@@ -1,5 +1,6 @@
 """Parts that are kept: what is read is what was written, and parts of two sweeps are never mixed."""
 
+import errno
 import json
 import math
 import os
@@ -75,6 +76,7 @@ def test_only_whole_parts_of_the_sweep_are_there(tmp_path: Path) -> None:
     other = PartsFolder(str(tmp_path / "other"), {"a": 2}, is_resumed=False)
     other.put(part(30, 40))
     os.replace(tmp_path / "other" / files[3].name, files[3])
+    folder.close()
     again = PartsFolder(str(tmp_path), {"a": 1}, is_resumed=True)
     again.find(range(0, 60, 10), lambda start: start + 10)
     assert again.done == {0}
@@ -103,6 +105,7 @@ def test_pipes_and_devices_are_no_parts(tmp_path: Path) -> None:
     assert not folder.done
     (tmp_path / "manifest.json").unlink()
     (tmp_path / "manifest.json").symlink_to("/dev/zero")
+    folder.close()
     with pytest.raises(PartsError, match="is no manifest of parts"):
         PartsFolder(str(tmp_path), {"a": 1}, is_resumed=True)
 
@@ -159,6 +162,33 @@ def test_a_sweep_goes_on_with_what_is_not_done(run, ended, monkeypatch: pytest.M
     assert run("sweep", SECTION_V, *ASKED, "-o", f"{output}.plain.csv").exit_code == 0
     assert output.read_bytes() == Path(f"{output}.plain.csv").read_bytes()
     assert not os.path.exists(f"{output}.parts")
+
+
+def test_two_commands_do_not_share_a_folder(run, ended) -> None:
+    """Each would write the parts of the other, and the first that ends takes them away."""
+    fcntl = pytest.importorskip("fcntl", reason="Windows has no such locks")
+    output = ended()
+    folder = os.open(f"{output}.parts", os.O_RDONLY)
+    try:
+        fcntl.flock(folder, fcntl.LOCK_EX)
+        found = run("sweep", SECTION_V, *ASKED, "-o", str(output), "--resume")
+        assert found.exit_code == 2
+        assert f"another command works on {output}.parts; accepted: wait for it" in found.stderr
+        assert not output.exists()
+    finally:
+        os.close(folder)
+    assert run("sweep", SECTION_V, *ASKED, "-o", str(output), "--resume").exit_code == 0
+
+
+def test_a_file_system_without_locks_has_no_lock(run, ended, monkeypatch: pytest.MonkeyPatch) -> None:
+    fcntl = pytest.importorskip("fcntl", reason="Windows has no such locks")
+    output = ended()
+
+    def refuses(*_: object) -> None:
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(fcntl, "flock", refuses)
+    assert run("sweep", SECTION_V, *ASKED, "-o", str(output), "--resume").exit_code == 0
 
 
 def test_a_model_of_the_file_that_is_none_is_not_asked_for(run, tmp_path) -> None:
