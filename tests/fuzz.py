@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 
 import yaml
 
+from bisar_budget.mission.schema import mission_schema
 from tests.conftest import ROOT
 from tests.families import FAMILIES, mission_text
 
@@ -308,6 +309,19 @@ def places(node: Any) -> Iterator[tuple[Any, Any]]:
         yield from places(value)
 
 
+@cache
+def _keys_of_missions() -> frozenset[str]:
+    """Every key that a mission file may have: `islr` is one letter from `pslr`."""
+
+    def below(schema: Any) -> Iterator[str]:
+        if isinstance(schema, dict):
+            yield from schema.get("properties", ())
+        for inner in schema.values() if isinstance(schema, dict) else schema if isinstance(schema, list) else ():
+            yield from below(inner)
+
+    return frozenset(below(mission_schema()))
+
+
 def _misspelt(text: str, random: Random) -> Case:
     """A key with one letter changed, in a section whose keys are known."""
     tree = tree_of(text)
@@ -318,7 +332,7 @@ def _misspelt(text: str, random: Random) -> Case:
         if isinstance(node, dict) and id(node) != free and not key[0].isdigit()  # 1 mHz for 1 kHz is no slip to find
     ]
     node, key = random.choice(keys)
-    known = {name for _, name in keys}
+    known = {name for _, name in keys} | _keys_of_missions()
     wrong = key
     while wrong in known:
         at = random.randrange(len(key))

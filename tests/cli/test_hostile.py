@@ -897,7 +897,7 @@ def test_an_error_that_no_image_has_is_no_part_of_a_sum(format_name: str) -> Non
     assert "no image" in text
 
 
-@pytest.mark.parametrize("seed", range(0, 400, 4))
+@pytest.mark.parametrize("seed", [*range(0, 400, 4), 52552])
 def test_a_fuzzed_file_is_a_mission_or_faults(seed: int) -> None:
     """The first cases of the long round, `docs/prove_hostile.py`."""
     hostile = case(seed)
