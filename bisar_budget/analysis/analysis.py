@@ -26,11 +26,13 @@ class Analysis:
     """One mission, analysed once.
 
     `is_brief` leaves out what a terminal does not show: allowables of errors that nobody declared, and of the model
-    that does not gate. Nothing is judged by them.
+    that does not gate. `is_bare` leaves out how far one autofocus correction serves the scene. Nothing is judged by
+    them.
     """
 
     mission: Mission
     is_brief: bool = False
+    is_bare: bool = False
 
     @cached_property
     def geometry(self) -> BistaticGeometry:

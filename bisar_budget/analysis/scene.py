@@ -52,8 +52,8 @@ class SceneEdge(NamedTuple):
 
     `difference` is the largest of the quadratic phases between edge and centre, combined as the mission says [rad],
     at `azimuth` on the rim. `autofocus_radius` is that within which it stays inside the total budget [m]; None where
-    it does as far as `searched` [m]. `degeneracy` says why a part of the edge has no image, `doubt` which error is
-    over its limit there and not at the centre.
+    it does as far as `searched` [m], which is 0 if nobody asked. `degeneracy` says why a part of the edge has no
+    image, `doubt` which error is over its limit there and not at the centre.
     """
 
     radius: float
@@ -68,10 +68,8 @@ class SceneEdge(NamedTuple):
         """Where the difference is largest, and how far one autofocus correction serves."""
         if not self.difference:
             return (phrases.same_at_the_edge(),)
-        return (
-            phrases.largest_at_the_edge(math.degrees(self.azimuth), self.radius),
-            phrases.one_correction_serves(self.served, total),
-        )
+        largest = phrases.largest_at_the_edge(math.degrees(self.azimuth), self.radius)
+        return (largest, phrases.one_correction_serves(self.served, total)) if self.searched else (largest,)
 
     @property
     def served(self) -> str:
@@ -391,7 +389,11 @@ def scene_edge(analysis: Analysis, allocation: Allocation) -> SceneEdge | None:
     difference, azimuth = edge.largest(rim, radius)
     if math.isinf(difference):
         return SceneEdge(radius, math.nan, 0.0, None, searched, phrases.no_image(), NOTHING)
-    reach = _autofocus_radius(edge, radius, rim, allocation.qpe_total, searched)
+    reach = None
+    if analysis.is_bare:
+        searched = 0.0
+    else:
+        reach = _autofocus_radius(edge, radius, rim, allocation.qpe_total, searched)
     doubt = _over_at_the_edge(edge, allocation, rim)
     return SceneEdge(radius, difference, azimuth, reach, searched, NOTHING, doubt)
 

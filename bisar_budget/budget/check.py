@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from bisar_budget.analysis.scene import SceneEdge
 
 
-def check_mission(mission: Mission, today: date, *, is_brief: bool = False) -> MissionFindings:
+def check_mission(mission: Mission, today: date, *, is_brief: bool = False, is_bare: bool = False) -> MissionFindings:
     """Check one mission.
 
     Parameters
@@ -46,13 +46,15 @@ def check_mission(mission: Mission, today: date, *, is_brief: bool = False) -> M
     is_brief : bool
         Leave out what a terminal does not show: allowables of errors that nobody declared, and of the model that does
         not gate. Statuses are the same.
+    is_bare : bool
+        Leave out what decides nothing and is searched for: how far one autofocus correction serves the scene.
 
     Returns
     -------
     MissionFindings
         Rows in the order of the contract, declared or not.
     """
-    analysis = Analysis(mission, is_brief)
+    analysis = Analysis(mission, is_brief, is_bare)
     gating = mission.gating_model
     if gating == "strictest":
         checked = stricter(_checked(analysis, "published"), _checked(analysis, "full"))

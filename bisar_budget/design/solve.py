@@ -27,11 +27,11 @@ _OF_ALL = ", or --scale for all of them"
 PLACES = 65  # of a range
 PLACES_OF_CIRCLE = 181  # every 2 degrees: geometry changes fast where gradients are nearly parallel
 _NARROW = 2e-7  # of the value, between the two sides of a crossing before they are written
-_TO_TURN = 7e-5  # of two places, around a turn
+_GOLDEN = (math.sqrt(5) - 1) / 2
+_STEPS_TO_TURN = 20  # a golden section to 7e-5 of two places
 _TURNS = 16  # that are looked for
-_AT_ONCE = 15  # values of a section that arrays check in less time than one by one takes for one
 
-Look = Callable[[Sequence[float]], list[State]]
+Evaluate = Callable[[float], State]
 
 
 def solve(
@@ -155,12 +155,10 @@ class _Search:
         else:
             self.number = number_of(tree_of(self.variation.mission), key, _OF_ALL).said_like(between)
         self.range: Range = range_of(self.number, between)
-        found = check_mission(self.base, today)
+        found = check_mission(self.base, today, is_bare=True)
         hold_to_decisions([found, *self._at_the_end()], row)
         self.given = None if self.number.value is None else self._state(self.number.value, found)
         self.engine = self._engine(found, target)
-        # With a scene's radius arrays check many values sooner than `check` checks one.
-        self.at_once = _AT_ONCE if self.engine and self.base.scene.radius is not None else 1
 
     def _engine(self, found: MissionFindings, target: str) -> Engine | None:
         """What checks many values together; None where no array holds them."""
@@ -174,7 +172,7 @@ class _Search:
     def _at_the_end(self) -> Iterator[MissionFindings]:
         """Findings at the end of the range: the number may be an error that the file does not declare."""
         with suppress(MissionError):
-            yield check_mission(self.at(self.range.high), self.today)
+            yield check_mission(self.at(self.range.high), self.today, is_bare=True)
 
     def places(self) -> list[float]:
         """Values that the scan looks at, in rising order; that of the file is among them."""
@@ -193,11 +191,11 @@ class _Search:
     def scanned(self, progress: Progress) -> list[State]:
         """Look at every place of the range, and where the utilization turns."""
         places = self.places()
-        return _with_turns(self.states(places, progress), self.states, self.at_once)
+        return _with_turns(self.states(places, progress), self.evaluate)
 
-    def states(self, values: Sequence[float], progress: Progress = unseen) -> list[State]:
-        """Check the mission with each of some values."""
-        if self.engine is None or len(values) < _AT_ONCE:
+    def states(self, values: Sequence[float], progress: Progress) -> list[State]:
+        """Check the mission with each of many values."""
+        if self.engine is None:
             states = []
             for done, value in enumerate(values, 1):
                 states.append(self.evaluate(value))
@@ -220,7 +218,7 @@ class _Search:
     def evaluate(self, value: float, *, is_brief: bool = True) -> State:
         """Check the mission with another value."""
         try:
-            return self._state(value, check_mission(self.at(value), self.today, is_brief=is_brief))
+            return self._state(value, check_mission(self.at(value), self.today, is_brief=is_brief, is_bare=True))
         except MissionError as error:
             fault = error.faults[0]
             return State(value, complies=False, status="error", reason=f"{fault.key}: {fault.problem}")
@@ -234,11 +232,11 @@ class _Search:
         is_upper = low.complies
         least = 1e-9 * (self.range.high - self.range.low)  # around 0, where no part of the value is small
         while high.value - low.value > _NARROW * max(abs(low.value), abs(high.value), least):
-            section = _between(low.value, high.value, self.at_once)
-            if not low.value < section[0] <= section[-1] < high.value:
+            middle = (low.value + high.value) / 2
+            if not low.value < middle < high.value:
                 break
-            states = (low, *self.states(section), high)
-            low, high = next(pair for pair in pairwise(states) if pair[0].complies != pair[1].complies)
+            state = self.evaluate(middle)
+            low, high = (state, high) if state.complies == low.complies else (low, state)
         texts = [self.number.text(low.value, is_up=False), self.number.text(high.value, is_up=True)]
         below, above = (self._checked(text) for text in texts)
         is_verified = below.complies == low.complies and above.complies == high.complies
@@ -253,7 +251,8 @@ class _Search:
         if self.is_scale:
             return self.evaluate(value, is_brief=False)
         try:
-            return self._state(value, check_mission(self.variation.read([SetValue(self.key, text)]), self.today))
+            mission = self.variation.read([SetValue(self.key, text)])
+            return self._state(value, check_mission(mission, self.today, is_bare=True))
         except MissionError as error:
             fault = error.faults[0]
             return State(value, complies=False, status="error", reason=f"{fault.key}: {fault.problem}")
@@ -266,7 +265,7 @@ class _Search:
         return {value: self.number.text(value) for value in values}
 
 
-def _with_turns(states: Sequence[State], look: Look, at_once: int = 1) -> list[State]:
+def _with_turns(states: Sequence[State], evaluate: Evaluate) -> list[State]:
     """Add, where the utilization turns between places without a change of compliance, a place that differs in it."""
     found = list(states)
     turns = 0
@@ -278,7 +277,7 @@ def _with_turns(states: Sequence[State], look: Look, at_once: int = 1) -> list[S
         ends = [end for end in (first, last) if not _is_alike(end, middle)]  # a turn that rounding makes is none
         if ends and max(ends) < middle and turns < _TURNS:
             turns += 1
-            if (turned := _turn(look, before.value, after.value, here, at_once)) is not None:
+            if (turned := _turn(evaluate, before.value, after.value, here)) is not None:
                 found.append(turned)
     return sorted(found, key=lambda state: state.value)
 
@@ -288,23 +287,15 @@ def _sign(state: State) -> float:
     return 1.0 if state.complies else -1.0
 
 
-def _turn(look: Look, low: float, high: float, here: State, at_once: int) -> State | None:
+def _turn(evaluate: Evaluate, low: float, high: float, here: State) -> State | None:
     """Where the utilization turns between two places, the first value whose compliance differs; None if none does."""
-    least = _TO_TURN * (high - low)
-    while high - low > least:
-        section = _between(low, high, max(3, at_once))
-        states = look(section)
-        for state in states:
+    for _ in range(_STEPS_TO_TURN):
+        left, right = (evaluate(high - _GOLDEN * (high - low)), evaluate(low + _GOLDEN * (high - low)))
+        for state in (left, right):
             if state.complies != here.complies and not state.reason:
                 return state
-        uses = [_sign(here) * state.utilization for state in states if state.utilization is not None]
-        if len(uses) < len(states):
+        if left.utilization is None or right.utilization is None:
             return None
-        top, ends = uses.index(max(uses)), (low, *section, high)
-        low, high = ends[top], ends[top + 2]
+        is_left = _sign(here) * left.utilization > _sign(here) * right.utilization
+        low, high = (low, right.value) if is_left else (left.value, high)
     return None
-
-
-def _between(low: float, high: float, count: int) -> list[float]:
-    """Values between two others, as far from each other as from these."""
-    return [low + (high - low) * number / (count + 1) for number in range(1, count + 1)]

@@ -2,13 +2,14 @@
 
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from datetime import date
 from itertools import pairwise
 from typing import Any
 
 import pytest
 
+from bisar_budget.analysis import scene
 from bisar_budget.budget.check import check_mission
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.design import solve as solving
@@ -130,8 +131,7 @@ def test_where_there_is_no_mission_is_a_border_too() -> None:
     assert "look vectors cancel" in found.crossings[0].outside.reason
 
 
-@pytest.mark.parametrize("at_once", [1, 15])
-def test_a_pair_of_crossings_between_two_places_is_found(at_once: int) -> None:
+def test_a_pair_of_crossings_between_two_places_is_found() -> None:
     """Places are 0.0625 apart; between two of them the utilization crosses its limit, and 0.004 on again."""
 
     def dips(value: float) -> State:
@@ -144,12 +144,8 @@ def test_a_pair_of_crossings_between_two_places_is_found(at_once: int) -> None:
 
     places = [index / 16 for index in range(17)]
     for evaluate in (dips, bumps):
-
-        def look(values: Sequence[float], evaluate: Callable[[float], State] = evaluate) -> list[State]:
-            return [evaluate(value) for value in values]
-
         assert len({evaluate(place).complies for place in places}) == 1
-        scanned = solving._with_turns([evaluate(place) for place in places], look, at_once)
+        scanned = solving._with_turns([evaluate(place) for place in places], evaluate)
         assert sum(one.complies != other.complies for one, other in pairwise(scanned)) == 2
 
 
@@ -198,26 +194,24 @@ def assert_alike(found: Solution, other: Solution) -> None:
             assert (side.status, side.row, side.requirement) == (of_same.status, of_same.row, of_same.requirement)
 
 
-def test_a_scene_is_searched_by_arrays(monkeypatch) -> None:
-    """A check of its edge takes as long as an array of many; `check` is asked for what is said alone."""
+def test_how_far_one_correction_serves_is_not_searched(monkeypatch) -> None:
+    """It decides nothing, and took twenty times as long as the rest of a check: solving took half a minute."""
     text = mission_text(
         scene__radius="300 m",
         platforms__receiver__motion_error={"velocity": ["5 mm/s", 0, 0]},
         allocation__model="full",
     )
     mission = parse_mission(text, "m.yaml")
-    checks: list[object] = []
-    check = solving.check_mission
-    monkeypatch.setattr(
-        solving, "check_mission", lambda *given, **more: checks.append(given) or check(*given, **more)
-    )
-    found = solving.solve(mission, "platforms.receiver.motion_error.velocity.0", today=DAY)
-    assert len(checks) < 8
-    monkeypatch.setattr(solving._Search, "_engine", lambda *_: None)
-    monkeypatch.setattr(solving, "PLACES", 9)
-    other = solving.solve(mission, "platforms.receiver.motion_error.velocity.0", today=DAY)
-    assert other.crossings
-    assert_alike(found, other._replace(nearest=found.nearest))
+    full = check_mission(mission, DAY)
+    monkeypatch.setattr(scene, "_autofocus_radius", lambda *_: pytest.fail("it is searched"))
+    bare = check_mission(mission, DAY, is_bare=True)
+    assert [(row.id, row.status, row.utilization) for row in bare.rows] == [
+        (row.id, row.status, row.utilization) for row in full.rows
+    ]
+    (row,), (same,) = ([row for row in one.rows if row.subject.kind == "spatial_variance"] for one in (bare, full))
+    assert [note.code for note in row.notes] == ["largest-at-the-edge"]
+    assert [note.code for note in same.notes] == ["largest-at-the-edge", "one-correction-serves"]
+    assert solving.solve(mission, "platforms.receiver.motion_error.velocity.0", today=DAY).crossings
 
 
 def test_scaling_multiplies_what_an_error_is_sized_by() -> None:
