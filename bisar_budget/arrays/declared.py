@@ -9,7 +9,7 @@ import numpy as np
 from bisar_budget import evaluators
 from bisar_budget.arrays.collections import Floats, Geometries, Vectors, angle_between_lines, axes_of
 from bisar_budget.arrays.followed import Held, ManyPointPaths, Places, Truths
-from bisar_budget.arrays.located import Course, Effects, ManyExactRanges
+from bisar_budget.arrays.located import CourseAtNodes, Effects, ManyExactRanges
 from bisar_budget.arrays.together import squared
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, ROUNDING, SPEED_OF_LIGHT
 from bisar_budget.effects import models
@@ -320,17 +320,17 @@ class DeclaredErrors:
             self._paths[key] = ManyPointPaths(self.exact, self.course(error), sign, per_unit, self.is_left_out)
         return self._paths[key]
 
-    def course(self, error: ManyErrors) -> Course:
+    def course(self, error: ManyErrors) -> CourseAtNodes:
         """A unit of an error at the nodes."""
         if error.moves:
-            return Course(self.exact.powers[error.unit], error.unit, error.moves, error.direction)
+            return CourseAtNodes(self.exact.powers[error.unit], error.unit, error.moves, error.direction)
         return self._clock_course(error.unit)
 
-    def _clock_course(self, unit: str) -> Course:
+    def _clock_course(self, unit: str) -> CourseAtNodes:
         """A unit of a clock error at the nodes; nothing where the direct path stands in for the clock."""
         power = list(CLOCK_UNITS.values()).index(unit)
         metres = SPEED_OF_LIGHT * self.exact.times**power
-        return Course(metres * 0.0 if self.has_direct_path else metres, unit)
+        return CourseAtNodes(metres * 0.0 if self.has_direct_path else metres, unit)
 
     def doubts(self, model: str, is_over: Any) -> Any:
         """Where a model that does not gate casts a doubt; the published one does not know a direct path."""

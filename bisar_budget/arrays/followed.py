@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.arrays.collections import Floats
-from bisar_budget.arrays.located import Course, ManyExactRanges
+from bisar_budget.arrays.located import CourseAtNodes, ManyExactRanges
 from bisar_budget.effects import point_path as scalar
 from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
 
@@ -58,7 +58,7 @@ class ManyPointPaths:
     ----------
     exact : ManyExactRanges
         Of the cases.
-    error : Course
+    error : CourseAtNodes
         The error.
     sign : float
         ±1.
@@ -76,7 +76,7 @@ class ManyPointPaths:
     def __init__(
         self,
         exact: ManyExactRanges,
-        error: Course,
+        error: CourseAtNodes,
         sign: float,
         per_unit: Floats,
         is_lost: Truths,

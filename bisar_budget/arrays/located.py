@@ -29,7 +29,7 @@ class Effects(NamedTuple):
     cubic: Any
 
 
-class Course(NamedTuple):
+class CourseAtNodes(NamedTuple):
     """A unit of an error at the nodes, (nodes, cases): of the position of `platforms`, or of the range by a clock."""
 
     at_nodes: Floats
@@ -37,7 +37,7 @@ class Course(NamedTuple):
     platforms: tuple[int, ...] = ()
     direction: Vectors = (0.0, 0.0, 0.0)
 
-    def of(self, some: NDArray[Any]) -> "Course":
+    def of(self, some: NDArray[Any]) -> "CourseAtNodes":
         """The same in some of the cases."""
         x, y, z = (part[some] if np.ndim(part) else part for part in self.direction)
         return self._replace(at_nodes=self.at_nodes[:, some], direction=(x, y, z))
@@ -204,14 +204,14 @@ class ManyExactRanges:
         found: Floats = -dot(self.tracks[platform], direction) / self.ranges[platform]
         return found + dot(self._heard_along[platform], direction) if self.has_direct_path else found
 
-    def range_error(self, course: Course) -> Floats:
+    def range_error(self, course: CourseAtNodes) -> Floats:
         """Range error at the nodes of a small unit of any error, before it displaces anything. [m/unit]"""
         if not course.platforms:
             return course.at_nodes
         moved: Floats = sum(self.along(platform, course.direction) for platform in course.platforms)  # type: ignore[assignment]
         return moved * course.at_nodes
 
-    def quadratics_of(self, courses: Sequence[Course]) -> list[Floats]:
+    def quadratics_of(self, courses: Sequence[CourseAtNodes]) -> list[Floats]:
         """Quadratic phase of a small unit of each error, that of `effect`, in a tenth of its time. [rad/unit]"""
         weights = self.phase_weights[0]
         whole = np.abs(weights).sum(axis=0)
@@ -275,7 +275,7 @@ class ManyExactRanges:
             (c * effect.constant + d * effect.linear) * scale,
         )
 
-    def phases(self, error: Course, size: Floats, near: tuple[Any, Any], some: NDArray[Any]) -> Found:
+    def phases(self, error: CourseAtNodes, size: Floats, near: tuple[Any, Any], some: NDArray[Any]) -> Found:
         """Find where an error of some cases moves a point at the centre, and what defocuses there.
 
         `size` (some,), signed, and `near`, where the search starts, are those of the cases `some`.
@@ -299,7 +299,7 @@ class ManyExactRanges:
         return np.asarray(grown / (baseline + np.sqrt(np.abs(baseline * baseline + grown))))
 
     def way(
-        self, error: Course, size: Floats, place: tuple[Floats, Floats], some: NDArray[Any]
+        self, error: CourseAtNodes, size: Floats, place: tuple[Floats, Floats], some: NDArray[Any]
     ) -> tuple[Floats, Floats]:
         """Where the point goes with a larger error, at the places that errors of some cases move it to. [m/unit]"""
         course, _, _, (x, y, z) = error.of(some)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from bisar_budget import evaluators
 from bisar_budget.arrays.collections import Floats
 from bisar_budget.effects import spectra as scalar
-from bisar_budget.effects.spectra import Piece
+from bisar_budget.effects.spectra import PowerLawPiece
 from bisar_budget.effects.tones import SLOW
 
 ManyParts = Floats  # (3, cases): mean squares as `Parts` has them [rad²]
@@ -25,7 +25,7 @@ _NODES, _WEIGHTS = (np.array(column)[:, None] for column in zip(*scalar.NODES, s
 _MOST = 4096  # panels that are integrated at once
 
 
-def many_parts(pieces: Sequence[Piece], aperture_time: Floats) -> ManyParts:
+def many_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats) -> ManyParts:
     """Integrate a spectrum with the parts of a tone, over aperture times (cases,); as `parts`."""
     scale = math.pi * aperture_time
     total = np.zeros((3, *aperture_time.shape))
@@ -100,7 +100,7 @@ def _squares(angle: Floats) -> Floats:
 
 
 # ---------------------------------------------------------------------- synchronisation
-def many_synchronized_parts(pieces: Sequence[Piece], aperture_time: Floats, interval: float) -> ManyParts:
+def many_synchronized_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, interval: float) -> ManyParts:
     """The same of what synchronisation leaves; as `synchronized_parts`."""
     rate = 1 / interval
     beyond = [scalar.folded_from_beyond(piece, rate) for piece in pieces]
@@ -162,7 +162,7 @@ def _held(step: Floats) -> Floats:
     return np.asarray((np.sin(half) / half) ** 4)
 
 
-def _left(pieces: Sequence[Piece], beyond: Sequence[float], f: Floats, rate: float) -> Floats:
+def _left(pieces: Sequence[PowerLawPiece], beyond: Sequence[float], f: Floats, rate: float) -> Floats:
     """Spectrum that straight lines between samples leave [rad²/Hz]; as `_left`."""
     passed, nearest = _held(2 * math.pi * f / rate), np.rint(f / rate)
     start = f - nearest * rate
@@ -178,7 +178,7 @@ def _left(pieces: Sequence[Piece], beyond: Sequence[float], f: Floats, rate: flo
     return total
 
 
-def _at(piece: Piece, f: Floats) -> Floats:
+def _at(piece: PowerLawPiece, f: Floats) -> Floats:
     """Density of a piece, 0 beside it. [rad²/Hz]"""
     is_in: NDArray[Any] = (piece.low <= f) & (f < piece.high)
     return np.where(is_in, piece.density * np.where(is_in, f, 1.0) ** -piece.slope, 0.0)

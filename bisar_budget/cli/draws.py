@@ -14,7 +14,7 @@ from bisar_budget.faults import printable
 
 if TYPE_CHECKING:
     from bisar_budget.budget.fleet import Draws
-    from bisar_budget.monte_carlo.draws import Drawing, Piece, Tally
+    from bisar_budget.monte_carlo.draws import Drawing, DrawsPiece, Tally
 
 _MANY = 1_000_000  # draws from which on it is measured how long they will take
 _TRIAL = 0.3  # s; a shorter one is too short to measure
@@ -58,11 +58,11 @@ class _Watched:
     """Passes on the pieces of draws that `make` gives; says how long they will take, and how far they are."""
 
     def __init__(
-        self, make: "Callable[[Drawing], Iterator[tuple[Piece, Tally]]]", threads: Callable[[], int]
+        self, make: "Callable[[Drawing], Iterator[tuple[DrawsPiece, Tally]]]", threads: Callable[[], int]
     ) -> None:
         self._make, self._threads = make, threads
 
-    def __call__(self, drawing: "Drawing") -> "Iterator[tuple[Piece, Tally]]":
+    def __call__(self, drawing: "Drawing") -> "Iterator[tuple[DrawsPiece, Tally]]":
         if drawing.draws > _MANY and drawing.judged:
             seconds = _seconds(drawing) / max(self._threads(), 1)
             if seconds > LONG:
@@ -75,13 +75,13 @@ class _Watched:
 
 def _seconds(drawing: "Drawing") -> float:
     """Measure how long all draws will take in one thread, by some of them."""
-    from bisar_budget.monte_carlo.draws import Drawer, Piece
+    from bisar_budget.monte_carlo.draws import Drawer, DrawsPiece
 
     drawer, tried = Drawer(drawing), _FEW
-    drawer.tally(Piece(0, tried))  # it makes what the others find
+    drawer.tally(DrawsPiece(0, tried))  # it makes what the others find
     while True:
         began = perf_counter()
-        drawer.tally(Piece(0, tried))
+        drawer.tally(DrawsPiece(0, tried))
         seconds = perf_counter() - began
         if seconds > _TRIAL or tried >= min(drawing.chunk, drawing.draws):
             return seconds * drawing.draws / tried

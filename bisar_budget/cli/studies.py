@@ -13,7 +13,7 @@ from bisar_budget.design.quantities import QuestionError, tree_of
 from bisar_budget.design.sweep import sweep
 from bisar_budget.findings.mission import MissionFindings, UnusableMission
 from bisar_budget.findings.status import STATUS
-from bisar_budget.findings.trade import Study
+from bisar_budget.findings.trade import TradeStudy
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import FORMATS
 from bisar_budget.report.drawing.trades import Gathered, rows_that_matter, varying_keys
@@ -82,7 +82,7 @@ def _study(
     model: str | None,
     today: date,
     advance: Callable[[int], None],
-) -> Study:
+) -> TradeStudy:
     """Check all cases; over one key also the utilizations of the rows that are the worst somewhere."""
 
     def gathered(columns: Sequence[str]) -> Gathered:
@@ -101,7 +101,7 @@ def _study(
         values = gathered(tuple(names)).trade().values if names else {}
         rows = {row: values[name] for name, row in names.items()}
     statuses = trade.values["status"].ravel().tolist()
-    return Study(
+    return TradeStudy(
         asked=tuple(texts),
         trade=trade,
         rows=rows,

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from bisar_budget import __version__
-from bisar_budget.design.cases import Cases, Grid, Table
+from bisar_budget.design.cases import Cases, CaseTable, Grid
 from bisar_budget.design.sweep import Asked, Chunks
 from bisar_budget.design.swept import Part, Values
 from bisar_budget.faults import changes_words
@@ -77,7 +77,7 @@ def manifest_of(asked: Asked, chunks: Chunks, named: Named) -> dict[str, Any]:
 def _hash_of(cases: Cases) -> str:
     """SHA-256 of what the cases are made from: the values of each key."""
     whole = sha256(repr((type(cases).__name__, cases.shape, cases.count)).encode())
-    for values in cases.axes if isinstance(cases, Grid) else cases.columns if isinstance(cases, Table) else ():
+    for values in cases.axes if isinstance(cases, Grid) else cases.columns if isinstance(cases, CaseTable) else ():
         if values.dtype == object:  # words
             whole.update(json.dumps(values.tolist()).encode())
         else:

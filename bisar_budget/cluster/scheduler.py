@@ -24,7 +24,7 @@ from bisar_budget import __version__
 from bisar_budget.cluster.parts_folder import encoded
 from bisar_budget.design.sweep import Asked, Chunks, Question, part_of
 from bisar_budget.faults import MissionError, printable
-from bisar_budget.monte_carlo.draws import Drawer, Drawing, Piece, Tally
+from bisar_budget.monte_carlo.draws import Drawer, Drawing, DrawsPiece, Tally
 
 _ADDRESS = re.compile(r"(?:tcp|tls)://\S+:\d{1,5}", re.ASCII)
 _LOCAL = re.compile(r"local:([1-9]\d{0,2})", re.ASCII)
@@ -215,7 +215,7 @@ class Workers:
         )
         return self._done(checked, asked.question, tasks)
 
-    def drawn(self, drawing: Drawing) -> Iterator[tuple[Piece, Tally]]:
+    def drawn(self, drawing: Drawing) -> Iterator[tuple[DrawsPiece, Tally]]:
         """Make all pieces of the draws; gives each when it is done, in any order. Faults are those of `_done`."""
         tasks = (
             _Task(piece, f"draws {piece.start} to {piece.stop - 1} of {printable(drawing.name)}", (piece,))
@@ -315,7 +315,7 @@ def checked(question: Question, version: str, mark: str, start: int, stop: int, 
         raise UnlikeWorkerError(f"worker {here} cannot use the mission: {'; '.join(error.lines())}") from None
 
 
-def tallied(drawing: Drawing, version: str, piece: Piece) -> Tally:
+def tallied(drawing: Drawing, version: str, piece: DrawsPiece) -> Tally:
     """Make a piece of draws on a worker."""
     _like(version)
     return Drawer(drawing).tally(piece)

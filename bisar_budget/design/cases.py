@@ -79,7 +79,7 @@ class Grid:
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class CaseTable:
     """Cases of which each has a value of its own of every key: one column, in SI, or words, for each."""
 
     varied: tuple[Varied, ...]
@@ -185,7 +185,7 @@ def grid_of(tree: dict[str, Any], values: Mapping[str, ArrayLike]) -> Grid:
     return Grid(varied, arrays)
 
 
-def table_of(tree: dict[str, Any], values: Mapping[str, ArrayLike]) -> Table:
+def table_of(tree: dict[str, Any], values: Mapping[str, ArrayLike]) -> CaseTable:
     """Cases of which each takes one value of every array; arguments and faults are those of `grid_of`.
 
     Raises
@@ -196,7 +196,7 @@ def table_of(tree: dict[str, Any], values: Mapping[str, ArrayLike]) -> Table:
     varied, arrays = _at_hand(tree, values)
     if len({array.size for array in arrays}) > 1:
         raise QuestionError(f"{', '.join(values)}: differ in length; accepted: one value of each for every case")
-    return Table(varied, arrays)
+    return CaseTable(varied, arrays)
 
 
 def _at_hand(tree: dict[str, Any], values: Mapping[str, ArrayLike]) -> tuple[tuple[Varied, ...], tuple[Values, ...]]:
@@ -225,7 +225,7 @@ def _at_hand(tree: dict[str, Any], values: Mapping[str, ArrayLike]) -> tuple[tup
     return tuple(varied), tuple(arrays)
 
 
-def sample(tree: dict[str, Any], texts: Sequence[str], how: str) -> Table:
+def sample(tree: dict[str, Any], texts: Sequence[str], how: str) -> CaseTable:
     """Draw a Latin hypercube over ranges: of as many equal parts as there are cases, each has one value of each key.
 
     Parameters
@@ -264,7 +264,7 @@ def sample(tree: dict[str, Any], texts: Sequence[str], how: str) -> Table:
         if asked.listed:
             raise QuestionError(f"{asked.option}: --sample draws from a range; {_RANGE.format(key=asked.varied.key)}")
         columns.append(_spread(asked, (rng.permutation(count) + rng.random(count)) / count))
-    return Table(tuple(asked.varied for asked in all_asked), tuple(columns))
+    return CaseTable(tuple(asked.varied for asked in all_asked), tuple(columns))
 
 
 def _all_asked(tree: dict[str, Any], texts: Sequence[str], name: str) -> Iterator[_Asked | _AskedWords]:
@@ -378,18 +378,18 @@ def _scale(number: Number) -> tuple[float, float]:
     return number.dimension.scales.get(number.unit) or (1.0, 1.0)
 
 
-def some_of(cases: Cases, count: int) -> Table:
+def some_of(cases: Cases, count: int) -> CaseTable:
     """Some cases, spread over all of them in short stretches, that stand for the others."""
     length = max(1, count // _STRETCHES)
     starts = [int((place * _GOLDEN + 0.5) % 1 * (cases.count - length)) for place in range(-(-count // length))]
     found = [cases.values(start, start + length) for start in starts]
     columns = (np.concatenate([values[one.key] for values in found]) for one in cases.varied)
-    return Table(cases.varied, tuple(columns))
+    return CaseTable(cases.varied, tuple(columns))
 
 
 def words_of(cases: Cases) -> Iterator[tuple[Choices, list[str]]]:
     """Keys that have words, and the words that occur."""
-    values = cases.axes if isinstance(cases, Grid) else cases.columns if isinstance(cases, Table) else ()
+    values = cases.axes if isinstance(cases, Grid) else cases.columns if isinstance(cases, CaseTable) else ()
     for one, words in zip(cases.varied, values, strict=True):
         if isinstance(one, Choices):
             yield one, list(dict.fromkeys(words.tolist()))
@@ -412,7 +412,7 @@ def _rounded(values: Floats) -> Floats:
     return np.where(np.isfinite(found), found, values)
 
 
-def table(tree: dict[str, Any], text: str, file: str) -> Table:
+def table(tree: dict[str, Any], text: str, file: str) -> CaseTable:
     """Read a CSV of cases: a header `KEY [unit]` for each column, then one case in each line.
 
     Lines that are empty or start with `#` are left out. A number alone needs no unit, and words have none. Whether a
@@ -465,7 +465,7 @@ def table(tree: dict[str, Any], text: str, file: str) -> Table:
             values.append(np.array([*known, None], object)[column.astype(int)])
         else:
             values.append(column * factor / divisor)
-    return Table(varied, tuple(values))
+    return CaseTable(varied, tuple(values))
 
 
 def _line_ends(text: str) -> str:

@@ -78,7 +78,7 @@ def compare_parts(
         raise QuestionError(f"{key}: takes no parts; accepted: platforms.receiver.motion_error.sensor and the like")
     variation = Variation(mission, model)
     try:
-        search = _Search(variation, key)
+        search = _PartSearch(variation, key)
     except PartError as error:
         raise QuestionError(f"{key}: {error}") from None
     tried = [(one, search.checked(one, today)) for one in search.candidates]
@@ -130,7 +130,7 @@ class _Candidate(NamedTuple):
     part: Part
 
 
-class _Checked(NamedTuple):
+class _CheckedPart(NamedTuple):
     """The mission with a part: findings, the figures that it takes of the part, why there is no mission."""
 
     findings: MissionFindings | None
@@ -138,7 +138,7 @@ class _Checked(NamedTuple):
     reason: str = ""
 
 
-class _Search:
+class _PartSearch:
     """The parts that one key of a mission can name; raises `PartError`."""
 
     def __init__(self, variation: Variation, key: str) -> None:
@@ -167,14 +167,16 @@ class _Search:
         others = [other for other, part in self.given.items() if part.kind != kind]
         return json.dumps([*others, name] if others else name, ensure_ascii=False)
 
-    def checked(self, one: _Candidate, today: date) -> _Checked:
+    def checked(self, one: _Candidate, today: date) -> _CheckedPart:
         """Check the mission with a part."""
         try:
             mission = self.variation.read([SetValue(self.key, self.value(one.id, one.part.kind))])
         except MissionError as error:
             fault = error.faults[0]
-            return _Checked(None, reason=f"{fault.key}: {fault.problem}")
-        return _Checked(check_mission(mission, today, is_brief=True, is_bare=True), self._taken(mission, one.part))
+            return _CheckedPart(None, reason=f"{fault.key}: {fault.problem}")
+        return _CheckedPart(
+            check_mission(mission, today, is_brief=True, is_bare=True), self._taken(mission, one.part)
+        )
 
     def _taken(self, mission: Mission, part: Part) -> tuple[str, ...]:
         platform = getattr(mission.platforms, self.platform)
@@ -184,7 +186,7 @@ class _Search:
         figures = (figure for figure in FIGURES[part.kind] if getattr(part, figure))
         return tuple(figure for figure in figures if taken.get(figure) == evidence(part, figure))
 
-    def state(self, one: _Candidate, checked: _Checked, row: str | None, breaks: frozenset[str]) -> PartState:
+    def state(self, one: _Candidate, checked: _CheckedPart, row: str | None, breaks: frozenset[str]) -> PartState:
         """Say how the mission stands with a part."""
         state = PartState(
             id=one.id,
@@ -230,4 +232,4 @@ def _names(tree: Any, parts: Sequence[str]) -> list[str]:
 
 def mission_with(variation: Variation, key: str, part: PartState) -> Mission:
     """Read the mission with a part that was compared."""
-    return variation.read([SetValue(key, _Search(variation, key).value(part.id, part.kind))])
+    return variation.read([SetValue(key, _PartSearch(variation, key).value(part.id, part.kind))])

@@ -7,7 +7,7 @@ from itertools import combinations, pairwise
 from typing import NamedTuple
 
 from bisar_budget import evaluators, phrases
-from bisar_budget.effects.spectra import Piece
+from bisar_budget.effects.spectra import PowerLawPiece
 from bisar_budget.mission.instruments import Oscillator, Points, PowerLaw
 from bisar_budget.phrases import NOTHING, Note
 
@@ -18,7 +18,7 @@ _STEEPEST, _LEAST_STEEP = 4.0, 3.0  # slopes of a mask below its first point
 class Noise(NamedTuple):
     """Phase noise of an oscillator at the radar's centre frequency, and what was assumed to get it."""
 
-    pieces: tuple[Piece, ...]
+    pieces: tuple[PowerLawPiece, ...]
     notes: tuple[Note, ...] = ()
     extrapolated: Note = NOTHING  # how it goes on beyond what is stated
     misfit: float = 0.0  # of a power law to an Allan deviation, the worst point's
@@ -51,10 +51,10 @@ def _of_mask(oscillator: Oscillator, center_frequency: float, aperture_time: flo
     pieces = []
     for (f, density), (g, next_density) in pairwise(densities):
         slope = math.log(density / next_density) / math.log(g / f)
-        pieces.append(Piece(f, min(g, oscillator.bandwidth), density * f**slope, slope))
+        pieces.append(PowerLawPiece(f, min(g, oscillator.bandwidth), density * f**slope, slope))
     first, density = densities[0]
     slope = min(_STEEPEST, max(_LEAST_STEEP, pieces[0].slope))
-    pieces.insert(0, Piece(0.0, min(first, oscillator.bandwidth), density * first**slope, slope))
+    pieces.insert(0, PowerLawPiece(0.0, min(first, oscillator.bandwidth), density * first**slope, slope))
     # The quadratic phase is made of tones of about a cycle per aperture.
     below = NOTHING
     if first * aperture_time > 0.5:
@@ -62,11 +62,13 @@ def _of_mask(oscillator: Oscillator, center_frequency: float, aperture_time: flo
     return Noise(tuple(piece for piece in pieces if piece.low < piece.high), extrapolated=below)
 
 
-def _of_power_law(law: PowerLaw, center_frequency: float, bandwidth: float) -> tuple[Piece, ...]:
+def _of_power_law(law: PowerLaw, center_frequency: float, bandwidth: float) -> tuple[PowerLawPiece, ...]:
     """S_φ = f₀²·S_y/f²."""
     square = center_frequency**2
     return tuple(
-        Piece(0.0, bandwidth, square * h, slope) for slope, h in zip((4.0, 3.0, 2.0, 1.0, 0.0), law, strict=True) if h
+        PowerLawPiece(0.0, bandwidth, square * h, slope)
+        for slope, h in zip((4.0, 3.0, 2.0, 1.0, 0.0), law, strict=True)
+        if h
     )
 
 

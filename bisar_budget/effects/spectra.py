@@ -24,7 +24,7 @@ ALIASES = 3  # tones folded from so many rates away are counted one by one, thos
 NODES = tuple((0.5 + 0.5 * node, weight) for node, weight in zip(*evaluators.LEGENDRE_FITS[6][:2], strict=True))
 
 
-class Piece(NamedTuple):
+class PowerLawPiece(NamedTuple):
     """Part of a spectrum: density·f^(−slope) from `low` to `high`. [Hz]"""
 
     low: float
@@ -44,12 +44,12 @@ class Piece(NamedTuple):
         return float(self.density * (high**exponent - (low**exponent if low else 0.0)) / exponent)
 
 
-def parts(pieces: Sequence[Piece], aperture_time: float) -> Parts:
+def parts(pieces: Sequence[PowerLawPiece], aperture_time: float) -> Parts:
     """Integrate a spectrum with the parts of a tone, to 1e-4.
 
     Parameters
     ----------
-    pieces : sequence of Piece
+    pieces : sequence of PowerLawPiece
         Of a one-sided spectrum. [rad²/Hz]
     aperture_time : float
         [s]
@@ -67,7 +67,7 @@ def parts(pieces: Sequence[Piece], aperture_time: float) -> Parts:
     return total
 
 
-def synchronized_parts(pieces: Sequence[Piece], aperture_time: float, interval: float) -> Parts:
+def synchronized_parts(pieces: Sequence[PowerLawPiece], aperture_time: float, interval: float) -> Parts:
     """The same of what synchronisation leaves: a phase less the straight lines between samples of it.
 
     Straight lines pass sinc²(f·T_s) of a tone, and fold every tone that is m/T_s away on it: of a spectrum S they
@@ -91,7 +91,7 @@ def synchronized_parts(pieces: Sequence[Piece], aperture_time: float, interval: 
     return total
 
 
-def _left(pieces: Sequence[Piece], beyond: Sequence[float], f: float, rate: float) -> float:
+def _left(pieces: Sequence[PowerLawPiece], beyond: Sequence[float], f: float, rate: float) -> float:
     """Spectrum that straight lines between samples leave. [rad²/Hz]"""
     passed = held(2 * math.pi * f / rate)  # sinc⁴
     nearest = round(f / rate)
@@ -112,7 +112,7 @@ def _left(pieces: Sequence[Piece], beyond: Sequence[float], f: float, rate: floa
     return total
 
 
-def folded_from_beyond(piece: Piece, rate: float) -> float:
+def folded_from_beyond(piece: PowerLawPiece, rate: float) -> float:
     """Sum of what is folded from farther away, as an integral; its first correction is that of the midpoint rule."""
     low = max(piece.low, (ALIASES + 0.5) * rate)
     if low >= piece.high:
@@ -131,7 +131,7 @@ def exchange_edges(aperture_time: float, rate: float) -> list[float]:
     return edges
 
 
-def image_edges(pieces: Sequence[Piece], rate: float) -> list[float]:
+def image_edges(pieces: Sequence[PowerLawPiece], rate: float) -> list[float]:
     """Frequencies at which pieces of a spectrum begin and end, and where images of it end. [Hz]"""
     end = max((piece.high for piece in pieces), default=0.0)  # an oscillator may be stated to have no noise
     edges = [edge for piece in pieces for edge in (piece.low, piece.high)]
@@ -177,7 +177,7 @@ def _panel(density: Callable[[float], float], low: float, high: float, scale: fl
     return Parts(quadratic, cubic, left)
 
 
-def _slow(piece: Piece, low: float, high: float, scale: float) -> Parts:
+def _slow(piece: PowerLawPiece, low: float, high: float, scale: float) -> Parts:
     """Tones so slow that their parts are their first powers: x²/2, x³/6 and x⁸/99225."""
     return Parts(
         piece.integral(low, high, 4) * scale**4 / 4,
@@ -186,7 +186,7 @@ def _slow(piece: Piece, low: float, high: float, scale: float) -> Parts:
     )
 
 
-def _fast(piece: Piece, low: float, high: float, scale: float) -> Parts:
+def _fast(piece: PowerLawPiece, low: float, high: float, scale: float) -> Parts:
     """Tones so fast that what turns with them is averaged."""
     powers = [piece.integral(low, high, -power) * scale**-power for power in (0, 2, 4, 6, 8)]
     (found,) = evaluators.tone_parts_fast(*powers)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from bisar_budget.analysis.scene import SceneEdge
     from bisar_budget.findings.images import ImageEvidence, Verdict
     from bisar_budget.findings.monte_carlo import MonteCarlo
-    from bisar_budget.findings.trade import Study
+    from bisar_budget.findings.trade import TradeStudy
 
 
 class FileWarning(NamedTuple):
@@ -69,7 +69,7 @@ class MissionFindings(NamedTuple):
     image_evidence: "tuple[ImageEvidence, ...]" = ()  # a few of those images, where a report shows them
     monte_carlo: "MonteCarlo | None" = None  # if errors were drawn
     document: Document = Document()
-    study: "Study | None" = None  # of other values, if a report shows them
+    study: "TradeStudy | None" = None  # of other values, if a report shows them
     changes: tuple[SetValue, ...] = ()  # values that options put in place of the file's
 
     @property

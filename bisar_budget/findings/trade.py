@@ -60,7 +60,7 @@ class Trade(NamedTuple):
         return sorted(set(self.values["status"].ravel().tolist()), key=RANK.__getitem__)
 
 
-class Study(NamedTuple):
+class TradeStudy(NamedTuple):
     """A sweep that a report of the mission shows.
 
     `asked` is what stood behind each option; `rows` are the utilizations of the rows that are the worst anywhere,

@@ -63,7 +63,7 @@ class DeclaredMotionError(NamedTuple):
         )
 
 
-class Reference(NamedTuple):
+class ReferenceGeometry(NamedTuple):
     """Both slant ranges [m] and the bistatic angle [rad] at the file's reference vector, at a slow time. [s]"""
 
     slow_time: float
@@ -93,7 +93,7 @@ class Imported(NamedTuple):
     transmitter: Track
     receiver: Track
     is_monostatic: bool
-    reference: Reference | None
+    reference: ReferenceGeometry | None
     transmitter_error: DeclaredMotionError | None = None
     receiver_error: DeclaredMotionError | None = None
     common_error: DeclaredMotionError | None = None
@@ -104,11 +104,11 @@ class Imported(NamedTuple):
     unused: str = ""
 
 
-def reference_of(transmitter: PlatformState, receiver: PlatformState, slow_time: float) -> Reference:
+def reference_of(transmitter: PlatformState, receiver: PlatformState, slow_time: float) -> ReferenceGeometry:
     """Ranges and bistatic angle at a slow time."""
     t, r = transmitter.at(slow_time)[0], receiver.at(slow_time)[0]
     angle = math.atan2(norm(cross(unit(t), unit(r))), dot(unit(t), unit(r)))
-    return Reference(slow_time, norm(t), norm(r), angle)
+    return ReferenceGeometry(slow_time, norm(t), norm(r), angle)
 
 
 def fitted(times: "Floats", places: "Floats", aperture_time_s: float, wavelength_m: float) -> Track:

@@ -19,8 +19,8 @@ from bisar_budget import __version__
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.exact_arrays import aperture_nodes
 from bisar_budget.faults import printable
-from bisar_budget.formats.declared import ADDED, KINDS
 from bisar_budget.formats.document import MissingExtraError
+from bisar_budget.formats.file_errors import ADDED, KINDS
 from bisar_budget.geometry import Axes, PlatformState, Vector
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.paths.earth import Geodetic, SceneAxes, axes_at, geodetic

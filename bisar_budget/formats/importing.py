@@ -14,14 +14,14 @@ from bisar_budget.formats.collected import (
     LONGEST,
     Imported,
     NoPathError,
-    Reference,
+    ReferenceGeometry,
     Track,
     fitted,
     reference_of,
 )
 from bisar_budget.formats.containers import Container, open_container
-from bisar_budget.formats.declared import DeclaredErrors, Seen, of_matrices, of_sigmas
 from bisar_budget.formats.document import Element, FormatError, MissingExtraError
+from bisar_budget.formats.file_errors import FileErrors, Seen, of_matrices, of_sigmas
 from bisar_budget.geometry import PlatformState, Vector
 from bisar_budget.paths.earth import Geodetic, SceneAxes, axes_at, geodetic
 from bisar_budget.paths.instant import parse_instant
@@ -517,7 +517,7 @@ def _names(xml: Element, path: str) -> tuple[str, list[str]]:
 
 def _at_reference(
     pulses: _Pulses, axes: SceneAxes, aperture: _Aperture, tracks: tuple[Track, Track]
-) -> Reference | None:
+) -> ReferenceGeometry | None:
     import numpy as np
 
     at = float(_scene_time(pulses, np.array(axes.origin))[pulses.reference]) - aperture.middle
@@ -536,8 +536,8 @@ def _imported(
     start: Element,
     tracks: tuple[Track, Track],
     is_monostatic: bool,
-    reference: Reference | None,
-    errors: DeclaredErrors,
+    reference: ReferenceGeometry | None,
+    errors: FileErrors,
     remarks: list[str],
     unused: str = "",
 ) -> Imported:

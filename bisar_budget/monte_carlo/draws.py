@@ -19,7 +19,7 @@ import numpy as np
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.monte_carlo.sums import ExactPaths, Sums, paths_of
-from bisar_budget.monte_carlo.variables import Floats, Judged, Variable
+from bisar_budget.monte_carlo.variables import Floats, HeldSum, Variable
 
 # Draws held at once, the same for every number of draws: results depend on the seed alone. All that is summed are
 # a few megabytes and stay in a cache.
@@ -32,7 +32,7 @@ _AFTER_BYTES = 256
 _WORTH_COMPILING = 1 << 30  # normal numbers; then Numba saves more seconds than it takes
 
 
-class Piece(NamedTuple):
+class DrawsPiece(NamedTuple):
     """Draws from `start` to before `stop`, all of one chunk."""
 
     start: int
@@ -47,18 +47,18 @@ class Drawing(NamedTuple):
 
     name: str
     variables: tuple[Variable, ...]
-    judged: tuple[Judged, ...]
+    judged: tuple[HeldSum, ...]
     paths: ExactPaths
     draws: int
     seed: int
     is_exact: bool
     chunk: int
 
-    def pieces(self) -> Iterator[Piece]:
+    def pieces(self) -> Iterator[DrawsPiece]:
         """Cut the draws into pieces, always the same ones; none where they are held to nothing."""
         size = min(EXACT_PIECE, self.chunk) if self.is_exact else self.chunk
         for start in range(0, self.draws if self.judged else 0, size):
-            yield Piece(start, min(start + size, self.draws))
+            yield DrawsPiece(start, min(start + size, self.draws))
 
 
 class Tally(NamedTuple):
@@ -87,7 +87,7 @@ class Counted(NamedTuple):
 
 
 def drawing_of(
-    analysis: Analysis, variables: Sequence[Variable], judged: Sequence[Judged], draws: int, seed: int
+    analysis: Analysis, variables: Sequence[Variable], judged: Sequence[HeldSum], draws: int, seed: int
 ) -> Drawing:
     """Prepare draws of all variables; a sample decides whether they need exact ranges."""
     paths, name = paths_of(analysis.exact), analysis.mission.name
@@ -97,7 +97,7 @@ def drawing_of(
     return drawing._replace(variables=drawn, is_exact=is_exact)
 
 
-def _counts(variable: Variable, judged: Sequence[Judged], is_exact: bool) -> bool:
+def _counts(variable: Variable, judged: Sequence[HeldSum], is_exact: bool) -> bool:
     """Whether a variable does anything that is judged; each has a stream of its own, so that none misses it."""
     if is_exact and variable.parts:
         return any(size for _, size in variable.parts)
@@ -118,10 +118,10 @@ def joined(tallies: Iterable[Tally], count: int) -> Counted:
     return Counted(holds, means, all_hold)
 
 
-Share = Callable[[Drawing], Iterable[tuple[Piece, Tally]]]  # gives every piece once, in any order
+Share = Callable[[Drawing], Iterable[tuple[DrawsPiece, Tally]]]  # gives every piece once, in any order
 
 
-def in_turn(drawing: Drawing) -> Iterator[tuple[Piece, Tally]]:
+def in_turn(drawing: Drawing) -> Iterator[tuple[DrawsPiece, Tally]]:
     """Draw all pieces here, one after the other."""
     drawer = Drawer(drawing)
     for piece in drawing.pieces():
@@ -139,7 +139,7 @@ class Drawer:
         self._fill_normal = _compiled() if drawing.draws * normal >= _WORTH_COMPILING else _fill_normal
         self._buffer = np.empty(BLOCK)
 
-    def tally(self, piece: Piece) -> Tally:
+    def tally(self, piece: DrawsPiece) -> Tally:
         """Draw a piece and count."""
         drawing = self._drawing
         self._go_to(piece.start)

@@ -24,7 +24,7 @@ from bisar_budget.findings.monte_carlo import MonteCarlo, Requirement
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
 from bisar_budget.mission.symmetric import eigensystem
 from bisar_budget.monte_carlo.draws import Share, drawing_of, in_turn, joined
-from bisar_budget.monte_carlo.variables import Judged, Variable
+from bisar_budget.monte_carlo.variables import HeldSum, Variable
 from bisar_budget.phrases import Note
 
 if TYPE_CHECKING:
@@ -154,7 +154,7 @@ def _variable(
     return Variable(id, of, owner, distribution, tuple(parts), effects)
 
 
-def _requirements(mission: Mission, allocation: Allocation, variables: Sequence[Variable]) -> Iterator[Judged]:
+def _requirements(mission: Mission, allocation: Allocation, variables: Sequence[Variable]) -> Iterator[HeldSum]:
     """Those of `check` that declared errors count against."""
     present = {variable.owner for variable in variables}
     every = ("transmitter", "receiver", "clock", "mission")
@@ -167,13 +167,13 @@ def _requirements(mission: Mission, allocation: Allocation, variables: Sequence[
     for name, owners in wanted.items():
         if present.intersection(owners):
             limit = allocation.qpe_limit("clock" if name == "timing" else name) * allocation.autofocus_gain
-            yield Judged(f"{name}.quadratic_phase_error", "rad", limit, owners, (0,))
+            yield HeldSum(f"{name}.quadratic_phase_error", "rad", limit, owners, (0,))
     cubic, location = mission.requirements.cubic_phase_error, mission.requirements.location_error
     moves = any(source.is_motion for variable in variables for source, _ in variable.parts)
     if cubic is not None and (moves or any(variable.effects[1] for variable in variables)):
-        yield Judged("mission.cubic_phase_error", "rad", cubic, every, (1,))
+        yield HeldSum("mission.cubic_phase_error", "rad", cubic, every, (1,))
     if location is not None and moves:
-        yield Judged("mission.location_error", "m", location, every, (2, 3))
+        yield HeldSum("mission.location_error", "m", location, every, (2, 3))
 
 
 class _Predictions:
@@ -184,7 +184,7 @@ class _Predictions:
         drawn = {error.id for error in analysis.random}
         self.noise = [own for own in self.together.own if own.row_id in drawn]
 
-    def combined(self, judged: Judged, rule: str) -> float | None:
+    def combined(self, judged: HeldSum, rule: str) -> float | None:
         """What a rule of `allocation.combine` holds to the limit, coverage factor included; None: no image."""
         together = self.together
         if judged.columns == (0,):
@@ -199,7 +199,7 @@ class _Predictions:
             return None if moves is None else combined_displacement(moves, rule, together.groups)
         return phase if math.isfinite(phase) else None
 
-    def variances(self, judged: Judged) -> dict[str, float]:
+    def variances(self, judged: HeldSum) -> dict[str, float]:
         """Variance that each error, or each covariance, brings."""
         found: dict[str, float] = {}
         for variable in self.variables:
@@ -212,7 +212,7 @@ class _Predictions:
         """Whether an error has a normal distribution; a covariance, which is no single variable, always has."""
         return all(v.distribution == "normal" for v in self.variables if v.id == name)
 
-    def probability_normal(self, judged: Judged) -> float:
+    def probability_normal(self, judged: HeldSum) -> float:
         """Probability that a normal distribution with these variances stays within the limit."""
         members = [variable.effects for variable in self.variables if variable.owner in judged.owners]
         covariance = [
@@ -258,7 +258,7 @@ def _wilson(successes: int, draws: int, quantile: float) -> tuple[float, float]:
 
 
 def _requirement(
-    judged: Judged, holds: int, mean_square: float, draws: int, predictions: _Predictions
+    judged: HeldSum, holds: int, mean_square: float, draws: int, predictions: _Predictions
 ) -> Requirement:
     variances = predictions.variances(judged)
     variance = math.fsum(variances.values())

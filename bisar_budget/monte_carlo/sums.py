@@ -19,7 +19,7 @@ from bisar_budget.effects.exact_arrays import (
     room_for,
 )
 from bisar_budget.effects.exact_ranges import ExactRanges
-from bisar_budget.monte_carlo.variables import Floats, Judged, Variable
+from bisar_budget.monte_carlo.variables import Floats, HeldSum, Variable
 
 _ORDER = {"m": 0, "m/s": 1, "m/s^2": 2}
 _CLOCK = {unit: power for power, unit in enumerate(CLOCK_UNITS.values())}
@@ -50,7 +50,7 @@ class Sums:
     ----------
     paths : ExactPaths
         For exact ranges.
-    variables, judged : sequences of Variable, Judged
+    variables, judged : sequences of Variable, HeldSum
         What will be added, and what will be asked for.
     size : int
         Draws.
@@ -62,7 +62,7 @@ class Sums:
         self,
         paths: ExactPaths,
         variables: Sequence[Variable],
-        judged: Sequence[Judged],
+        judged: Sequence[HeldSum],
         size: int,
         *,
         adds: bool,
@@ -121,7 +121,7 @@ class Sums:
             where[owner] = np.zeros((*shape, self.size))
         return where[owner]
 
-    def square(self, judged: Judged) -> Floats:
+    def square(self, judged: HeldSum) -> Floats:
         """Square of what a requirement is about, (draws,); it stands until the next is asked for."""
         square = self._square
         if judged.columns == (0,):
@@ -138,7 +138,7 @@ class Sums:
             square += self._scaled
         return square
 
-    def exact_square(self, judged: Judged) -> Floats:
+    def exact_square(self, judged: HeldSum) -> Floats:
         """The same by exact ranges; not a number for a draw without an image."""
         owners = judged.owners
         if owners not in self._exact:

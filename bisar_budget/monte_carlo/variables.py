@@ -27,7 +27,7 @@ class Variable(NamedTuple):
     effects: tuple[float, float, float, float]
 
 
-class Judged(NamedTuple):
+class HeldSum(NamedTuple):
     """A requirement before the draws: the sum of whose errors, in which effects, is held to which limit."""
 
     id: str

@@ -38,7 +38,7 @@ _VECTOR = ("X", "Y", "Z", "X_DOT", "Y_DOT", "Z_DOT")
 _GAUSS = ((0.5 - math.sqrt(0.15), 5 / 18), (0.5, 8 / 18), (0.5 + math.sqrt(0.15), 5 / 18))
 
 
-class _Block(NamedTuple):
+class _EphemerisBlock(NamedTuple):
     """Metadata of a segment: keyword to line and value; and its ephemeris: line, epoch and numbers of each sample."""
 
     line: int
@@ -198,7 +198,7 @@ def _at(segments: Sequence[_Segment], name: str, center: Instant) -> _Segment:
     return max(holding, key=lambda one: min(time.since(one.first), one.last.since(time)))
 
 
-def _segment(block: _Block, name: str) -> _Segment:
+def _segment(block: _EphemerisBlock, name: str) -> _Segment:
     metadata = block.metadata
 
     def where(key: str) -> str:
@@ -376,7 +376,7 @@ def _has_leap_second(minute: Instant) -> bool:
     return minute.seconds == DAY - 60 and has_leap_second(minute.day)
 
 
-def _from_keywords(text: str, name: str) -> Iterator[_Block]:
+def _from_keywords(text: str, name: str) -> Iterator[_EphemerisBlock]:
     """Segments of a message that has a keyword and a value in each line."""
     text = text.rstrip()
     lines = ((at, line.strip()) for at, line in enumerate(text.split("\n"), 1))
@@ -395,7 +395,7 @@ def _from_keywords(text: str, name: str) -> Iterator[_Block]:
             state = "header"
         elif line == "META_START" and state in ("header", "ephemeris"):
             if metadata is not None:
-                yield _Block(began, metadata, rows)
+                yield _EphemerisBlock(began, metadata, rows)
             metadata, rows, began, state = {}, [], at, "metadata"
         elif line == "META_STOP" and state == "metadata":
             state = "ephemeris"
@@ -421,10 +421,10 @@ def _from_keywords(text: str, name: str) -> Iterator[_Block]:
         last = text.count("\n") + 1
         raise PathFileError(f"{name}:{last}: ends within {'metadata' if state == 'metadata' else 'a covariance'}")
     if metadata is not None:
-        yield _Block(began, metadata, rows)
+        yield _EphemerisBlock(began, metadata, rows)
 
 
-def _from_markup(data: bytes, name: str) -> Iterator[_Block]:
+def _from_markup(data: bytes, name: str) -> Iterator[_EphemerisBlock]:
     """Segments of a message in XML."""
     for message in parse_markup(data, name).all("oem"):
         for segment in message.all("segment"):
@@ -435,7 +435,7 @@ def _from_markup(data: bytes, name: str) -> Iterator[_Block]:
                 if one.name != "COMMENT"
             }
             rows = [_state(state, name) for block in segment.all("data") for state in block.all("stateVector")]
-            yield _Block(segment.line, metadata, rows)
+            yield _EphemerisBlock(segment.line, metadata, rows)
 
 
 def _state(state: MessageElement, name: str) -> tuple[int, str, Sequence[str]]:

@@ -15,7 +15,7 @@ from bisar_budget.constants import SPEED_OF_LIGHT, STANDARD_GRAVITY
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.effects.random_errors import RandomError
-from bisar_budget.effects.spectra import Piece
+from bisar_budget.effects.spectra import PowerLawPiece
 from bisar_budget.mission.instruments import GaussMarkov
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.mission.platforms import MotionError
@@ -242,7 +242,7 @@ class _Drawn(NamedTuple):
 class _Tones:
     """A spectrum as tones: those that turn within the aperture at even distances, the others by logarithms."""
 
-    def __init__(self, pieces: tuple[Piece, ...], aperture_time: float) -> None:
+    def __init__(self, pieces: tuple[PowerLawPiece, ...], aperture_time: float) -> None:
         high, fine = max(piece.high for piece in pieces), 1 / (_PERIODS * aperture_time)
         slow: Floats = np.geomspace(_SLOWEST / aperture_time, fine / 2, _SLOW_TONES + 1)
         self.slow: Floats = (slow[1:] + slow[:-1]) / 2
@@ -258,7 +258,7 @@ class _Tones:
         self.times: Floats = (np.arange(samples + 1) / samples - 0.5) / fine
 
     @staticmethod
-    def _size(pieces: tuple[Piece, ...], frequency: Floats, width: Floats) -> Floats:
+    def _size(pieces: tuple[PowerLawPiece, ...], frequency: Floats, width: Floats) -> Floats:
         """Sigma of what a tone has of cosine, and of sine: √(S·Δf)."""
         density = np.zeros(frequency.size)
         for piece in pieces:

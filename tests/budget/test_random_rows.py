@@ -9,7 +9,7 @@ import pytest
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.effects.models import QUADRATIC
-from bisar_budget.effects.spectra import Piece, synchronized_parts
+from bisar_budget.effects.spectra import PowerLawPiece, synchronized_parts
 from bisar_budget.faults import MissionError
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import Row
@@ -411,7 +411,7 @@ class TestWhatAReviewFound:
     def test_images_above_the_band_of_the_noise_are_counted(self, product: float) -> None:
         """All that straight lines leave of noise in a band B, by the share of each tone; 1.6 dB were cut at 0.5."""
         interval = 0.05
-        pieces = [Piece(0.0, product / interval, 1.0, 0.0)]
+        pieces = [PowerLawPiece(0.0, product / interval, 1.0, 0.0)]
         found = synchronized_parts(pieces, 20.0, interval)
         y = np.linspace(1e-6, 2 * math.pi * product, 20_001)
         shares = 5 / 3 + np.cos(y) / 3 - 4 * (1 - np.cos(y)) / y**2

@@ -9,7 +9,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from bisar_budget import units
-from bisar_budget.design.cases import MAX_VALUES, Table, TableError, grid, in_unit, sample, some_of, table
+from bisar_budget.design.cases import MAX_VALUES, CaseTable, TableError, grid, in_unit, sample, some_of, table
 from bisar_budget.design.quantities import QuestionError
 from bisar_budget.mission.tree import read_tree
 from bisar_budget.units import parse_quantity
@@ -282,7 +282,7 @@ class TestSamples:
     """Latin hypercubes."""
 
     @staticmethod
-    def drawn(how: str = "latin:50:1", log: str = "") -> Table:
+    def drawn(how: str = "latin:50:1", log: str = "") -> CaseTable:
         return sample(TREE, [f"{TIME}=1:10s{log}", f"{AZIMUTH}=0:180deg:7"], how)
 
     def test_each_part_of_each_range_has_one_case(self) -> None:

@@ -11,7 +11,7 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.design.cases import Grid, Table, sample
+from bisar_budget.design.cases import CaseTable, Grid, sample
 from bisar_budget.design.cases import grid as cases_of
 from bisar_budget.design.quantities import QuestionError, number_of, tree_of
 from bisar_budget.design.sweep import sweep
@@ -588,7 +588,7 @@ class TestWords:
         for model in ("published", "full"):
             some = whole["allocation.model"] == model
             number = tuple(one for one in cases.varied if one.unit)
-            alone, _ = swept(mission, Table(number, (cases.columns[0][some],)), model=model)
+            alone, _ = swept(mission, CaseTable(number, (cases.columns[0][some],)), model=model)
             assert alone["utilization"].tolist() == whole["utilization"][some].tolist()
 
     def test_processes_find_the_same(self, monkeypatch) -> None:

@@ -13,7 +13,7 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import STANDARD_GRAVITY
 from bisar_budget.effects.exact_arrays import ExactEffects, aperture_nodes, exact_effects
 from bisar_budget.effects.random_errors import RandomError
-from bisar_budget.effects.spectra import Piece, synchronized_parts
+from bisar_budget.effects.spectra import PowerLawPiece, synchronized_parts
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
 
@@ -197,6 +197,6 @@ def test_an_oscillator_does_what_whole_time_series_do(interval: float | None) ->
 @pytest.mark.parametrize("interval", [5.0, 2.5, 1.25, 1.0, 0.2])
 def test_an_interval_that_divides_the_aperture_is_no_singular_one(interval: float) -> None:
     """Edges of tones and exchanges fall together; a tone between the two was folded on 0 Hz: a division by 0."""
-    pieces = [Piece(0.0, 1e3, 1e-2, 4.0)]
+    pieces = [PowerLawPiece(0.0, 1e3, 1e-2, 4.0)]
     found = synchronized_parts(pieces, 5.0, interval)
     assert found == pytest.approx(synchronized_parts(pieces, 5.0, interval * 1.0001), rel=1e-3)

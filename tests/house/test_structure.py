@@ -3,6 +3,7 @@
 import ast
 import subprocess
 import sys
+from collections import defaultdict
 from pathlib import Path
 
 import pytest
@@ -149,3 +150,22 @@ for name in [one.name for one in FORMATS.values() if one.is_illustrated == {is_f
     loaded = loaded_after(code)
     assert not loaded & ({*HEAVY} - ({"jinja2"} if is_for_people else set()))
     assert ("bisar_budget.mission.covariance" in loaded) == (name == "drones_same_gnss")
+
+
+# Rooms whose modules are beside those of another: many cases at once, the command, the derivation.
+BESIDE = {"arrays", "cli", "theory"}
+
+
+def test_no_name_has_two_meanings() -> None:
+    """A class has its name alone, and so has a module, but those that stand beside another by design."""
+    classes, modules = defaultdict(list), defaultdict(list)
+    for path in MODULES:
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        names = {node.name for node in ast.walk(tree) if isinstance(node, ast.ClassDef)}
+        for name in names:
+            classes[name].append(room(module_name(path)))
+        if path.stem not in ("__init__", "compiled"):  # kernels, of images and of draws
+            modules[path.stem].append(room(module_name(path)))
+    for name, rooms in (*classes.items(), *modules.items()):
+        assert len([one for one in rooms if one not in BESIDE]) <= 1, (name, rooms)
+        assert len(set(rooms)) == len(rooms), (name, rooms)

@@ -13,7 +13,7 @@ from sympy import lambdify
 
 from bisar_budget import evaluators
 from bisar_budget.constants import STANDARD_GRAVITY
-from bisar_budget.effects.spectra import Piece, link_parts, parts
+from bisar_budget.effects.spectra import PowerLawPiece, link_parts, parts
 from bisar_budget.effects.tones import gauss_markov, held, tone
 from bisar_budget.report.explain import formulas
 from bisar_budget.theory import random_errors, render
@@ -62,7 +62,7 @@ def test_a_power_law_has_the_constants_of_the_closed_form() -> None:
 @pytest.mark.parametrize("slope", range(5))
 def test_the_numeric_integral_is_the_closed_form(slope: int) -> None:
     """To 1e-4, as far as the band lets it: white noise loses its part beyond 1 MHz, below 1e-6."""
-    found = parts([Piece(0.0, 1e6, 1.0, float(slope))], T)
+    found = parts([PowerLawPiece(0.0, 1e6, 1.0, float(slope))], T)
     quadratic, cubic = evaluators.power_law_parts(T)
     assert found.quadratic == pytest.approx(quadratic[slope], rel=1e-4)
     assert found.cubic == pytest.approx(cubic[slope], rel=1e-4)
@@ -70,7 +70,7 @@ def test_the_numeric_integral_is_the_closed_form(slope: int) -> None:
 
 @pytest.mark.parametrize(("low", "high", "slope"), [(0.02, 0.3, 2.5), (0.3, 7.0, 1.0), (0.5, 900.0, 0.0)])
 def test_a_piece_of_a_mask_is_integrated_to_1e_4(low: float, high: float, slope: float) -> None:
-    found = parts([Piece(low, high, 2.0, slope)], T)
+    found = parts([PowerLawPiece(low, high, 2.0, slope)], T)
     middle = min(high, 5.0)
     f = np.concatenate([np.geomspace(low, middle, 20_000), np.linspace(middle, high, 2_000_000)])
     x = math.pi * f * T
@@ -92,7 +92,7 @@ def test_check_values_of_three_pairs_of_oscillators() -> None:
     ):
         scale = (9.65e9 / own) ** 2
         pieces = [
-            Piece(0.0, 1e3, scale * 10 ** (level / 10), 4.0 - n)
+            PowerLawPiece(0.0, 1e3, scale * 10 ** (level / 10), 4.0 - n)
             for n, level in enumerate(levels)
             if level is not None
         ]
@@ -103,8 +103,8 @@ def test_check_values_of_three_pairs_of_oscillators() -> None:
 
 def test_an_oscillator_leaves_what_is_beyond_the_cubic_and_no_more_than_the_cut() -> None:
     """1 - Σ(2n + 1)jₙ² is near 0 below two cycles per aperture, where the simple cut at one counts all."""
-    found = parts([Piece(0.0, 1e3, 1.0, 3.0)], T)
-    assert found.left < Piece(0.0, 1e3, 1.0, 3.0).integral(1 / T, 1e3)
+    found = parts([PowerLawPiece(0.0, 1e3, 1.0, 3.0)], T)
+    assert found.left < PowerLawPiece(0.0, 1e3, 1.0, 3.0).integral(1 / T, 1e3)
 
 
 def test_walks_have_the_moments_of_their_covariance() -> None:

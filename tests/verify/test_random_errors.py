@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bisar_budget.effects.random_errors import RandomError
-from bisar_budget.effects.spectra import Piece
+from bisar_budget.effects.spectra import PowerLawPiece
 from bisar_budget.effects.subject import subject
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.simulate.point import simulate_point
@@ -73,7 +73,7 @@ def test_a_limit_of_noise_of_a_short_correlation_time_is_confirmed(time: str) ->
 
 def test_noise_faster_than_every_drawn_tone_has_its_power() -> None:
     """Flat from 1 Hz to 1 GHz, which no tones resolve; it was left out and no longer spread anything."""
-    tones = _Tones((Piece(1.0, 1e9, 1e-12, 0.0),), 6.0)
+    tones = _Tones((PowerLawPiece(1.0, 1e9, 1e-12, 0.0),), 6.0)
     moments = np.linspace(-3, 3, 4001)
     drawn = tones.draw(np.random.default_rng(5)).at(moments)
     assert np.var(drawn) == pytest.approx(1e-12 * 1e9, rel=0.1)  # 4001 samples: 2.2 % of a variance

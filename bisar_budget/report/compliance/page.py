@@ -270,7 +270,7 @@ def studied(found: MissionFindings, file: str) -> Studied | None:
     """Write a sweep, where there is one; `file` is the name of the mission file that is shown."""
     if found.study is None:
         return None
-    from bisar_budget.report.compliance.study import written
+    from bisar_budget.report.compliance.trade_study import written
 
     return written(found, found.study, file)
 

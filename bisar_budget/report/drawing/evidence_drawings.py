@@ -15,7 +15,7 @@ _KEY = 40.0  # px above a panel, for its title and its curves' names
 _TOP_DB, _STEP_DB = 0.0, 10.0
 
 
-class _Curve(NamedTuple):
+class _DrawnCurve(NamedTuple):
     name: str
     levels: tuple[float, ...]
     style: str
@@ -38,16 +38,16 @@ def impulse_response_cuts(evidence: ImageEvidence) -> str:
     canvas = Canvas()
     at_limit = evidence.at_limit
     curves = [
-        _Curve("at the limit", at_limit.cut_db, "line transmitter"),
-        _Curve("without error", at_limit.error_free_db, "line dotted"),  # last, so that none covers it
+        _DrawnCurve("at the limit", at_limit.cut_db, "line transmitter"),
+        _DrawnCurve("without error", at_limit.error_free_db, "line dotted"),  # last, so that none covers it
     ]
     bottom = _panel(canvas, 0.0, at_limit.step_m, _at_limit(verdict), curves)
     before, after = evidence.before_autofocus, evidence.after_autofocus
     if before and after:
         curves = [
-            _Curve("before autofocus", before.cut_db, "line receiver dashed"),
-            _Curve("after", after.cut_db, "line transmitter"),
-            _Curve("without error", before.error_free_db, "line dotted"),
+            _DrawnCurve("before autofocus", before.cut_db, "line receiver dashed"),
+            _DrawnCurve("after", after.cut_db, "line transmitter"),
+            _DrawnCurve("without error", before.error_free_db, "line dotted"),
         ]
         bottom = _panel(canvas, bottom + 12, before.step_m, _with_autofocus(verdict), curves)
     description = (
@@ -130,7 +130,7 @@ def _phase(value: float | None) -> str:
     return "unknown" if value is None else f"{value:.3f} rad"
 
 
-def _panel(canvas: Canvas, top: float, step_m: float, title: str, curves: Sequence[_Curve]) -> float:
+def _panel(canvas: Canvas, top: float, step_m: float, title: str, curves: Sequence[_DrawnCurve]) -> float:
     """Draw one panel, its title and key above, and return where it ends. [px]"""
     frame = Box(_AXIS[0], top + _KEY, _WIDTH - _EDGE, top + _KEY + _HEIGHT)
     half = (len(curves[0].levels) // 2) * step_m
@@ -161,7 +161,7 @@ def _panel(canvas: Canvas, top: float, step_m: float, title: str, curves: Sequen
     return frame.bottom + _AXIS[1]
 
 
-def _key(canvas: Canvas, at: Point, curves: Sequence[_Curve]) -> None:
+def _key(canvas: Canvas, at: Point, curves: Sequence[_DrawnCurve]) -> None:
     x, y = at
     for curve in curves:
         canvas.polyline([(x, y - 4), (x + 28, y - 4)], curve.style)

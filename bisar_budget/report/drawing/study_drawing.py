@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from bisar_budget.faults import printable
 from bisar_budget.findings.status import STATUS
-from bisar_budget.findings.trade import Axis, Study, Trade
-from bisar_budget.report.drawing import tones
+from bisar_budget.findings.trade import Axis, Trade, TradeStudy
+from bisar_budget.report.drawing import status_colours
 from bisar_budget.report.drawing.svg import (
     LINE_HEIGHT,
     Box,
@@ -40,12 +40,12 @@ _CELLS = 60  # of a map that have room for words of their own
 _LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 
 
-def study_drawing(study: Study, key: str, title: str, description: str) -> str:
+def study_drawing(study: TradeStudy, key: str, title: str, description: str) -> str:
     """Draw a sweep as SVG.
 
     Parameters
     ----------
-    study : Study
+    study : TradeStudy
         Over one key or two.
     key : str
         What makes the ids of the drawing its own.
@@ -67,14 +67,14 @@ def study_drawing(study: Study, key: str, title: str, description: str) -> str:
 
 def _style(statuses: Sequence[str]) -> str:
     """Rules for what only these drawings have."""
-    light, dark = tones.light(), tones.dark()
-    names = dict.fromkeys((*tones.ROWS, "fail"))
+    light, dark = status_colours.light(), status_colours.dark()
+    names = dict.fromkeys((*status_colours.ROWS, "fail"))
     rules = []
-    for place, (name, dashes) in enumerate(zip(tones.ROWS, _DASHES, strict=True)):
+    for place, (name, dashes) in enumerate(zip(status_colours.ROWS, _DASHES, strict=True)):
         rules.append(f".row{place}{{fill:none;stroke:var(--{name},{light[name]});stroke-width:1.8")
         rules[-1] += f";stroke-dasharray:{dashes}}}" if dashes else "}"
-    for name, strength in tones.strengths(statuses, _STRENGTHS).items():
-        tone = tones.tone_of(name)
+    for name, strength in status_colours.strengths(statuses, _STRENGTHS).items():
+        tone = status_colours.tone_of(name)
         rules.append(
             f".is-{name}{{fill:var(--{tone},{light[tone]});fill-opacity:{strength};shape-rendering:crispEdges}}"
         )
@@ -217,7 +217,7 @@ def _line(canvas: Canvas, words: str, style: str) -> _Entry:
 
 def _swatches(canvas: Canvas, statuses: Sequence[str]) -> Iterator[_Entry]:
     for name in statuses:
-        yield _Entry(tones.status_words(name), lambda at, name=name: _swatch(canvas, at, name))  # type: ignore[misc]
+        yield _Entry(status_colours.status_words(name), lambda at, name=name: _swatch(canvas, at, name))  # type: ignore[misc]
 
 
 def _swatch(canvas: Canvas, at: Point, status: str) -> None:
@@ -227,7 +227,7 @@ def _swatch(canvas: Canvas, at: Point, status: str) -> None:
 
 
 # ---------------------------------------------------------------- one key
-def _curves_of_rows(canvas: Canvas, study: Study) -> float:
+def _curves_of_rows(canvas: Canvas, study: TradeStudy) -> float:
     """Utilizations of rows over a number; behind them the status."""
     trade = study.trade
     (axis,) = trade.axes
@@ -318,7 +318,7 @@ def _bars(canvas: Canvas, trade: Trade) -> float:
         if math.isfinite(use):
             end = max(along.at(max(100 * use, along.low)), frame.left + 2)
             canvas.boxes([Box(frame.left, y - 7, end, y + 7)], f"bar is-{status}")
-        said = percent(use) if math.isfinite(use) else tones.status_words(status)
+        said = percent(use) if math.isfinite(use) else status_colours.status_words(status)
         beside = limit if end < limit < end + 60 else end
         canvas.text((beside + 6, y + 4), [said], "small")
     canvas.lines([((limit, frame.top), (limit, frame.bottom))], "limit")

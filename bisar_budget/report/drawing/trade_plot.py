@@ -13,7 +13,7 @@ from bisar_budget.findings.trade import Axis, Trade
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission
 from bisar_budget.report.drawing.figure import figure_file, new_figure
-from bisar_budget.report.drawing.tones import ROWS, has_no_mission, light, status_words, strengths, tone_of
+from bisar_budget.report.drawing.status_colours import ROWS, has_no_mission, light, status_words, strengths, tone_of
 from bisar_budget.report.drawing.trades import borders, per_word, regions, runs
 from bisar_budget.report.words.sentences import percent
 

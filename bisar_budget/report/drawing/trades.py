@@ -167,7 +167,7 @@ def runs(axis: Axis, statuses: NDArray[Any]) -> Iterator[Run]:
         yield Run(str(statuses[start]), float(edges[start]), float(edges[stop]))
 
 
-class Region(NamedTuple):
+class MapRegion(NamedTuple):
     """Neighbouring cells of a map with one worst row: where its name stands, and how many cells it has around."""
 
     row: str
@@ -175,7 +175,7 @@ class Region(NamedTuple):
     size: tuple[int, int]
 
 
-def regions(rows: NDArray[Any]) -> list[Region]:
+def regions(rows: NDArray[Any]) -> list[MapRegion]:
     """Find the regions of a map that are large enough for a name, which stands where it is farthest from others.
 
     `rows` is (n, m); places are indices of it.
@@ -193,7 +193,7 @@ def regions(rows: NDArray[Any]) -> list[Region]:
             place = _innermost(one)
             along = (_run(one[:, place[1]], place[0]), _run(one[place[0]], place[1]))
             found.append(
-                Region(
+                MapRegion(
                     str(thin[first, second]),
                     (place[0] * strides[0], place[1] * strides[1]),
                     (along[0] * strides[0], along[1] * strides[1]),

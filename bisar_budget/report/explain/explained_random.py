@@ -12,7 +12,7 @@ from bisar_budget.effects.clocks import spurs_of
 from bisar_budget.effects.models import CUBIC, QUADRATIC
 from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.effects.random_errors import RandomError
-from bisar_budget.effects.spectra import Piece, parts, synchronized_parts
+from bisar_budget.effects.spectra import PowerLawPiece, parts, synchronized_parts
 from bisar_budget.effects.tones import gauss_markov
 from bisar_budget.faults import printable
 from bisar_budget.findings.row import Row
@@ -168,7 +168,7 @@ def _oscillator(mission: Mission, error: RandomError) -> Iterator[Step]:
         yield from step(f"Phases times the coverage factor {number(k)}; what is left is a mean power and has none")
 
 
-def _integrals(pieces: Sequence[Piece], mission: Mission, interval: float | None) -> Iterator[Step]:
+def _integrals(pieces: Sequence[PowerLawPiece], mission: Mission, interval: float | None) -> Iterator[Step]:
     """What each piece of a spectrum adds to the mean squares."""
     T = mission.collection.aperture_time
     if interval is None:

@@ -15,7 +15,7 @@ from bisar_budget.report import Piece, Style
 if TYPE_CHECKING:
     from bisar_budget.findings.images import Verdict
     from bisar_budget.findings.monte_carlo import MonteCarlo
-    from bisar_budget.findings.trade import Study
+    from bisar_budget.findings.trade import TradeStudy
 
 FORMAT = "bisar-budget/check/1"
 
@@ -141,7 +141,7 @@ def _mission(mission: MissionFindings) -> dict[str, Any]:
     }
 
 
-def _study(study: "Study") -> dict[str, Any]:
+def _study(study: "TradeStudy") -> dict[str, Any]:
     return {
         "vary": list(study.asked),
         "cases": study.cases,

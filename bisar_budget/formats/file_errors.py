@@ -28,7 +28,7 @@ _UNCORRELATED = 1e-6  # of a correlation: rounding of a turned covariance
 _NEGATIVE = 2.5e-6  # of an eigenvalue of correlations that are written with six decimals
 
 
-class DeclaredErrors(NamedTuple):
+class FileErrors(NamedTuple):
     """Of both platforms, or common to them; clock terms of a mission; and what no key of a mission says."""
 
     transmitter: DeclaredMotionError | None = None
@@ -118,22 +118,22 @@ def _axes_of(name: str, state: PlatformState, axes: SceneAxes) -> Axes:
     return radial, cross(across, radial), across
 
 
-def of_sigmas(parameters: Element | None, seen: Seen, *, is_monostatic: bool) -> DeclaredErrors:
+def of_sigmas(parameters: Element | None, seen: Seen, *, is_monostatic: bool) -> FileErrors:
     """Errors of CPHD's `ErrorParameters`, or of SICD's `ErrorStatistics` with components."""
     if parameters is None:
-        return DeclaredErrors(remarks=("The file declares no errors (ErrorParameters).",))
+        return FileErrors(remarks=("The file declares no errors (ErrorParameters).",))
     mono = parameters.maybe("Monostatic") or (parameters.maybe("Components") if is_monostatic else None)
     if mono is not None and mono.maybe("PosVelErr") is not None:
         return _of_one(mono, seen)
     both = parameters.maybe("Bistatic")
     if both is not None:
         return _of_two(both, seen)
-    return DeclaredErrors(
+    return FileErrors(
         at=parameters.path, remarks=(f"{parameters.path} declares no component that a mission has a key for.",)
     )
 
 
-def _of_one(mono: Element, seen: Seen) -> DeclaredErrors:
+def _of_one(mono: Element, seen: Seen) -> FileErrors:
     error = mono.one("PosVelErr")
     whole, remarks = declared(
         sigmas_and_correlations(error), error.one("Frame"), seen.transmitter, seen.axes, "platform"
@@ -151,22 +151,22 @@ def _of_one(mono: Element, seen: Seen) -> DeclaredErrors:
     return _common(whole, remarks)._replace(timing_constant=constant, at=mono.path)
 
 
-def _common(whole: DeclaredMotionError, remarks: list[str]) -> DeclaredErrors:
+def _common(whole: DeclaredMotionError, remarks: list[str]) -> FileErrors:
     """Errors of one platform that transmits and receives."""
     if whole.is_isotropic:
         remarks.append(
             "One platform transmits and receives, with the same error: it is that of common_motion_error. Its frame "
             "does not matter, since it is alike along each axis."
         )
-        return DeclaredErrors(common=whole._replace(frame="scene"), remarks=tuple(remarks))
+        return FileErrors(common=whole._replace(frame="scene"), remarks=tuple(remarks))
     remarks.append(
         "One platform transmits and receives: the errors below are the same on both ways, and add. `combine: sum` "
         "judges them together; `rss` would take them for independent."
     )
-    return DeclaredErrors(transmitter=whole, receiver=whole, remarks=tuple(remarks))
+    return FileErrors(transmitter=whole, receiver=whole, remarks=tuple(remarks))
 
 
-def _of_two(both: Element, seen: Seen) -> DeclaredErrors:
+def _of_two(both: Element, seen: Seen) -> FileErrors:
     found: dict[str, DeclaredMotionError | None] = {"transmitter": None, "receiver": None}
     remarks: list[str] = []
     clocks: list[float] = []
@@ -194,7 +194,7 @@ def _of_two(both: Element, seen: Seen) -> DeclaredErrors:
         )
     if delays:
         remarks.append("timing_error.constant is the root sum square of DelayBias of both platforms.")
-    return DeclaredErrors(
+    return FileErrors(
         transmitter=found["transmitter"],
         receiver=found["receiver"],
         timing_constant=math.hypot(*delays) if delays else None,
@@ -234,7 +234,7 @@ def _with_added(
 
 def of_matrices(
     parameters: Element | None, seen: Seen, names: tuple[str, str], clocks: tuple[int, int]
-) -> DeclaredErrors:
+) -> FileErrors:
     """Errors of CRSD's `ErrorParameters/SARImage`, or of SICD's `ErrorStatistics` with bistatic components.
 
     Parameters
@@ -249,7 +249,7 @@ def of_matrices(
         Rows of both clocks' frequencies in the matrix of times and frequencies.
     """
     if parameters is None:
-        return DeclaredErrors(remarks=("The file declares no errors (ErrorParameters).",))
+        return FileErrors(remarks=("The file declares no errors (ErrorParameters).",))
     mono = parameters.maybe("Monostatic")
     if mono is not None:
         error = mono.one(names[0])
@@ -281,7 +281,7 @@ def of_matrices(
             linear = math.sqrt(variance)
             remarks.append("timing_error.linear is one sigma of the difference of both clocks' frequency scales.")
         remarks.append(f"{times.path}: errors of the times of transmission and reception are not taken over.")
-    return DeclaredErrors(found[0], found[1], None, None, linear, both.path, tuple(remarks))
+    return FileErrors(found[0], found[1], None, None, linear, both.path, tuple(remarks))
 
 
 def _decorrelation(element: Element, what: str) -> list[str]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.status import STATUS
-from bisar_budget.findings.trade import Axis, Study, Trade
+from bisar_budget.findings.trade import Axis, Trade, TradeStudy
 from bisar_budget.report.compliance.view import Picture, Stretch, Studied, StudyPart
 from bisar_budget.report.drawing.study_drawing import study_drawing
 from bisar_budget.report.drawing.trades import per_word
@@ -21,7 +21,7 @@ _MOST = 20  # lines of a table
 _FEW = 6  # words that are listed in a sentence
 
 
-def written(found: MissionFindings, study: Study, file: str) -> Studied:
+def written(found: MissionFindings, study: TradeStudy, file: str) -> Studied:
     """Write a sweep of a mission; `file` is the name of the mission file that is shown."""
     trade = study.trade
     stretches = list(_stretches(trade)) if len(trade.axes) == 1 else []
@@ -68,7 +68,7 @@ def _value(axis: Axis, place: int) -> str:
     return printable(axis.words[place]) if axis.words else f"{axis.values[place]:.5g} {axis.unit}".rstrip()
 
 
-def _counts(study: Study) -> str:
+def _counts(study: TradeStudy) -> str:
     failing = study.cases - study.complying - study.missing
     said = [f"{study.cases} cases", f"{study.complying} comply ({percent(study.complying / study.cases)})"]
     if study.unevaluated:
@@ -80,7 +80,7 @@ def _counts(study: Study) -> str:
     return f"{said[0]}: {', '.join(said[1:])}."
 
 
-def _command(found: MissionFindings, study: Study, file: str) -> str:
+def _command(found: MissionFindings, study: TradeStudy, file: str) -> str:
     """The command that gives the cases as a table, and a plot."""
     analysed = found.analysed().mission
     words = ["bisar-budget sweep", quote(printable(file))]
