@@ -733,7 +733,9 @@ class TestBounds:
         assert len(str(caught.value)) < 1000
 
     @pytest.mark.parametrize(
-        "question", [["solve", "--for", "collection.aperture_time"], ["sensitivity"]], ids=["solve", "sensitivity"]
+        "question",
+        [["solve", "--for", "platforms.transmitter.motion_error", "--scale"], ["sensitivity"]],
+        ids=["solve", "sensitivity"],
     )
     def test_how_long_a_question_takes_is_said(self, monkeypatch, question) -> None:
         """Each value is a whole check: of a mission that takes 0.6 s, minutes went by in silence."""
