@@ -734,7 +734,10 @@ class TestBounds:
 
     @pytest.mark.parametrize(
         "question",
-        [["solve", "--for", "platforms.transmitter.motion_error", "--scale"], ["sensitivity"]],
+        [
+            ["solve", "--for", "platforms.transmitter.motion_error", "--scale", "--between", "0.01..1"],
+            ["sensitivity"],
+        ],
         ids=["solve", "sensitivity"],
     )
     def test_how_long_a_question_takes_is_said(self, monkeypatch, question) -> None:
