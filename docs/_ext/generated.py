@@ -22,6 +22,7 @@ from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
+from bisar_budget import file_warnings
 from bisar_budget.catalogue import SYMBOLS
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission import readers
@@ -29,8 +30,10 @@ from bisar_budget.mission.model import MISSION
 from bisar_budget.phrases import CODES
 from bisar_budget.report import FORMATS
 from bisar_budget.units import DIMENSIONS
+from bisar_budget.verify import reasons
 
 MISSIONS = ROOT / "specs" / "missions"
+SPOKEN = (file_warnings, reasons)  # imported, they add to CODES
 
 
 def table(heads: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
