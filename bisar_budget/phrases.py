@@ -108,6 +108,59 @@ def no_requirement_of(metric: str) -> str:
     return f"no requirements.{metric} to hold it to"
 
 
+_SHOWN_EFFECTS = {
+    "cubic": "cubic phase of {} rad at the aperture edge",
+    "spread": "{} rad rms of phase that spreads",
+    "tone": "tone of {} rad",
+}
+_NEEDED_DECLARATIONS = {
+    "quadratic_phase_error": "has a quadratic phase (position, velocity, acceleration, imu, timing)",
+    "cubic_phase_error": "has a cubic phase (velocity, acceleration, imu, timing)",
+    "location_error": "displaces the image (position, velocity, timing)",
+    "pslr": "makes echoes (vibration.sinusoidal, oscillator.spurs)",
+    "islr": "spreads (vibration, random, oscillator)",
+}
+
+
+def _effect(kind: str, size: float) -> str:
+    return _SHOWN_EFFECTS[kind].format(f"{size:.3g}")
+
+
+@phrase
+def effect_is_not_judged(kind: str, size: float, total: float, lines: Sequence[str]) -> str:
+    """Of a row with an effect that no requirement takes."""
+    alone = f", {total:.3g} rad with the others" if total > 1.005 * size else ""
+    added = " or ".join(f"`{line}`" for line in lines)
+    return f"{_effect(kind, size)}{alone}, which no requirement judges: add {added} to requirements"
+
+
+@phrase
+def effect_is_negligible(kind: str, total: float, keys: Sequence[str]) -> str:
+    """Of a mission with a small effect that no requirement takes."""
+    return (
+        f"negligible: {_effect(kind, total)} in all, which no requirement judges ({' or '.join(keys)} would): "
+        "below a tenth of the quadratic requirement and below 0.08 rad"
+    )
+
+
+@phrase
+def nothing_judges(key: str) -> str:
+    """Of a requirement without a row that judges it."""
+    return f"nothing declared that {_NEEDED_DECLARATIONS[key]}"
+
+
+@phrase
+def place_is_not_known(row_ids: Sequence[str]) -> str:
+    """Of the location, beside errors that vary at random."""
+    return f"{', '.join(row_ids)}: random errors move the image too, and this version does not compute by how much"
+
+
+@phrase
+def not_all_is_declared(keys: Sequence[str]) -> str:
+    """Of `requirements.declare`."""
+    return f"the file does not declare {', '.join(keys)}"
+
+
 @phrase
 def not_declared_as_required(key: str) -> str:
     """Of an error that the file should declare."""
@@ -480,6 +533,13 @@ def noise_spreads_too_much(level_db: float, limit_db: float, row_id: str, larges
 def echoes_over(level_db: float, limit_db: float) -> str:
     """Of a tone."""
     return f"paired echoes of {_level(level_db)}, {_level(limit_db, 'down')} allowed"
+
+
+@phrase
+def echoes_together_over(level_db: float, limit_db: float, row_id: str, count: int) -> str:
+    """Of all tones."""
+    others = f", with {count - 1} near it" if count > 1 else ""
+    return f"echoes of {_level(level_db)}, {_level(limit_db)} allowed; largest: {row_id}{others}"
 
 
 @phrase

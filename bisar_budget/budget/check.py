@@ -14,9 +14,11 @@ from bisar_budget.budget.error_rows import error_rows
 from bisar_budget.budget.judgement import judged
 from bisar_budget.budget.orbit import straight_orbits
 from bisar_budget.budget.pull_in import pull_in_caps
+from bisar_budget.budget.random_rows import islr_rows, pslr_row, random_rows, spur_rows
+from bisar_budget.budget.declared_kinds import declared_kinds
 from bisar_budget.budget.required import with_required
+from bisar_budget.budget.requirement_table import judged_requirements
 from bisar_budget.budget.vibration_rows import vibration_rows
-from bisar_budget.budget.waivers import apply_waivers
 from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
 from bisar_budget.effects.correlation import unused_correlations
 from bisar_budget.effects.effect import PLATFORMS
@@ -60,7 +62,8 @@ def check_mission(mission: Mission, today: date, *, is_brief: bool = False, is_b
         checked = stricter(_checked(analysis, "published"), _checked(analysis, "full"))
     else:
         checked = _checked(analysis, gating)
-    rows, warnings = apply_waivers(with_required(checked.rows, mission), mission, today)
+    verdict = judged_requirements(with_required(checked.rows, mission), analysis, analysis.allocation, today)
+    rows = verdict.rows
     geometry = analysis.geometry
     resolution = Resolution(
         range=geometry.range_resolution(mission.radar.bandwidth, SPEED_OF_LIGHT),
@@ -80,11 +83,13 @@ def check_mission(mission: Mission, today: date, *, is_brief: bool = False, is_b
         resolution=resolution,
         allocation=analysis.allocation,
         rows=tuple(rows),
+        requirements=verdict.requirements,
+        kinds=declared_kinds(mission),
         warnings=(
             *_changed(mission),
             *_unknown_requirement_ids(mission, rows),
             *_overruled_model(mission),
-            *warnings,
+            *verdict.warnings,
             *_unused_correlations(mission),
             *straight_orbits(mission),
             *_doubtful_paths(mission),
@@ -95,7 +100,7 @@ def check_mission(mission: Mission, today: date, *, is_brief: bool = False, is_b
         place=_place(mission),
         paths=tuple((name, path) for name, path in _paths(mission) if path.source),
         scene=checked.scene,
-        notes=(*collection_notes(analysis), *_unused_keys(mission)),
+        notes=(*verdict.notes, *collection_notes(analysis), *_unused_keys(mission)),
         document=mission.document,
         changes=mission.changes,
     )
@@ -126,13 +131,13 @@ def _checked(analysis: Analysis, gating: str) -> _Checked:
 
 
 def _instrument_rows(analysis: Analysis, gating: str, allocation: Allocation) -> list[Row]:
-    """Rows of sensors and clocks, which few missions name."""
-    if not analysis.random:
-        return []
-    from bisar_budget.budget.random_rows import islr_rows, random_rows, spur_rows
-
-    rows = (random_rows, spur_rows, islr_rows)
-    return [row for of_kind in rows for row in of_kind(analysis, gating, allocation)]
+    """Rows of sensors and clocks, and of all that echoes and spreads together."""
+    return [
+        *random_rows(analysis, gating, allocation),
+        *spur_rows(analysis, gating, allocation),
+        *pslr_row(analysis.mission, gating),
+        *islr_rows(analysis, gating, allocation),
+    ]
 
 
 def stricter(published: _Checked, full: _Checked) -> _Checked:

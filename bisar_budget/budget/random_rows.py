@@ -11,13 +11,14 @@ from typing import NamedTuple
 from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.analysis.spread import spread_limit, spread_powers
-from bisar_budget.analysis.vibration_limits import vibration_limits
+from bisar_budget.analysis.spread import CUBIC_POWER, spread_limit, spread_powers, tones
+from bisar_budget.analysis.vibration_limits import LARGEST_ECHO, echo_level, tone_limits
 from bisar_budget.budget.judgement import judged
 from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.budget.vibration_rows import ECHO_CYCLES, islr_db
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.effects.clocks import spurs_of
+from bisar_budget.effects.echoes import near_lines, worst_phases
 from bisar_budget.effects.models import CUBIC, QUADRATIC
 from bisar_budget.effects.random_errors import RandomEffect, RandomError
 from bisar_budget.effects.subject import subject
@@ -48,6 +49,14 @@ def sizes_at(effect: RandomEffect, limits: Limits) -> dict[str, float]:
     return {name: limit / per_unit for name, per_unit, limit in parts if per_unit and limit is not None}
 
 
+def held_effect(mission: Mission, effect: RandomEffect) -> RandomEffect:
+    """An effect as requirements hold it: a cubic phase that none takes is power that ISLR holds, at one sigma."""
+    if mission.requirements.cubic_phase_error is not None:
+        return effect
+    cubic = effect.cubic / mission.allocation.coverage_factor
+    return effect._replace(spread=math.sqrt(effect.spread**2 + CUBIC_POWER * cubic**2))
+
+
 def random_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterator[Row]:
     """Rows of every error of a sensor or a clock, declared or not."""
     other = "full" if gating == "published" else "published"
@@ -58,8 +67,9 @@ def random_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iter
 def _row(analysis: Analysis, error: RandomError, gating: str, other: str, allocation: Allocation) -> Row:
     mission, gain, size = analysis.mission, allocation.autofocus_gain, error.declared
     mine, theirs = error.effect(gating), error.effect(other)
+    held, held_by_other = held_effect(mission, mine), held_effect(mission, theirs)
     limits, others = (limits_for(mission, allocation, error.owner, model, gain) for model in (gating, other))
-    sizes = sizes_at(mine, limits)
+    sizes = sizes_at(held, limits)
     allowable = min(sizes.values(), default=None)
     binding = min(sizes, key=lambda name: sizes[name]) if sizes else None
     qpe = cubic = None
@@ -69,8 +79,8 @@ def _row(analysis: Analysis, error: RandomError, gating: str, other: str, alloca
         if mission.allocation.combine != "each":
             info = phrases.aggregate_decides(mission.allocation.combine)
         elif allowable is not None and size > allowable:
-            over = _over(mission, error, mine, limits, binding or "", allocation).then(error.extrapolated)
-        doubt = _doubt(other, theirs, others, size)
+            over = _over(mission, error, held, limits, binding or "", allocation).then(error.extrapolated)
+        doubt = _doubt(other, held_by_other, others, size)
     by_model = (mine, theirs) if gating == "published" else (theirs, mine)
     row = judged(
         mission,
@@ -165,25 +175,25 @@ def _doubt(other: str, effect: RandomEffect, limits: Limits, size: float) -> Not
 def spur_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterator[Row]:
     """Rows of the oscillators' tones, which make paired echoes as vibrations do. [dB of an echo to the response]"""
     mission = analysis.mission
-    limits = vibration_limits(mission, allocation, "pslr")
+    metric, limits = tone_limits(mission, allocation)
     other = "full" if gating == "published" else "published"
     k = 2 * math.pi / mission.radar.wavelength
     for spur in spurs_of(mission):
         cycles = spur.frequency * mission.collection.aperture_time
         allowed = limits.get(spur.name)
         over = doubt = NOTHING
-        not_evaluated = missing = NOTHING if allowed else phrases.no_requirement_of("pslr")
+        not_evaluated, missing = NOTHING, NOTHING if allowed else phrases.no_requirement_of("pslr")
         if allowed is not None:
             limit, by_other = k * allowed.by(gating), k * allowed.by(other)
             over = phrases.echoes_over(_echo(spur.phase), _echo(limit))
             if spur.phase > by_other * (1 + UTILIZATION_TOLERANCE):
                 doubt = phrases.other_model_allows(other, _echo(by_other), "dB")
-            if cycles < ECHO_CYCLES:
+            if metric == "pslr" and cycles < ECHO_CYCLES:
                 not_evaluated = phrases.echoes_on_the_mainlobe(cycles, ECHO_CYCLES)
         row = judged(
             mission,
             subject=subject(spur.name, "oscillator", "spur", entry=spur.entry),
-            metric="pslr",
+            metric=metric,
             unit="dB",
             declared=spur.phase / 2,  # amplitude of an echo over that of the response
             allowable=None if allowed is None else limit / 2,
@@ -191,13 +201,15 @@ def spur_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterat
             equation="first principles" if gating == "full" else "Section V, sinusoidal",
             no_limit=missing,
             not_evaluated=not_evaluated,
+            info=missing,
             over=over,
             doubt=doubt,
             limits=(None, None) if allowed is None else (k * allowed.published / 2, k * allowed.full / 2),
             evidence=getattr(mission.platforms, spur.name).oscillator.source,
             notes=(phrases.tone_lies(spur.frequency, cycles),),
         )
-        yield in_decibel(row._replace(model=gating))
+        row = in_decibel(row._replace(model=gating))
+        yield row._replace(islr_db=islr_db(spur.phase**2 / 2)) if metric == ISLR else row
 
 
 def _echo(phase: float) -> float:
@@ -207,16 +219,19 @@ def _echo(phase: float) -> float:
 
 # ---------------------------------------------------------------------- powers together
 def islr_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterator[Row]:
-    """What all independent noise spreads, for each platform and the mission; none where only vibration does."""
+    """What spreads, for the mission where ISLR is required, and for each owner whose noise no other row holds whole."""
     mission = analysis.mission
-    if mission.requirements.islr is None or not any(error.declared is not None for error in analysis.random):
+    if mission.requirements.islr is None:
         return
     owners = ["transmitter", "receiver", "mission"]
     if allocation.islr.clock is not None:
         owners.insert(2, "clock")
     other = "full" if gating == "published" else "published"
-    for owner in owners:
-        members = spread_powers(analysis, allocation, owner, gating)
+    powers = {owner: spread_powers(analysis, allocation, owner, gating) for owner in owners}
+    is_vibration_alone = all(row_id.endswith("vibration.wideband") for row_id, _ in powers["mission"])
+    for owner, members in powers.items():
+        if owner != "mission" and is_vibration_alone:  # its own row holds it to the platform's share
+            continue
         variance = math.fsum(power for _, power in members)
         limit, by_other = (spread_limit(mission, allocation, owner, model) or 0.0 for model in (gating, other))
         rms = math.sqrt(variance)
@@ -240,6 +255,46 @@ def islr_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterat
             limits=(limit, by_other) if gating == "published" else (by_other, limit),
         )
         yield _as_islr(row, variance, gating)
+
+
+def pslr_row(mission: Mission, gating: str) -> Iterator[Row]:
+    """The highest echo that all tones make together, in the worst of their phases; where PSLR is required.
+
+    From first principles by both models: the shares of the paper's rule stay 3 dB inside it. Tones at most 2.5 cycles
+    per aperture apart raise each other's echo, whoever makes them.
+    """
+    required = mission.requirements.pslr
+    if required is None:
+        return
+    found = tones(mission)
+    over = NOTHING
+    highest, allowed = 0.0, 10 ** (required / 20)
+    for group in (*((index,) for index in range(len(found))), *near_lines([one.cycles for one in found])):
+        near = [found[index] for index in group]
+        phase = worst_phases([one.phase for one in near], [one.cycles for one in near]).amplitude
+        level = echo_level(phase) if phase <= LARGEST_ECHO else phase / 2
+        if level > max(highest, allowed):
+            largest = max(near, key=lambda one: one.phase)
+            over = phrases.echoes_together_over(_db(level), required, largest.subject.id, len(near))
+        highest = max(highest, level)
+    row = judged(
+        mission,
+        subject=subject("mission", "pslr"),
+        metric="pslr",
+        unit="dB",
+        declared=highest if found else None,
+        allowable=allowed,
+        path=("requirements", "pslr"),
+        equation="first principles",
+        over=over,
+        limits=(allowed, allowed),
+    )
+    yield in_decibel(row._replace(binding_requirement="pslr", model=gating))
+
+
+def _db(amplitude: float) -> float:
+    """Level of an amplitude over that of the response. [dB]"""
+    return 20 * math.log10(amplitude)
 
 
 def _as_islr(row: Row, variance: float, gating: str) -> Row:

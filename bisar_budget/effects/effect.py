@@ -74,6 +74,11 @@ class ErrorSource(NamedTuple):
         return self.unit != "rad"
 
     @property
+    def is_covered(self) -> bool:
+        """Whether the coverage factor is in what is declared: not of the terrain, and not of what only is a phase."""
+        return self.subject.kind in (*MOTION, "timing")
+
+    @property
     def is_position(self) -> bool:
         """Whether it is an error of a platform's measured path, or of both."""
         return self.direction != NOWHERE

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.faults import Fault, SetValue
+from bisar_budget.findings.requirement import DeclaredKinds, JudgedRequirement, Override
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUSES, worst
 from bisar_budget.geometry import BistaticGeometry
@@ -71,6 +72,9 @@ class MissionFindings(NamedTuple):
     document: Document = Document()
     study: "TradeStudy | None" = None  # of other values, if a report shows them
     changes: tuple[SetValue, ...] = ()  # values that options put in place of the file's
+    requirements: tuple[JudgedRequirement, ...] = ()
+    kinds: DeclaredKinds = DeclaredKinds()
+    overrides: tuple[Override, ...] = ()  # what from outside the file bears on the verdict
 
     @property
     def mission(self) -> Mission | None:
@@ -96,14 +100,14 @@ class MissionFindings(NamedTuple):
 
     @property
     def status(self) -> str:
-        """Worst status of the rows and of what is doubtful about the whole.
+        """Worst status of the rows, of the requirements and of what is doubtful about the whole.
 
         No better than `not_evaluated` if nothing was judged, or if images were formed and verified nothing; no better
         than `warn` if a warning doubts what was checked.
         """
         doubts = ["not_evaluated"] if self.is_unverified or self.is_empty else []
         doubts += ["warn" for warning in self.warnings if warning.is_doubt]
-        return worst([*(row.status for row in self.rows), *doubts])
+        return worst([*(one.status for one in (*self.rows, *self.requirements)), *doubts])
 
     @property
     def summary(self) -> dict[str, int]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from bisar_budget.analysis.allocation import Split
 from bisar_budget.findings.mission import FileWarning, MissionFindings, UnusableMission
+from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import worst
 from bisar_budget.geometry import PlatformState
@@ -129,6 +130,11 @@ def _mission(mission: MissionFindings) -> dict[str, Any]:
             "autofocus_radius_m": mission.scene.autofocus_radius,
             "searched_radius_m": mission.scene.searched,
         },
+        "requirements": [_requirement(one) for one in mission.requirements],
+        "declared_kinds": mission.kinds.declared,
+        "not_declared": mission.kinds.missing,
+        "without_source": mission.kinds.without_source,
+        "overrides": [one._asdict() for one in mission.overrides],
         "summary": mission.summary,
         "rows": [_row(row) for row in mission.rows],
         "warnings": [_warning(warning) for warning in mission.warnings],
@@ -159,6 +165,11 @@ def verdict_item(verdict: "Verdict") -> dict[str, Any]:
     """Write what images say of a limit, with the codes of the reasons."""
     reasons = {"reason_code": verdict.reason, "reason_autofocus_code": verdict.reason_autofocus}
     return verdict._asdict() | {name: None if reason is None else reason.code for name, reason in reasons.items()}
+
+
+def _requirement(one: JudgedRequirement) -> dict[str, Any]:
+    found = {name: value for name, value in one._asdict().items() if name != "waivers"}
+    return found | {"reason_code": None if one.reason is None else one.reason.code}
 
 
 def _row(row: Row) -> dict[str, Any]:
