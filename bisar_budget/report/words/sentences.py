@@ -2,8 +2,9 @@
 
 import math
 
+from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import Row
-from bisar_budget.units import format_quantity
+from bisar_budget.report.words.quantities import row_limit, row_size
 
 # A requirement that can set an allowable, in words; the terminal has room for the first.
 BINDING_WORDS = {
@@ -49,12 +50,12 @@ def percent(ratio: float) -> str:
     return f"{value} %"
 
 
-def measure(row: Row) -> str:
+def measure(row: Row, mission: MissionFindings) -> str:
     """Say what is declared, what is allowed and how much of it is used."""
-    declared = "not declared" if row.declared is None else f"declared {format_quantity(row.declared, row.unit)}"
+    declared = "not declared" if row.declared is None else f"declared {row_size(row.declared, row, mission)}"
     if row.allowable is None:
         return declared
-    text = f"{declared}, allowable {format_quantity(row.allowable, row.unit, 3, 'down')}"
+    text = f"{declared}, allowable {row_limit(row.allowable, row, mission)}"
     if binding := binding_words(row):
         text += f" (limited by the {binding})"
     return text if row.utilization is None else f"{text}, {percent(row.utilization)} of it used"
@@ -65,8 +66,8 @@ def cause(row: Row) -> str:
     return "; ".join([row.reason, *row.notes] if row.reason else row.notes)
 
 
-def finding(row: Row) -> str:
+def finding(row: Row, mission: MissionFindings) -> str:
     """Say both, and which requirement of the project it concerns."""
     why = cause(row)
     own_id = f" [{row.requirement_id}]" if row.requirement_id else ""
-    return f"{row.id}{own_id}: {measure(row)}{f'. {why}' if why else ''}"
+    return f"{row.id}{own_id}: {measure(row, mission)}{f'. {why}' if why else ''}"
