@@ -262,15 +262,16 @@ def format_in(value: float, unit: str, given: str, digits: int = 3, rounding: st
     text = _rounded(number, digits, rounding) if number else "0"
     mantissa, _, power = text.partition("e")
     text = f"{mantissa}e{int(power)}" if power else text
-    return f"{text} {_pretty(given)}"
+    return text + _pretty(given)
 
 
 @cache
 def _pretty(given: str) -> str:
-    """Write a unit of the tables for reading: `um` is µm, `m/s^2` m/s², `deg/sqrt(h)` deg/√h."""
+    """Write a unit of the tables behind a number: `um` is µm, `m/s^2` m/s², `deg/sqrt(h)` deg/√h."""
     text = given.replace("^2", "²").replace("^3", "³").replace("^4", "⁴").replace("°", "deg")
     text = re.sub(r"sqrt\((\w+)\)", r"√\1", text)
-    return re.sub(r"^u(?=m|g|s|rad)", "µ", text)
+    text = re.sub(r"^u(?=m|g|s|rad)", "µ", text)
+    return text.removeprefix("1") if text.startswith(("1/", "/")) else f" {text}"
 
 
 def format_limit(limit: float, unit: str) -> str:

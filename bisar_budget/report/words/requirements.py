@@ -45,6 +45,7 @@ def requirement_lines(mission: MissionFindings) -> Iterator[RequirementLine]:
     for one in mission.requirements:
         is_open = one.status == "not_evaluated"
         allowed = one.value if one.allowed is None else one.allowed
+        remark = ", ".join(_remarks(one, mission))
         yield RequirementLine(
             requirement=one,
             name=one.name,
@@ -52,8 +53,8 @@ def requirement_lines(mission: MissionFindings) -> Iterator[RequirementLine]:
             reached=requirement_size(one.reached, one),
             use="-" if one.utilization is None or one.allowed is None or is_open else percent(one.utilization),
             status=one.status,
-            decided_by=(_short(one.reason) if is_open and one.reason else one.row) or "-",
-            remark=", ".join(_remarks(one, mission)),
+            decided_by=(_short(one.reason) if is_open and one.reason else one.row) or ("" if remark else "-"),
+            remark=remark,
         )
 
 

@@ -71,3 +71,14 @@ def finding(row: Row, mission: MissionFindings) -> str:
     why = cause(row)
     own_id = f" [{row.requirement_id}]" if row.requirement_id else ""
     return f"{row.id}{own_id}: {measure(row, mission)}{f'. {why}' if why else ''}"
+
+
+def sentence(text: str) -> str:
+    """Begin with a capital letter; what begins with the name of a row or a file keeps its letters."""
+    first = text.partition(" ")[0].rstrip(",:;")
+    return text[:1].upper() + text[1:] if first.replace("-", "").isalpha() else text
+
+
+def dashed(text: str) -> str:
+    """Write the dash of what has no value as a page does."""
+    return "–" if text == "-" else text
