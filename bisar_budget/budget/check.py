@@ -12,6 +12,7 @@ from bisar_budget.budget.aggregates import aggregate_rows
 from bisar_budget.budget.collection_notes import collection_notes
 from bisar_budget.budget.error_rows import error_rows
 from bisar_budget.budget.judgement import judged
+from bisar_budget.budget.overrides import NOTHING_OUTSIDE, Outside, overrides
 from bisar_budget.budget.orbit import straight_orbits
 from bisar_budget.budget.pull_in import pull_in_caps
 from bisar_budget.budget.random_rows import islr_rows, pslr_row, random_rows, spur_rows
@@ -36,7 +37,14 @@ if TYPE_CHECKING:
     from bisar_budget.analysis.scene import SceneEdge
 
 
-def check_mission(mission: Mission, today: date, *, is_brief: bool = False, is_bare: bool = False) -> MissionFindings:
+def check_mission(
+    mission: Mission,
+    today: date,
+    *,
+    is_brief: bool = False,
+    is_bare: bool = False,
+    outside: Outside = NOTHING_OUTSIDE,
+) -> MissionFindings:
     """Check one mission.
 
     Parameters
@@ -50,6 +58,8 @@ def check_mission(mission: Mission, today: date, *, is_brief: bool = False, is_b
         not gate. Statuses are the same.
     is_bare : bool
         Leave out what decides nothing and is searched for: how far one autofocus correction serves the scene.
+    outside : Outside
+        What from outside the file bears on the verdict, besides what the mission itself carries.
 
     Returns
     -------
@@ -85,6 +95,7 @@ def check_mission(mission: Mission, today: date, *, is_brief: bool = False, is_b
         rows=tuple(rows),
         requirements=verdict.requirements,
         kinds=declared_kinds(mission),
+        overrides=overrides(mission, outside, today),
         warnings=(
             *_changed(mission),
             *_unknown_requirement_ids(mission, rows),

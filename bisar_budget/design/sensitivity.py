@@ -53,8 +53,8 @@ def sensitivity(
     Returns
     -------
     Sensitivity
-        Effects as changes of utilization, 0.01 being 1 % of a limit. The number that has to change least to use up the
-        margin stands first, by one measure for all: parts of a number, of a radian, of a power, of a range.
+        Effects as changes of utilization, 0.01 being 1 % of a limit. The number that has to change least to use up
+        the margin stands first, by one measure for all: parts of a number, of a radian, of a power, of a range.
 
     Raises
     ------

@@ -210,7 +210,6 @@ def test_numbers_are_ranked_by_the_change_that_uses_up_the_margin() -> None:
         "collection.aperture_time",
         "radar.center_frequency",
         "platforms.transmitter.motion_error.acceleration.0",
-        "requirements.quadratic_phase_error",
     ],
 )
 def test_the_change_that_uses_up_the_margin_is_where_the_limit_is(key: str) -> None:

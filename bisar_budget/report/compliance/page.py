@@ -219,7 +219,8 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
         alone=_ALONE if not found.is_empty and found.combine == "each" else "",
         narrow=narrow_gradients(found.geometry),
         status=found.status,
-        verdict=(_NOTHING if found.is_empty else _verdict(found.status, waived)) + (_CHANGED if found.changes else ""),
+        verdict=(_NOTHING if found.is_empty else _verdict(found.status, waived))
+        + (_CHANGED if found.changes else ""),
         is_empty=found.is_empty,
         said=verdict(found),
         rule=rule_words(found),
@@ -255,7 +256,9 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
         validity=tuple(_validity(mission, found)),
         inputs=tuple(_inputs(mission, found, file)),
         undeclared=tuple(
-            Undeclared(row.id, _allowable(row, found), row.equation) for row in found.rows if row.status == "not_declared"
+            Undeclared(row.id, _allowable(row, found), row.equation)
+            for row in found.rows
+            if row.status == "not_declared"
         ),
         notes=found.notes,
         warnings=tuple(
@@ -681,10 +684,10 @@ def _sources(rows: Sequence[Row]) -> tuple[Source, ...]:
 
 
 def _evidence(found: MissionFindings) -> Iterator[Evidence]:
-    for verdict in found.verdicts or ():
-        limit, numbers = verification.limit(verdict), verification.numbers(verdict)
-        by_autofocus = verdict.verdict_autofocus
-        refocused = (*verification.refocused_cells(verdict)[:4], by_autofocus) if by_autofocus else ()
-        with_autofocus = verdict.reason_autofocus and f"with autofocus: {verdict.reason_autofocus}"
-        reasons = tuple(reason for reason in (verdict.reason, with_autofocus) if reason)
-        yield Evidence(verdict.id, limit, *numbers, verdict.verdict, refocused, reasons)
+    for one in found.verdicts or ():
+        limit, numbers = verification.limit(one), verification.numbers(one)
+        by_autofocus = one.verdict_autofocus
+        refocused = (*verification.refocused_cells(one)[:4], by_autofocus) if by_autofocus else ()
+        with_autofocus = one.reason_autofocus and f"with autofocus: {one.reason_autofocus}"
+        reasons = tuple(reason for reason in (one.reason, with_autofocus) if reason)
+        yield Evidence(one.id, limit, *numbers, one.verdict, refocused, reasons)

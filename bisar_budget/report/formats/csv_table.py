@@ -1,7 +1,7 @@
 """The table of requirements and the rows as CSV for a spreadsheet: SI values, a line for each, a header.
 
-`kind` tells them apart. A requirement has the id `requirement.islr`, what is reached under `declared`, what is allowed
-under `allowable`, and the row that decides under `decided_by`.
+`kind` tells them apart. A requirement has the id `requirement.islr`, what is reached under `declared`, what is
+allowed under `allowable`, and the row that decides under `decided_by`.
 """
 
 import csv
@@ -52,7 +52,7 @@ COLUMNS = (
 
 
 def piece(mission: MissionFindings | UnusableMission, style: Style) -> str:
-    """Write every requirement and row of a mission; an unusable file gives one line per fault with the status `error`."""
+    """Write every requirement and row of a mission; of an unusable file a line per fault, with the status `error`."""
     return _written(_faults(mission) if isinstance(mission, UnusableMission) else _rows(mission))
 
 

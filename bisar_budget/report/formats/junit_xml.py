@@ -54,7 +54,8 @@ def _unusable(mission: UnusableMission, style: Style, counts: Counter[str]) -> I
 
 
 def _mission(mission: MissionFindings, style: Style, counts: Counter[str]) -> Iterator[str]:
-    outcomes = Counter(STATUS[one.status].junit for one in (*mission.requirements, *mission.rows))
+    statuses = [*(one.status for one in mission.requirements), *(row.status for row in mission.rows)]
+    outcomes = Counter(STATUS[name].junit for name in statuses)
     tests, failures = outcomes.total(), outcomes["failure"]
     counts.update(tests=tests, failures=failures)
     yield _suite(mission.name, tests=tests, failures=failures, errors=0, skipped=outcomes["skipped"])

@@ -22,7 +22,7 @@ from bisar_budget.report.words.sentences import cause, measure
 
 
 def render(report: Report, style: Style) -> str:
-    """Write every requirement and row of every mission; a file that cannot be used is one need with the status `error`."""
+    """Write every requirement and row of every mission; a file that cannot be used is one need, of status `error`."""
     needs: dict[str, dict[str, Any]] = {}
     for mission in report.missions:
         file = source_path(mission.file, style.root)

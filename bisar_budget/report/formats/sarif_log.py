@@ -60,8 +60,8 @@ RULES = {
     ),
     "declare": (
         "Errors that the file must declare",
-        "requirements.declare names errors that the file has to declare, for both platforms; what is missing cannot be "
-        "judged. Declare them: a zero declares too.",
+        "requirements.declare names errors that the file has to declare, for both platforms; what is missing cannot "
+        "be judged. Declare them: a zero declares too.",
     ),
     "other": (
         "Declared value within its limit",
@@ -91,6 +91,9 @@ def render(report: Report, style: Style) -> str:
         results += [_requirement(one, mission, artifact) for one in unseen(mission)]
         results += [_result(row, mission, artifact) for row in mission.rows if STATUS[row.status].sarif]
         results += [_warning(warning, mission, artifact) for warning in mission.warnings]
+        if outside := overrides_words(mission):
+            said = f"From outside the file: {outside}"
+            results.append(_located("mission_file", "note", said, None, artifact, "from outside the file"))
     run = {
         "tool": {"driver": _driver(report.version)},
         "columnKind": "unicodeCodePoints",
@@ -187,7 +190,9 @@ def _requirement(one: JudgedRequirement, mission: MissionFindings, artifact: dic
 def _properties(**values: str | float | None) -> dict[str, str | float]:
     """Return what has a value, made harmless."""
     return {
-        key: printable(value) if isinstance(value, str) else value for key, value in values.items() if value is not None
+        key: printable(value) if isinstance(value, str) else value
+        for key, value in values.items()
+        if value is not None
     }
 
 

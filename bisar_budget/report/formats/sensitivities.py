@@ -11,6 +11,7 @@ from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report.words.layout import table, wrapped
+from bisar_budget.report.words.requirements import overrides_lines
 from bisar_budget.report.words.sentences import BINDING_WORDS, percent
 
 FORMAT = "bisar-budget/sensitivity/1"
@@ -27,6 +28,7 @@ def _mission(found: Sensitivity) -> dict[str, Any]:
         "file": found.file,
         "name": found.name,
         "set": [change._asdict() for change in found.changes],
+        "overrides": [one._asdict() for one in found.overrides],
         "model": found.model,
         "status": found.status,
         "worst_row": found.worst_row,
@@ -91,6 +93,7 @@ def _lines(found: Sensitivity, style: Style) -> Iterator[str]:
     yield from wrapped(
         f"{printable(found.file)}{changed}, {printable(found.name)}: {status.text}, {found.model} model", "  "
     )
+    yield from overrides_lines(found)
     yield ""
     yield from _table(found)
     yield from _notes(found)

@@ -17,6 +17,7 @@ from bisar_budget.report.words.requirements import (
     RequirementLine,
     declared_words,
     is_said_with_the_table,
+    overrides_lines,
     overrides_words,
     requirement_lines,
     rule_words,
@@ -82,8 +83,7 @@ def _verdict(mission: MissionFindings, style: Style) -> list[str]:
     document = ", ".join(filter(None, (document_words(mission.document), mission.document.author)))
     name = f"{mission.name} ({document})" if document else mission.name
     lines = [_lead(first, mission.status, style), *rest, *wrapped(f"{name}; {rule_words(mission)}", "  ")]
-    if outside := overrides_words(mission, with_changes=False):
-        lines += wrapped(f"From outside the file: {outside}", "  ")
+    lines += overrides_lines(mission)
     if sentence := narrow_gradients(mission.geometry):
         lines += wrapped(sentence, "  ")
     return lines
@@ -157,7 +157,13 @@ def _table(mission: MissionFindings, style: Style, room: int) -> Iterator[str]:
     is_met = [STATUS[row.status].is_met or row.status == "info" for row in rows]
     while True:
         lines = [*_lines(rows, mission, style), *wrapped(_table_key(rows, hidden), "  ")]
-        if not is_short or mission.is_empty or len(lines) <= room or len(rows) <= _FEWEST or not is_met[len(rows) - 1]:
+        if (
+            not is_short
+            or mission.is_empty
+            or len(lines) <= room
+            or len(rows) <= _FEWEST
+            or not is_met[len(rows) - 1]
+        ):
             break
         hidden, rows = [rows[-1], *hidden], rows[:-1]
     yield from lines

@@ -1,13 +1,15 @@
 """What every format says of the requirements of a mission: whether each was judged and is met, and by what."""
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from bisar_budget import phrases
+from bisar_budget.faults import printable
 from bisar_budget.findings.mission import MissionFindings
-from bisar_budget.findings.requirement import DeclaredKinds, JudgedRequirement
+from bisar_budget.findings.requirement import DeclaredKinds, JudgedRequirement, Override
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import RANK, STATUS
+from bisar_budget.report.words.layout import wrapped
 from bisar_budget.report.words.quantities import requirement_size
 from bisar_budget.report.words.sentences import percent
 
@@ -16,6 +18,14 @@ MODELS = {"published": "published model", "full": "full model", "strictest": "st
 RULES = {"each": "each error alone", "sum": "worst-case sum", "rss": "root-sum-square"}
 _BREAKS = ("fail", "not_evaluated")
 _SHORT = {"place-is-not-known": "random errors move the image too"}  # of reasons that rows say at length
+
+
+class HasOverrides(Protocol):
+    """What was found about a mission, by a check or another study."""
+
+    @property
+    def overrides(self) -> tuple[Override, ...]:
+        """What from outside the file bears on it."""
 
 
 class RequirementLine(NamedTuple):
@@ -81,7 +91,9 @@ def requirement_finding(one: JudgedRequirement) -> str:
         text += f" of {requirement_size(one.value, one)}{' (default)' if one.is_default else ''}"
     text += f": {STATUS[one.status].words}"
     if one.reached is not None and one.allowed is not None and one.status != "not_evaluated":
-        text += f", {requirement_size(one.reached, one)} reached, {requirement_size(one.allowed, one, 'down')} allowed"
+        text += (
+            f", {requirement_size(one.reached, one)} reached, {requirement_size(one.allowed, one, 'down')} allowed"
+        )
     if one.row is not None:
         text += f", decided by {one.row}"
     return ". ".join([text, *filter(None, [one.reason]), *(waiver.words for waiver in one.waivers)])
@@ -110,8 +122,7 @@ def verdict(mission: MissionFindings) -> str:
 
 
 def _met(mission: MissionFindings) -> str:
-    lines = [*mission.requirements, *mission.rows]
-    waived = any(one.status == "waived" for one in lines)
+    waived = "waived" in [*(one.status for one in mission.requirements), *(row.status for row in mission.rows)]
     text = f"every requirement is judged and {'met or waived' if waived else 'met'}"
     if mission.status == "warn":
         return f"{text}, with warnings"
@@ -195,11 +206,17 @@ def rule_words(mission: MissionFindings) -> str:
     return f"{MODELS[mission.model]}, {RULES[mission.combine]}"
 
 
-def overrides_words(mission: MissionFindings, *, with_changes: bool = True) -> str:
+def overrides_words(found: HasOverrides, *, with_changes: bool = True) -> str:
     """Say what from outside the file bears on the verdict; empty if nothing does. `--set` may be said elsewhere."""
     said = [
-        f"{one.name} {one.value} ({one.origin})"
-        for one in mission.overrides
-        if with_changes or not one.name.startswith("--set ")
+        f"{one.name} {printable(one.value)} ({one.origin})"
+        for one in found.overrides
+        if with_changes or one.name != "--set"
     ]
     return "; ".join(said)
+
+
+def overrides_lines(found: HasOverrides) -> list[str]:
+    """The same for a terminal, beside `--set`; no line if there is nothing."""
+    said = overrides_words(found, with_changes=False)
+    return wrapped(f"From outside the file: {said}", "  ") if said else []
