@@ -8,6 +8,7 @@ __all__ = [
     "error_rows",
     "fleet",
     "orbit",
+    "overrides",
     "pull_in",
     "random_rows",
     "required",

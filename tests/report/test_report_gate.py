@@ -347,7 +347,7 @@ class TestGithub:
         found = findings(**STATUSES)
         rows = {f"{row.id}": row for row in found.rows}
         commands = self.commands(found)
-        levels = {"fail": "error", "warn": "warning", "not_evaluated": "warning", "waived": "notice"}
+        levels = {"fail": "error", "warn": "warning", "not_evaluated": "error", "waived": "notice"}
         titles = {}
         for command, properties, message in commands:
             titles[properties["title"].split(" ", 1)[1]] = (command, properties)
