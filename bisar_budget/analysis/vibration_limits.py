@@ -24,7 +24,6 @@ from bisar_budget.effects.models import CUBIC, QUADRATIC
 from bisar_budget.effects.slow_vibration import cubic_part, quadratic_part
 from bisar_budget.mission.model import Mission
 
-
 LARGEST_ECHO = 2.0  # rad; beyond, echoes are above the response
 
 

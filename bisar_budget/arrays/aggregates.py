@@ -53,6 +53,22 @@ class ManyTogether:
         found = [(error.subject.id, self.errors.does(self.model, error).cubic) for error in self.motion]
         return self._with(found, self.own, [(one.row_id, one.cubic) for one in self.own])
 
+    def cubic_without_coverage(self, split: Split, owner: str) -> Floats:
+        """Cubic phase of what counts against an owner's share, at the declared sigmas; as of `Together`. [rad]"""
+        factor = self.errors.mission.allocation.coverage_factor
+        found = [
+            (error.subject.id, self.errors.does(self.model, error).cubic / (factor if error.is_covered else 1.0))
+            for error in self.motion
+            if is_owed(error.subject.owner, owner, split)
+        ]
+        found += [(one.row_id, one.cubic / one.coverage) for one in self.own if is_owed(one.owner, owner, split)]
+        return self.errors.array(combined_phase(found, self.rule_of_all, self.groups))
+
+    @property
+    def rule_of_all(self) -> str:
+        """Rule by which all declared errors add up; as of `Together`."""
+        return "rss" if self.rule == "each" else self.rule
+
     def _with(self, phases: Phases, own: Own, of_own: Phases) -> Owed:
         is_there = [np.full(self.errors.cases, bool(phases)), *(one.is_there for one in own)]
         return Owed([*phases, *of_own], np.any(is_there, axis=0))

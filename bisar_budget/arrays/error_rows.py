@@ -71,7 +71,12 @@ class ErrorRows:
         cubic = (
             np.where(np.isfinite(mine.cubic), np.abs(mine.cubic), math.nan) if error.is_motion else array(math.nan)
         )
-        return judged._replace(binding=binding, qpe_published_rad=np.abs(published.qpe), cubic_rad=cubic)
+        return judged._replace(
+            binding=binding,
+            qpe_published_rad=np.abs(published.qpe),
+            cubic_rad=cubic,
+            quadratic_use=np.abs(mine.qpe) / limit,
+        )
 
     def _held(self, error: ManyErrors) -> list[tuple[str, Floats]]:
         """What an error is held to: requirements and their limits."""

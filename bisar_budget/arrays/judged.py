@@ -27,14 +27,25 @@ from bisar_budget.arrays.random_rows import RandomRows
 from bisar_budget.arrays.rim import ManyScenePhases
 from bisar_budget.arrays.rows import Judged
 from bisar_budget.arrays.shares import is_balanced, shares_of
-from bisar_budget.arrays.together import ManyOwnPhases
-from bisar_budget.arrays.vibrating import judged_one_by_one, many_slow_phases
+from bisar_budget.arrays.together import ManyOwnPhases, combined_phase
+from bisar_budget.arrays.vibrating import judged_one_by_one, many_slow_phases, many_tones
 from bisar_budget.budget.orbit import FASTEST_FLIGHT
-from bisar_budget.budget.random_rows import spur_rows
+from bisar_budget.budget.random_rows import pslr_row, spur_rows
 from bisar_budget.budget.required import is_asked_for, missing_declarations
+from bisar_budget.budget.requirements import (
+    KEYS,
+    TAKEN_BY,
+    EffectTotal,
+    RequirementState,
+    SeenRow,
+    requirement_states,
+    status_of,
+    untaken_effects,
+)
 from bisar_budget.budget.vibration_rows import vibration_rows
 from bisar_budget.budget.waivers import named_by
 from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.models import LOCATION
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
@@ -42,6 +53,7 @@ from bisar_budget.mission.model import Mission
 
 MODELS = ("published", "full")
 _STATUSES = tuple(STATUS)
+_BROKEN = [CODE["fail"], CODE["not_evaluated"]]  # what a waiver covers
 
 
 class Checked(NamedTuple):
@@ -99,15 +111,18 @@ class _Check:
         self.array, self.does, self.combine = errors.array, errors.does, errors.mission.allocation.combine
         self.judging = Judging(errors.cases, errors.mission.allocation.warn_above)
         self.random = many_random_errors(errors.mission, errors.geometries, errors.cases)
+        oscillators = [getattr(self.mission.platforms, name).oscillator for name in PLATFORMS]
+        self.has_spurs = any(oscillator is not None and oscillator.spurs for oscillator in oscillators)
+        self.tones = many_tones(errors.cases, one) if has_lines or self.has_spurs else {}
         self.stated_random = [error for error in self.random if error.declared is not None]
 
     def _own(self, model: str) -> list[ManyOwnPhases]:
         """Phases of what displaces nothing: slow vibrations, and the declared errors of sensors and clocks."""
-        found = list(self.slow)
+        found, factor = list(self.slow), self.mission.allocation.coverage_factor
         for error in self.stated_random:
             quadratic, cubic, _ = (self.array(part * error.declared) for part in error.effect(model))
             always = np.ones(self.cases, dtype=bool)
-            found.append(ManyOwnPhases(error.subject.id, error.subject.owner, quadratic, cubic, always))
+            found.append(ManyOwnPhases(error.subject.id, error.subject.owner, quadratic, cubic, always, factor))
         return found
 
     def checked(self) -> Checked:
@@ -130,14 +145,99 @@ class _Check:
         together = {model: ManyTogether(self.errors, model, own[model], self.split) for model in MODELS}
         self.error_rows = ErrorRows(self.judging, self.errors, self.limits, self.gain, is_brief=self.is_brief)
         self.aggregates = Aggregates(self.judging, self.errors, together, self.limits, self.gain)
+        self.random_rows = RandomRows(
+            self.judging,
+            self.mission,
+            self.errors.geometries,
+            self.random,
+            self.limits,
+            self.gain,
+            allocate(self.mission, (), {}).islr,
+            self.tones,
+        )
+        self.together = together
         by_model = [self._rows(model) for model in gates]
         rows = _stricter(*by_model) if len(by_model) > 1 else by_model[0]
-        return Checked(
-            tuple(self._waived(self._required(row)) for row in rows),
-            self.errors.is_left_out,
+        rows, states = self._judged_requirements([self._required(row) for row in rows], gates)
+        floors = [
             self._floor(),
-            self.errors.geometries,
+            *(np.where(state.status == CODE["waived"], CODE["pass"], state.status) for state in states),
+        ]
+        floor = np.min(floors, axis=0)
+        return Checked(tuple(rows), self.errors.is_left_out, floor, self.errors.geometries)
+
+    # ---------------------------------------------------------------- requirements
+    def _judged_requirements(
+        self, rows: Sequence[Judged], gates: Sequence[str]
+    ) -> tuple[list[Judged], list[RequirementState]]:
+        """Rows with what they could not be judged by, after waivers, and how each requirement stands."""
+        mission = self.mission
+        untaken = untaken_effects(mission, self._effect_totals(gates))
+        is_misplaced = self._is_misplaced()
+        found, seen = [], []
+        for row in rows:
+            status = status_of(row.status, row.subject.id, ~np.isnan(row.allowable), untaken)
+            if row.subject.id == f"mission.{LOCATION}" and mission.requirements.location_error is not None:
+                is_known = np.isin(status, [CODE["fail"], CODE["not_declared"]])
+                status = np.where(is_misplaced & ~is_known, CODE["not_evaluated"], status)
+            waived = self._waived(row._replace(status=status))
+            found.append(waived)
+            is_covered = (waived.status == CODE["waived"]) & np.isin(row.status, _BROKEN)
+            judges = np.where((row.binding >= 0) & (row.binding < len(KEYS)), row.binding, KEYS.index(row.metric))
+            seen.append(
+                SeenRow(
+                    row.subject.id,
+                    np.where(is_covered, CODE["waived"], row.status),
+                    row.utilization,
+                    judges.astype(np.int8),
+                    row.quadratic_use,
+                )
+            )
+        ids = [f"mission.{key}" for key in KEYS]
+        named = {ids[place] for one in mission.waivers if self.today <= one.until for place in named_by(one.id, ids)}
+        noise = [one.variance for model in gates for one in self.random_rows.noise(model)]
+        noise += list(self.tones.values()) if mission.requirements.pslr is None else []
+        states = requirement_states(
+            mission,
+            seen,
+            {key: f"mission.{key}" in named for key in KEYS},
+            has_noise=np.any([np.zeros(self.cases, bool), *(~np.isnan(one) for one in noise)], axis=0),
+            is_misplaced=is_misplaced,
         )
+        return found, states
+
+    def _effect_totals(self, gates: Sequence[str]) -> list[EffectTotal]:
+        """Add up cubic phases, what spreads and tones; as `effect_totals`."""
+        found: dict[str, dict[str, Any]] = {kind: {} for kind in TAKEN_BY}
+        totals: dict[str, Any] = {kind: self.array(0.0) for kind in TAKEN_BY}
+        for model in gates:
+            together = self.together[model]
+            parts: dict[str, Sequence[tuple[str, Any]]] = {
+                "cubic": together.all_cubics().phases,
+                "spread": [
+                    (one.row_id, np.sqrt(np.nan_to_num(one.variance))) for one in self.random_rows.noise(model)
+                ],
+                "tone": [(what.id, np.nan_to_num(phase)) for what, phase in self.tones.items()],
+            }
+            for kind, of_kind in parts.items():
+                groups = together.groups if kind == "cubic" else ()
+                total = self.array(combined_phase(of_kind, together.rule_of_all, groups))
+                totals[kind] = np.fmax(totals[kind], total)
+                for row_id, size in of_kind:
+                    found[kind][row_id] = np.fmax(found[kind].get(row_id, 0.0), np.abs(self.array(size)))
+        return [EffectTotal(kind, totals[kind], list(of_kind.items())) for kind, of_kind in found.items()]
+
+    def _is_misplaced(self) -> NDArray[np.bool_]:
+        """Whether errors that vary at random displace the image; as `requirement_table` has it."""
+        timing = self.mission.timing_error
+        is_clock_stated = timing.constant is not None and timing.linear is not None
+        found = np.zeros(self.cases, dtype=bool)
+        for error in self.stated_random:
+            if error.subject.kind in ("oscillator", "synchronization") and is_clock_stated:
+                continue
+            parts = [self.array(part) for model in MODELS for part in error.effect(model)[:2]]
+            found |= (self.array(error.declared) > 0) & np.any([part > 0 for part in parts], axis=0)
+        return found
 
     def _rows(self, gating: str) -> list[Judged]:
         other = "published" if gating == "full" else "full"
@@ -172,18 +272,19 @@ class _Check:
         return judged_one_by_one(np.flatnonzero(~self.errors.is_left_out), self.cases, of_case)
 
     def _instruments(self, gating: str) -> Iterator[Judged]:
-        """Rows of sensors and clocks, which few missions name."""
-        if not self.random:
-            return
-        islr = allocate(self.mission, (), {}).islr
-        rows = RandomRows(
-            self.judging, self.mission, self.errors.geometries, self.random, self.limits, self.gain, islr
-        )
+        """Rows of sensors and clocks, and of all that echoes and spreads together."""
+        rows, needs = self.random_rows, self.mission.requirements
         yield from rows.rows(gating)
-        oscillators = [getattr(self.mission.platforms, name).oscillator for name in PLATFORMS]
-        if any(one is not None and one.spurs for one in oscillators):
+        if self.has_spurs:
             yield from self._one_by_one(lambda mission, allocation: spur_rows(Analysis(mission), gating, allocation))
-        yield from rows.islr_rows(gating)
+        if needs.pslr is not None:
+            if self.tones:
+                yield from self._one_by_one(lambda mission, _: pslr_row(mission, gating))
+            else:
+                level = self.array(needs.pslr)
+                yield self.judging.row(subject("mission", "pslr"), None, level)._replace(metric="pslr")
+        together = self.together[gating]
+        yield from rows.islr_rows(gating, lambda owner: together.cubic_without_coverage(rows.islr, owner))
 
     @cached_property
     def _edges(self) -> ManySceneEdges | None:
@@ -217,11 +318,11 @@ class _Check:
         return judged.where(np.isinf(edges.difference), nothing)
 
     def _waived(self, row: Judged) -> Judged:
-        """Waive a row where it fails and a waiver that holds names it."""
+        """Waive a row where it fails or is not evaluated and a waiver that holds names it."""
         names = [row.subject.id]
         if not any(self.today <= one.until and named_by(one.id, names) for one in self.mission.waivers):
             return row
-        return row._replace(status=np.where(row.status == CODE["fail"], CODE["waived"], row.status))
+        return row._replace(status=np.where(np.isin(row.status, _BROKEN), CODE["waived"], row.status))
 
     def _required(self, row: Judged) -> Judged:
         """Turn a row that the file should declare and does not from `not_declared` into `not_evaluated`."""

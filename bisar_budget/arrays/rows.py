@@ -25,6 +25,7 @@ class Judged(NamedTuple):
     binding: NDArray[np.int8]  # place in REQUIREMENTS of what sets the allowable, or -1: the row's metric
     qpe_published_rad: Floats
     cubic_rad: Floats
+    quadratic_use: Floats  # quadratic phase over its limit, whatever sets the allowable; NaN where it has none
     never_fails: bool = False
     metric: str = QUADRATIC
 
@@ -32,8 +33,8 @@ class Judged(NamedTuple):
     def of_none(cls, what: Subject, cases: int) -> "Judged":
         """A row that is not declared in any case."""
         status, binding = np.full(cases, RANK["not_declared"], np.int8), np.full(cases, -1, np.int8)
-        declared, allowable, utilization, qpe, cubic = (np.full(cases, math.nan) for _ in range(5))
-        return cls(what, status, declared, allowable, utilization, binding, qpe, cubic)
+        declared, allowable, utilization, qpe, cubic, use = (np.full(cases, math.nan) for _ in range(6))
+        return cls(what, status, declared, allowable, utilization, binding, qpe, cubic, use)
 
     def where(self, is_other: Any, other: "Judged") -> "Judged":
         """This row, but in some cases the other."""
@@ -46,6 +47,7 @@ class Judged(NamedTuple):
             np.where(is_other, other.binding, self.binding),
             np.where(is_other, other.qpe_published_rad, self.qpe_published_rad),
             np.where(is_other, other.cubic_rad, self.cubic_rad),
+            np.where(is_other, other.quadratic_use, self.quadratic_use),
             self.never_fails,
             self.metric,
         )

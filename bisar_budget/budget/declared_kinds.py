@@ -11,7 +11,7 @@ MOTION = ("position", "velocity", "acceleration")
 
 def declared_kinds(mission: Mission) -> DeclaredKinds:
     """List the kinds of a mission, by owner; a still platform owes its position alone of the errors of its path."""
-    declared, missing, without_source = [], [], []
+    declared, missing, without_source = list[str](), list[str](), list[str]()
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
         error = platform.motion_error

@@ -219,7 +219,7 @@ def _echo(phase: float) -> float:
 
 # ---------------------------------------------------------------------- powers together
 def islr_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterator[Row]:
-    """What spreads, for the mission where ISLR is required, and for each owner whose noise no other row holds whole."""
+    """What spreads: of the mission where ISLR is required, and of each owner unless only wideband vibration does."""
     mission = analysis.mission
     if mission.requirements.islr is None:
         return

@@ -254,8 +254,10 @@ def _sizes(row: Row, key: str, mission: Mission, allocation: Allocation) -> tupl
         limit = spread_limit(mission, allocation, row.owner, row.model or "full")
         return None if limit is None else islr_db(limit**2), row.islr_db
     k = 2 * math.pi / mission.radar.wavelength
-    allowed, reached = (None if size is None else _echo_db(k * size) for size in (row.allowable, row.declared))
-    return allowed, reached
+    levels: list[float | None] = [
+        None if size is None else _echo_db(k * size) for size in (row.allowable, row.declared)
+    ]
+    return levels[0], levels[1]
 
 
 def _echo_db(phase: float) -> float | None:

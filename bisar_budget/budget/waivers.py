@@ -1,4 +1,4 @@
-"""Waivers: rows and requirements that may be broken until a date. What is waived, expired or useless is always said."""
+"""Waivers: rows and requirements that may be broken until a date. What is waived, expired or useless is said."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -13,16 +13,14 @@ from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import AppliedWaiver, Row
 from bisar_budget.mission.model import Mission
 
-
 _BROKEN = ("fail", "not_evaluated")  # statuses that a waiver covers
 
 
 class Waived(NamedTuple):
     """Rows after waivers, and the waivers that name requirements.
 
-    Rows that fail or are not evaluated, and that a valid waiver names, are `waived`; one with expired waivers keeps its
-    status and has the last of them. `requirements` are the valid waivers of each requirement, by its id, of which the
-    first counts. `covered` are, for each waiver of the file, the rows that it could cover.
+    Rows that fail or are not evaluated, and that a valid waiver names, are `waived`; one with expired waivers keeps
+    its status and has the last of them. `requirements` has the first valid waiver of each requirement, by its id.
     """
 
     mission: Mission

@@ -107,7 +107,8 @@ class MissionFindings(NamedTuple):
         """
         doubts = ["not_evaluated"] if self.is_unverified or self.is_empty else []
         doubts += ["warn" for warning in self.warnings if warning.is_doubt]
-        return worst([*(one.status for one in (*self.rows, *self.requirements)), *doubts])
+        statuses = [row.status for row in self.rows] + [one.status for one in self.requirements]
+        return worst([*statuses, *doubts])
 
     @property
     def summary(self) -> dict[str, int]:
