@@ -21,6 +21,7 @@ from bisar_budget.effects.vibration_lines import counted, lines_of
 from bisar_budget.mission.model import Mission, has_instruments
 
 CUBIC_POWER = 4 / 175  # of a cubic phase φ₃ at the edge: its Legendre part 2/5·φ₃, whose mean square is (4/25)/7·φ₃²
+SMALLEST_CUBIC_RAD = 1e-6  # of a power of -136 dB; below, exact ranges are rounding
 NOISE = ("velocity_random_walk", "angle_random_walk")  # figures of an inertial sensor that spread
 
 
@@ -97,6 +98,6 @@ def spread_powers(analysis: Analysis, allocation: Allocation, owner: str, model:
     if needs.cubic_phase_error is None:
         together = Together(analysis, analysis.full if model == "full" else analysis.published)
         cubic = together.cubic_without_coverage(allocation.islr, owner)
-        if 0 < cubic < math.inf:
+        if SMALLEST_CUBIC_RAD < cubic < math.inf:
             powers.append((subject("mission", CUBIC).id, CUBIC_POWER * cubic**2))
     return powers

@@ -63,6 +63,7 @@ class Checked(NamedTuple):
     is_left_out: NDArray[np.bool_]
     floor: NDArray[np.int8]
     geometries: Geometries
+    requirements: tuple[RequirementState, ...]
 
 
 def check_arrays(
@@ -164,7 +165,7 @@ class _Check:
             *(np.where(state.status == CODE["waived"], CODE["pass"], state.status) for state in states),
         ]
         floor = np.min(floors, axis=0)
-        return Checked(tuple(rows), self.errors.is_left_out, floor, self.errors.geometries)
+        return Checked(tuple(rows), self.errors.is_left_out, floor, self.errors.geometries, tuple(states))
 
     # ---------------------------------------------------------------- requirements
     def _judged_requirements(

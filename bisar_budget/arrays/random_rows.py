@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bisar_budget.analysis.allocation import Split
-from bisar_budget.analysis.spread import CUBIC_POWER, NOISE
+from bisar_budget.analysis.spread import CUBIC_POWER, NOISE, SMALLEST_CUBIC_RAD
 from bisar_budget.arrays.collections import Floats, Geometries, axes_of, dot
 from bisar_budget.arrays.instruments import ManyRandomErrors
 from bisar_budget.arrays.judgement import BOUND, Judging
@@ -153,15 +153,16 @@ class RandomRows:
                 is_vibration_alone &= np.isnan(one.variance)
         has_cubic = needs.cubic_phase_error is None
         if has_cubic:
-            is_vibration_alone &= ~(cubic("mission") > 0)
+            is_vibration_alone &= ~(cubic("mission") > SMALLEST_CUBIC_RAD)
         for owner in ("transmitter", "receiver", *(["clock"] if self.islr.clock is not None else []), "mission"):
             members = [one.variance for one in spreads if owner == "mission" or self.islr.includes(one.owner, owner)]
             is_declared = np.any([array(False) > 0, *(~np.isnan(one) for one in members)], axis=0)
             variance = array(sum(np.nan_to_num(one) for one in members))
             if has_cubic:
-                power = CUBIC_POWER * cubic(owner) ** 2
-                is_declared = is_declared | ((power > 0) & np.isfinite(power))
-                variance = variance + np.where(np.isfinite(power), power, 0.0)
+                phase = cubic(owner)
+                counts = (phase > SMALLEST_CUBIC_RAD) & np.isfinite(phase)
+                is_declared = is_declared | counts
+                variance = variance + CUBIC_POWER * np.where(counts, phase, 0.0) ** 2
             limit, by_other = (array(self._spread_limit(owner, model)) for model in (gating, other))
             rms, what = np.sqrt(variance), subject(owner, "islr")
             judged = self.judging.row(what, rms, limit, doubt=rms > by_other * BOUND)

@@ -251,12 +251,10 @@ def _sizes(row: Row, key: str, mission: Mission, allocation: Allocation) -> tupl
         moved = None if row.displacement_m is None else math.hypot(*row.displacement_m)
         return mission.requirements.location_error, moved
     if key == "islr":
-        limit = spread_limit(mission, allocation, row.owner, row.model or "full")
-        return None if limit is None else islr_db(limit**2), row.islr_db
+        rms = spread_limit(mission, allocation, row.owner, row.model or "full")
+        return None if rms is None else islr_db(rms**2), row.islr_db
     k = 2 * math.pi / mission.radar.wavelength
-    levels: list[float | None] = [
-        None if size is None else _echo_db(k * size) for size in (row.allowable, row.declared)
-    ]
+    levels = [None if size is None else _echo_db(k * size) for size in (row.allowable, row.declared)]
     return levels[0], levels[1]
 
 

@@ -81,7 +81,7 @@ class RequirementState(NamedTuple):
 def required_keys(mission: Mission) -> tuple[str, ...]:
     """Keys of the requirements that a mission has, the default of the quadratic phase included."""
     needs = mission.requirements
-    return tuple(key for key in KEYS if getattr(needs, key) not in (None, ()))
+    return tuple(key for key in KEYS if (needs.declare if key == "declare" else getattr(needs, key) is not None))
 
 
 def is_taken(mission: Mission, kind: str) -> bool:

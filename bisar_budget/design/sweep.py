@@ -549,6 +549,8 @@ def _verdict(checked: judged.Checked, row_id: str | None, breaks: Container[str]
         status = codes[0]
     may_decide = np.array([[not one.never_fails or "warn" in breaks] for one in rows])
     decides = may_decide & judged[codes] & (does_break[codes] | ~does_break[status])
+    has_number = np.array([~np.isnan(one.utilization) for one in rows])
+    decides &= has_number | (codes != RANK["not_evaluated"])
     use = np.array([np.nan_to_num(one.utilization, nan=-1.0, posinf=math.inf) for one in rows])
     use = np.where(decides, use, -2.0)
     highest = use.max(axis=0)
@@ -559,11 +561,15 @@ def _verdict(checked: judged.Checked, row_id: str | None, breaks: Container[str]
     binding = np.take_along_axis(np.array([row.binding for row in rows]), worst[None], axis=0)[0]
     requirement = np.where(binding >= 0, np.array(REQUIREMENTS, dtype=object)[binding], metrics[worst])
     utilization = np.take_along_axis(np.array([row.utilization for row in rows]), worst[None], axis=0)[0]
+    unmet = np.full(status.shape, "", dtype=object)  # where no row decides, the requirement that breaks
+    if row_id is None:
+        for one in reversed(checked.requirements):
+            unmet = np.where((one.status == status) & does_break[status], one.key, unmet)
     return {
         "status": statuses(status),
         "worst_row": np.where(has_one, ids[worst], ""),
         "utilization": np.where(has_one, utilization, math.nan),
-        "binding_requirement": np.where(has_one, requirement, ""),
+        "binding_requirement": np.where(has_one, requirement, unmet),
     }
 
 
