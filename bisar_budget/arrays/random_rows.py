@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bisar_budget.analysis.allocation import Split
+from bisar_budget.analysis.spread import islr_db, mainlobe_energy, spread_phase
 from bisar_budget.arrays.collections import Floats, Geometries, axes_of, dot
 from bisar_budget.arrays.instruments import ManyRandomErrors
 from bisar_budget.arrays.judgement import BOUND, Judging
@@ -81,8 +82,7 @@ class RandomRows:
         if self.mission.requirements.islr is None:
             return None
         power = 10 ** (np.asarray(self.mission.requirements.islr) / 10)
-        whole = np.sqrt(power) if model == "published" else np.sqrt(np.log1p(power))
-        return whole * np.sqrt(self.islr.of(owner))
+        return spread_phase(power, model, mainlobe_energy(self.mission), np) * np.sqrt(self.islr.of(owner))
 
     def _sizes(self, error: ManyRandomErrors, model: str) -> Floats:
         """Size at which an error reaches each requirement, (3, cases); infinite where it does not. [unit]"""
@@ -141,7 +141,17 @@ class RandomRows:
             judged = self.judging.row(what, rms, limit, doubt=rms > by_other * BOUND)
             if not self._has_wideband(owner):  # what is declared may spread nothing
                 judged = judged.where(variance == 0, self.judging.row(what, None, limit))
-            yield _as_islr(judged)
+            yield self._as_islr(judged, gating)
+
+    def _as_islr(self, row: Judged, model: str) -> Judged:
+        """Write rms phases as the ISLR that they add, by a model."""
+        energy = mainlobe_energy(self.mission)
+        declared, allowable = (
+            np.where(column > 0, islr_db(column**2, model, energy, np), math.nan)
+            for column in (row.declared, row.allowable)
+        )
+        binding = np.full_like(row.binding, REQUIREMENTS.index("islr"))
+        return row._replace(declared=declared, allowable=allowable, binding=binding, metric="islr")
 
     def _has_wideband(self, owner: str) -> bool:
         owners = PLATFORMS if owner == "mission" else [name for name in PLATFORMS if name == owner]
@@ -179,16 +189,3 @@ def _in_decibel(row: Judged) -> Judged:
         np.where(column > 0, 20 * np.log10(column), math.nan) for column in (row.declared, row.allowable)
     )
     return row._replace(declared=declared, allowable=allowable)
-
-
-def _as_islr(row: Judged) -> Judged:
-    """Write rms phases as the ISLR that they add."""
-    declared, allowable = (_islr_db(column**2) for column in (row.declared, row.allowable))
-    binding = np.full_like(row.binding, REQUIREMENTS.index("islr"))
-    return row._replace(declared=declared, allowable=allowable, binding=binding, metric="islr")
-
-
-def _islr_db(variance: Floats) -> Floats:
-    """ISLR that noise of a phase variance adds; as `islr_db`. [dB]"""
-    level = 10 / math.log(10) * (variance + np.log(-np.expm1(-variance)))
-    return np.where(variance > 0, level, math.nan)

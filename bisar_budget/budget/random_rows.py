@@ -5,17 +5,17 @@ of sensors and phase noise spread is held together to each platform's share of I
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.analysis.spread import spread_limit, spread_powers
+from bisar_budget.analysis.spread import islr_db, mainlobe_energy, shown_islr_db, spread_limit, spread_powers
 from bisar_budget.analysis.vibration_limits import vibration_limits
 from bisar_budget.budget.judgement import judged
 from bisar_budget.budget.pull_in import caps, needed_sentence
-from bisar_budget.budget.vibration_rows import ECHO_CYCLES, islr_db
+from bisar_budget.budget.vibration_rows import ECHO_CYCLES
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.effects.clocks import spurs_of
 from bisar_budget.effects.models import CUBIC, QUADRATIC
@@ -69,8 +69,8 @@ def _row(analysis: Analysis, error: RandomError, gating: str, other: str, alloca
         if mission.allocation.combine != "each":
             info = phrases.aggregate_decides(mission.allocation.combine)
         elif allowable is not None and size > allowable:
-            over = _over(mission, error, mine, limits, binding or "", allocation).then(error.extrapolated)
-        doubt = _doubt(other, theirs, others, size)
+            over = _over(mission, error, gating, limits, binding or "", allocation).then(error.extrapolated)
+        doubt = _doubt(mission, other, theirs, others, size)
     by_model = (mine, theirs) if gating == "published" else (theirs, mine)
     row = judged(
         mission,
@@ -95,7 +95,7 @@ def _row(analysis: Analysis, error: RandomError, gating: str, other: str, alloca
     row = row._replace(
         binding_requirement=binding,
         cubic_rad=cubic,
-        islr_db=None if size is None else islr_db((mine.spread * size) ** 2),
+        islr_db=None if size is None else shown_islr_db(mission, (mine.spread * size) ** 2),
         model=gating,
     )
     return in_decibel(row) if error.unit == "dB" else row
@@ -131,31 +131,33 @@ def in_decibel(row: Row) -> Row:
 
 
 def _over(
-    mission: Mission, error: RandomError, effect: RandomEffect, limits: Limits, binding: str, allocation: Allocation
+    mission: Mission, error: RandomError, model: str, limits: Limits, binding: str, allocation: Allocation
 ) -> Note:
-    size = error.declared or 0.0
+    effect, size = error.effect(model), error.declared or 0.0
     if binding == CUBIC:
         return phrases.cubic_phase_over(effect.cubic * size, limits.cubic or 0.0)
     if binding == ISLR:
-        return phrases.spreads_too_much(_level(effect.spread * size), _level(limits.spread or 0.0))
+        level = _levels(mission, model)
+        return phrases.spreads_too_much(level(effect.spread * size), level(limits.spread or 0.0))
     qpe = effect.quadratic * size
     needed = needed_sentence(allocation.n_pull_needed(qpe, error.owner), caps(mission))
     return phrases.quadratic_phase_over(qpe, limits.quadratic).then(needed)
 
 
-def _level(rms: float) -> float:
-    """ISLR of a phase. [dB]"""
-    return islr_db(rms**2) or 0.0
+def _levels(mission: Mission, model: str) -> Callable[[float], float]:
+    """ISLR of an rms phase [rad] by a model, whatever the size that it is compared with. [dB]"""
+    energy = mainlobe_energy(mission)
+    return lambda rms: islr_db(rms**2, model, energy) if rms else 0.0
 
 
-def _doubt(other: str, effect: RandomEffect, limits: Limits, size: float) -> Note:
+def _doubt(mission: Mission, other: str, effect: RandomEffect, limits: Limits, size: float) -> Note:
     """Say that the model that does not gate fails a declared error; else nothing."""
     sizes = sizes_at(effect, limits)
     if not sizes or size <= min(sizes.values()) * (1 + UTILIZATION_TOLERANCE):
         return NOTHING
     name = min(sizes, key=lambda one: sizes[one])
     if name == ISLR:
-        return phrases.other_model_spreads(other, _level(effect.spread * size))
+        return phrases.other_model_spreads(other, _levels(mission, other)(effect.spread * size))
     if name == QUADRATIC:
         return phrases.other_model_fails(other, effect.quadratic * size, limits.quadratic, "rad", "QPE")
     return phrases.other_model_fails(other, effect.cubic * size, limits.cubic or 0.0, "rad", "cubic phase")
@@ -215,6 +217,9 @@ def islr_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterat
     if allocation.islr.clock is not None:
         owners.insert(2, "clock")
     other = "full" if gating == "published" else "published"
+    level = _levels(
+        mission, gating
+    )  # every level of a row by one rule: what is required of the whole reads as required
     for owner in owners:
         members = spread_powers(analysis, allocation, owner, gating)
         variance = math.fsum(power for _, power in members)
@@ -223,9 +228,9 @@ def islr_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterat
         over = doubt = NOTHING
         if rms > limit and members:
             row_id, largest = max(members, key=lambda member: member[1])
-            over = phrases.noise_spreads_too_much(_level(rms), _level(limit), row_id, _level(math.sqrt(largest)))
+            over = phrases.noise_spreads_too_much(level(rms), level(limit), row_id, level(math.sqrt(largest)))
         if rms > by_other * (1 + UTILIZATION_TOLERANCE):
-            doubt = phrases.other_model_allows(other, _level(by_other), "dB")
+            doubt = phrases.other_model_allows(other, level(by_other), "dB")
         row = judged(
             mission,
             subject=subject(owner, ISLR),
@@ -239,21 +244,21 @@ def islr_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterat
             doubt=doubt,
             limits=(limit, by_other) if gating == "published" else (by_other, limit),
         )
-        yield _as_islr(row, variance, gating)
+        yield _as_islr(row, shown_islr_db(mission, variance), gating, level)
 
 
-def _as_islr(row: Row, variance: float, gating: str) -> Row:
-    """Write rms phases as the ISLR that they add."""
+def _as_islr(row: Row, shown: float | None, gating: str, of_rms: Callable[[float], float]) -> Row:
+    """Write rms phases as the ISLR that they add; `shown` is that of an image, whatever model gates. [dB]"""
 
     def level(rms: float | None) -> float | None:
-        return islr_db(rms**2) if rms else None
+        return of_rms(rms) if rms else None
 
     return row._replace(
         declared=level(row.declared),
         allowable=level(row.allowable),
         allowable_published=level(row.allowable_published),
         allowable_full=level(row.allowable_full),
-        islr_db=None if row.declared is None else islr_db(variance),
+        islr_db=shown,
         binding_requirement=ISLR,
         model=gating,
     )
