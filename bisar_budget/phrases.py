@@ -627,12 +627,6 @@ def both_platforms_vibrate(other: str, apart: float, level_db: float, is_more: b
 
 
 @phrase
-def published_rule_is_exact() -> str:
-    """Of a limit of a vibration."""
-    return "the published rule is that of first principles, to 0.01 dB"
-
-
-@phrase
 def published_rule_is_off(margin_db: float) -> str:
     """Of a limit of a vibration."""
     side = "inside" if margin_db >= 0 else "beyond"

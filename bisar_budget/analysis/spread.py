@@ -3,22 +3,26 @@
 Independent powers add, whatever `allocation.combine` says of phases. Each effect is judged once: a tone by PSLR, and
 without that requirement its power φ²/2 by ISLR; a cubic phase by its own requirement, and without one its power by
 ISLR, since it is in the image's sidelobes.
+
+Noise of a phase variance σ² leaves exp(-σ²) of the energy in the response and spreads the rest over the image. Of the
+response a share E lies within the first nulls, which an image counts as its mainlobe, so that noise adds
+(exp(σ²) - 1)/E to the ISLR. The paper's rule takes σ² for it.
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.together import Together
-from bisar_budget.analysis.vibration_limits import spread_phase
+from bisar_budget.constants import MAINLOBE_ENERGY
 from bisar_budget.effects.clocks import spurs_of
 from bisar_budget.effects.echoes import SLOWEST
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.models import CUBIC
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.vibration_lines import counted, lines_of
-from bisar_budget.mission.model import Mission, has_instruments
+from bisar_budget.mission.model import Mission, Simulation, has_instruments
 
 CUBIC_POWER = 4 / 175  # of a cubic phase φ₃ at the edge: its Legendre part 2/5·φ₃, whose mean square is (4/25)/7·φ₃²
 SMALLEST_CUBIC_RAD = 1e-6  # of a power of -136 dB; below, exact ranges are rounding
@@ -41,12 +45,49 @@ class Spread(NamedTuple):
     variance: float
 
 
+def mainlobe_energy(mission: Mission) -> float:
+    """Share E of the error-free response's energy within its first nulls, under the window of the images."""
+    return MAINLOBE_ENERGY[(mission.simulation or Simulation()).window]
+
+
+def spread_phase(ratio: Any, model: str, energy: float, xp: Any = math) -> Any:
+    """Rms phase of noise that adds an ISLR, inverse of `islr_db`. [rad]
+
+    Parameters
+    ----------
+    ratio : float or array
+        ISLR, a power ratio.
+    model : str
+        `published` for the paper's rule; any other is what an image shows.
+    energy : float
+        Share E, see `mainlobe_energy`.
+    xp : module
+        `math` for floats, `numpy` for arrays.
+    """
+    return xp.sqrt(ratio if model == "published" else xp.log1p(ratio * energy))
+
+
+def islr_db(variance: Any, model: str, energy: float, xp: Any = math) -> Any:
+    """ISLR that noise of a phase variance [rad²], above 0, adds: σ² by the paper's rule, else as an image shows. [dB]
+
+    Parameters are those of `spread_phase`.
+    """
+    if model == "published":
+        return 10 * xp.log10(variance)
+    # Of (exp(σ²) - 1)/E, without exp(σ²), which overflows.
+    return 10 / math.log(10) * (variance + xp.log(-xp.expm1(-variance)) - math.log(energy))
+
+
+def shown_islr_db(mission: Mission, variance: float) -> float | None:
+    """ISLR that noise of a phase variance [rad²] adds to an image; None where there is none. [dB]"""
+    return islr_db(variance, "full", mainlobe_energy(mission)) if variance else None
+
+
 def spread_limit(mission: Mission, allocation: Allocation, owner: str, model: str) -> float | None:
-    """Rms phase that an owner may spread: the paper's rule, its square is the power, or first principles. [rad]"""
+    """Rms phase that an owner may spread, by the paper's rule or as an image shows it. [rad]"""
     if mission.requirements.islr is None:
         return None
-    power = 10 ** (mission.requirements.islr / 10)
-    whole = math.sqrt(power) if model == "published" else spread_phase(power)
+    whole: float = spread_phase(10 ** (mission.requirements.islr / 10), model, mainlobe_energy(mission))
     return whole * math.sqrt(allocation.islr.of(owner))
 
 

@@ -7,7 +7,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bisar_budget.analysis.allocation import Split
-from bisar_budget.analysis.spread import CUBIC_POWER, NOISE, SMALLEST_CUBIC_RAD
+from bisar_budget.analysis.spread import (
+    CUBIC_POWER,
+    NOISE,
+    SMALLEST_CUBIC_RAD,
+    islr_db,
+    mainlobe_energy,
+    spread_phase,
+)
 from bisar_budget.arrays.collections import Floats, Geometries, axes_of, dot
 from bisar_budget.arrays.instruments import ManyRandomErrors
 from bisar_budget.arrays.judgement import BOUND, Judging
@@ -85,8 +92,7 @@ class RandomRows:
         if self.mission.requirements.islr is None:
             return None
         power = 10 ** (np.asarray(self.mission.requirements.islr) / 10)
-        whole = np.sqrt(power) if model == "published" else np.sqrt(np.log1p(power))
-        return whole * np.sqrt(self.islr.of(owner))
+        return spread_phase(power, model, mainlobe_energy(self.mission), np) * np.sqrt(self.islr.of(owner))
 
     def _sizes(self, error: ManyRandomErrors, model: str) -> Floats:
         """Size at which an error reaches each requirement, (3, cases); infinite where it does not. [unit]"""
@@ -169,7 +175,17 @@ class RandomRows:
             judged = judged.where(~is_declared, self.judging.row(what, None, limit))
             if owner != "mission":
                 judged = judged.where(is_vibration_alone, Judged.of_none(what, self.judging.cases))
-            yield _as_islr(judged)
+            yield self._as_islr(judged, gating)
+
+    def _as_islr(self, row: Judged, model: str) -> Judged:
+        """Write rms phases as the ISLR that they add, by a model."""
+        energy = mainlobe_energy(self.mission)
+        declared, allowable = (
+            np.where(column > 0, islr_db(column**2, model, energy, np), math.nan)
+            for column in (row.declared, row.allowable)
+        )
+        binding = np.full_like(row.binding, REQUIREMENTS.index("islr"))
+        return row._replace(declared=declared, allowable=allowable, binding=binding, metric="islr")
 
     def noise(self, model: str) -> list[Spreads]:
         """What spreads beyond the cubic; as `noise` of `analysis.spread`."""
@@ -207,16 +223,3 @@ def _in_decibel(row: Judged) -> Judged:
         np.where(column > 0, 20 * np.log10(column), math.nan) for column in (row.declared, row.allowable)
     )
     return row._replace(declared=declared, allowable=allowable)
-
-
-def _as_islr(row: Judged) -> Judged:
-    """Write rms phases as the ISLR that they add."""
-    declared, allowable = (_islr_db(column**2) for column in (row.declared, row.allowable))
-    binding = np.full_like(row.binding, REQUIREMENTS.index("islr"))
-    return row._replace(declared=declared, allowable=allowable, binding=binding, metric="islr")
-
-
-def _islr_db(variance: Floats) -> Floats:
-    """ISLR that noise of a phase variance adds; as `islr_db`. [dB]"""
-    level = 10 / math.log(10) * (variance + np.log(-np.expm1(-variance)))
-    return np.where(variance > 0, level, math.nan)

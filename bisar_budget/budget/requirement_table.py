@@ -10,7 +10,7 @@ import numpy as np
 from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis, Model
-from bisar_budget.analysis.spread import noise, spread_limit, tones
+from bisar_budget.analysis.spread import islr_db, mainlobe_energy, noise, spread_limit, tones
 from bisar_budget.analysis.together import Together
 from bisar_budget.analysis.vibration_limits import LARGEST_ECHO, echo_level
 from bisar_budget.budget.required import missing_declarations
@@ -27,7 +27,6 @@ from bisar_budget.budget.requirements import (
     status_of,
     untaken_effects,
 )
-from bisar_budget.budget.vibration_rows import islr_db
 from bisar_budget.budget.waivers import Waived, apply_waivers
 from bisar_budget.effects.combine import combine_phases
 from bisar_budget.effects.correlation import combined_phase
@@ -251,8 +250,10 @@ def _sizes(row: Row, key: str, mission: Mission, allocation: Allocation) -> tupl
         moved = None if row.displacement_m is None else math.hypot(*row.displacement_m)
         return mission.requirements.location_error, moved
     if key == "islr":
-        rms = spread_limit(mission, allocation, row.owner, row.model or "full")
-        return None if rms is None else islr_db(rms**2), row.islr_db
+        model = row.model or "full"
+        limit, use = spread_limit(mission, allocation, row.owner, model) or 0.0, row.utilization or 0.0
+        sizes = [islr_db(rms**2, model, mainlobe_energy(mission)) if rms else None for rms in (limit, limit * use)]
+        return sizes[0], sizes[1]
     k = 2 * math.pi / mission.radar.wavelength
     levels = [None if size is None else _echo_db(k * size) for size in (row.allowable, row.declared)]
     return levels[0], levels[1]

@@ -10,9 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bisar_budget.analysis.spread import spread_limit, spread_powers
+from bisar_budget.analysis.spread import shown_islr_db, spread_limit, spread_powers
 from bisar_budget.budget.random_rows import ISLR, limits_for, sizes_at
-from bisar_budget.budget.vibration_rows import islr_db
 from bisar_budget.effects.clocks import Spur
 from bisar_budget.effects.exact_arrays import aperture_nodes
 from bisar_budget.effects.models import CUBIC
@@ -178,7 +177,9 @@ def verify_islr(study: Study, of: Subject) -> Verdict:
     """Everything that spreads, scaled together to the limit of a row's owner."""
     model = study.models[-1].name
     limit = spread_limit(study.mission, study.allocation, of.owner, model) or 0.0
-    blank = Verdict(id=of.id, model=study.model, boundary_error=islr_db(limit**2) or 0.0, unit="dB")
+    blank = Verdict(
+        id=of.id, model=study.model, boundary_error=shown_islr_db(study.mission, limit**2) or 0.0, unit="dB"
+    )
     powers = spread_powers(study.analysis, study.allocation, of.owner, model)
     total = math.fsum(power for _, power in powers)
     if not total:
@@ -217,7 +218,7 @@ def _power(
     coherent = np.abs(phasor.mean(axis=1)) ** 2
     ratios = (1 - coherent) / coherent
     mean, spread = float(np.mean(ratios)), float(np.std(ratios, ddof=1)) / math.sqrt(_POWER_DRAWS)
-    level, required = 10 * math.log10(mean), islr_db(limit**2) or 0.0
+    level, required = 10 * math.log10(mean), shown_islr_db(study.mission, limit**2) or 0.0
     excess = level - required
     verdict = "confirmed" if abs(excess) <= TOLERANCE_DB else "optimistic" if excess > 0 else "conservative"
     return blank._replace(

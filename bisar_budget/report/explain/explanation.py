@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.scene import ScenePhases, at
+from bisar_budget.analysis.spread import mainlobe_energy
 from bisar_budget.analysis.together import Together
 from bisar_budget.analysis.vibration_limits import amplitude_share, echo_phase, slow_limits
 from bisar_budget.constants import ROUNDING
@@ -235,7 +236,8 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[S
             WorkedEquation("φ", "", {}, values["φ"], "rad"),
         ]
     else:
-        title = "First principles, independent on both platforms; a phase of σ rad has the ISLR exp(σ²) − 1"
+        title = "First principles, independent on both platforms; a phase of σ rad has the ISLR (exp(σ²) − 1)/E"
+        values = {**values, "E": mainlobe_energy(mission)}
         known = []
     lines = equation("full", formulas.FULL_VIBRATION[row.metric], values, row.allowable_full, "m")
     yield from step(title, *known, *lines)
