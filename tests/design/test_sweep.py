@@ -408,6 +408,20 @@ def test_a_fixed_platform_that_moves_has_no_direction() -> None:
     assert "lacks motion_azimuth" in whole["reason"][1]
 
 
+@pytest.mark.parametrize("rule", ["each", "rss"])
+def test_autofocus_counts_up_to_range_walk(rule) -> None:
+    """f₀/B varies from 10 to 100 and n_pull from below to above it."""
+    text = mission_text(timing_error__quadratic="2e-12 /s", autofocus__n_pull=2, allocation__combine=rule)
+    mission = parse_mission(text, "m.yaml")
+    cases = grid(mission, radar__bandwidth=[100e6, 300e6, 1e9], autofocus__n_pull=[1.0, 9.99, 10.0, 33.4, 1e4])
+    columns = ["timing.quadratic.allowable", "mission.autofocus_pull_in.allowable", "timing.quadratic.status"]
+    whole, by_case = swept(mission, cases, columns)
+    assert by_case == 0
+    assert_as_checked(mission, cases, whole, columns)
+    counts = np.minimum(whole["autofocus.n_pull"], 10e9 / whole["radar.bandwidth"])
+    assert whole["mission.autofocus_pull_in.allowable"] == pytest.approx(math.pi * counts)
+
+
 def test_both_sides_of_the_limit() -> None:
     """An error set a part in 10⁸ below its allowable passes (with a warning: it is near), one above fails."""
     mission = parse_mission(mission_text(timing_error__quadratic="1e-12 /s"), "m.yaml")
