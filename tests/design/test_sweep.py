@@ -275,6 +275,17 @@ def test_vibrations_may_be_slow(rule) -> None:
     assert_as_checked(mission, cases, whole, columns)
 
 
+def test_the_end_of_the_image_binds() -> None:
+    """A transmitter of 30 m of doubt along the line of sight, of which the image ends at 10.8 m."""
+    mission = parse_mission(of_family("aircraft", 3), "m.yaml", "full")
+    T = mission.collection.aperture_time
+    cases = grid(mission, collection__aperture_time=[0.9 * T, T, 1.1 * T])
+    whole, by_case = swept(mission, cases, model="full")
+    assert by_case == 0
+    assert list(whole["binding_requirement"]) == ["end_of_image"] * 3
+    assert_as_checked(mission, cases, whole, model="full")
+
+
 def test_what_arrays_do_not_hold_is_checked_one_by_one() -> None:
     """A path that the Earth decides is found anew for every aperture."""
     mission = load_mission(str(MISSIONS / "sentinel1_elements_besancon.yaml"))
