@@ -196,6 +196,12 @@ def location_over(moved: float | None, limit: float, equation: str) -> str:
 
 
 @phrase
+def beyond_the_image(end: float, unit: str) -> str:
+    """Of one error that is larger than any with an image."""
+    return f"the image ends at {format_limit(end, unit)}: no ground point has the range history of a larger error"
+
+
+@phrase
 def aggregate_over(
     what: str, size: float, limit: float, unit: str, row_id: str, largest: float, extrapolated: str = ""
 ) -> str:

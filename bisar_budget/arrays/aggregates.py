@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.analysis.allocation import Split
+from bisar_budget.analysis.allocation import Split, effective_n_pull
 from bisar_budget.arrays.collections import Floats
 from bisar_budget.arrays.declared import DeclaredErrors
 from bisar_budget.arrays.judgement import BOUND, CODE, Judging
@@ -186,7 +186,7 @@ class Aggregates:
 
     def _pull_in(self, mine: ManyTogether, theirs: ManyTogether) -> Judged:
         (phases, is_declared), what = mine.owed("mission"), subject("mission", "autofocus_pull_in")
-        pull_in = self.errors.array(math.pi * np.asarray(self.errors.mission.autofocus.n_pull))
+        pull_in = self.errors.array(math.pi * np.asarray(effective_n_pull(self.errors.mission)))
         by_other = theirs.combined(theirs.owed("mission").phases, "sum")
         doubt = self.errors.doubts(theirs.model, by_other > pull_in * BOUND)
         total = mine.combined(phases, "sum")

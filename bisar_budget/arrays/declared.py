@@ -369,6 +369,15 @@ class DeclaredErrors:
             first = np.minimum(first, smallest)
         return smallest
 
+    def ends_image(self, error: ManyErrors, size: Floats) -> Truths:
+        """Whether allowables, as found, are where the image ends; as `FullModel.ends_image`."""
+        found = np.zeros(self.cases, dtype=bool)
+        for sign in (1.0, -1.0):
+            path = self._paths.get((error.subject.id, sign))
+            if path is not None:
+                found |= path.end == size
+        return found
+
     def farthest(self, error: ManyErrors) -> Any:
         """Size beyond which an error is none of navigation; infinite: it has no effect whatever its size."""
         if self.is_heard_out(error):

@@ -11,7 +11,7 @@ from bisar_budget.arrays.declared import DeclaredErrors, ManyErrors
 from bisar_budget.arrays.judgement import BOUND, Judging
 from bisar_budget.arrays.rows import REQUIREMENTS, Judged
 from bisar_budget.effects import models
-from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
+from bisar_budget.effects.models import CUBIC, END_OF_IMAGE, LOCATION, QUADRATIC
 
 
 class ErrorRows:
@@ -112,6 +112,8 @@ class ErrorRows:
                 smallest = np.where(is_less, sized, smallest)
                 binding[is_less] = REQUIREMENTS.index(name)
         smallest[~np.isfinite(smallest)] = math.nan
+        if model == "full":
+            binding[self.errors.ends_image(error, smallest)] = REQUIREMENTS.index(END_OF_IMAGE)
         return smallest, binding
 
     def _sized(

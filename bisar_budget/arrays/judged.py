@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import evaluators
-from bisar_budget.analysis.allocation import Allocation, Split, allocate
+from bisar_budget.analysis.allocation import Allocation, Split, allocate, effective_n_pull
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.arrays.aggregates import Aggregates, ManyTogether, is_owed
 from bisar_budget.arrays.collections import Geometries, norm
@@ -136,7 +136,7 @@ class _Check:
         own = {model: self._own(model) for model in MODELS}
         self.split = shares_of(self.errors, gates, [own[model] for model in gates])
         total = self.array(self.mission.requirements.quadratic_phase_error)
-        n_pull = self.mission.autofocus.n_pull
+        n_pull = effective_n_pull(self.mission)
         self.gain = np.ones(self.cases)
         if n_pull is not None:
             self.gain = np.maximum(1.0, self.array(evaluators.autofocus_gain(n_pull, total)))  # type: ignore[arg-type]

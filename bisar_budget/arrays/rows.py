@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.arrays.collections import Floats
-from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
+from bisar_budget.effects.models import CUBIC, END_OF_IMAGE, LOCATION, QUADRATIC
 from bisar_budget.effects.subject import Subject
 from bisar_budget.findings.status import RANK
 
-REQUIREMENTS = (QUADRATIC, CUBIC, LOCATION, "pslr", "islr")
+REQUIREMENTS = (QUADRATIC, CUBIC, LOCATION, "pslr", "islr", END_OF_IMAGE)
 
 
 class Judged(NamedTuple):

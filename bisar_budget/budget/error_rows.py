@@ -11,7 +11,7 @@ from bisar_budget.budget.judgement import judgement
 from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.effects.effect import ErrorSource
-from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC, Declared
+from bisar_budget.effects.models import CUBIC, END_OF_IMAGE, LOCATION, QUADRATIC, Declared
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import FRAME_AXES
 from bisar_budget.phrases import NOTHING, Note
@@ -20,7 +20,7 @@ from bisar_budget.phrases import NOTHING, Note
 class Allowed(NamedTuple):
     """How large one error may be by one model [unit]: by its quadratic phase alone, and by every requirement.
 
-    None: no limit. `binding` is the requirement that sets the smallest.
+    None: no limit. `binding` is the requirement that sets the smallest, or that the image ends there.
     """
 
     quadratic: float | None
@@ -134,7 +134,9 @@ def allowed_by(analysis: Analysis, model: Model, source: ErrorSource, limit: flo
             quadratic = size
         if size is not None and size < smallest:
             smallest, binding = size, name
-    return Allowed(quadratic, None if binding is None else smallest, binding)
+    if binding is None:
+        return Allowed(quadratic, None, None)
+    return Allowed(quadratic, smallest, END_OF_IMAGE if model.ends_image(source, smallest) else binding)
 
 
 def _over(
@@ -148,6 +150,8 @@ def _over(
 ) -> Note:
     """Say which requirement the declared error breaks, should it break one."""
     requirements = analysis.mission.requirements
+    if allowed.binding == END_OF_IMAGE and allowed.smallest is not None:
+        return phrases.beyond_the_image(allowed.smallest, source.unit)
     if allowed.binding == CUBIC and requirements.cubic_phase_error is not None:
         return phrases.cubic_phase_over(mine.cubic, requirements.cubic_phase_error, model.equation(source))
     if allowed.binding == LOCATION and requirements.location_error is not None:

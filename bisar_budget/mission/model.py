@@ -251,7 +251,10 @@ class Autofocus(NamedTuple):
     algorithm: Annotated[str, Key(Choice("pga", "map_drift"))] = "pga"
     n_pull: Annotated[
         float | None,
-        Key(Quantity(units.RATIO, gt=0, ge=1e-3, le=1e4), "Corrects n_pull·π radians; omitted: none."),
+        Key(
+            Quantity(units.RATIO, gt=0, ge=1e-3, le=1e4),
+            "Corrects n_pull·π radians, counts up to f₀/B; omitted: none.",
+        ),
     ] = None
 
 

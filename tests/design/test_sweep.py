@@ -275,6 +275,17 @@ def test_vibrations_may_be_slow(rule) -> None:
     assert_as_checked(mission, cases, whole, columns)
 
 
+def test_the_end_of_the_image_binds() -> None:
+    """A transmitter of 30 m of doubt along the line of sight, of which the image ends at 10.8 m."""
+    mission = parse_mission(of_family("aircraft", 3), "m.yaml", "full")
+    T = mission.collection.aperture_time
+    cases = grid(mission, collection__aperture_time=[0.9 * T, T, 1.1 * T])
+    whole, by_case = swept(mission, cases, model="full")
+    assert by_case == 0
+    assert list(whole["binding_requirement"]) == ["end_of_image"] * 3
+    assert_as_checked(mission, cases, whole, model="full")
+
+
 def test_what_arrays_do_not_hold_is_checked_one_by_one() -> None:
     """A path that the Earth decides is found anew for every aperture."""
     mission = load_mission(str(MISSIONS / "sentinel1_elements_besancon.yaml"))
@@ -406,6 +417,20 @@ def test_a_fixed_platform_that_moves_has_no_direction() -> None:
     assert by_case == 2
     assert_as_checked(mission, cases, whole)
     assert "lacks motion_azimuth" in whole["reason"][1]
+
+
+@pytest.mark.parametrize("rule", ["each", "rss"])
+def test_autofocus_counts_up_to_range_walk(rule) -> None:
+    """f₀/B varies from 10 to 100 and n_pull from below to above it."""
+    text = mission_text(timing_error__quadratic="2e-12 /s", autofocus__n_pull=2, allocation__combine=rule)
+    mission = parse_mission(text, "m.yaml")
+    cases = grid(mission, radar__bandwidth=[100e6, 300e6, 1e9], autofocus__n_pull=[1.0, 9.99, 10.0, 33.4, 1e4])
+    columns = ["timing.quadratic.allowable", "mission.autofocus_pull_in.allowable", "timing.quadratic.status"]
+    whole, by_case = swept(mission, cases, columns)
+    assert by_case == 0
+    assert_as_checked(mission, cases, whole, columns)
+    counts = np.minimum(whole["autofocus.n_pull"], 10e9 / whole["radar.bandwidth"])
+    assert whole["mission.autofocus_pull_in.allowable"] == pytest.approx(math.pi * counts)
 
 
 def test_both_sides_of_the_limit() -> None:

@@ -13,6 +13,7 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.catalogue import EQUATIONS
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.effect import MOTION_UNITS, ErrorSource
+from bisar_budget.effects.models import END_OF_IMAGE
 from bisar_budget.effects.subject import Subject
 from bisar_budget.faults import KeyPath, changes_words
 from bisar_budget.findings.images import PointImage
@@ -421,6 +422,8 @@ def _requirement(mission: Mission, found: MissionFindings, row: Row, source: Err
     if binding == "cubic_phase_error":
         value = requirements.cubic_phase_error
         return "none stated" if value is None else f"cubic phase ≤ {_limit(value, 'rad')}"
+    if binding == END_OF_IMAGE:
+        return "end of the image: no ground point has the range history of a larger error"
     if binding == "location_error":
         value = requirements.location_error
         return "none stated" if value is None else f"displacement ≤ {_limit(value, 'm')}"

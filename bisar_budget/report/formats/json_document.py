@@ -120,6 +120,7 @@ def _mission(mission: MissionFindings) -> dict[str, Any]:
                 "reserve": allocation.qpe.reserve * allocation.qpe_total,
             },
             "autofocus_gain": allocation.autofocus_gain,
+            "n_pull": allocation.n_pull,
             "pslr_share": _shares(allocation.pslr),
             "islr_share": _shares(allocation.islr),
         },

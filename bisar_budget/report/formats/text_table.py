@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterator, Sequence
 from functools import cache
 
+from bisar_budget.effects.models import END_OF_IMAGE
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.mission import MissionFindings, UnusableMission
 from bisar_budget.findings.row import Row, worst_first
@@ -135,7 +136,9 @@ def _row(row: Row) -> tuple[str, ...]:
 def _limited_by(row: Row) -> str:
     """What sets the allowable: another requirement than the row's own, else the place of its equation."""
     binding = binding_words(row)
-    return binding.split()[0] if binding else _short_reference(row.equation)
+    if binding:
+        return binding if row.binding_requirement == END_OF_IMAGE else binding.split()[0]
+    return _short_reference(row.equation)
 
 
 @cache

@@ -5,12 +5,13 @@ import math
 from bisar_budget.findings.row import Row
 from bisar_budget.units import format_quantity
 
-# A requirement that can set an allowable, in words; the terminal has room for the first.
+# What can set an allowable, in words; of a requirement the terminal has room for the first.
 BINDING_WORDS = {
     "quadratic_phase_error": "quadratic phase error",
     "cubic_phase_error": "cubic phase error",
     "location_error": "location error",
     "islr": "ISLR",
+    "end_of_image": "end of the image",
 }
 
 
