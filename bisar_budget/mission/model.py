@@ -236,8 +236,8 @@ class AllocationRules(NamedTuple):
     coverage_factor: Annotated[
         float,
         Key(
-            Quantity(units.RATIO, gt=0, ge=1e-3, le=1e3),
-            "Multiplies position, velocity, acceleration and clock errors.",
+            Quantity(units.RATIO, ge=1, le=1e3),
+            "Multiplies position, velocity, acceleration and clock errors; at least 1.",
         ),
     ] = 1.0
     warn_above: Annotated[

@@ -15,6 +15,7 @@ from bisar_budget.geometry import (
     norm,
     state_from_angles,
 )
+from bisar_budget.mission import later
 from bisar_budget.mission.bounds import (
     ACCELERATION,
     COORDINATE,
@@ -161,12 +162,7 @@ class CommonMotionError(NamedTuple):
     frame: Annotated[
         str,
         Key(
-            Choice(
-                "scene",
-                refused=dict.fromkeys(
-                    ("track", "look", "ric"), "each platform has its own, an error of both has none"
-                ),
-            ),
+            Choice("scene", refused=later.FRAMES),
             "east, north, up.",
         ),
     ] = "scene"

@@ -107,7 +107,7 @@ _KEYS = {
     "platforms__transmitter__position__2": _FACTORS,
     "timing_error__quadratic": _FACTORS,
     "requirements__quadratic_phase_error": _FACTORS,
-    "allocation__coverage_factor": _FACTORS,
+    "allocation__coverage_factor": st.lists(st.floats(1.0, 3.0), min_size=2, max_size=2),  # at least 1
     "scene__radius": _FACTORS,
 }
 MASK = """
