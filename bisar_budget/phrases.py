@@ -114,6 +114,14 @@ def not_declared_as_required(key: str) -> str:
     return f"the file has no {key}, which requirements.declare asks for"
 
 
+@phrase
+def declarations_are_missing(keys: Sequence[str]) -> str:
+    """Of all errors that the file should declare."""
+    *others, last = keys
+    said = f"{', no '.join(others)} and no {last}" if others else last
+    return f"the file has no {said}, which requirements.declare asks for"
+
+
 # ---------------------------------------------------------------------- over the limit
 @phrase
 def quadratic_phase_over(phase: float, limit: float, equation: str = "") -> str:

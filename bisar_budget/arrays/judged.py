@@ -31,12 +31,12 @@ from bisar_budget.arrays.together import ManyOwnPhases
 from bisar_budget.arrays.vibrating import judged_one_by_one, many_slow_phases
 from bisar_budget.budget.orbit import FASTEST_FLIGHT
 from bisar_budget.budget.random_rows import spur_rows
-from bisar_budget.budget.required import is_asked_for, missing_declarations
+from bisar_budget.budget.required import DECLARATIONS, Missing, is_asked_for, missing_declarations
 from bisar_budget.budget.vibration_rows import vibration_rows
-from bisar_budget.budget.waivers import named_by
+from bisar_budget.budget.waivers import is_waived
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.subject import Subject, subject
-from bisar_budget.findings.row import Row
+from bisar_budget.findings.row import DECLARE, Row
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.model import Mission
 
@@ -133,7 +133,10 @@ class _Check:
         by_model = [self._rows(model) for model in gates]
         rows = _stricter(*by_model) if len(by_model) > 1 else by_model[0]
         return Checked(
-            tuple(self._waived(self._required(row)) for row in rows),
+            tuple(
+                waived(row, self.mission, self.today)
+                for row in with_required(rows, self.mission, self.errors.geometries, self.cases)
+            ),
             self.errors.is_left_out,
             self._floor(),
             self.errors.geometries,
@@ -216,22 +219,8 @@ class _Check:
         nothing.status[:] = CODE["not_evaluated"]
         return judged.where(np.isinf(edges.difference), nothing)
 
-    def _waived(self, row: Judged) -> Judged:
-        """Waive a row where it fails and a waiver that holds names it."""
-        names = [row.subject.id]
-        if not any(self.today <= one.until and named_by(one.id, names) for one in self.mission.waivers):
-            return row
-        return row._replace(status=np.where(row.status == CODE["fail"], CODE["waived"], row.status))
-
-    def _required(self, row: Judged) -> Judged:
-        """Turn a row that the file should declare and does not from `not_declared` into `not_evaluated`."""
-        if not any(is_asked_for(row.subject, one) for one in missing_declarations(self.mission)):
-            return row
-        is_missing = row.status == CODE["not_declared"]
-        return row._replace(status=np.where(is_missing, CODE["not_evaluated"], row.status))
-
     def _floor(self) -> NDArray[np.int8]:
-        """Best status that each case can have: paths may be in doubt, and errors missing that must be declared."""
+        """Best status that each case can have: paths may be in doubt, and nothing declared."""
         floor = np.full(self.cases, CODE["pass"])
         for name, path in zip(
             PLATFORMS, (self.errors.geometries.transmitter, self.errors.geometries.receiver), strict=True
@@ -241,11 +230,48 @@ class _Check:
                 floor[:] = CODE["warn"]
             if platform.acceleration is None and not platform.is_of_the_earth:
                 floor[np.broadcast_to(norm(path.velocity) > FASTEST_FLIGHT, floor.shape)] = CODE["warn"]
-        if not (self.errors.stated or self._vibrates or self.stated_random) or any(
-            missing_declarations(self.mission)
-        ):
+        if not (self.errors.stated or self._vibrates or self.stated_random):
             floor[:] = CODE["not_evaluated"]
         return floor
+
+
+def with_required(rows: Sequence[Judged], mission: Mission, geometries: Geometries, cases: int) -> list[Judged]:
+    """Put the row of what must be declared before the others; as `budget.required.with_required`."""
+    if not mission.requirements.declare:
+        return list(rows)
+    still = np.array(
+        [np.broadcast_to(path.is_still, (cases,)) for path in (geometries.transmitter, geometries.receiver)]
+    )
+    whole = Judged.of_none(DECLARATIONS, cases)._replace(metric=DECLARE, is_of_declare=True)
+    whole.status[:] = CODE["pass"]
+    found = [whole, *rows]
+    for which in np.unique(still, axis=1).T:  # nearly always one: a platform that moves does in every case
+        these = (still == which[:, None]).all(axis=0)
+        names = [name for name, is_still in zip(PLATFORMS, which, strict=True) if is_still]
+        missing = missing_declarations(mission, names)
+        whole.status[these] = CODE["not_evaluated" if missing else "pass"]
+        found = [_required(row, missing, these) for row in found]
+    return found
+
+
+def _required(row: Judged, missing: Sequence[Missing], these: NDArray[np.bool_]) -> Judged:
+    """Turn a row that these cases should declare and do not from `not_declared` into `not_evaluated`."""
+    is_missing = these & (row.status == CODE["not_declared"])
+    if not is_missing.any() or not any(is_asked_for(row.subject, one) for one in missing):
+        return row
+    return row._replace(status=np.where(is_missing, CODE["not_evaluated"], row.status), is_of_declare=True)
+
+
+def waived(row: Judged, mission: Mission, today: date) -> Judged:
+    """Waive a row where it fails, or is not there as it must be, and a waiver that holds names it."""
+    is_broken = row.status == CODE["fail"]
+    names = [row.subject.id]
+    if row.is_of_declare:
+        is_broken = is_broken | (row.status == CODE["not_evaluated"])
+        names.append(DECLARATIONS.id)
+    if not is_waived(mission, today, names):
+        return row
+    return row._replace(status=np.where(is_broken, CODE["waived"], row.status))
 
 
 def _stricter(published: Sequence[Judged], full: Sequence[Judged]) -> list[Judged]:

@@ -27,6 +27,7 @@ class Judged(NamedTuple):
     cubic_rad: Floats
     never_fails: bool = False
     metric: str = QUADRATIC
+    is_of_declare: bool = False  # as `Row.is_of_declare`, in some of the cases
 
     @classmethod
     def of_none(cls, what: Subject, cases: int) -> "Judged":
@@ -48,6 +49,7 @@ class Judged(NamedTuple):
             np.where(is_other, other.cubic_rad, self.cubic_rad),
             self.never_fails,
             self.metric,
+            self.is_of_declare,
         )
 
     @property

@@ -220,7 +220,7 @@ def _overruled_model(mission: Mission) -> Iterator[FileWarning]:
 
 
 def _nothing_declared(rows: Sequence[Row]) -> Iterator[FileWarning]:
-    if all(row.status == "not_declared" for row in rows):
+    if all(row.status == "not_declared" or row.is_of_declare for row in rows):
         yield FileWarning(line=None, message=file_warnings.nothing_declared())
 
 

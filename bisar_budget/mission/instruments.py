@@ -55,6 +55,11 @@ class Imu(NamedTuple):
     angle_random_walk: AngleRandomWalk = None
     source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
 
+    @property
+    def is_stated(self) -> bool:
+        """Whether the file states any of its figures; a zero does."""
+        return any(getattr(self, kind) is not None for kind in IMU_KINDS)
+
 
 class GaussMarkov(NamedTuple):
     """A first-order Gauss-Markov position error: what is left of GNSS noise, say."""
