@@ -156,15 +156,17 @@ def place_is_not_known(row_ids: Sequence[str]) -> str:
 
 
 @phrase
-def not_all_is_declared(keys: Sequence[str]) -> str:
-    """Of `requirements.declare`."""
-    return f"the file does not declare {', '.join(keys)}"
-
-
-@phrase
 def not_declared_as_required(key: str) -> str:
     """Of an error that the file should declare."""
     return f"the file has no {key}, which requirements.declare asks for"
+
+
+@phrase
+def declarations_are_missing(keys: Sequence[str]) -> str:
+    """Of all errors that the file should declare."""
+    *others, last = keys
+    said = f"{', no '.join(others)} and no {last}" if others else last
+    return f"the file has no {said}, which requirements.declare asks for"
 
 
 # ---------------------------------------------------------------------- over the limit

@@ -13,11 +13,12 @@ from bisar_budget.arrays.declared import SAFE
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.subject import MOTION
+from bisar_budget.geometry import STILL
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.covariance import EIGENVALUE_TOLERANCE
 from bisar_budget.mission.instruments import RISE, STEEPEST
 from bisar_budget.mission.model import PLACE_KEYS, WHOLE, MetricSplits, Mission, Shares, flies_on_earth
-from bisar_budget.mission.platforms import BASELINE_PLACES, FARTHEST_BY, LEAST_BASELINE, STILL, MotionError, Platform
+from bisar_budget.mission.platforms import BASELINE_PLACES, FARTHEST_BY, LEAST_BASELINE, MotionError, Platform
 
 
 def not_held(mission: Mission, keys: Mapping[str, bool]) -> str:

@@ -31,7 +31,7 @@ from bisar_budget.arrays.together import ManyOwnPhases, combined_phase
 from bisar_budget.arrays.vibrating import judged_one_by_one, many_slow_phases, many_tones
 from bisar_budget.budget.orbit import FASTEST_FLIGHT
 from bisar_budget.budget.random_rows import pslr_row, spur_rows
-from bisar_budget.budget.required import is_asked_for, missing_declarations
+from bisar_budget.budget.required import DECLARATIONS, Missing, is_asked_for, missing_declarations
 from bisar_budget.budget.requirements import (
     KEYS,
     TAKEN_BY,
@@ -43,11 +43,11 @@ from bisar_budget.budget.requirements import (
     untaken_effects,
 )
 from bisar_budget.budget.vibration_rows import vibration_rows
-from bisar_budget.budget.waivers import named_by
+from bisar_budget.budget.waivers import is_waived
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.models import LOCATION
 from bisar_budget.effects.subject import Subject, subject
-from bisar_budget.findings.row import Row
+from bisar_budget.findings.row import DECLARE, Row
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.model import Mission
 
@@ -159,7 +159,8 @@ class _Check:
         self.together = together
         by_model = [self._rows(model) for model in gates]
         rows = _stricter(*by_model) if len(by_model) > 1 else by_model[0]
-        rows, states = self._judged_requirements([self._required(row) for row in rows], gates)
+        rows = with_required(rows, self.mission, self.errors.geometries, self.cases)
+        rows, states = self._judged_requirements(rows, gates)
         floors = [
             self._floor(),
             *(np.where(state.status == CODE["waived"], CODE["pass"], state.status) for state in states),
@@ -181,9 +182,9 @@ class _Check:
             if row.subject.id == f"mission.{LOCATION}" and mission.requirements.location_error is not None:
                 is_known = np.isin(status, [CODE["fail"], CODE["not_declared"]])
                 status = np.where(is_misplaced & ~is_known, CODE["not_evaluated"], status)
-            waived = self._waived(row._replace(status=status))
-            found.append(waived)
-            is_covered = (waived.status == CODE["waived"]) & np.isin(row.status, _BROKEN)
+            after = waived(row._replace(status=status), mission, self.today)
+            found.append(after)
+            is_covered = (after.status == CODE["waived"]) & np.isin(row.status, _BROKEN)
             judges = np.where((row.binding >= 0) & (row.binding < len(KEYS)), row.binding, KEYS.index(row.metric))
             seen.append(
                 SeenRow(
@@ -194,14 +195,12 @@ class _Check:
                     row.quadratic_use,
                 )
             )
-        ids = [f"mission.{key}" for key in KEYS]
-        named = {ids[place] for one in mission.waivers if self.today <= one.until for place in named_by(one.id, ids)}
         noise = [one.variance for model in gates for one in self.random_rows.noise(model)]
         noise += list(self.tones.values()) if mission.requirements.pslr is None else []
         states = requirement_states(
             mission,
             seen,
-            {key: f"mission.{key}" in named for key in KEYS},
+            {key: is_waived(mission, self.today, [f"mission.{key}"]) for key in KEYS},
             has_noise=np.any([np.zeros(self.cases, bool), *(~np.isnan(one) for one in noise)], axis=0),
             is_misplaced=is_misplaced,
         )
@@ -318,22 +317,8 @@ class _Check:
         nothing.status[:] = CODE["not_evaluated"]
         return judged.where(np.isinf(edges.difference), nothing)
 
-    def _waived(self, row: Judged) -> Judged:
-        """Waive a row where it fails or is not evaluated and a waiver that holds names it."""
-        names = [row.subject.id]
-        if not any(self.today <= one.until and named_by(one.id, names) for one in self.mission.waivers):
-            return row
-        return row._replace(status=np.where(np.isin(row.status, _BROKEN), CODE["waived"], row.status))
-
-    def _required(self, row: Judged) -> Judged:
-        """Turn a row that the file should declare and does not from `not_declared` into `not_evaluated`."""
-        if not any(is_asked_for(row.subject, one) for one in missing_declarations(self.mission)):
-            return row
-        is_missing = row.status == CODE["not_declared"]
-        return row._replace(status=np.where(is_missing, CODE["not_evaluated"], row.status))
-
     def _floor(self) -> NDArray[np.int8]:
-        """Best status that each case can have: paths may be in doubt, and errors missing that must be declared."""
+        """Best status that each case can have: paths may be in doubt, and nothing declared."""
         floor = np.full(self.cases, CODE["pass"])
         for name, path in zip(
             PLATFORMS, (self.errors.geometries.transmitter, self.errors.geometries.receiver), strict=True
@@ -343,11 +328,44 @@ class _Check:
                 floor[:] = CODE["warn"]
             if platform.acceleration is None and not platform.is_of_the_earth:
                 floor[np.broadcast_to(norm(path.velocity) > FASTEST_FLIGHT, floor.shape)] = CODE["warn"]
-        if not (self.errors.stated or self._vibrates or self.stated_random) or any(
-            missing_declarations(self.mission)
-        ):
+        if not (self.errors.stated or self._vibrates or self.stated_random):
             floor[:] = CODE["not_evaluated"]
         return floor
+
+
+def with_required(rows: Sequence[Judged], mission: Mission, geometries: Geometries, cases: int) -> list[Judged]:
+    """Put the row of what must be declared before the others; as `budget.required.with_required`."""
+    if not mission.requirements.declare:
+        return list(rows)
+    still = np.array(
+        [np.broadcast_to(path.is_still, (cases,)) for path in (geometries.transmitter, geometries.receiver)]
+    )
+    whole = Judged.of_none(DECLARATIONS, cases)._replace(metric=DECLARE, is_of_declare=True)
+    whole.status[:] = CODE["pass"]
+    found = [whole, *rows]
+    for which in np.unique(still, axis=1).T:  # nearly always one: a platform that moves does in every case
+        these = (still == which[:, None]).all(axis=0)
+        names = [name for name, is_still in zip(PLATFORMS, which, strict=True) if is_still]
+        missing = missing_declarations(mission, names)
+        whole.status[these] = CODE["not_evaluated" if missing else "pass"]
+        found = [_required(row, missing, these) for row in found]
+    return found
+
+
+def _required(row: Judged, missing: Sequence[Missing], these: NDArray[np.bool_]) -> Judged:
+    """Turn a row that these cases should declare and do not from `not_declared` into `not_evaluated`."""
+    is_missing = these & (row.status == CODE["not_declared"])
+    if not is_missing.any() or not any(is_asked_for(row.subject, one) for one in missing):
+        return row
+    return row._replace(status=np.where(is_missing, CODE["not_evaluated"], row.status), is_of_declare=True)
+
+
+def waived(row: Judged, mission: Mission, today: date) -> Judged:
+    """Waive a row where it fails or is not evaluated and a waiver that holds names it."""
+    names = [row.subject.id, *([DECLARATIONS.id] if row.is_of_declare else [])]
+    if not is_waived(mission, today, names):
+        return row
+    return row._replace(status=np.where(np.isin(row.status, _BROKEN), CODE["waived"], row.status))
 
 
 def _stricter(published: Sequence[Judged], full: Sequence[Judged]) -> list[Judged]:

@@ -28,6 +28,7 @@ class Judged(NamedTuple):
     quadratic_use: Floats  # quadratic phase over its limit, whatever sets the allowable; NaN where it has none
     never_fails: bool = False
     metric: str = QUADRATIC
+    is_of_declare: bool = False  # as `Row.is_of_declare`, in some of the cases
 
     @classmethod
     def of_none(cls, what: Subject, cases: int) -> "Judged":
@@ -50,6 +51,7 @@ class Judged(NamedTuple):
             np.where(is_other, other.quadratic_use, self.quadratic_use),
             self.never_fails,
             self.metric,
+            self.is_of_declare,
         )
 
     @property

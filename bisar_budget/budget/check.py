@@ -10,13 +10,12 @@ from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.aggregates import aggregate_rows
 from bisar_budget.budget.collection_notes import collection_notes
-from bisar_budget.budget.declared_kinds import declared_kinds
 from bisar_budget.budget.error_rows import error_rows
 from bisar_budget.budget.judgement import judged
 from bisar_budget.budget.orbit import straight_orbits
 from bisar_budget.budget.pull_in import pull_in_caps
 from bisar_budget.budget.random_rows import islr_rows, pslr_row, random_rows, spur_rows
-from bisar_budget.budget.required import with_required
+from bisar_budget.budget.required import declared_kinds, with_required
 from bisar_budget.budget.requirement_table import judged_requirements
 from bisar_budget.budget.vibration_rows import vibration_rows
 from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
@@ -225,7 +224,7 @@ def _overruled_model(mission: Mission) -> Iterator[FileWarning]:
 
 
 def _nothing_declared(rows: Sequence[Row]) -> Iterator[FileWarning]:
-    if all(row.status == "not_declared" for row in rows):
+    if all(row.status == "not_declared" or row.is_of_declare for row in rows):
         yield FileWarning(line=None, message=file_warnings.nothing_declared())
 
 

@@ -13,7 +13,6 @@ from bisar_budget.analysis.analysis import Analysis, Model
 from bisar_budget.analysis.spread import islr_db, mainlobe_energy, noise, spread_limit, tones
 from bisar_budget.analysis.together import Together
 from bisar_budget.analysis.vibration_limits import LARGEST_ECHO, echo_level
-from bisar_budget.budget.required import missing_declarations
 from bisar_budget.budget.requirements import (
     KEYS,
     TAKEN_BY,
@@ -202,7 +201,7 @@ def _entry(
     allowed, reached = _sizes(decider, key, mission, allocation) if decider is not None else (None, None)
     reason: Note | None = None
     if status == "not_evaluated" and (decider is None or decider.status != status or key == "islr"):
-        reason = _why_not_judged(key, analysis, misplacing)
+        reason = _why_not_judged(key, misplacing)
     elif decider is not None and status not in ("pass", "info"):
         reason = decider.reason
     path = ("requirements", key)
@@ -223,9 +222,7 @@ def _entry(
     )
 
 
-def _why_not_judged(key: str, analysis: Analysis, misplacing: Sequence[str]) -> Note:
-    if key == "declare":
-        return phrases.not_all_is_declared([one[2] for one in missing_declarations(analysis.mission)])
+def _why_not_judged(key: str, misplacing: Sequence[str]) -> Note:
     if key == LOCATION and misplacing:
         return phrases.place_is_not_known(misplacing)
     return phrases.nothing_judges(key)

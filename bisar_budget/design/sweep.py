@@ -20,10 +20,9 @@ from bisar_budget.arrays import judged
 from bisar_budget.arrays.collections import Geometries, paths_of
 from bisar_budget.arrays.held import is_image, not_held
 from bisar_budget.arrays.judged import check_arrays, statuses
-from bisar_budget.arrays.rows import REQUIREMENTS
+from bisar_budget.arrays.rows import REQUIREMENTS, Judged
 from bisar_budget.arrays.varied import varied
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.required import is_asked_for, missing_declarations
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.design.cases import Cases, words_of
 from bisar_budget.design.quantities import Choices, Number, QuestionError, number_of, tree_of
@@ -485,14 +484,17 @@ class Engine:
             if one.row in rows:
                 found[one.name][to] = judged.field(rows[one.row], one.field)[sure]
             elif one.field == "status":
-                found[one.name][to] = self._status_of_nothing(one.row)
+                of_nothing = self._status_of_nothing(one.row, mission, geometries, some.size)
+                found[one.name][to] = np.broadcast_to(of_nothing, some.shape)[sure]
         return sure
 
-    def _status_of_nothing(self, row: str) -> str:
-        """Status of a row that is not declared."""
-        what, missing = self.subjects.get(row), missing_declarations(self.mission)
-        is_asked = what is not None and any(is_asked_for(what, one) for one in missing)
-        return "not_evaluated" if is_asked else "not_declared"
+    def _status_of_nothing(self, row_id: str, mission: Mission, geometries: Geometries, cases: int) -> Any:
+        """Status of a row that is not declared in any case."""
+        what = self.subjects.get(row_id)
+        if what is None:
+            return "not_declared"
+        row = judged.with_required([Judged.of_none(what, cases)], mission, geometries, cases)[-1]
+        return judged.statuses(judged.waived(row, mission, self.question.today).status)
 
     def _one(self, found: Mapping[str, Values], some: NDArray[Any], place: int) -> Mission:
         """The mission of one case of some, with its numbers."""

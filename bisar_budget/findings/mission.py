@@ -96,7 +96,7 @@ class MissionFindings(NamedTuple):
     @property
     def is_empty(self) -> bool:
         """The file declares no error at all: nothing was judged."""
-        return all(row.status == "not_declared" for row in self.rows)
+        return all(row.status == "not_declared" or row.is_of_declare for row in self.rows)
 
     @property
     def status(self) -> str:

@@ -8,6 +8,7 @@ from typing import Annotated, Any, NamedTuple
 from bisar_budget import units
 from bisar_budget.faults import InvalidValueError, KeyPath, Problem
 from bisar_budget.geometry import Vector
+from bisar_budget.mission import later
 from bisar_budget.mission.readers import (
     INVALID,
     Choice,
@@ -53,6 +54,11 @@ class Imu(NamedTuple):
     velocity_random_walk: VelocityRandomWalk = None
     angle_random_walk: AngleRandomWalk = None
     source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
+
+    @property
+    def is_stated(self) -> bool:
+        """Whether the file states any of its figures; a zero does."""
+        return any(getattr(self, kind) is not None for kind in IMU_KINDS)
 
 
 class GaussMarkov(NamedTuple):
@@ -136,7 +142,8 @@ class _PowerLawReader(Reader):
         is_valid = True
         for key, item in value.items():
             if key not in read:
-                report((*path, key), Problem("is not a known key", f"accepted: {', '.join(_POWERS)}"))
+                accepted = f"accepted: {', '.join(_POWERS)}"
+                report((*path, key), Problem("is not a known key", accepted, is_of_key=True))
                 is_valid = False
                 continue
             read[key] = item if item is INVALID else _COEFFICIENT.read(item, (*path, key), report)
@@ -256,7 +263,7 @@ class Synchronization(NamedTuple):
     """How the receiver follows the transmitter's oscillator."""
 
     error: Annotated[
-        float, Key(Quantity(units.ANGLE, ge=0, le=math.pi), "Phase error of the link, 1 sigma, each time.")
+        float, Key(Quantity(units.ANGLE, ge=0, lt=math.pi / 2), "Phase error of the link, 1 sigma, each time.")
     ]
     interval: Annotated[
         float | None, Key(Quantity(units.TIME, gt=0, ge=1e-9, le=1e6), "Between exchanged pulses.")
@@ -264,7 +271,7 @@ class Synchronization(NamedTuple):
     method: Annotated[
         str,
         Key(
-            Choice(*METHODS),
+            Choice(*METHODS, refused=later.METHODS),
             "linear: pulses are exchanged, between them the phase is interpolated; "
             "direct_path: the receiver hears the transmitter and takes it as its clock.",
         ),

@@ -144,7 +144,10 @@ class OtherError(NamedTuple):
     source: Annotated[str | None, Key(Text())] = None
 
 
-DECLARABLE = ("position", "velocity", "acceleration", "timing")
+# Kinds of error that each platform has, and the clock's.
+OF_PLATFORMS = ("position", "velocity", "acceleration", "covariance", "vibration", "imu", "random", "oscillator")
+DECLARABLE = (*OF_PLATFORMS, "timing")
+_OF_ONE = tuple(f"{name}.{kind}" for name in Platforms._fields for kind in OF_PLATFORMS)
 
 
 class Requirements(NamedTuple):
@@ -162,9 +165,10 @@ class Requirements(NamedTuple):
     declare: Annotated[
         tuple[str, ...],
         Key(
-            Words(*DECLARABLE),
-            "Errors that the file must declare, for both platforms; what is missing is not_evaluated. "
-            "timing: any term of timing_error.",
+            Words(*DECLARABLE, *_OF_ONE),
+            "Errors that the file must declare, for both platforms or for one (receiver.imu); what is missing is "
+            "not_evaluated. A zero declares; a still platform owes its position only. A covariance declares position "
+            "and velocity; timing: any term of timing_error.",
         ),
     ] = ()
 
@@ -236,8 +240,8 @@ class AllocationRules(NamedTuple):
     coverage_factor: Annotated[
         float,
         Key(
-            Quantity(units.RATIO, gt=0, ge=1e-3, le=1e3),
-            "Multiplies position, velocity, acceleration and clock errors.",
+            Quantity(units.RATIO, ge=1, le=1e3),
+            "Multiplies position, velocity, acceleration and clock errors; at least 1.",
         ),
     ] = 1.0
     warn_above: Annotated[

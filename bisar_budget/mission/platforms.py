@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from bisar_budget.faults import KeyPath, Problem
 from bisar_budget.geometry import (
+    STILL,
     STRAIGHT,
     BistaticGeometry,
     PlatformState,
@@ -15,6 +16,7 @@ from bisar_budget.geometry import (
     norm,
     state_from_angles,
 )
+from bisar_budget.mission import later
 from bisar_budget.mission.bounds import (
     ACCELERATION,
     COORDINATE,
@@ -39,7 +41,6 @@ if TYPE_CHECKING:
     from bisar_budget.mission.instruments import GaussMarkov, Imu, Oscillator
     from bisar_budget.mission.routes import OrbitSource, TrajectorySource
 
-STILL = 1e-6  # m/s; slower than this no platform flies an aperture
 LEAST_BASELINE = 1.0  # m, between platforms of which one hears the other
 FARTHEST_BY = 3  # times the least baseline, that they move by in half an aperture: so far a fit of 16 nodes is true
 
@@ -74,6 +75,11 @@ class Vibration(NamedTuple):
 
     sinusoidal: Annotated[tuple[Sinusoid, ...], Key(ListOf(Sinusoid), "One entry per line.")] = ()
     wideband: Annotated[Wideband | None, Key(Section(Wideband))] = None
+
+    @property
+    def is_stated(self) -> bool:
+        """Whether the file says anything of it; a zero does."""
+        return bool(self.sinusoidal) or self.wideband is not None
 
 
 PART = Reference()
@@ -161,12 +167,7 @@ class CommonMotionError(NamedTuple):
     frame: Annotated[
         str,
         Key(
-            Choice(
-                "scene",
-                refused=dict.fromkeys(
-                    ("track", "look", "ric"), "each platform has its own, an error of both has none"
-                ),
-            ),
+            Choice("scene", refused=later.FRAMES),
             "east, north, up.",
         ),
     ] = "scene"

@@ -107,7 +107,7 @@ _KEYS = {
     "platforms__transmitter__position__2": _FACTORS,
     "timing_error__quadratic": _FACTORS,
     "requirements__quadratic_phase_error": _FACTORS,
-    "allocation__coverage_factor": _FACTORS,
+    "allocation__coverage_factor": st.lists(st.floats(1.0, 3.0), min_size=2, max_size=2),  # at least 1
     "scene__radius": _FACTORS,
 }
 MASK = """
@@ -464,6 +464,43 @@ def test_what_must_be_declared_and_is_not() -> None:
     whole, by_case = swept(mission, cases, column)
     assert by_case == 0
     assert list(whole["status"]) == list(whole[column[0]]) == ["not_evaluated"] * 2
+    assert_as_checked(mission, cases, whole, column)
+
+
+@pytest.mark.parametrize("asked", ["[imu, receiver.oscillator]", "[timing]", "[transmitter.velocity]"])
+@pytest.mark.parametrize("waived", [None, "mission.declare", "transmitter.*"])
+def test_what_must_be_declared_and_has_no_row_is_said_in_every_case(asked, waived) -> None:
+    """A kind that nobody declares has no row of its own; a waiver of the whole covers the rows that there are."""
+    changes = [SetValue("requirements.declare", asked)]
+    waivers = [{"id": waived, "until": "2999-01-01", "reason": "known"}] if waived else []
+    text = mission_text(timing_error__quadratic="1e-13 /s", waivers=waivers)
+    mission = parse_mission(text, "m.yaml", changes=changes)
+    cases = grid(mission, collection__aperture_time=[1.0, 4.0])
+    column = ["transmitter.velocity.y.status", "mission.declare.status"]
+    whole, by_case = swept(mission, cases, column)
+    assert by_case == 0
+    is_met = asked == "[timing]" or waived == "mission.declare"
+    assert list(whole["status"]) == ["pass" if is_met else "not_evaluated"] * 2
+    assert_as_checked(mission, cases, whole, column)
+
+
+def test_a_platform_that_stands_still_in_some_cases_owes_less_in_them() -> None:
+    receiver = {
+        "position": ["6 km", "6 km", "2 km"],
+        "velocity": [0, "1 m/s", 0],
+        "motion_error": {"position": "1 cm"},
+    }
+    text = mission_text(
+        platforms__receiver=receiver,
+        platforms__transmitter__motion_error={"velocity": "1 mm/s"},
+        requirements__declare=["velocity"],
+    )
+    mission = parse_mission(text, "m.yaml")
+    cases = grid(mission, platforms__receiver__velocity__1=[0.0, 1.0, 5.0])
+    column = ["mission.declare.status", "receiver.velocity.x.status"]
+    whole, by_case = swept(mission, cases, column)
+    assert by_case == 0
+    assert list(whole[column[0]]) == ["pass", "not_evaluated", "not_evaluated"]
     assert_as_checked(mission, cases, whole, column)
 
 

@@ -18,7 +18,7 @@ from bisar_budget.effects.subject import Subject
 from bisar_budget.faults import KeyPath, changes_words
 from bisar_budget.findings.images import PointImage
 from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
-from bisar_budget.findings.row import Row, worst_first
+from bisar_budget.findings.row import DECLARE, Row, worst_first
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import Style
@@ -356,7 +356,7 @@ def _limit(value: float, unit: str) -> str:
 def _allowable(row: Row) -> str:
     if row.allowable is not None:
         return _limit(row.allowable, row.unit)
-    is_open = row.status in ("not_evaluated", "info") or row.metric in ("pslr", "islr")
+    is_open = row.status in ("not_evaluated", "info") or row.metric in ("pslr", "islr", DECLARE)
     return "–" if is_open else "no limit"
 
 
@@ -427,6 +427,8 @@ def _requirement(mission: Mission, found: MissionFindings, row: Row, source: Err
     if binding == "location_error":
         value = requirements.location_error
         return "none stated" if value is None else f"displacement ≤ {_limit(value, 'm')}"
+    if row.metric == DECLARE:
+        return f"declared: {', '.join(requirements.declare)}"
     if row.subject.kind == "autofocus_pull_in":
         return "all QPE together within what autofocus corrects, π·N_pull"
     if row.subject.kind == "spatial_variance":  # one correction for the whole scene: no gain

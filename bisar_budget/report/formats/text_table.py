@@ -7,7 +7,7 @@ from functools import cache
 from bisar_budget.effects.models import END_OF_IMAGE
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.mission import MissionFindings, UnusableMission
-from bisar_budget.findings.row import Row, worst_first
+from bisar_budget.findings.row import DECLARE, Row, worst_first
 from bisar_budget.findings.status import STATUS, worst
 from bisar_budget.report import Piece, Style
 from bisar_budget.report.words.layout import WIDTH, wrapped, wrapped_counts
@@ -123,7 +123,7 @@ def _row(row: Row) -> tuple[str, ...]:
     size = "-" if declared is None else format_quantity(declared, unit)
     use = "-"
     if limit is None:
-        is_open = status == "not_evaluated" or status == "info" or row.metric == "pslr" or row.metric == "islr"
+        is_open = status in ("not_evaluated", "info") or row.metric in ("pslr", "islr", DECLARE)
         allowable = "-" if is_open else "no limit"
     else:
         # Rounded down, so that an allowable copied from the page into a file passes.

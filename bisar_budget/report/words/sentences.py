@@ -2,7 +2,7 @@
 
 import math
 
-from bisar_budget.findings.row import Row
+from bisar_budget.findings.row import DECLARE, Row
 from bisar_budget.units import format_quantity
 
 # What can set an allowable, in words; of a requirement the terminal has room for the first.
@@ -52,6 +52,8 @@ def percent(ratio: float) -> str:
 
 def measure(row: Row) -> str:
     """Say what is declared, what is allowed and how much of it is used."""
+    if row.metric == DECLARE:
+        return "everything asked for is declared" if row.status == "pass" else "not everything asked for is declared"
     declared = "not declared" if row.declared is None else f"declared {format_quantity(row.declared, row.unit)}"
     if row.allowable is None:
         return declared
