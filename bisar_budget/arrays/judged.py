@@ -29,6 +29,7 @@ from bisar_budget.arrays.rows import Judged
 from bisar_budget.arrays.shares import is_balanced, shares_of
 from bisar_budget.arrays.together import ManyOwnPhases
 from bisar_budget.arrays.vibrating import judged_one_by_one, many_slow_phases
+from bisar_budget.budget.input_doubt import declared_position_error, is_in_doubt, least_doubt
 from bisar_budget.budget.orbit import FASTEST_FLIGHT
 from bisar_budget.budget.random_rows import spur_rows
 from bisar_budget.budget.required import is_asked_for, missing_declarations
@@ -133,7 +134,7 @@ class _Check:
         by_model = [self._rows(model) for model in gates]
         rows = _stricter(*by_model) if len(by_model) > 1 else by_model[0]
         return Checked(
-            tuple(self._waived(self._required(row)) for row in rows),
+            tuple(self._waived(self._doubted(self._required(row))) for row in [*self._undeclared(rows), *rows]),
             self.errors.is_left_out,
             self._floor(),
             self.errors.geometries,
@@ -230,6 +231,37 @@ class _Check:
         is_missing = row.status == CODE["not_declared"]
         return row._replace(status=np.where(is_missing, CODE["not_evaluated"], row.status))
 
+    @cached_property
+    def _in_doubt(self) -> dict[str, NDArray[np.bool_]]:
+        """Platforms with a path, and in which cases that is in doubt by more than the file declares."""
+        found = {}
+        for name in PLATFORMS:
+            platform = getattr(self.mission.platforms, name)
+            if platform.path is not None:
+                least = least_doubt(platform.path, declared_position_error(platform.motion_error))
+                found[name] = platform.path.doubt_m > self.array(least)
+        return found
+
+    def _doubted(self, row: Judged) -> Judged:
+        """Turn a row of a position error of a path in doubt into `not_evaluated`; one that fails stays so."""
+        for name, is_doubtful in self._in_doubt.items():
+            if is_in_doubt(row.subject, name, self.mission):
+                is_open = is_doubtful & (row.status != CODE["fail"])
+                row = row._replace(status=np.where(is_open, CODE["not_evaluated"], row.status))
+        return row
+
+    def _undeclared(self, rows: Sequence[Judged]) -> Iterator[Judged]:
+        """Rows of position errors that nobody declared, of paths in doubt: they are not evaluated."""
+        known = {row.subject.id for row in rows}
+        for name, is_doubtful in self._in_doubt.items():
+            own = [subject(name, "position", axis) for axis in "xyz"]
+            if is_doubtful.any():
+                yield from (
+                    Judged.of_none(one, self.cases)
+                    for one in own
+                    if one.id not in known and is_in_doubt(one, name, self.mission)
+                )
+
     def _floor(self) -> NDArray[np.int8]:
         """Best status that each case can have: paths may be in doubt, and errors missing that must be declared."""
         floor = np.full(self.cases, CODE["pass"])
@@ -238,7 +270,7 @@ class _Check:
         ):
             platform = getattr(self.mission.platforms, name)
             if platform.path is not None and platform.path.doubts:
-                floor[:] = CODE["warn"]
+                floor[~self._in_doubt[name] | bool(platform.path.samples)] = CODE["warn"]
             if platform.acceleration is None and not platform.is_of_the_earth:
                 floor[np.broadcast_to(norm(path.velocity) > FASTEST_FLIGHT, floor.shape)] = CODE["warn"]
         if not (self.errors.stated or self._vibrates or self.stated_random) or any(
