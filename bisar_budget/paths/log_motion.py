@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.paths.flight import PathFileError
+from bisar_budget.units import format_quantity
 
 _STILL_M = 1e-3  # over a whole aperture; the noise of any receiver is more
 _SAME_M = 1e-6  # between two places; the same numbers, turned to the scene's axes, are rounded to 1e-9 m
@@ -73,7 +74,7 @@ def _hold_to_new_places(at: _Numbers, flown: _Numbers, extent: float, name: str)
         raise PathFileError(
             f"{name}: repeats places: {int(is_held.sum())} of {at.size} in the aperture are the place before; from "
             f"{at[begins[longest]]:+.4g} s of mid-aperture on for {durations[longest]:.3g} s, in which the platform "
-            f"moves {missed:.3g} m",
+            f"moves {format_quantity(missed, 'm')}",
             f"accepted: repeats in which it moves at most {_LEAST_M:g} m",
             "Leave out places that were not measured anew, or write more digits",
         )
@@ -90,9 +91,10 @@ def _hold_to_small_steps(times: _Numbers, places: _Numbers, half: float, name: s
     is_jump = (off > allowed) & (times[1:] >= -half) & (times[:-1] <= half)
     if is_jump.any():
         worst = int(np.where(is_jump, off / allowed, 0.0).argmax())
+        jump, least = format_quantity(float(off[worst]), "m"), format_quantity(float(allowed[worst]), "m", 2)
         raise PathFileError(
-            f"{name}: jumps by {off[worst]:.3g} m within {steps[worst]:.3g} s, {times[worst]:+.4g} s from "
-            f"mid-aperture; the steps beside it allow {allowed[worst]:.2g} m",
+            f"{name}: jumps by {jump} within {steps[worst]:.3g} s, {times[worst]:+.4g} s from mid-aperture; the "
+            f"steps beside it allow {least}",
             "accepted: the log of a flight without steps",
             "Take out the places that are wrong, or smooth the log before",
         )
