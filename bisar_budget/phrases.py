@@ -169,6 +169,13 @@ def declarations_are_missing(keys: Sequence[str]) -> str:
     return f"the file has no {said}, which requirements.declare asks for"
 
 
+@phrase
+def input_in_doubt(doubt: float, words: str, declared: float | None, key: str) -> str:
+    """Of a position error that is less than the doubt of the platform's path. [m]"""
+    stated = "no position error is declared" if declared is None else f"{_size(declared, 'm')} is declared"
+    return f"the path may be {_size(doubt, 'm')} off ({words}), {stated}: state it in {key}"
+
+
 # ---------------------------------------------------------------------- over the limit
 @phrase
 def quadratic_phase_over(phase: float, limit: float, equation: str = "") -> str:

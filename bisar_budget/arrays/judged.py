@@ -29,6 +29,7 @@ from bisar_budget.arrays.rows import Judged
 from bisar_budget.arrays.shares import is_balanced, shares_of
 from bisar_budget.arrays.together import ManyOwnPhases, combined_phase
 from bisar_budget.arrays.vibrating import judged_one_by_one, many_slow_phases, many_tones
+from bisar_budget.budget.input_doubt import declared_position_error, is_in_doubt, least_doubt
 from bisar_budget.budget.orbit import FASTEST_FLIGHT
 from bisar_budget.budget.random_rows import pslr_row, spur_rows
 from bisar_budget.budget.required import DECLARATIONS, Missing, is_asked_for, missing_declarations
@@ -159,7 +160,8 @@ class _Check:
         self.together = together
         by_model = [self._rows(model) for model in gates]
         rows = _stricter(*by_model) if len(by_model) > 1 else by_model[0]
-        rows = with_required(rows, self.mission, self.errors.geometries, self.cases)
+        rows = with_required([*self._undeclared(rows), *rows], self.mission, self.errors.geometries, self.cases)
+        rows = [self._doubted(row) for row in rows]
         rows, states = self._judged_requirements(rows, gates)
         floors = [
             self._floor(),
@@ -175,7 +177,7 @@ class _Check:
         """Rows with what they could not be judged by, after waivers, and how each requirement stands."""
         mission = self.mission
         untaken = untaken_effects(mission, self._effect_totals(gates))
-        is_misplaced = self._is_misplaced()
+        is_misplaced = np.any([self._is_misplaced(), *self._in_doubt.values()], axis=0)
         found, seen = [], []
         for row in rows:
             status = status_of(row.status, row.subject.id, ~np.isnan(row.allowable), untaken)
@@ -186,6 +188,8 @@ class _Check:
             found.append(after)
             is_covered = (after.status == CODE["waived"]) & np.isin(row.status, _BROKEN)
             judges = np.where((row.binding >= 0) & (row.binding < len(KEYS)), row.binding, KEYS.index(row.metric))
+            if row.is_of_declare and row.metric != DECLARE:  # judges nothing where it is not declared
+                judges = np.where(row.status == CODE["not_evaluated"], -1, judges)
             seen.append(
                 SeenRow(
                     row.subject.id,
@@ -317,6 +321,37 @@ class _Check:
         nothing.status[:] = CODE["not_evaluated"]
         return judged.where(np.isinf(edges.difference), nothing)
 
+    @cached_property
+    def _in_doubt(self) -> dict[str, NDArray[np.bool_]]:
+        """Platforms with a path, and in which cases that is in doubt by more than the file declares."""
+        found = {}
+        for name in PLATFORMS:
+            platform = getattr(self.mission.platforms, name)
+            if platform.path is not None:
+                least = least_doubt(platform.path, declared_position_error(platform.motion_error))
+                found[name] = platform.path.doubt_m > self.array(least)
+        return found
+
+    def _doubted(self, row: Judged) -> Judged:
+        """Turn a row of a position error of a path in doubt into `not_evaluated`; one that fails stays so."""
+        for name, is_doubtful in self._in_doubt.items():
+            if is_in_doubt(row.subject, name, self.mission):
+                is_open = is_doubtful & (row.status != CODE["fail"])
+                row = row._replace(status=np.where(is_open, CODE["not_evaluated"], row.status))
+        return row
+
+    def _undeclared(self, rows: Sequence[Judged]) -> Iterator[Judged]:
+        """Rows of position errors that nobody declared, of paths in doubt: they are not evaluated."""
+        known = {row.subject.id for row in rows}
+        for name, is_doubtful in self._in_doubt.items():
+            own = [subject(name, "position", axis) for axis in "xyz"]
+            if is_doubtful.any():
+                yield from (
+                    Judged.of_none(one, self.cases)
+                    for one in own
+                    if one.id not in known and is_in_doubt(one, name, self.mission)
+                )
+
     def _floor(self) -> NDArray[np.int8]:
         """Best status that each case can have: paths may be in doubt, and nothing declared."""
         floor = np.full(self.cases, CODE["pass"])
@@ -325,7 +360,7 @@ class _Check:
         ):
             platform = getattr(self.mission.platforms, name)
             if platform.path is not None and platform.path.doubts:
-                floor[:] = CODE["warn"]
+                floor[~self._in_doubt[name] | bool(platform.path.samples)] = CODE["warn"]
             if platform.acceleration is None and not platform.is_of_the_earth:
                 floor[np.broadcast_to(norm(path.velocity) > FASTEST_FLIGHT, floor.shape)] = CODE["warn"]
         if not (self.errors.stated or self._vibrates or self.stated_random):

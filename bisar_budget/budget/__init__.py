@@ -7,6 +7,7 @@ __all__ = [
     "collection_notes",
     "error_rows",
     "fleet",
+    "input_doubt",
     "orbit",
     "pull_in",
     "random_rows",

@@ -11,6 +11,7 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.aggregates import aggregate_rows
 from bisar_budget.budget.collection_notes import collection_notes
 from bisar_budget.budget.error_rows import error_rows
+from bisar_budget.budget.input_doubt import InputDoubt, input_doubts, with_input_doubts
 from bisar_budget.budget.judgement import judged
 from bisar_budget.budget.orbit import straight_orbits
 from bisar_budget.budget.pull_in import pull_in_caps
@@ -61,7 +62,9 @@ def check_mission(mission: Mission, today: date, *, is_brief: bool = False, is_b
         checked = stricter(_checked(analysis, "published"), _checked(analysis, "full"))
     else:
         checked = _checked(analysis, gating)
-    verdict = judged_requirements(with_required(checked.rows, mission), analysis, analysis.allocation, today)
+    doubts = input_doubts(mission)
+    asked = with_input_doubts(with_required(checked.rows, mission), doubts, mission)
+    verdict = judged_requirements(asked, analysis, analysis.allocation, doubts, today)
     rows = verdict.rows
     geometry = analysis.geometry
     resolution = Resolution(
@@ -91,7 +94,7 @@ def check_mission(mission: Mission, today: date, *, is_brief: bool = False, is_b
             *verdict.warnings,
             *_unused_correlations(mission),
             *straight_orbits(mission),
-            *_doubtful_paths(mission),
+            *_doubtful_paths(mission, doubts),
             *_of_instruments(analysis),
             *pull_in_caps(mission, resolution),
             *_nothing_declared(rows),
@@ -250,9 +253,11 @@ def _paths(mission: Mission) -> Iterator[tuple[str, FlownPath]]:
             yield name, path
 
 
-def _doubtful_paths(mission: Mission) -> Iterator[FileWarning]:
+def _doubtful_paths(mission: Mission, said: Sequence[InputDoubt]) -> Iterator[FileWarning]:
+    """Warn of paths in doubt where rows do not say it; a place that strays is no part of a log's residual."""
+    owners = {one.owner for one in said}
     for name, path in _paths(mission):
-        for doubt in path.doubts:
+        for doubt in path.doubts if name not in owners or path.samples else ():
             place = mission.line(("platforms", name, getattr(mission.platforms, name).way))
             yield FileWarning(line=place, message=file_warnings.path_is_doubtful(name, doubt), is_doubt=True)
 

@@ -13,6 +13,7 @@ from bisar_budget.analysis.analysis import Analysis, Model
 from bisar_budget.analysis.spread import islr_db, mainlobe_energy, noise, spread_limit, tones
 from bisar_budget.analysis.together import Together
 from bisar_budget.analysis.vibration_limits import LARGEST_ECHO, echo_level
+from bisar_budget.budget.input_doubt import InputDoubt
 from bisar_budget.budget.requirements import (
     KEYS,
     TAKEN_BY,
@@ -50,7 +51,9 @@ class Verdict(NamedTuple):
     notes: list[Note]
 
 
-def judged_requirements(rows: Sequence[Row], analysis: Analysis, allocation: Allocation, today: date) -> Verdict:
+def judged_requirements(
+    rows: Sequence[Row], analysis: Analysis, allocation: Allocation, doubts: Sequence[InputDoubt], today: date
+) -> Verdict:
     """Judge every requirement of a mission, after waivers.
 
     Parameters
@@ -61,6 +64,8 @@ def judged_requirements(rows: Sequence[Row], analysis: Analysis, allocation: All
         Of the mission.
     allocation : Allocation
         Shares of the budgets, and the gain of autofocus.
+    doubts : sequence of InputDoubt
+        Of the paths, by more than the file declares.
     today : date
         Day on which waivers are judged, UTC.
     """
@@ -69,8 +74,9 @@ def judged_requirements(rows: Sequence[Row], analysis: Analysis, allocation: All
     untaken = untaken_effects(mission, effect_totals(analysis, gates))
     looked_at = [_looked_at(row, mission, untaken) for row in rows]
     misplacing = _misplacing(analysis)
-    if misplacing and mission.requirements.location_error is not None:
-        looked_at = [_misplaced(row, misplacing) for row in looked_at]
+    unknown_place = phrases.place_is_not_known(misplacing) if misplacing else doubts[0].note if doubts else NOTHING
+    if unknown_place and mission.requirements.location_error is not None:
+        looked_at = [_misplaced(row, unknown_place) for row in looked_at]
     waived = apply_waivers(looked_at, mission, today)
     seen = [
         _seen(waived.rows[place] if waived.rows[place].status == "waived" and is_broken(row) else row, allocation)
@@ -82,9 +88,9 @@ def judged_requirements(rows: Sequence[Row], analysis: Analysis, allocation: All
         {key: True for key in KEYS if f"mission.{key}" in waived.requirements},
         has_noise=any(noise(analysis, model.name) for model in gates)
         or (mission.requirements.pslr is None and bool(tones(mission))),
-        is_misplaced=bool(misplacing),
+        is_misplaced=bool(unknown_place),
     )
-    requirements = tuple(_entry(state, waived, analysis, allocation, misplacing) for state in states)
+    requirements = tuple(_entry(state, waived, analysis, allocation, unknown_place) for state in states)
     notes = [
         phrases.effect_is_negligible(one.kind, float(one.total[0]), list(TAKEN_BY[one.kind]))
         for one in untaken
@@ -165,17 +171,19 @@ def _misplacing(analysis: Analysis) -> list[str]:
     return found
 
 
-def _misplaced(row: Row, misplacing: Sequence[str]) -> Row:
+def _misplaced(row: Row, unknown_place: Note) -> Row:
     is_location = row.owner == "mission" and row.subject.kind == LOCATION
     if not is_location or row.status in ("fail", "not_declared"):
         return row
-    return row._replace(status="not_evaluated", reason=phrases.place_is_not_known(misplacing))
+    return row._replace(status="not_evaluated", reason=unknown_place)
 
 
 def _seen(row: Row, allocation: Allocation) -> SeenRow:
     """A row as an array of one case."""
     binding = row.binding_requirement or row.metric
     key = binding if binding in KEYS else row.metric
+    if row.is_of_declare and row.metric != "declare":
+        key = ""  # judges nothing: it is not declared
     qpe = row.qpe_full_rad if row.model == "full" else row.qpe_published_rad
     use = math.nan
     if qpe is not None and row.metric == QUADRATIC:
@@ -191,7 +199,7 @@ def _seen(row: Row, allocation: Allocation) -> SeenRow:
 
 # ---------------------------------------------------------------------- words
 def _entry(
-    state: RequirementState, waived: Waived, analysis: Analysis, allocation: Allocation, misplacing: Sequence[str]
+    state: RequirementState, waived: Waived, analysis: Analysis, allocation: Allocation, unknown_place: Note
 ) -> JudgedRequirement:
     mission, key = analysis.mission, state.key
     rows = waived.rows
@@ -201,7 +209,7 @@ def _entry(
     allowed, reached = _sizes(decider, key, mission, allocation) if decider is not None else (None, None)
     reason: Note | None = None
     if status == "not_evaluated" and (decider is None or decider.status != status or key == "islr"):
-        reason = _why_not_judged(key, misplacing)
+        reason = _why_not_judged(key, unknown_place)
     elif decider is not None and status not in ("pass", "info"):
         reason = decider.reason
     path = ("requirements", key)
@@ -222,9 +230,9 @@ def _entry(
     )
 
 
-def _why_not_judged(key: str, misplacing: Sequence[str]) -> Note:
-    if key == LOCATION and misplacing:
-        return phrases.place_is_not_known(misplacing)
+def _why_not_judged(key: str, unknown_place: Note) -> Note:
+    if key == LOCATION and unknown_place:
+        return unknown_place
     return phrases.nothing_judges(key)
 
 

@@ -216,6 +216,10 @@ class FlownPath(NamedTuple):
     `source` says where it comes from, empty where the file states it; `file` and `sha256` are those of the file it
     was read from, `age` that of its elements [s]. Of a fit the order, the residual at most and root mean square [m],
     and the number of places of a log. `doubts` are warnings, for reports.
+
+    `doubt_m` is how far the truth may be from it by what its own source says: the age of elements, the interpolation
+    of an ephemeris, the residual of a smoothed log; `doubt_of` says which. Where the file declares no position error,
+    it counts if it `is_doubted`.
     """
 
     state: PlatformState
@@ -228,6 +232,9 @@ class FlownPath(NamedTuple):
     rms: float | None = None
     samples: int | None = None
     doubts: tuple[str, ...] = ()
+    doubt_m: float = 0.0
+    doubt_of: str = ""
+    is_doubted: bool = False
     accuracy: tuple[str, str] | None = None  # file that states its errors, and its SHA-256
 
 

@@ -208,6 +208,7 @@ def _platform(mission: MissionFindings, name: str) -> dict[str, Any]:
             "residual_max_m": path.farthest,
             "residual_rms_m": path.rms,
             "samples": path.samples,
+            "doubt_m": path.doubt_m,
             "accuracy": None if path.accuracy is None else dict(zip(("file", "sha256"), path.accuracy, strict=True)),
         }
     return found
