@@ -37,7 +37,7 @@ class Tone(NamedTuple):
     cycles: float
 
 
-class Spread(NamedTuple):
+class SpreadPhase(NamedTuple):
     """A row, whose share it counts against, and the variance of the phase that it spreads. [rad²]"""
 
     row_id: str
@@ -107,7 +107,7 @@ def tones(mission: Mission) -> list[Tone]:
     return found
 
 
-def noise(analysis: Analysis, model: str) -> list[Spread]:
+def noise(analysis: Analysis, model: str) -> list[SpreadPhase]:
     """List what spreads beyond the cubic: wideband vibration, noise of sensors, phase noise, links."""
     mission, found = analysis.mission, []
     for name in PLATFORMS:
@@ -115,10 +115,10 @@ def noise(analysis: Analysis, model: str) -> list[Spread]:
         if wideband is not None:
             rms = counted(mission, name, wideband.rms, "islr")
             variance = (2 * math.pi * rms / mission.radar.wavelength) ** 2
-            found.append(Spread(subject(name, "vibration", "wideband").id, name, variance))
+            found.append(SpreadPhase(subject(name, "vibration", "wideband").id, name, variance))
     for one in analysis.random:
         if one.declared is not None and (one.subject.kind != "imu" or one.subject.axis in NOISE):
-            found.append(Spread(one.id, one.owner, (one.effect(model).spread * one.declared) ** 2))
+            found.append(SpreadPhase(one.id, one.owner, (one.effect(model).spread * one.declared) ** 2))
     return found
 
 
@@ -130,7 +130,7 @@ def spread_powers(analysis: Analysis, allocation: Allocation, owner: str, model:
     needs = analysis.mission.requirements
     found = noise(analysis, model)
     if needs.pslr is None:
-        found += [Spread(one.subject.id, one.subject.owner, one.phase**2 / 2) for one in tones(analysis.mission)]
+        found += [SpreadPhase(one.subject.id, one.subject.owner, one.phase**2 / 2) for one in tones(analysis.mission)]
     powers = [
         (one.row_id, one.variance)
         for one in found

@@ -12,6 +12,7 @@ __all__ = [
     "pull_in",
     "random_rows",
     "required",
+    "requirements",
     "verdicts",
     "vibration_rows",
     "waivers",

@@ -42,7 +42,7 @@ _STATUSES = tuple(STATUS)
 _EXAMPLES = {CUBIC: "22.5 deg", "islr": "-20 dB", "pslr": "-30 dB"}
 
 
-class Verdict(NamedTuple):
+class JudgedMission(NamedTuple):
     """Rows with what they could not be judged by, the table of requirements, and what is to be said of the whole."""
 
     rows: list[Row]
@@ -53,7 +53,7 @@ class Verdict(NamedTuple):
 
 def judged_requirements(
     rows: Sequence[Row], analysis: Analysis, allocation: Allocation, doubts: Sequence[InputDoubt], today: date
-) -> Verdict:
+) -> JudgedMission:
     """Judge every requirement of a mission, after waivers.
 
     Parameters
@@ -96,7 +96,7 @@ def judged_requirements(
         for one in untaken
         if one.is_negligible[0]
     ]
-    return Verdict(waived.rows, requirements, waived.unused(requirements), notes)
+    return JudgedMission(waived.rows, requirements, waived.unused(requirements), notes)
 
 
 def is_broken(row: Row) -> bool:

@@ -209,14 +209,16 @@ def test_a_tone_is_judged_by_pslr_and_leaves_islr_alone() -> None:
     assert requirement(found, "islr").status == "not_evaluated"
 
 
-@pytest.mark.parametrize("factor", [0.95, 1.01])
+@pytest.mark.parametrize("factor", [0.94, 1.01])
 def test_without_pslr_the_power_of_a_tone_counts_in_islr(factor: float) -> None:
     """φ²/2 against the platform's half of the power, by the paper's rule."""
     phase = math.sqrt(2 * 0.5 * 1e-2) * factor
     tone = {"sinusoidal": [{"amplitude": um(phase), "frequency": "20 Hz"}]}
     allocation = {"combine": "each", "model": "published", "warn_above": 1}
     found = check(requirements={"islr": "-20 dB"}, allocation=allocation, **{VIBRATION: tone}, **SMALL)
-    status = "fail" if factor > 1 else "pass"  # by the full model too, which allows up to 5 % less
+    status = (
+        "fail" if factor > 1 else "pass"
+    )  # by the full model too: the mask of an image leaves 0.948 of the paper's limit
     assert row(found, "receiver.vibration.sinusoidal.0").status == status
     assert row(found, "receiver.islr").utilization == pytest.approx(factor, rel=1e-6)
     assert requirement(found, "islr").status == status
