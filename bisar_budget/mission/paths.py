@@ -26,6 +26,7 @@ from bisar_budget.paths.flight import (
 )
 from bisar_budget.paths.instant import Instant
 from bisar_budget.resources import UnreadableError, content
+from bisar_budget.units import format_quantity
 
 Beside = Callable[[str], bytes]  # content of a file that a mission names
 
@@ -186,10 +187,11 @@ def _of_orbit(mission: Mission, route: routes.OrbitSource, axes: earth.SceneAxes
 def _hold_to_range(doubt: PathDoubt, slant_range: float, said: Sequence[str], remedy: str, name: str) -> None:
     """Refuse an orbit that may be elsewhere by more than a tenth of the slant range: the geometry is not known."""
     if not doubt.size <= _LOST * slant_range:
-        words = said[0] if said else f"{name}: may be {doubt.size / 1e3:.4g} km off ({doubt.words})"
+        away, known, size = (format_quantity(one, "m", 4) for one in (slant_range, _LOST * slant_range, doubt.size))
+        words = said[0] if said else f"{name}: {doubt.words}"
         raise PathFileError(
-            f"{words}: more than a tenth of the slant range, {slant_range / 1e3:.4g} km",
-            f"accepted: an orbit that is known to {_LOST * slant_range / 1e3:.4g} km",
+            f"{words}; a doubt of {size} is more than a tenth of the slant range, {away}",
+            f"accepted: an orbit that is known to {known}",
             remedy,
         )
 

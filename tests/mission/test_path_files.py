@@ -21,6 +21,7 @@ from bisar_budget.mission.load import load_mission
 from bisar_budget.paths import earth, flight_log, two_lines
 from bisar_budget.paths.ephemeris import read_oem
 from bisar_budget.paths.instant import Instant
+from bisar_budget.units import format_quantity
 from tests.conftest import mission_text
 from tests.paths.flown import flight, geodetic_csv, sbet, smrmsg
 from tests.paths.orbit_files import CENTER, EPOCH, LINE_1, LINE_2, START, TLE, oem, omm_json, on_circle
@@ -345,7 +346,7 @@ BROKEN: dict[str, tuple[Callable[[], str], dict[str, bytes | str], str]] = {
     "elements ten years old": (
         lambda: satellite(EPOCH.after(3652.2 * 86400)),
         {},
-        "3652.2 days before the aperture; SGP4 may place it 3653 to 10958 km off: more than a tenth of the slant",
+        "3652.2 days before the aperture; SGP4 may place it 3653 to 10958 km off; a doubt of 7305 km is more",
     ),
     "an ephemeris that is missed by 80 km": (
         lambda: ephemeris("2026-06-01T05:20:00Z", oem()),
@@ -488,7 +489,8 @@ def test_elements_are_refused_from_a_tenth_of_the_slant_range_on(folder: Path, d
         load_mission(str(folder / "m.yaml"))
     (fault,) = error.value.faults
     assert (fault.line, fault.key) == (12, "platforms.transmitter.orbit.tle")
-    assert fault.accepted == f"accepted: an orbit that is known to {away / 1e4:.4g} km"
+    assert fault.accepted == f"accepted: an orbit that is known to {format_quantity(away / 10, 'm', 4)}"
+    assert f"is more than a tenth of the slant range, {format_quantity(away, 'm', 4)}" in fault.problem
     assert fault.hint == "Take elements whose epoch is nearer to collection.center_time"
 
 
