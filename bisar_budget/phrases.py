@@ -692,6 +692,12 @@ def images_formed(conditions: str) -> str:
     return f"images: {conditions}"
 
 
+@phrase
+def overrides_a_part(key: str, text: str, part: str) -> str:
+    """Of a figure of a part that the file replaces; of its rows and of a mission."""
+    return f"{key} stands in place of {text} of {part}"
+
+
 # ---------------------------------------------------------------------- the collection
 @phrase
 def path_curves(platform: str) -> str:

@@ -21,7 +21,7 @@ from bisar_budget.budget.requirement_table import judged_requirements
 from bisar_budget.budget.vibration_rows import vibration_rows
 from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
 from bisar_budget.effects.correlation import unused_correlations
-from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.effect import PLATFORMS, override_notes
 from bisar_budget.effects.subject import subject
 from bisar_budget.faults import changes_words
 from bisar_budget.findings.mission import FileWarning, MissionFindings, Resolution
@@ -102,7 +102,7 @@ def check_mission(mission: Mission, today: date, *, is_brief: bool = False, is_b
         place=_place(mission),
         paths=tuple((name, path) for name, path in _paths(mission) if path.source),
         scene=checked.scene,
-        notes=(*verdict.notes, *collection_notes(analysis), *_unused_keys(mission)),
+        notes=(*verdict.notes, *collection_notes(analysis), *_unused_keys(mission), *_overridden(mission)),
         document=mission.document,
         changes=mission.changes,
     )
@@ -260,6 +260,14 @@ def _doubtful_paths(mission: Mission, said: Sequence[InputDoubt]) -> Iterator[Fi
         for doubt in path.doubts if name not in owners or path.samples else ():
             place = mission.line(("platforms", name, getattr(mission.platforms, name).way))
             yield FileWarning(line=place, message=file_warnings.path_is_doubtful(name, doubt), is_doubt=True)
+
+
+def _overridden(mission: Mission) -> Iterator[Note]:
+    """Say which figures of parts the file replaces."""
+    for name in PLATFORMS:
+        platform = getattr(mission.platforms, name)
+        for section in filter(None, (platform.motion_error, platform.oscillator)):
+            yield from override_notes(name, section.overridden)
 
 
 def _unused_keys(mission: Mission) -> Iterator[Note]:

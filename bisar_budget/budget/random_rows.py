@@ -27,10 +27,12 @@ from bisar_budget.budget.vibration_rows import ECHO_CYCLES
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.effects.clocks import spurs_of
 from bisar_budget.effects.echoes import near_lines, worst_phases
+from bisar_budget.effects.effect import override_notes
 from bisar_budget.effects.models import CUBIC, QUADRATIC
 from bisar_budget.effects.random_errors import RandomEffect, RandomError
 from bisar_budget.effects.subject import subject
 from bisar_budget.findings.row import Row
+from bisar_budget.mission.instruments import Oscillator
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import NOTHING, Note
 
@@ -189,6 +191,7 @@ def spur_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterat
     other = "full" if gating == "published" else "published"
     k = 2 * math.pi / mission.radar.wavelength
     for spur in spurs_of(mission):
+        oscillator: Oscillator = getattr(mission.platforms, spur.name).oscillator
         cycles = spur.frequency * mission.collection.aperture_time
         allowed = limits.get(spur.name)
         over = doubt = NOTHING
@@ -215,8 +218,11 @@ def spur_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterat
             over=over,
             doubt=doubt,
             limits=(None, None) if allowed is None else (k * allowed.published / 2, k * allowed.full / 2),
-            evidence=getattr(mission.platforms, spur.name).oscillator.source,
-            notes=(phrases.tone_lies(spur.frequency, cycles),),
+            evidence=oscillator.source,
+            notes=(
+                phrases.tone_lies(spur.frequency, cycles),
+                *override_notes(spur.name, oscillator.overridden, "frequency"),
+            ),
         )
         row = in_decibel(row._replace(model=gating))
         yield row._replace(islr_db=shown_islr_db(mission, spur.phase**2 / 2)) if metric == ISLR else row

@@ -45,6 +45,18 @@ VelocityRandomWalk = Annotated[Vector | None, Key(_VELOCITY_WALK, "Noise of the 
 AngleRandomWalk = Annotated[Vector | None, Key(_ANGLE_WALK, "Noise of the gyros.")]
 
 
+class Overridden(NamedTuple):
+    """A figure of a part, or of the accuracy of a log, that something in the file replaces.
+
+    `key` is what replaces it, below the platform, `text` the figure as its file has it.
+    """
+
+    figure: str
+    key: str
+    part: str
+    text: str
+
+
 class Imu(NamedTuple):
     """Figures of an inertial sensor, 1 sigma. A scalar means each axis; three values follow the error's frame."""
 
@@ -196,7 +208,10 @@ PowerLawFigures = Annotated[
 
 
 class Oscillator(NamedTuple):
-    """An oscillator and its noise, in one of three forms or as a part of the catalogue."""
+    """An oscillator and its noise, in one of three forms or as a part of the catalogue.
+
+    `overridden` are the figures of the part that keys beside it replace.
+    """
 
     frequency: Frequency = None
     phase_noise: PhaseNoise = None
@@ -225,6 +240,7 @@ class Oscillator(NamedTuple):
         str | None, Key(Reference(), "A part of the catalogue, or a file; keys beside it override.")
     ] = None
     source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
+    overridden: tuple[Overridden, ...] = ()
 
     @property
     def needs_frequency(self) -> bool:

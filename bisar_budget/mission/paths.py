@@ -10,6 +10,7 @@ from typing import Any
 from bisar_budget.faults import Problem
 from bisar_budget.geometry import STRAIGHT, PlatformState
 from bisar_budget.mission import routes
+from bisar_budget.mission.instruments import Overridden
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import FlownPath, MotionError, Platform, without_image
 from bisar_budget.mission.readers import INVALID, Report
@@ -282,12 +283,16 @@ def _by_accuracy(
         )
     except PathFileError as unusable:
         raise _UnusablePathError(key, _of_file(file, unusable)) from None
-    if error.covariance is None:
-        source = f"accuracy file {file}"
-        if error.position is None:
-            error = error._replace(position=stated.position, of_parts=(*error.of_parts, ("position", source)))
-        if error.velocity is None:
-            error = error._replace(velocity=stated.velocity, of_parts=(*error.of_parts, ("velocity", source)))
+    source = f"accuracy file {file}"
+    for kind, unit in (("position", "m"), ("velocity", "m/s")):
+        figure = getattr(stated, kind)
+        if error.covariance is None and getattr(error, kind) is None:
+            error = error._replace(**{kind: figure}, of_parts=(*error.of_parts, (kind, source)))
+        else:
+            own = "covariance" if error.covariance is not None else kind
+            text = f"[{', '.join(format_quantity(sigma, unit) for sigma in figure)}]"
+            replaced = Overridden(kind, f"motion_error.{own}", source, text)
+            error = error._replace(overridden=(*error.overridden, replaced))
     return error, hashlib.sha256(data).hexdigest()
 
 

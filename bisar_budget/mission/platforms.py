@@ -38,7 +38,7 @@ from bisar_budget.mission.readers import Choice, Key, Late, ListOf, OneOf, Refer
 
 if TYPE_CHECKING:
     from bisar_budget.mission.covariance import Covariance
-    from bisar_budget.mission.instruments import GaussMarkov, Imu, Oscillator
+    from bisar_budget.mission.instruments import GaussMarkov, Imu, Oscillator, Overridden
     from bisar_budget.mission.routes import OrbitSource, TrajectorySource
 
 LEAST_BASELINE = 1.0  # m, between platforms of which one hears the other
@@ -89,7 +89,8 @@ PARTS = OneOf(lambda value: TextList() if isinstance(value, list) else PART, (PA
 class MotionError(NamedTuple):
     """How wrong the measured motion of one platform may be. A scalar means each axis.
 
-    `of_parts` names the figures that come from parts of the catalogue, and the source of each.
+    `of_parts` names the figures that come from parts of the catalogue, and the source of each. `overridden` are the
+    figures of parts that something else in the file replaces.
     """
 
     frame: Annotated[
@@ -123,6 +124,7 @@ class MotionError(NamedTuple):
     ] = ()
     source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
     of_parts: tuple[tuple[str, str], ...] = ()
+    overridden: "tuple[Overridden, ...]" = ()
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:

@@ -484,6 +484,16 @@ def test_what_must_be_declared_and_has_no_row_is_said_in_every_case(asked, waive
     assert_as_checked(mission, cases, whole, column)
 
 
+def test_a_frequency_that_would_relabel_the_mask_of_a_part_is_an_error_of_each_case() -> None:
+    text = mission_text(platforms__receiver__oscillator={"sensor": "sit5358", "frequency": "10 MHz"})
+    mission = parse_mission(text, "m.yaml")
+    cases = grid(mission, platforms__receiver__oscillator__frequency=[5e6, 10e6, 100e6])
+    whole, _ = swept(mission, cases)
+    assert [status == "error" for status in whole["status"]] == [True, False, True]
+    assert "is stated at its own frequency, 10 MHz" in whole["reason"][0]
+    assert_as_checked(mission, cases, whole)
+
+
 def test_a_platform_that_stands_still_in_some_cases_owes_less_in_them() -> None:
     receiver = {
         "position": ["6 km", "6 km", "2 km"],

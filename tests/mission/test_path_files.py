@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bisar_budget.budget.check import check_mission
 from bisar_budget.faults import MissionError
 from bisar_budget.geometry import Vector
 from bisar_budget.mission import paths
@@ -22,7 +23,7 @@ from bisar_budget.paths import earth, flight_log, two_lines
 from bisar_budget.paths.ephemeris import read_oem
 from bisar_budget.paths.instant import Instant
 from bisar_budget.units import format_quantity
-from tests.conftest import mission_text
+from tests.conftest import TODAY, mission_text
 from tests.paths.flown import flight, geodetic_csv, sbet, smrmsg
 from tests.paths.orbit_files import CENTER, EPOCH, LINE_1, LINE_2, START, TLE, oem, omm_json, on_circle
 from tests.report.test_report_diff import git
@@ -153,6 +154,33 @@ class TestEveryKindOfPath:
         assert error.position == pytest.approx((0.03, 0.02, 0.05))  # east, north, up
         assert error.velocity == pytest.approx((0.01,) * 3)
         assert error.evidence("position") == "accuracy file smrmsg.out"
+        found = check_mission(load_mission(str(folder / "m.yaml")), TODAY)
+        said = (
+            "platforms.receiver.motion_error.velocity stands in place of [5 mm/s, 4 mm/s, 6 mm/s] of accuracy file "
+            "smrmsg.out"
+        )
+        assert said in found.notes
+        assert {row.id for row in found.rows if said in row.remarks} == {f"receiver.velocity.{one}" for one in "xyz"}
+
+    def test_an_accuracy_file_stands_before_a_part_and_behind_a_covariance_and_says_so(self, folder: Path) -> None:
+        """The evidence of the accuracy file was lost beside a part, and a covariance replaced it in silence."""
+        route = {"file": "sbet.out", "week": 2421, "accuracy": "smrmsg.out"}
+        stated = {"trajectory": route, "motion_error": {"sensor": ["stim300", "mosaic-x5-rtk"]}}
+        (folder / "m.yaml").write_text(aircraft(platforms__receiver=stated))
+        mission = load_mission(str(folder / "m.yaml"))
+        error = mission.platforms.receiver.motion_error
+        assert error.position == pytest.approx((0.03, 0.02, 0.05))
+        assert error.evidence("position") == error.evidence("velocity") == "accuracy file smrmsg.out"
+        said = [note for note in check_mission(mission, TODAY).notes if "in place of" in note]
+        assert [note.partition(" of ")[0] for note in said] == [
+            "platforms.receiver.trajectory.accuracy stands in place"
+        ] * 2
+        stated["motion_error"] = {"covariance": {"position": "1 cm", "velocity": "1 cm/s"}}
+        (folder / "m.yaml").write_text(aircraft(platforms__receiver=stated))
+        said = [note for note in check_mission(load_mission(str(folder / "m.yaml")), TODAY).notes if "smrmsg" in note]
+        assert [note.partition(" of ")[0] for note in said] == [
+            "platforms.receiver.motion_error.covariance stands in place"
+        ] * 2
 
 
 class TestWhatIsSaid:
@@ -405,6 +433,13 @@ BROKEN: dict[str, tuple[Callable[[], str], dict[str, bytes | str], str]] = {
         ),
         {},
         "sbet.out",
+    ),
+    "an accuracy of zeros": (
+        lambda: aircraft(
+            platforms__receiver={"trajectory": {"file": "sbet.out", "week": 2421, "accuracy": "zeros.out"}}
+        ),
+        {"zeros.out": smrmsg(np.arange(61.0), north=0, east=0, down=0, rates=(0, 0, 0))},
+        "no trajectory is without error",
     ),
     "an accuracy in another frame": (
         lambda: aircraft(
