@@ -10,7 +10,7 @@ from bisar_budget.findings.status import STATUSES, worst
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Document, Mission
 from bisar_budget.mission.platforms import FlownPath
-from bisar_budget.phrases import Note
+from bisar_budget.phrases import NOTHING, Note
 
 if TYPE_CHECKING:
     from bisar_budget.analysis.analysis import Analysis
@@ -71,6 +71,7 @@ class MissionFindings(NamedTuple):
     document: Document = Document()
     study: "TradeStudy | None" = None  # of other values, if a report shows them
     changes: tuple[SetValue, ...] = ()  # values that options put in place of the file's
+    model_doubt: Note = NOTHING  # where the published model judges and does not hold
 
     @property
     def mission(self) -> Mission | None:
