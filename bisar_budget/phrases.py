@@ -283,6 +283,21 @@ def other_model_spreads(model: str, level_db: float) -> str:
 
 
 @phrase
+def published_model_does_not_hold(
+    row_id: str, published: float | None, full: float | None, unit: str, others: int
+) -> str:
+    """Of a mission that the published model judges; None: no limit. How many other errors it does not hold of."""
+    by_published, by_full = (
+        "without limit" if size is None else format_limit(size, unit) for size in (published, full)
+    )
+    text = f"the published model does not hold here: it allows {row_id} {by_published}, the full model {by_full}"
+    if not others:
+        return text
+    more = "1 other declared error is" if others == 1 else f"{others} other declared errors are"
+    return f"{text}; {more} over 5 % apart too"
+
+
+@phrase
 def wrong_height_defocuses() -> str:
     """Why the full model fails the terrain."""
     return "a bistatic image defocuses on a wrong height"

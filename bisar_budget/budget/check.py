@@ -13,6 +13,7 @@ from bisar_budget.budget.collection_notes import collection_notes
 from bisar_budget.budget.error_rows import error_rows
 from bisar_budget.budget.input_doubt import InputDoubt, input_doubts, with_input_doubts
 from bisar_budget.budget.judgement import judged
+from bisar_budget.budget.model_doubt import model_doubt
 from bisar_budget.budget.orbit import straight_orbits
 from bisar_budget.budget.pull_in import pull_in_caps
 from bisar_budget.budget.random_rows import islr_rows, pslr_row, random_rows, spur_rows
@@ -46,10 +47,11 @@ def check_mission(mission: Mission, today: date, *, is_brief: bool = False, is_b
     today : date
         Day on which waivers are judged, UTC.
     is_brief : bool
-        Leave out what a terminal does not show: allowables of errors that nobody declared, and of the model that does
-        not gate. Statuses are the same.
+        Leave out what a terminal does not show: allowables of errors that nobody declared, and by the model that does
+        not gate, but for what `model_doubt` compares. Statuses are the same.
     is_bare : bool
-        Leave out what decides nothing and is searched for: how far one autofocus correction serves the scene.
+        Leave out what decides nothing and is searched for: how far one autofocus correction serves the scene, and
+        whether the published model holds.
 
     Returns
     -------
@@ -105,6 +107,7 @@ def check_mission(mission: Mission, today: date, *, is_brief: bool = False, is_b
         notes=(*verdict.notes, *collection_notes(analysis), *_unused_keys(mission), *_overridden(mission)),
         document=mission.document,
         changes=mission.changes,
+        model_doubt=model_doubt(analysis, rows),
     )
 
 

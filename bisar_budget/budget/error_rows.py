@@ -54,8 +54,12 @@ def error_rows(analysis: Analysis, model: Model, other: Model, allocation: Alloc
         if is_brief and (declared is None or not source.is_independent):
             yield _unseen(analysis, model, source, declared)
             continue
-        allowed = allowed_by(analysis, model, source, limit)
-        allowed_other = NOT_ASKED if is_brief else allowed_by(analysis, other, source, limit)
+        allowed, allowed_other = allowed_by(analysis, model, source, limit), NOT_ASKED
+        if not is_brief:
+            allowed_other = allowed_by(analysis, other, source, limit)
+        elif model.name == "published" and not analysis.is_bare:  # whether it holds is said beside the verdict
+            allowed = allowed._replace(quadratic=model.allowable(source, QUADRATIC, limit))
+            allowed_other = NOT_ASKED._replace(quadratic=other.allowable(source, QUADRATIC, limit))
         published, full = (allowed, allowed_other) if model.name == "published" else (allowed_other, allowed)
         info = over = doubt = NOTHING
         notes = source.notes

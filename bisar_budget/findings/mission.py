@@ -11,7 +11,7 @@ from bisar_budget.findings.status import STATUSES, worst
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Document, Mission
 from bisar_budget.mission.platforms import FlownPath
-from bisar_budget.phrases import Note
+from bisar_budget.phrases import NOTHING, Note
 
 if TYPE_CHECKING:
     from bisar_budget.analysis.analysis import Analysis
@@ -75,6 +75,7 @@ class MissionFindings(NamedTuple):
     requirements: tuple[JudgedRequirement, ...] = ()
     kinds: DeclaredKinds = DeclaredKinds()
     overrides: tuple[Override, ...] = ()  # what from outside the file bears on the verdict
+    model_doubt: Note = NOTHING  # where the published model judges and does not hold
 
     @property
     def mission(self) -> Mission | None:

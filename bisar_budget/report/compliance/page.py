@@ -55,7 +55,7 @@ from bisar_budget.report.drawing.evidence_drawings import (
 from bisar_budget.report.explain.explanation import chain, collection_chain
 from bisar_budget.report.formats import verification
 from bisar_budget.report.words.escapes import source_path
-from bisar_budget.report.words.missions import head, multiple_of_pi, narrow_gradients, path_words
+from bisar_budget.report.words.missions import doubtful_model, head, multiple_of_pi, narrow_gradients, path_words
 from bisar_budget.report.words.sentences import matters, measure, percent
 from bisar_budget.units import format_quantity
 
@@ -202,6 +202,7 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
         sha256=_digest(mission.data),
         document=found.document,
         alone=_ALONE if judged and found.combine == "each" else "",
+        doubt=doubtful_model(found),
         narrow=narrow_gradients(found.geometry),
         status=found.status,
         verdict=(_verdict(found.status, found.summary.get("waived", 0)) if judged else _NOTHING)

@@ -99,6 +99,8 @@ def _mission(mission: MissionFindings) -> dict[str, Any]:
         "status": mission.status,
         "set": [change._asdict() for change in mission.changes],
         "model": mission.model,
+        "model_doubt": mission.model_doubt or None,
+        "model_doubt_code": mission.model_doubt.code or None,
         "combine": mission.combine,
         "coverage_factor": mission.coverage_factor,
         "geometry": {

@@ -11,7 +11,7 @@ from bisar_budget.findings.row import DECLARE, Row, worst_first
 from bisar_budget.findings.status import STATUS, worst
 from bisar_budget.report import Piece, Style
 from bisar_budget.report.words.layout import WIDTH, wrapped, wrapped_counts
-from bisar_budget.report.words.missions import document_words, head, narrow_gradients
+from bisar_budget.report.words.missions import document_words, doubtful_model, head, narrow_gradients
 from bisar_budget.report.words.sentences import binding_words, matters, percent
 from bisar_budget.units import format_quantity
 
@@ -52,6 +52,8 @@ def _mission(mission: MissionFindings, style: Style) -> list[str]:
     document = ", ".join(filter(None, (document_words(mission.document), mission.document.author)))
     name = f"{mission.name} ({document})" if document else mission.name
     lines = [_lead(first, mission.status, style), *rest, *wrapped(name, "  ")]
+    if sentence := doubtful_model(mission):
+        lines += wrapped(sentence, "  ")
     if sentence := narrow_gradients(mission.geometry):
         lines += wrapped(sentence, "  ")
     lines += ["", *(line for key, text in head(mission) for line in wrapped(f"{key:<12} {text}", " " * 13))]
