@@ -344,7 +344,7 @@ def test_text(run: Callable) -> None:
     assert max(map(len, done.stdout.splitlines())) <= 80 or len(SECTION_V) > 60
     said = [line.split() for line in done.stdout.splitlines()]
     assert ["collection.aperture_time", "6", "s", "1", "%", "+23.6"] in said
-    assert "Left out: 6 keys (a whole number, 0)." in done.stdout
+    assert "Left out: 8 keys (a whole number, 0, a choice)." in done.stdout
 
 
 def test_json(run: Callable) -> None:

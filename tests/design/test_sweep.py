@@ -296,11 +296,11 @@ def test_what_arrays_do_not_hold_is_checked_one_by_one() -> None:
 
 
 _LINK = "{error: 1 deg, interval: 0.3 s}"
-_FIGURES = f"""
-synchronization: {_LINK}
-requirements: {{islr: -25 dB, pslr: -30 dB, quadratic_phase_error: 45 deg}}
-allocation: {{split: {{transmitter: 0.3, receiver: 0.5, clock: 0.2}}, combine: rss}}
-"""
+_FIGURES: dict[str, Any] = {
+    "synchronization": {"error": "1 deg", "interval": "0.3 s"},
+    "requirements": {"islr": "-25 dB", "pslr": "-30 dB", "quadratic_phase_error": "45 deg"},
+    "allocation": {"split": {"transmitter": 0.3, "receiver": 0.5, "clock": 0.2}, "combine": "rss"},
+}
 
 
 @pytest.mark.parametrize(("rule", "model"), [("each", "published"), ("rss", "full"), ("sum", "strictest")])
@@ -370,7 +370,7 @@ def test_figures_of_sensors_clocks_and_covariances_vary(axes) -> None:
         "platforms.receiver.motion_error": COVARIANCE,
         "platforms.transmitter.motion_error": "{frame: track, imu: {attitude: 0.01 deg}}",
     }
-    mission = parse_mission(mission_text() + _FIGURES, "m.yaml", changes=[SetValue(*one) for one in changes.items()])
+    mission = parse_mission(mission_text(**_FIGURES), "m.yaml", changes=[SetValue(*one) for one in changes.items()])
     cases = grid(mission, **axes)
     columns = ["receiver.oscillator.allowable", "mission.quadratic_phase_error.declared", "receiver.islr.margin"]
     whole, by_case = swept(mission, cases, columns)
