@@ -15,6 +15,7 @@ from bisar_budget.budget.input_doubt import InputDoubt, input_doubts, with_input
 from bisar_budget.budget.judgement import judged
 from bisar_budget.budget.model_doubt import model_doubt
 from bisar_budget.budget.orbit import straight_orbits
+from bisar_budget.budget.overrides import NOTHING_OUTSIDE, Outside, overrides
 from bisar_budget.budget.pull_in import pull_in_caps
 from bisar_budget.budget.random_rows import islr_rows, pslr_row, random_rows, spur_rows
 from bisar_budget.budget.required import declared_kinds, with_required
@@ -37,7 +38,14 @@ if TYPE_CHECKING:
     from bisar_budget.analysis.scene import SceneEdge
 
 
-def check_mission(mission: Mission, today: date, *, is_brief: bool = False, is_bare: bool = False) -> MissionFindings:
+def check_mission(
+    mission: Mission,
+    today: date,
+    *,
+    is_brief: bool = False,
+    is_bare: bool = False,
+    outside: Outside = NOTHING_OUTSIDE,
+) -> MissionFindings:
     """Check one mission.
 
     Parameters
@@ -52,6 +60,8 @@ def check_mission(mission: Mission, today: date, *, is_brief: bool = False, is_b
     is_bare : bool
         Leave out what decides nothing and is searched for: how far one autofocus correction serves the scene, and
         whether the published model holds.
+    outside : Outside
+        What from outside the file bears on the verdict, besides what the mission itself carries.
 
     Returns
     -------
@@ -89,6 +99,7 @@ def check_mission(mission: Mission, today: date, *, is_brief: bool = False, is_b
         rows=tuple(rows),
         requirements=verdict.requirements,
         kinds=declared_kinds(mission),
+        overrides=overrides(mission, outside, today),
         warnings=(
             *_changed(mission),
             *_unknown_requirement_ids(mission, rows),

@@ -283,7 +283,8 @@ class Mission(NamedTuple):
     """A mission file that can be used.
 
     `file` and `places` say where it stands: the path of each value to the parser's event. `data` is the file as
-    read, byte for byte. `changes` are the values that options put in place of the file's.
+    read, byte for byte. `changes` are the values that options put in place of the file's, `parts` name and file of
+    each part that it takes figures from.
     """
 
     schema_version: Annotated[int, Key(Version())]
@@ -312,6 +313,7 @@ class Mission(NamedTuple):
     places: Mapping[KeyPath, Any] = {}
     data: bytes = b""
     changes: tuple[SetValue, ...] = ()
+    parts: tuple[tuple[str, str], ...] = ()
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
