@@ -412,6 +412,9 @@ def _motion_of(error: MotionError, parts: Sequence[_Read], path: KeyPath, report
         elif taken and error.frame != "scene":
             report(path, Problem(f"{shown(part.name)} is stated east, north, up", "accepted: frame: scene"))
             return INVALID
+        elif taken.keys() & {"position", "velocity"} and error.distribution != "normal":
+            report(path, Problem(f"{shown(part.name)} is stated as one sigma", "accepted: distribution: normal"))
+            return INVALID
         else:
             error = error._replace(**taken)
         of_parts |= {figure: evidence(part, figure) for figure in taken}

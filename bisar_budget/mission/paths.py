@@ -279,6 +279,8 @@ def _by_accuracy(
         )
     except PathFileError as unusable:
         raise _UnusablePathError(key, _of_file(file, unusable)) from None
+    if error.distribution != "normal" and error.covariance is None and None in (error.position, error.velocity):
+        raise _UnusablePathError(key, Problem("states one sigma", "accepted: motion_error.distribution: normal"))
     source = f"accuracy file {file}"
     for kind, unit in (("position", "m"), ("velocity", "m/s")):
         figure = getattr(stated, kind)
