@@ -25,12 +25,13 @@ class Place(int):
     """
 
     _region: tuple[int | None, ...]
+    _text: str
 
     @classmethod
     def of(cls, event: Any) -> "Place":
         """Place of what the YAML parser saw; one for every event, since many rows point at the same key.
 
-        It keeps four numbers and lets the parser's marks go: they are half the memory of a mission.
+        It keeps four numbers and the text, and lets the parser's marks go: they are half the memory of a mission.
         """
         known: dict[str, Any] = vars(event)
         place: Place | None = known.get("place")
@@ -41,12 +42,18 @@ class Place(int):
             is_scalar = known.get("value") is not None
             ends = (end.line + 1, end.column + 1) if is_scalar else (None, None)
             place._region = (line, start.column + 1, *ends)
+            place._text = known["value"] if is_scalar else ""
         return place
 
     @property
     def region(self) -> Region:
         """Start of the value and, for a scalar, its end."""
         return Region._make(self._region)
+
+    @property
+    def text(self) -> str:
+        """What stands there, as the file has it; empty for a mapping or a list."""
+        return self._text
 
 
 def printable(text: str) -> str:
@@ -96,6 +103,7 @@ class Problem(NamedTuple):
     """Something wrong with a value, before anybody knows which file it stands in.
 
     `at` is the path of the culprit below the value that was checked. `names_value`: it says the value itself.
+    `is_of_key`: the key is wrong, whatever its value.
     """
 
     problem: str
@@ -103,6 +111,7 @@ class Problem(NamedTuple):
     hint: str = ""
     at: KeyPath = ()
     names_value: bool = False
+    is_of_key: bool = False
 
 
 class InvalidValueError(ValueError):

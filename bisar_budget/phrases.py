@@ -108,10 +108,72 @@ def no_requirement_of(metric: str) -> str:
     return f"no requirements.{metric} to hold it to"
 
 
+_SHOWN_EFFECTS = {
+    "cubic": "cubic phase of {} rad at the aperture edge",
+    "spread": "{} rad rms of phase that spreads",
+    "tone": "tone of {} rad",
+}
+_NEEDED_DECLARATIONS = {
+    "quadratic_phase_error": "has a quadratic phase (position, velocity, acceleration, imu, timing)",
+    "cubic_phase_error": "has a cubic phase (velocity, acceleration, imu, timing)",
+    "location_error": "displaces the image (position, velocity, timing)",
+    "pslr": "makes echoes (vibration.sinusoidal, oscillator.spurs)",
+    "islr": "spreads (vibration, random, oscillator)",
+}
+
+
+def _effect(kind: str, size: float) -> str:
+    return _SHOWN_EFFECTS[kind].format(f"{size:.3g}")
+
+
+@phrase
+def effect_is_not_judged(kind: str, size: float, total: float, lines: Sequence[str]) -> str:
+    """Of a row with an effect that no requirement takes."""
+    alone = f", {total:.3g} rad with the others" if total > 1.005 * size else ""
+    added = " or ".join(f"`{line}`" for line in lines)
+    return f"{_effect(kind, size)}{alone}, which no requirement judges: add {added} to requirements"
+
+
+@phrase
+def effect_is_negligible(kind: str, total: float, keys: Sequence[str]) -> str:
+    """Of a mission with a small effect that no requirement takes."""
+    return (
+        f"negligible: {_effect(kind, total)} in all, which no requirement judges ({' or '.join(keys)} would): "
+        "below a tenth of the quadratic requirement and below 0.08 rad"
+    )
+
+
+@phrase
+def nothing_judges(key: str) -> str:
+    """Of a requirement without a row that judges it."""
+    return f"nothing declared that {_NEEDED_DECLARATIONS[key]}"
+
+
+@phrase
+def place_is_not_known(row_ids: Sequence[str]) -> str:
+    """Of the location, beside errors that vary at random."""
+    return f"{', '.join(row_ids)}: random errors move the image too, and this version does not compute by how much"
+
+
 @phrase
 def not_declared_as_required(key: str) -> str:
     """Of an error that the file should declare."""
     return f"the file has no {key}, which requirements.declare asks for"
+
+
+@phrase
+def declarations_are_missing(keys: Sequence[str]) -> str:
+    """Of all errors that the file should declare."""
+    *others, last = keys
+    said = f"{', no '.join(others)} and no {last}" if others else last
+    return f"the file has no {said}, which requirements.declare asks for"
+
+
+@phrase
+def input_in_doubt(doubt: float, words: str, declared: float | None, key: str) -> str:
+    """Of a position error that is less than the doubt of the platform's path. [m]"""
+    stated = "no position error is declared" if declared is None else f"{_size(declared, 'm')} is declared"
+    return f"the path may be {_size(doubt, 'm')} off ({words}), {stated}: state it in {key}"
 
 
 # ---------------------------------------------------------------------- over the limit
@@ -140,6 +202,12 @@ def location_over(moved: float | None, limit: float, equation: str) -> str:
     """Of one error; None: there is no image of it. [m]"""
     where = "out of sight" if moved is None else f"by {format_quantity(moved, 'm')}"
     return f"moves the image {where}, {format_limit(limit, 'm')} allowed ({equation})"
+
+
+@phrase
+def beyond_the_image(end: float, unit: str) -> str:
+    """Of one error that is larger than any with an image."""
+    return f"the image ends at {format_limit(end, unit)}: no ground point has the range history of a larger error"
 
 
 @phrase
@@ -212,6 +280,21 @@ def other_model_allows(model: str, limit: float, unit: str) -> str:
 def other_model_spreads(model: str, level_db: float) -> str:
     """Of noise."""
     return f"the {model} model says fail: it spreads {_level(level_db)}"
+
+
+@phrase
+def published_model_does_not_hold(
+    row_id: str, published: float | None, full: float | None, unit: str, others: int
+) -> str:
+    """Of a mission that the published model judges; None: no limit. How many other errors it does not hold of."""
+    by_published, by_full = (
+        "without limit" if size is None else format_limit(size, unit) for size in (published, full)
+    )
+    text = f"the published model does not hold here: it allows {row_id} {by_published}, the full model {by_full}"
+    if not others:
+        return text
+    more = "1 other declared error is" if others == 1 else f"{others} other declared errors are"
+    return f"{text}; {more} over 5 % apart too"
 
 
 @phrase
@@ -483,6 +566,13 @@ def echoes_over(level_db: float, limit_db: float) -> str:
 
 
 @phrase
+def echoes_together_over(level_db: float, limit_db: float, row_id: str, count: int) -> str:
+    """Of all tones."""
+    others = f", with {count - 1} near it" if count > 1 else ""
+    return f"echoes of {_level(level_db)}, {_level(limit_db)} allowed; largest: {row_id}{others}"
+
+
+@phrase
 def echoes_on_the_mainlobe(cycles: float, least: float) -> str:
     """Of a slow tone."""
     return f"{cycles:.3g} cycles per aperture: below {least:g} its echoes lie on the mainlobe"
@@ -615,6 +705,12 @@ def optimistic_limit_with_autofocus(shown: str) -> str:
 def images_formed(conditions: str) -> str:
     """Of a mission with images."""
     return f"images: {conditions}"
+
+
+@phrase
+def overrides_a_part(key: str, text: str, part: str) -> str:
+    """Of a figure of a part that the file replaces; of its rows and of a mission."""
+    return f"{key} stands in place of {text} of {part}"
 
 
 # ---------------------------------------------------------------------- the collection

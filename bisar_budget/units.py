@@ -154,6 +154,9 @@ DIMENSIONS = (
     MEMORY,
 )
 
+# By the unit that rows are in; a clock's linear term is a ratio of times.
+_OF_SI = {dimension.si: dimension for dimension in reversed(DIMENSIONS) if dimension.si} | {"s/s": RATIO}
+
 
 def parse_quantity(value: object, dimension: Dimension) -> float:
     """Read `31 km`, `9.6GHz`, `2 µrad`, `1e-12`; a bare number is SI, in decibels where the dimension is.
@@ -231,6 +234,44 @@ def format_quantity(value: float, unit: str, digits: int = 3, rounding: str = "n
     if "e" in text or (rounding == "down" and abs(float(text)) > abs(value)):
         text = _rounded(value, digits, rounding)
     return text + suffix
+
+
+def given_unit(text: str, unit: str) -> str:
+    """Unit that a text states its number in, as the tables of units have it.
+
+    Empty where it is no quantity of the dimension of `unit`, the SI one, or states none.
+    """
+    match = _NUMBER.match(text.strip()) if len(text) <= _MAX_TEXT else None
+    dimension = _OF_SI.get(unit)
+    if match is None or dimension is None:
+        return ""
+    given = text.strip()[match.end() :].lstrip()
+    given = given if given in dimension.scales else normal_unit(given)
+    return given if given in dimension.scales else ""
+
+
+def format_in(value: float, unit: str, given: str, digits: int = 3, rounding: str = "nearest") -> str:
+    """Write an SI value in a unit of the same dimension: 349 µrad is `0.02 deg` where the file speaks of degrees.
+
+    Without a unit, as `format_quantity` does. What takes more than six digits, or zeros, has a power of ten.
+    """
+    if not given or unit == "dB" or not math.isfinite(value):
+        return format_quantity(value, unit, digits, rounding)
+    factor, divisor = _OF_SI[unit].scales[given]
+    number = value * divisor / factor
+    text = _rounded(number, digits, rounding) if number else "0"
+    mantissa, _, power = text.partition("e")
+    text = f"{mantissa}e{int(power)}" if power else text
+    return text + _pretty(given)
+
+
+@cache
+def _pretty(given: str) -> str:
+    """Write a unit of the tables behind a number: `um` is µm, `m/s^2` m/s², `deg/sqrt(h)` deg/√h."""
+    text = given.replace("^2", "²").replace("^3", "³").replace("^4", "⁴").replace("°", "deg")
+    text = re.sub(r"sqrt\((\w+)\)", r"√\1", text)
+    text = re.sub(r"^u(?=m|g|s|rad)", "µ", text)
+    return text.removeprefix("1") if text.startswith(("1/", "/")) else f" {text}"
 
 
 def format_limit(limit: float, unit: str) -> str:

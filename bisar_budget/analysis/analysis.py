@@ -26,8 +26,8 @@ class Analysis:
     """One mission, analysed once.
 
     `is_brief` leaves out what a terminal does not show: allowables of errors that nobody declared, and of the model
-    that does not gate. `is_bare` leaves out how far one autofocus correction serves the scene. Nothing is judged by
-    them.
+    that does not gate. `is_bare` leaves out how far one autofocus correction serves the scene, and whether the
+    published model holds. Nothing is judged by them.
     """
 
     mission: Mission
@@ -72,12 +72,11 @@ class Analysis:
     def own_phases(self, model: str) -> list[OwnPhase]:
         """Phases of what displaces nothing: slow vibrations, and the declared errors of sensors and clocks."""
         found = list(self.slow)
+        factor = self.mission.allocation.coverage_factor
         for error in self.random:
             if error.declared is not None:
-                effect = error.effect(model)
-                found.append(
-                    OwnPhase(error.id, error.owner, effect.quadratic * error.declared, effect.cubic * error.declared)
-                )
+                quadratic, cubic = (part * error.declared for part in error.effect(model)[:2])
+                found.append(OwnPhase(error.id, error.owner, quadratic, cubic, factor))
         return found
 
     @cached_property

@@ -2,8 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 
-from bisar_budget.analysis.allocation import Allocation
+from bisar_budget.analysis.allocation import Allocation, Split
 from bisar_budget.analysis.analysis import Analysis, Model
+from bisar_budget.effects.correlation import combined_phase
 from bisar_budget.effects.effect import ErrorSource
 from bisar_budget.effects.models import Declared
 from bisar_budget.geometry import GroundVector
@@ -17,6 +18,7 @@ class Together:
 
     def __init__(self, analysis: Analysis, model: Model) -> None:
         self.model, self.groups = model, analysis.groups
+        self.allocation_rules = analysis.mission.allocation
         self.found: Mapping[str, Declared] = analysis.declared(model)
         self.stated = analysis.stated
         self.motion = [source for source in self.stated if source.is_motion]
@@ -39,6 +41,29 @@ class Together:
     def all_cubics(self) -> Phases:
         """Cubic phases of motion, the clock, slow vibrations and sensors. [rad]"""
         return [*self.cubics(), *((one.row_id, one.cubic_rad) for one in self.own)]
+
+    def cubic_without_coverage(self, split: Split, owner: str) -> float:
+        """Cubic phase of what counts against an owner's share, at the declared sigmas; all, for the mission. [rad]
+
+        Added with `combine: sum`, else by root-sum-square: powers add.
+        """
+        factor = self.allocation_rules.coverage_factor
+        found = [
+            (source.id, self.found[source.id].cubic / (factor if source.is_covered else 1.0))
+            for source in self.motion
+            if owner == "mission" or split.includes(source.owner, owner)
+        ]
+        found += [
+            (one.row_id, one.cubic_rad / one.coverage)
+            for one in self.own
+            if owner == "mission" or split.includes(one.owner, owner)
+        ]
+        return combined_phase(found, self.rule_of_all, self.groups)
+
+    @property
+    def rule_of_all(self) -> str:
+        """Rule by which all declared errors add up: the mission's, and root-sum-square where each stands alone."""
+        return "rss" if self.allocation_rules.combine == "each" else self.allocation_rules.combine
 
     def cubics(self) -> Phases:
         """Cubic phase of each error that moves something, signed. [rad]"""

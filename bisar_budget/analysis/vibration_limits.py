@@ -26,6 +26,8 @@ from bisar_budget.effects.models import CUBIC, QUADRATIC
 from bisar_budget.effects.slow_vibration import cubic_part, quadratic_part
 from bisar_budget.mission.model import Mission
 
+LARGEST_ECHO = 2.0  # rad; beyond, echoes are above the response
+
 
 class VibrationLimits(NamedTuple):
     """What one platform may have, by the paper's rule and from first principles, 0 to peak or rms. [m]"""
@@ -82,6 +84,19 @@ def vibration_limits(mission: Mission, allocation: Allocation, metric: str) -> d
             published, evaluators.motion_of_phase(wavelength, all_of_it * part(split, name))
         )
     return found
+
+
+def tone_limits(mission: Mission, allocation: Allocation) -> tuple[str, dict[str, VibrationLimits]]:
+    """Requirement that holds tones, and the limits of each platform by it; empty where none does.
+
+    Without PSLR it is ISLR: a tone of peak phase φ spreads φ²/2.
+    """
+    needs = mission.requirements
+    if needs.pslr is not None or needs.islr is None:
+        return "pslr", vibration_limits(mission, allocation, "pslr")
+    rms = vibration_limits(mission, allocation, "islr")
+    root = math.sqrt(2)
+    return "islr", {name: VibrationLimits(root * one.published, root * one.full) for name, one in rms.items()}
 
 
 def amplitude_share(split: Split, name: str) -> float:

@@ -11,6 +11,7 @@ from functools import partial
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from bisar_budget.budget.check import check_mission
+from bisar_budget.budget.overrides import NOTHING_OUTSIDE, Outside
 from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.findings.mission import MissionFindings, UnusableMission
 from bisar_budget.mission.load import load_mission
@@ -52,6 +53,7 @@ def check_files(
     is_brief: bool = False,
     drawn: Draws | None = None,
     changes: Sequence[SetValue] = (),
+    outside: Outside = NOTHING_OUTSIDE,
 ) -> list[Kept]:
     """Check files, in their order; many are shared out between the cores.
 
@@ -71,13 +73,17 @@ def check_files(
         Of a Monte Carlo; None: no draws.
     changes : sequence of SetValue
         Values in place of each file's.
+    outside : Outside
+        What else from outside the files bears on their verdicts.
 
     Returns
     -------
     list
         What `keep` made of each.
     """
-    one = partial(_kept, today=today, model=model, keep=keep, is_brief=is_brief, drawn=drawn, changes=changes)
+    one = partial(
+        _kept, today=today, model=model, keep=keep, is_brief=is_brief, drawn=drawn, changes=changes, outside=outside
+    )
     count = cores()
     is_shared = drawn is not None and drawn.share is not None
     if len(files) < MANY or count == 1 or "-" in files or keep is whole or is_shared:
@@ -114,9 +120,10 @@ def _kept(
     is_brief: bool,
     drawn: Draws | None,
     changes: Sequence[SetValue],
+    outside: Outside,
 ) -> Kept:
     try:
-        found = check_mission(load_mission(file, model, changes), today, is_brief=is_brief)
+        found = check_mission(load_mission(file, model, changes), today, is_brief=is_brief, outside=outside)
     except MissionError as error:
         return keep(UnusableMission(file=file, faults=error.faults, data=error.data))
     if drawn is not None:

@@ -11,17 +11,28 @@ from typing import NamedTuple
 from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.analysis.spread import islr_db, mainlobe_energy, shown_islr_db, spread_limit, spread_powers
-from bisar_budget.analysis.vibration_limits import vibration_limits
+from bisar_budget.analysis.spread import (
+    CUBIC_POWER,
+    islr_db,
+    mainlobe_energy,
+    shown_islr_db,
+    spread_limit,
+    spread_powers,
+    tones,
+)
+from bisar_budget.analysis.vibration_limits import LARGEST_ECHO, echo_level, tone_limits
 from bisar_budget.budget.judgement import judged
 from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.budget.vibration_rows import ECHO_CYCLES
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.effects.clocks import spurs_of
+from bisar_budget.effects.echoes import near_lines, worst_phases
+from bisar_budget.effects.effect import override_notes
 from bisar_budget.effects.models import CUBIC, QUADRATIC
 from bisar_budget.effects.random_errors import RandomEffect, RandomError
 from bisar_budget.effects.subject import subject
 from bisar_budget.findings.row import Row
+from bisar_budget.mission.instruments import Oscillator
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import NOTHING, Note
 
@@ -48,6 +59,14 @@ def sizes_at(effect: RandomEffect, limits: Limits) -> dict[str, float]:
     return {name: limit / per_unit for name, per_unit, limit in parts if per_unit and limit is not None}
 
 
+def held_effect(mission: Mission, effect: RandomEffect) -> RandomEffect:
+    """An effect as requirements hold it: a cubic phase that none takes is power that ISLR holds, at one sigma."""
+    if mission.requirements.cubic_phase_error is not None:
+        return effect
+    cubic = effect.cubic / mission.allocation.coverage_factor
+    return effect._replace(spread=math.sqrt(effect.spread**2 + CUBIC_POWER * cubic**2))
+
+
 def random_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterator[Row]:
     """Rows of every error of a sensor or a clock, declared or not."""
     other = "full" if gating == "published" else "published"
@@ -58,8 +77,9 @@ def random_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iter
 def _row(analysis: Analysis, error: RandomError, gating: str, other: str, allocation: Allocation) -> Row:
     mission, gain, size = analysis.mission, allocation.autofocus_gain, error.declared
     mine, theirs = error.effect(gating), error.effect(other)
+    held, held_by_other = held_effect(mission, mine), held_effect(mission, theirs)
     limits, others = (limits_for(mission, allocation, error.owner, model, gain) for model in (gating, other))
-    sizes = sizes_at(mine, limits)
+    sizes = sizes_at(held, limits)
     allowable = min(sizes.values(), default=None)
     binding = min(sizes, key=lambda name: sizes[name]) if sizes else None
     qpe = cubic = None
@@ -70,7 +90,7 @@ def _row(analysis: Analysis, error: RandomError, gating: str, other: str, alloca
             info = phrases.aggregate_decides(mission.allocation.combine)
         elif allowable is not None and size > allowable:
             over = _over(mission, error, gating, limits, binding or "", allocation).then(error.extrapolated)
-        doubt = _doubt(mission, other, theirs, others, size)
+        doubt = _doubt(mission, other, held_by_other, others, size)
     by_model = (mine, theirs) if gating == "published" else (theirs, mine)
     row = judged(
         mission,
@@ -133,7 +153,7 @@ def in_decibel(row: Row) -> Row:
 def _over(
     mission: Mission, error: RandomError, model: str, limits: Limits, binding: str, allocation: Allocation
 ) -> Note:
-    effect, size = error.effect(model), error.declared or 0.0
+    effect, size = held_effect(mission, error.effect(model)), error.declared or 0.0
     if binding == CUBIC:
         return phrases.cubic_phase_over(effect.cubic * size, limits.cubic or 0.0)
     if binding == ISLR:
@@ -167,25 +187,26 @@ def _doubt(mission: Mission, other: str, effect: RandomEffect, limits: Limits, s
 def spur_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterator[Row]:
     """Rows of the oscillators' tones, which make paired echoes as vibrations do. [dB of an echo to the response]"""
     mission = analysis.mission
-    limits = vibration_limits(mission, allocation, "pslr")
+    metric, limits = tone_limits(mission, allocation)
     other = "full" if gating == "published" else "published"
     k = 2 * math.pi / mission.radar.wavelength
     for spur in spurs_of(mission):
+        oscillator: Oscillator = getattr(mission.platforms, spur.name).oscillator
         cycles = spur.frequency * mission.collection.aperture_time
         allowed = limits.get(spur.name)
         over = doubt = NOTHING
-        not_evaluated = missing = NOTHING if allowed else phrases.no_requirement_of("pslr")
+        not_evaluated, missing = NOTHING, NOTHING if allowed else phrases.no_requirement_of("pslr")
         if allowed is not None:
             limit, by_other = k * allowed.by(gating), k * allowed.by(other)
             over = phrases.echoes_over(_echo(spur.phase), _echo(limit))
             if spur.phase > by_other * (1 + UTILIZATION_TOLERANCE):
                 doubt = phrases.other_model_allows(other, _echo(by_other), "dB")
-            if cycles < ECHO_CYCLES:
+            if metric == "pslr" and cycles < ECHO_CYCLES:
                 not_evaluated = phrases.echoes_on_the_mainlobe(cycles, ECHO_CYCLES)
         row = judged(
             mission,
             subject=subject(spur.name, "oscillator", "spur", entry=spur.entry),
-            metric="pslr",
+            metric=metric,
             unit="dB",
             declared=spur.phase / 2,  # amplitude of an echo over that of the response
             allowable=None if allowed is None else limit / 2,
@@ -193,13 +214,18 @@ def spur_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterat
             equation="first principles" if gating == "full" else "Section V, sinusoidal",
             no_limit=missing,
             not_evaluated=not_evaluated,
+            info=missing,
             over=over,
             doubt=doubt,
             limits=(None, None) if allowed is None else (k * allowed.published / 2, k * allowed.full / 2),
-            evidence=getattr(mission.platforms, spur.name).oscillator.source,
-            notes=(phrases.tone_lies(spur.frequency, cycles),),
+            evidence=oscillator.source,
+            notes=(
+                phrases.tone_lies(spur.frequency, cycles),
+                *override_notes(spur.name, oscillator.overridden, "frequency"),
+            ),
         )
-        yield in_decibel(row._replace(model=gating))
+        row = in_decibel(row._replace(model=gating))
+        yield row._replace(islr_db=shown_islr_db(mission, spur.phase**2 / 2)) if metric == ISLR else row
 
 
 def _echo(phase: float) -> float:
@@ -209,19 +235,20 @@ def _echo(phase: float) -> float:
 
 # ---------------------------------------------------------------------- powers together
 def islr_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterator[Row]:
-    """What all independent noise spreads, for each platform and the mission; none where only vibration does."""
+    """What spreads: of the mission where ISLR is required, and of each owner unless only wideband vibration does."""
     mission = analysis.mission
-    if mission.requirements.islr is None or not any(error.declared is not None for error in analysis.random):
+    if mission.requirements.islr is None:
         return
     owners = ["transmitter", "receiver", "mission"]
     if allocation.islr.clock is not None:
         owners.insert(2, "clock")
     other = "full" if gating == "published" else "published"
-    level = _levels(
-        mission, gating
-    )  # every level of a row by one rule: what is required of the whole reads as required
-    for owner in owners:
-        members = spread_powers(analysis, allocation, owner, gating)
+    level = _levels(mission, gating)  # by one rule: what is required of the whole reads as required
+    powers = {owner: spread_powers(analysis, allocation, owner, gating) for owner in owners}
+    is_vibration_alone = all(row_id.endswith("vibration.wideband") for row_id, _ in powers["mission"])
+    for owner, members in powers.items():
+        if owner != "mission" and is_vibration_alone:  # its own row holds it to the platform's share
+            continue
         variance = math.fsum(power for _, power in members)
         limit, by_other = (spread_limit(mission, allocation, owner, model) or 0.0 for model in (gating, other))
         rms = math.sqrt(variance)
@@ -245,6 +272,46 @@ def islr_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterat
             limits=(limit, by_other) if gating == "published" else (by_other, limit),
         )
         yield _as_islr(row, shown_islr_db(mission, variance), gating, level)
+
+
+def pslr_row(mission: Mission, gating: str) -> Iterator[Row]:
+    """The highest echo that all tones make together, in the worst of their phases; where PSLR is required.
+
+    From first principles by both models: the shares of the paper's rule stay 3 dB inside it. Tones at most 2.5 cycles
+    per aperture apart raise each other's echo, whoever makes them.
+    """
+    required = mission.requirements.pslr
+    if required is None:
+        return
+    found = tones(mission)
+    over = NOTHING
+    highest, allowed = 0.0, 10 ** (required / 20)
+    for group in (*((index,) for index in range(len(found))), *near_lines([one.cycles for one in found])):
+        near = [found[index] for index in group]
+        phase = worst_phases([one.phase for one in near], [one.cycles for one in near]).amplitude
+        level = echo_level(phase) if phase <= LARGEST_ECHO else phase / 2
+        if level > max(highest, allowed):
+            largest = max(near, key=lambda one: one.phase)
+            over = phrases.echoes_together_over(_db(level), required, largest.subject.id, len(near))
+        highest = max(highest, level)
+    row = judged(
+        mission,
+        subject=subject("mission", "pslr"),
+        metric="pslr",
+        unit="dB",
+        declared=highest if found else None,
+        allowable=allowed,
+        path=("requirements", "pslr"),
+        equation="first principles",
+        over=over,
+        limits=(allowed, allowed),
+    )
+    yield in_decibel(row._replace(binding_requirement="pslr", model=gating))
+
+
+def _db(amplitude: float) -> float:
+    """Level of an amplitude over that of the response. [dB]"""
+    return 20 * math.log10(amplitude)
 
 
 def _as_islr(row: Row, shown: float | None, gating: str, of_rms: Callable[[float], float]) -> Row:

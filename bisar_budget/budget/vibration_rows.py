@@ -8,7 +8,14 @@ from typing import NamedTuple
 from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.spread import shown_islr_db
-from bisar_budget.analysis.vibration_limits import VibrationLimits, echo_level, slow_limits, vibration_limits
+from bisar_budget.analysis.vibration_limits import (
+    LARGEST_ECHO,
+    VibrationLimits,
+    echo_level,
+    slow_limits,
+    tone_limits,
+    vibration_limits,
+)
 from bisar_budget.budget.judgement import judged
 from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.constants import UTILIZATION_TOLERANCE
@@ -27,8 +34,6 @@ from bisar_budget.units import format_quantity
 
 ECHO_CYCLES = 3.0  # per aperture; below, echoes lie beside the mainlobe and the motion is a quadratic phase as well
 
-_LARGEST = 2.0  # rad; beyond, echoes are above the response
-
 
 class VibrationCase(NamedTuple):
     """One row to be judged: a line, lines near each other, or the noise of a platform.
@@ -45,7 +50,6 @@ class VibrationCase(NamedTuple):
     path: KeyPath
     equation: str
     missing: Note
-    not_evaluated: Note
     doubt: Note
     over: Note
     evidence: str | None
@@ -58,7 +62,8 @@ class VibrationCase(NamedTuple):
 def vibration_rows(mission: Mission, allocation: Allocation, model: str) -> Iterator[Row]:
     """Every row about vibration, declared or not, in the order of the contract, by one of the two models."""
     mission = mission._replace(allocation=mission.allocation._replace(model=model))
-    sinusoidal, wideband = (vibration_limits(mission, allocation, metric) for metric in ("pslr", "islr"))
+    metric, sinusoidal = tone_limits(mission, allocation)
+    wideband = vibration_limits(mission, allocation, "islr")
     T = mission.collection.aperture_time
     lines = {name: lines_of(mission, name) for name in PLATFORMS}
     joint = _of_both_platforms(mission, lines)
@@ -69,11 +74,22 @@ def vibration_rows(mission: Mission, allocation: Allocation, model: str) -> Iter
                 yield _slow_row(mission, allocation, name, index, line)
             else:
                 both = joint.get((name, index), _Together())
-                yield _row(mission, _line(mission, allocation, sinusoidal.get(name), name, index, line, both), model)
-        for index, members in enumerate(near_lines([line.frequency * T for line in lines[name]])):
+                case = _line(mission, allocation, sinusoidal.get(name), name, index, line, both)
+                yield _row(mission, case if metric == "pslr" else _as_spread(mission, case), model)
+        near_each_other = near_lines([line.frequency * T for line in lines[name]]) if metric == "pslr" else ()
+        for index, members in enumerate(near_each_other):
             near = [lines[name][member] for member in members]
             yield _row(mission, _together(mission, sinusoidal.get(name), name, index, near, members), model)
         yield _row(mission, _noise(mission, wideband.get(name), name, error), model)
+
+
+def _as_spread(mission: Mission, case: VibrationCase) -> VibrationCase:
+    """A line where ISLR holds it: the power φ²/2 that its echoes take."""
+    over = phrases.share_of_power_over("islr", case.equation)
+    if case.declared is None:
+        return case._replace(metric="islr", over=over)
+    phase = 2 * math.pi * case.declared / mission.radar.wavelength
+    return case._replace(metric="islr", over=over, islr_db=shown_islr_db(mission, phase**2 / 2))
 
 
 def _slow_row(mission: Mission, allocation: Allocation, name: str, index: int, line: Line) -> Row:
@@ -128,8 +144,7 @@ def _row(mission: Mission, case: VibrationCase, model: str) -> Row:
         path=case.path,
         equation=case.equation,
         no_limit=case.missing,
-        not_evaluated=case.not_evaluated,
-        is_declared=case.declared is not None,
+        info=case.missing,
         over=case.over,
         doubt=case.doubt,
         limits=allowed or (None, None),
@@ -158,9 +173,7 @@ def _case(
     if allowed is None and error.source is None:
         return case
     missing = NOTHING if allowed else case.missing
-    return case._replace(
-        limits=allowed, missing=missing, not_evaluated=missing, evidence=error.source, notes=_margin(allowed)
-    )
+    return case._replace(limits=allowed, missing=missing, evidence=error.source, notes=_margin(allowed))
 
 
 @cache
@@ -177,7 +190,6 @@ def _blank(what_it_is: Subject, metric: str, path: KeyPath, model: str) -> Vibra
         path=("platforms", what_it_is.owner, "motion_error", "vibration", kind, *path),
         equation=rule,
         missing=missing,
-        not_evaluated=missing,
         doubt=NOTHING,
         over=phrases.share_of_power_over(metric, rule),
         evidence=None,
@@ -288,9 +300,9 @@ def _of_both_platforms(mission: Mission, lines: dict[str, list[Line]]) -> dict[t
         phase = 2 * math.pi * amplitude / mission.radar.wavelength
         if not phase:
             continue
-        level = 20 * math.log10(echo_level(min(phase, _LARGEST)))
+        level = 20 * math.log10(echo_level(min(phase, LARGEST_ECHO)))
         for (name, index), _ in members:
             (other,) = (platform for platform in PLATFORMS if platform != name)
-            note = phrases.both_platforms_vibrate(other, NEAR_CYCLES, level, phase > _LARGEST, requirement)
+            note = phrases.both_platforms_vibrate(other, NEAR_CYCLES, level, phase > LARGEST_ECHO, requirement)
             found[name, index] = _Together((note,), note if level > requirement + 1e-6 else NOTHING)
     return found

@@ -12,13 +12,13 @@ import click
 from click.core import ParameterSource
 
 from bisar_budget import __version__
+from bisar_budget.cli.outside import day, day_origin, origin_of, outside
 from bisar_budget.cli.streams import (
     EXIT_BROKEN,
     FILE,
     SET,
     ParamType,
     complain,
-    day_of_run,
     deliver,
     expand,
     is_terminal,
@@ -33,6 +33,7 @@ from bisar_budget.report import FORMATS
 
 if TYPE_CHECKING:
     from bisar_budget.budget.fleet import Draws
+    from bisar_budget.budget.overrides import Outside
     from bisar_budget.faults import SetValue
     from bisar_budget.findings.mission import MissionFindings, Option, Report, UnusableMission
     from bisar_budget.report import Style
@@ -134,12 +135,12 @@ class _Draws(ParamType[int]):
 @click.option(
     "--strict/--no-strict",
     envvar="BISAR_BUDGET_STRICT",
-    help="Fail on warnings and on rows that could not be evaluated.",
+    help="Fail on warnings too.",
 )
 @click.option(
     "--exit-zero/--no-exit-zero",
     envvar="BISAR_BUDGET_EXIT_ZERO",
-    help="Exit with 0 even if a requirement is broken.",
+    help="Exit with 0 even if a requirement is broken or not judged; every report says it.",
 )
 @click.option(
     "--model",
@@ -231,8 +232,8 @@ def check(
 ) -> None:
     """Check mission files against their requirements.
 
-    MISSION is a YAML file, a glob pattern, or - for standard input. Exit code: 0 all met,
-    1 a requirement is broken, 2 wrong usage or an unusable mission file, 3 a fault of the tool.
+    MISSION is a YAML file, a glob pattern, or - for standard input. Exit code: 0 every requirement is judged and
+    met, 1 a requirement is broken or not judged, 2 wrong usage or an unusable mission file, 3 a fault of the tool.
 
     Defaults of --format, --report, --strict, --exit-zero, --model, --monte-carlo, --seed and --color:
     [tool.bisar-budget] in the nearest pyproject.toml, and over it the variables BISAR_BUDGET_FORMAT and so on.
@@ -258,14 +259,14 @@ def check(
                 "--explain writes text; it cannot be combined with --format, --report, --monte-carlo, --scheduler or "
                 "--sweep."
             )
-        _explain(files, explain, today.date() if today else day_of_run(), model, output, changes)
+        _explain(files, explain, day(today), model, output, changes, outside(today))
         return
     if swept:
         from bisar_budget.cli.studies import check_options
 
         check_options(swept, [format_name, *(name for _, name in written)])
     illustrated = any(FORMATS[name].is_illustrated for name in (format_name, *(name for _, name in written)))
-    day = today.date() if today else day_of_run()
+    judged_on, from_outside = day(today), outside(today)
     use_color = color == "always" or (color == "auto" and output is None and wants_color())
     verbosity = -1 if quiet else 1 if verbose else 0
     style = Style(color=use_color, verbosity=verbosity, root=_repository(), all_rows=all_rows, detail=detail)
@@ -275,7 +276,7 @@ def check(
 
         is_brief = format_name == "text" and verbosity <= 0 and not all_rows
         keep = partial(piece, format_name=format_name, style=style)
-        pieces = check_files(files, day, model, keep, is_brief=is_brief, changes=changes)
+        pieces = check_files(files, judged_on, model, keep, is_brief=is_brief, changes=changes, outside=from_outside)
         if says_faults:
             _say_faults(piece.unusable for piece in pieces)
         deliver(joined(format_name, pieces, __version__, style), output, format_name)
@@ -284,13 +285,13 @@ def check(
         from bisar_budget.cli.draws import drawn_by
 
         with drawn_by(scheduler, draws, seed, len(files)) as drawn:
-            report = check_all(files, day, model, verifying, illustrated, drawn, changes)
-        judged_on = _given_day(today) or (day if _has_waivers(report.missions) else None)
+            report = check_all(files, judged_on, model, verifying, illustrated, drawn, changes, from_outside)
+        shown_day = _given_day(today) or (judged_on if _has_waivers(report.missions) else None)
         if swept:
             from bisar_budget.cli.studies import with_studies
 
-            report = report._replace(missions=tuple(with_studies(report.missions, swept, model, day)))
-        report = report._replace(options=tuple(_options(judged_on)), day=judged_on)
+            report = report._replace(missions=tuple(with_studies(report.missions, swept, model, judged_on)))
+        report = report._replace(options=tuple(_options(shown_day, today)), day=shown_day)
         if says_faults:
             _say_faults(report.missions)
         for path, its_format in written:
@@ -308,29 +309,22 @@ def _has_waivers(missions: "Iterable[MissionFindings | UnusableMission]") -> boo
     from bisar_budget.findings.mission import MissionFindings
 
     usable = [mission for mission in missions if isinstance(mission, MissionFindings)]
-    return any(row.waivers for mission in usable for row in mission.rows)
+    return any(one.name == "--date" for mission in usable for one in mission.overrides)
 
 
-def _options(judged_on: date | None) -> "Iterator[Option]":
+def _options(judged_on: date | None, today: datetime | None) -> "Iterator[Option]":
     """Say what the options that bear on the result are, and where each came from."""
     from bisar_budget.findings.mission import Option
 
     context = click.get_current_context()
-    origins = {
-        ParameterSource.COMMANDLINE: "command line",
-        ParameterSource.DEFAULT_MAP: "pyproject.toml",
-        ParameterSource.DEFAULT: "default",
-    }
     for parameter in context.command.params:
         name, value = str(parameter.name), context.params[str(parameter.name)]
-        source = context.get_parameter_source(name)
-        origin = origins.get(source, f"environment, {parameter.envvar}") if source else "default"
+        origin = origin_of(parameter)
         if name == "model":
             yield Option("--model", value or "as each file says", origin)
         elif name == "today":
             if value is None and judged_on is not None:
-                by_environment = os.environ.get("SOURCE_DATE_EPOCH")
-                origin = "environment, SOURCE_DATE_EPOCH" if by_environment else "the day of the run"
+                origin = day_origin(today)
             unrecorded = "the day of the run (not recorded: no waiver depends on it)"
             yield Option("--date", judged_on.isoformat() if judged_on else unrecorded, origin)
         elif name == "changes":
@@ -351,7 +345,7 @@ def _given_day(today: datetime | None) -> date | None:
     """The day that the command line or the environment gives; a report has no other, so as to be reproducible."""
     if today is not None:
         return today.date()
-    return day_of_run() if os.environ.get("SOURCE_DATE_EPOCH") else None
+    return day(today) if os.environ.get("SOURCE_DATE_EPOCH") else None
 
 
 def check_all(
@@ -362,16 +356,21 @@ def check_all(
     illustrated: bool = False,
     drawn: "Draws | None" = None,
     changes: "Sequence[SetValue]" = (),
+    from_outside: "Outside | None" = None,
 ) -> "Report":
     """Check every file; `verifying` adds verdicts of images. `illustrated` keeps the analyses, and the images.
 
-    `drawn` are the draws of a Monte Carlo, `changes` are values in place of the files'.
+    `drawn` are the draws of a Monte Carlo, `changes` are values in place of the files', and `from_outside` is what
+    else bears on the verdicts.
     """
     from bisar_budget.budget.fleet import check_files, whole, without_analysis
+    from bisar_budget.budget.overrides import NOTHING_OUTSIDE
     from bisar_budget.findings.mission import Report
 
     keep = whole if verifying or illustrated else without_analysis
-    missions = check_files(files, today, model, keep, drawn=drawn, changes=changes)
+    missions = check_files(
+        files, today, model, keep, drawn=drawn, changes=changes, outside=from_outside or NOTHING_OUTSIDE
+    )
     if verifying:
         missions = _with_images(missions, illustrated)
     return Report(version=__version__, missions=tuple(missions))
@@ -408,19 +407,21 @@ def _explain(
     model: str | None,
     output: str | None,
     changes: "Sequence[SetValue]",
+    from_outside: "Outside",
 ) -> None:
     """Explain a row in every mission that has it."""
     from bisar_budget.budget.check import check_mission
     from bisar_budget.mission.readers import did_you_mean
     from bisar_budget.report.explain.explanation import explain
+    from bisar_budget.report.words.requirements import overrides_lines
 
     texts: list[str] = []
     known: dict[str, None] = {}
     for mission in load_all(files, model, changes):
-        found = check_mission(mission, today)
+        found = check_mission(mission, today, outside=from_outside)
         known |= dict.fromkeys(row.id for row in found.rows)
         if any(row.id == row_id for row in found.rows):
-            texts.append(explain(mission, found, row_id))
+            texts.append(explain(mission, found, row_id) + "".join(f"{line}\n" for line in overrides_lines(found)))
     if not texts:
         hint = did_you_mean(row_id, tuple(known))
         raise click.UsageError(f"--explain {printable(row_id)}: no row has this id. {hint or 'A check lists them.'}")

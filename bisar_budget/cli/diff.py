@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from bisar_budget import __version__
+from bisar_budget.cli.outside import day, outside
 from bisar_budget.cli.streams import (
     DATE,
     EXIT_BROKEN,
@@ -16,7 +17,6 @@ from bisar_budget.cli.streams import (
     OUTPUT,
     ParamType,
     complain,
-    day_of_run,
     deliver,
     expand,
     fail,
@@ -105,7 +105,7 @@ def diff(
         )
     files = expand(files) if is_with_itself else files
     spare(files, [output])
-    day = today.date() if today else day_of_run()
+    judged_on, from_outside = day(today), outside(today)
     pairs = [(file, file) for file in files] if is_with_itself else [(files[0], files[1])]
     compared = []
     for before, after in pairs:
@@ -118,7 +118,8 @@ def diff(
             for line in error.lines():
                 complain(line)
             sys.exit(EXIT_USAGE)
-        compared.append(compare(check_mission(old, day), check_mission(new, day)))
+        judged = [check_mission(mission, judged_on, outside=from_outside) for mission in (old, new)]
+        compared.append(compare(*judged))
     if format_name == "json":
         text = difference.as_json(__version__, compared, tolerated)
     else:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from bisar_budget import __version__
+from bisar_budget.cli.outside import day, outside
 from bisar_budget.cli.streams import (
     DATE,
     FILE,
@@ -15,7 +16,6 @@ from bisar_budget.cli.streams import (
     OUTPUT,
     SET,
     TEXT_OR_JSON,
-    day_of_run,
     deliver,
     expand,
     fail,
@@ -57,6 +57,7 @@ def sensitivity(
     smaller slant range. With balanced shares a second table says what relaxing an error costs the others. Exit code:
     0, or 2 for wrong usage or an unusable mission file.
     """
+    from bisar_budget.budget.overrides import overrides
     from bisar_budget.design import sensitivity as asking
     from bisar_budget.design.quantities import QuestionError
     from bisar_budget.report import Style
@@ -69,12 +70,13 @@ def sensitivity(
     if plot is not None and len(files) > 1:
         raise click.UsageError("--plot draws one mission.")
     spare(files, [output, plot])
-    day = today.date() if today else day_of_run()
+    judged_on, from_outside = day(today), outside(today)
     found = []
     for mission in load_all(files, model, changes):
         try:
             with watched_checks(mission.name) as progress:
-                found.append(asking.sensitivity(mission, row=row, model=model, today=day, progress=progress))
+                asked = asking.sensitivity(mission, row=row, model=model, today=judged_on, progress=progress)
+            found.append(asked._replace(overrides=overrides(mission, from_outside, judged_on)))
         except QuestionError as error:
             fail(f"{mission.file}: {error}")
     if plot is not None:

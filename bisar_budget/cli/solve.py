@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from bisar_budget import __version__
+from bisar_budget.cli.outside import day, outside
 from bisar_budget.cli.streams import (
     DATE,
     EXIT_BROKEN,
@@ -16,7 +17,6 @@ from bisar_budget.cli.streams import (
     OUTPUT,
     SET,
     TEXT_OR_JSON,
-    day_of_run,
     deliver,
     expand,
     fail,
@@ -89,6 +89,7 @@ def solve(
     1 if no value of the range or no part complies or if the image refutes the limit (--verify), 2 for wrong usage or
     an unusable mission file.
     """
+    from bisar_budget.budget.overrides import overrides
     from bisar_budget.design import compare
     from bisar_budget.design import solve as solving
     from bisar_budget.design.quantities import QuestionError
@@ -101,19 +102,22 @@ def solve(
         raise click.UsageError(f"{option}: {key} names parts of the catalogue, which are compared one by one.")
     files = expand(missions)
     spare(files, [output])
-    day = today.date() if today else day_of_run()
+    judged_on, from_outside = day(today), outside(today)
     solved: list[Solution | Comparison] = []
     for mission in load_all(files, model, changes):
         try:
             found: Solution | Comparison
             if is_of_parts:
-                found = compare.compare_parts(mission, key, row=row, target=target, model=model, today=day)
+                found = compare.compare_parts(mission, key, row=row, target=target, model=model, today=judged_on)
             else:
                 asked: dict[str, Any] = {"between": between, "target": target, "is_scale": is_scale}
                 with watched_checks(mission.name) as progress:
-                    found = solving.solve(mission, key, **asked, row=row, model=model, today=day, progress=progress)
+                    found = solving.solve(
+                        mission, key, **asked, row=row, model=model, today=judged_on, progress=progress
+                    )
         except QuestionError as error:
             fail(f"{mission.file}: {error}")
+        found = found._replace(overrides=overrides(mission, from_outside, judged_on))
         solved.append(_imaged(mission, found, model) if is_imaged else found)
     if format_name == "json":
         text = solutions.as_json(__version__, solved)

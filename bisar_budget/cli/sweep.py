@@ -12,13 +12,13 @@ import click
 
 from bisar_budget import __version__
 from bisar_budget.cli.keeping import Keeping, keeping
+from bisar_budget.cli.outside import day, outside
 from bisar_budget.cli.streams import (
     DATE,
     FILE,
     MODEL,
     SET,
     complain,
-    day_of_run,
     deliver_parts,
     fail,
     load_all,
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from bisar_budget.design.cases import Cases
     from bisar_budget.design.swept import Part, Swept
     from bisar_budget.faults import SetValue
+    from bisar_budget.findings.requirement import Override
     from bisar_budget.mission.model import Mission
     from bisar_budget.report.drawing.trades import Gathered
 
@@ -132,6 +133,7 @@ def sweep(
     if cases_file is not None and sample is not None:
         raise click.UsageError("--sample draws from the ranges of --vary; --cases has cases of its own.")
     spare([mission, *([cases_file] if cases_file else [])], [output, plot])
+    from bisar_budget.budget.overrides import overrides
     from bisar_budget.cluster.parts_folder import PartsError
     from bisar_budget.cluster.scheduler import ClusterError
     from bisar_budget.design.cases import TableError
@@ -144,9 +146,10 @@ def sweep(
         cases = _cases(loaded, varied, cases_file, sample)
         if plot is not None:
             check_plot(cases, is_polar=is_polar)
-        day = today.date() if today else day_of_run()
+        judged_on = day(today)
+        said = overrides(loaded, outside(today), judged_on)
         with keeping(output, scheduler, is_resumed, jobs or cores()) as kept:
-            run = _Run(loaded, cases, columns, model, day, jobs or cores(), kept)
+            run = _Run(loaded, cases, columns, model, judged_on, jobs or cores(), kept, said)
             run.foresee(force)
             run.write(output, plot, plot_column, is_polar)
     except TableError as error:
@@ -202,9 +205,10 @@ class _Run:
         day: date,
         jobs: int,
         kept: Keeping | None = None,
+        overrides: "tuple[Override, ...]" = (),
     ) -> None:
         self.mission, self.cases, self.columns, self.model = mission, cases, columns, model
-        self.day, self.jobs, self.kept = day, jobs, kept
+        self.day, self.jobs, self.kept, self.overrides = day, jobs, kept, overrides
         self.done = self.by_case = self.complying = self.unevaluated = self.missing = 0
 
     def swept(self, cases: "Cases", columns: Sequence[str]) -> "Swept":
@@ -265,7 +269,7 @@ class _Run:
             columns = (*columns, plot_column)
         gathered = None
         with self._kept(columns) as swept:
-            described = Described(swept, self.cases, self.mission, __version__)
+            described = Described(swept, self.cases, self.mission, __version__, self.overrides)
             if plot is not None:
                 from bisar_budget.report.drawing.trades import Gathered
 
@@ -338,7 +342,7 @@ class _Run:
             said[0] += f" of {self.cases.count}"
         said.append(f"{self.complying} comply ({_part(self.complying, self.done)})")
         if self.unevaluated:
-            said.append(f"{self.unevaluated} of them not evaluated")
+            said.append(f"{self.unevaluated} not evaluated")
         if self.missing:
             said.append(f"{self.missing} without a mission")
         said.append(f"{_part(self.by_case, self.done)} checked one by one")

@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Sequence
+from datetime import date
 from typing import TYPE_CHECKING
 
 import click
@@ -58,12 +59,19 @@ def verify(
     each limit is formed again with its gain and refocused. Exit code: 0, or 1 if a limit is optimistic, 2
     for wrong usage, an unusable file, or a mission on whose limits no image gave a verdict.
     """
+    from bisar_budget.budget.overrides import NOTHING_OUTSIDE, overrides
     from bisar_budget.report import Style
     from bisar_budget.report.formats import verification
 
     files = expand(missions)
     spare(files, [output])
-    verified = verify_all(load_all(files, changes=changes), only, jobs)
+    loaded = load_all(files, changes=changes)
+    verified = [
+        found._replace(
+            overrides=overrides(mission._replace(waivers=()), NOTHING_OUTSIDE, date.min)
+        )  # images waive nothing
+        for mission, found in zip(loaded, verify_all(loaded, only, jobs), strict=True)
+    ]
     if format_name == "json":
         text = verification.as_json(__version__, verified)
     else:

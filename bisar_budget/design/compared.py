@@ -5,6 +5,7 @@ from typing import NamedTuple
 from bisar_budget.design.solution import Imaged
 from bisar_budget.design.variation import Standing
 from bisar_budget.faults import SetValue
+from bisar_budget.findings.requirement import Override
 
 
 class PartState(NamedTuple):
@@ -40,6 +41,7 @@ class Comparison(NamedTuple):
     `parts` has those that comply first, the smallest margin first, then the others, the nearest miss first. `kinds`
     are those that were compared, `kept` parts of other kinds that stay. `overridden` are figures that parts have and
     the file states itself. `imaged` is what images say of the part with the smallest margin, if any were formed.
+    `overrides` is what from outside the file bears on it.
     """
 
     file: str
@@ -54,6 +56,7 @@ class Comparison(NamedTuple):
     parts: tuple[PartState, ...]
     changes: tuple[SetValue, ...] = ()
     imaged: Imaged | None = None
+    overrides: tuple[Override, ...] = ()
 
     @property
     def complying(self) -> tuple[PartState, ...]:

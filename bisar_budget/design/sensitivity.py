@@ -53,7 +53,8 @@ def sensitivity(
     Returns
     -------
     Sensitivity
-        Effects as changes of utilization, 0.01 being 1 % of a limit; the largest first.
+        Effects as changes of utilization, 0.01 being 1 % of a limit. The number that has to change least to use up
+        the margin stands first, by one measure for all: parts of a number, of a radian, of a power, of a range.
 
     Raises
     ------
@@ -83,7 +84,7 @@ def sensitivity(
             unchanging.append(slope.key)
         else:
             slopes.append(slope._replace(part=_part_of(slope.key, of_parts)))
-    slopes.sort(key=lambda slope: -abs(slope.effect))
+    slopes.sort(key=lambda slope: -abs(slope.even_effect))
     balanced = is_balanced(base)
     return Sensitivity(
         file=mission.file,
@@ -183,6 +184,7 @@ class _Differences:
             unit=number.number.dimension.si,
             per=number.per,
             per_text=number.per_text,
+            measure=number.part,
             step=abs(number.step),
             difference=kind,
             change=scale * _sum(weights, [use.worst for use in uses]),

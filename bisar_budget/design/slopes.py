@@ -1,19 +1,24 @@
 """What changing each number of a mission does to its utilizations, as frozen data. Values in SI and radians."""
 
+import math
 from typing import NamedTuple
 
 from bisar_budget.design.stated import Skipped
 from bisar_budget.faults import SetValue
+from bisar_budget.findings.requirement import Override
 
 LITTLE = 1e-4  # of a utilization: less of a change is not shown
+EVEN = 0.01  # part of every number for which effects are compared
+_FAR = 1e6  # times: a number that would have to change by so much decides nothing
 
 
 class Slope(NamedTuple):
     """What one number of the file does.
 
     `text` is its value as the file has it, `value` the same in `unit`; of a covariance the factor 1 on its sigmas.
-    `per_text` says how much more of it `change` is for, `per` the same in SI, signed like the value. `change` is that
-    of the worst utilization, `row_change` that of the row that was asked for; None where there is none. Both are
+    `per_text` says how much more of it `change` is for, `per` the same in SI, signed like the value, and `measure` the
+    same by one measure for all numbers: a part of the number, of a radian, of a power, of a range. `change` is that of
+    the worst utilization, `row_change` that of the row that was asked for; None where there is none. Both are
     differences over values `step` to either side, or, where there is no mission on one side, over two steps on the
     other (`difference`: central, forward, backward). `row_below` and `row_above` have the worst utilization at the
     smaller and the larger end of the difference, in magnitude; `is_mixed` is whether the row that has it at the value
@@ -35,6 +40,7 @@ class Slope(NamedTuple):
     row_above: str
     is_mixed: bool
     part: str = ""
+    measure: float = 0.01
 
     @property
     def given(self) -> str:
@@ -45,6 +51,16 @@ class Slope(NamedTuple):
     def effect(self) -> float:
         """Change of what was asked for: the row, else the worst utilization."""
         return self.change if self.row_change is None else self.row_change
+
+    @property
+    def even_effect(self) -> float:
+        """Effect of the same small part of every number: of itself, of a radian, of a power, of a range."""
+        return self.effect * EVEN / self.measure
+
+    @property
+    def is_proportional(self) -> bool:
+        """Whether it changes by parts of itself."""
+        return self.per_text == "1 %"
 
 
 class Relaxed(NamedTuple):
@@ -72,7 +88,8 @@ class Sensitivity(NamedTuple):
 
     `worst_row` has the worst utilization of all rows that are judged and can fail, `requirement` sets its allowable.
     `row` is the one that was asked for, whose effects order the numbers; None without one. `unchanging` are keys of
-    numbers that change neither. `relaxed` is empty where shares are not balanced.
+    numbers that change neither. `relaxed` is empty where shares are not balanced. `overrides` is what
+    from outside the file bears on it.
     """
 
     file: str
@@ -90,13 +107,28 @@ class Sensitivity(NamedTuple):
     is_balanced: bool = False
     relaxed: tuple[Relaxed, ...] = ()
     changes: tuple[SetValue, ...] = ()
+    overrides: tuple[Override, ...] = ()
 
     @property
     def asked(self) -> float:
         """Utilization of what was asked for: the row, else the worst."""
         return self.utilization if self.row_utilization is None else self.row_utilization
 
+    def to_limit(self, slope: Slope) -> float | None:
+        """Change of a number, by itself, that uses up the margin: the utilization is 1 there; signed, in its unit.
+
+        The utilization goes on as it goes here: with a power of the number, or exponentially with a level or an
+        angle. Exact where it does, as of the aperture time or of an error; None beyond a millionfold or a full turn.
+        """
+        if not slope.effect or self.asked <= 0:
+            return None
+        change = -math.log(self.asked) * self.asked / slope.effect  # in `per`s, of the logarithm of the utilization
+        if slope.is_proportional:
+            power = EVEN * change
+            return slope.value * math.expm1(power) if abs(power) <= math.log(_FAR) else None
+        return change * slope.per if abs(change * slope.measure) <= 2 * math.pi else None
+
     @property
     def shown(self) -> tuple[Slope, ...]:
         """Numbers that a reader wants to see: they change it by a ten-thousandth of itself, or more."""
-        return tuple(slope for slope in self.slopes if abs(slope.effect) >= LITTLE * self.asked)
+        return tuple(slope for slope in self.slopes if abs(slope.even_effect) >= LITTLE * self.asked)

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from bisar_budget.faults import SetValue
 from bisar_budget.findings.images import Verdict
+from bisar_budget.findings.requirement import Override
 
 
 class State(NamedTuple):
@@ -65,7 +66,8 @@ class Solution(NamedTuple):
     is the nearest miss where nothing complies, or where everything does the value with the least left. `given` is
     the value of the file. `texts` has every value as the file would have it. `is_constant` is whether the number
     changes no utilization that decides. `skipped` counts the places of the range at which there is no mission.
-    `imaged` is what images say at the best crossing, if any were formed.
+    `imaged` is what images say at the best crossing, if any were formed. `overrides` is what from outside the file
+    bears on it.
     """
 
     file: str
@@ -87,6 +89,7 @@ class Solution(NamedTuple):
     texts: Mapping[float, str]
     changes: tuple[SetValue, ...] = ()
     imaged: Imaged | None = None
+    overrides: tuple[Override, ...] = ()
 
     @property
     def value(self) -> float | None:

@@ -25,8 +25,9 @@ class Stated(NamedTuple):
     """A number that the file states as `text`.
 
     `step` is half of the difference that is taken, `per` the change that an effect is said for, in SI, and `per_text`
-    the same in words. `others` are numbers that change with it: shares sum to 1. `is_scale` marks the elements of a
-    covariance, of which the value is a factor on all sigmas.
+    the same in words. `part` is how much of a change that is, by one measure for all: a part of the number, of a
+    radian, of a power, or of the smaller slant range. `others` are numbers that change with it: shares sum to 1.
+    `is_scale` marks the elements of a covariance, of which the value is a factor on all sigmas.
     """
 
     number: Number
@@ -35,6 +36,7 @@ class Stated(NamedTuple):
     step: float
     per: float
     per_text: str
+    part: float = 0.01
     others: tuple[Number, ...] = ()
     is_scale: bool = False
 
@@ -109,9 +111,9 @@ def _stated(number: Number, text: str, nearest_m: float, shares: Mapping[str, An
         step = RELATIVE_STEP * nearest_m / _EARTH
         return Stated(number, text, value, step, step, f"{math.degrees(step):.2g} deg")
     if number.reader in (DIRECTION, ELEVATION):
-        return Stated(number, text, value, DIRECTION_STEP, math.radians(1), "1 deg")
+        return Stated(number, text, value, DIRECTION_STEP, math.radians(1), "1 deg", part=math.radians(1))
     if number.dimension in _LEVELS:
-        return Stated(number, text, value, LEVEL_STEP, 1.0, "1 dB")
+        return Stated(number, text, value, LEVEL_STEP, 1.0, "1 dB", part=math.log(10) / 10)
     if value == 0:
         return Skipped(number.key, text, "is 0: there is no part of it")
     step = RELATIVE_STEP * value
@@ -123,7 +125,7 @@ def _stated(number: Number, text: str, nearest_m: float, shares: Mapping[str, An
         )
         if value == 1:
             return Skipped(number.key, text, "is the whole: no other share could give what it takes")
-    return Stated(number, text, value, step, 0.01 * value, "1 %", others)
+    return Stated(number, text, value, step, 0.01 * value, "1 %", others=others)
 
 
 def _of_sigmas(key: str) -> Stated:

@@ -30,12 +30,16 @@ def cubic_part(cycles: float) -> float:
 
 
 class OwnPhase(NamedTuple):
-    """What has no displacement, but phases that count in sums: row id, owner, QPE and cubic phase. [rad]"""
+    """What has no displacement, but phases that count in sums: row id, owner, QPE and cubic phase. [rad]
+
+    `coverage` is the coverage factor that both phases have in them.
+    """
 
     row_id: str
     owner: str
     qpe_rad: float
     cubic_rad: float
+    coverage: float = 1.0
 
 
 def slow_phases(mission: Mission) -> list[OwnPhase]:

@@ -1,4 +1,4 @@
 """What a check finds, as frozen data: statuses, rows, missions, verdicts of images."""
 
 # What other rooms may use.
-__all__ = ["images", "mission", "monte_carlo", "row", "status", "trade"]
+__all__ = ["images", "mission", "monte_carlo", "requirement", "row", "status", "trade"]

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from bisar_budget import file_warnings
 from bisar_budget.faults import SetValue
+from bisar_budget.findings.requirement import Override
 from bisar_budget.geometry import GroundVector
 from bisar_budget.phrases import NOTHING, Note
 
@@ -64,7 +65,8 @@ class Verdict(NamedTuple):
 class VerifiedMission(NamedTuple):
     """The verdicts on one mission's limits; `conditions` says of what images they are.
 
-    `changes` are values that options put in place of the file's.
+    `changes` are values that options put in place of the file's, `overrides` is all that from outside the file bears
+    on the verdicts.
     """
 
     file: str
@@ -72,6 +74,7 @@ class VerifiedMission(NamedTuple):
     rows: tuple[Verdict, ...]
     conditions: str = ""
     changes: tuple[SetValue, ...] = ()
+    overrides: tuple[Override, ...] = ()
 
     @property
     def status(self) -> str:

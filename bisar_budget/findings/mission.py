@@ -5,12 +5,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.faults import Fault, SetValue
+from bisar_budget.findings.requirement import DeclaredKinds, JudgedRequirement, Override
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUSES, worst
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Document, Mission
 from bisar_budget.mission.platforms import FlownPath
-from bisar_budget.phrases import Note
+from bisar_budget.phrases import NOTHING, Note
 
 if TYPE_CHECKING:
     from bisar_budget.analysis.analysis import Analysis
@@ -71,6 +72,10 @@ class MissionFindings(NamedTuple):
     document: Document = Document()
     study: "TradeStudy | None" = None  # of other values, if a report shows them
     changes: tuple[SetValue, ...] = ()  # values that options put in place of the file's
+    requirements: tuple[JudgedRequirement, ...] = ()
+    kinds: DeclaredKinds = DeclaredKinds()
+    overrides: tuple[Override, ...] = ()  # what from outside the file bears on the verdict
+    model_doubt: Note = NOTHING  # where the published model judges and does not hold
 
     @property
     def mission(self) -> Mission | None:
@@ -92,18 +97,19 @@ class MissionFindings(NamedTuple):
     @property
     def is_empty(self) -> bool:
         """The file declares no error at all: nothing was judged."""
-        return all(row.status == "not_declared" for row in self.rows)
+        return all(row.status == "not_declared" or row.is_of_declare for row in self.rows)
 
     @property
     def status(self) -> str:
-        """Worst status of the rows and of what is doubtful about the whole.
+        """Worst status of the rows, of the requirements and of what is doubtful about the whole.
 
         No better than `not_evaluated` if nothing was judged, or if images were formed and verified nothing; no better
         than `warn` if a warning doubts what was checked.
         """
         doubts = ["not_evaluated"] if self.is_unverified or self.is_empty else []
         doubts += ["warn" for warning in self.warnings if warning.is_doubt]
-        return worst([*(row.status for row in self.rows), *doubts])
+        statuses = [row.status for row in self.rows] + [one.status for one in self.requirements]
+        return worst([*statuses, *doubts])
 
     @property
     def summary(self) -> dict[str, int]:

@@ -56,8 +56,8 @@ _WORST_FIRST = (
     ),
     Status(
         "not_evaluated", "NOT EVAL", "not evaluated",
-        gates=True, fails_strict=True, is_judged=True, is_explained=True,
-        sarif="warning", github="warning", junit="skipped", junit_words="not evaluated",
+        gates=True, fails=True, fails_strict=True, is_judged=True, is_explained=True,
+        sarif="error", github="error", junit="failure", junit_words="not evaluated",
         verdict="Not shown to comply", sgr="35", color="doubt", symbol="diamond",
     ),
     Status(
@@ -96,7 +96,7 @@ def worst(statuses: Iterable[str]) -> str:
 
 
 def exit_code(statuses: Container[str], strict: bool) -> int:
-    """Return 2 if a file is unusable, 1 if a requirement is broken, else 0; `strict` breaks on doubt too."""
+    """Return 2 if a file is unusable, 1 if a requirement is broken or not judged, else 0; `strict`: on doubt too."""
     if "error" in statuses:
         return 2
     breaks = (one.name for one in _WORST_FIRST if one.fails or (strict and one.fails_strict))

@@ -90,6 +90,7 @@ def parse_mission(
     if model is not None and isinstance(tree.root.get("allocation"), dict):
         tree.root["allocation"]["model"] = model
     mission = INVALID
+    parts: dict[str, str] = {}
     with suppress(UnusableError):
         mission = MISSION.read(tree.root, (), tree.report)
         folder = folder_of(file)
@@ -100,7 +101,7 @@ def parse_mission(
         if mission is not INVALID and names_parts(mission):
             from bisar_budget.mission.parts import finder_of, with_parts
 
-            mission = with_parts(mission, folder, find or finder_of(folder), tree.report)
+            mission = with_parts(mission, folder, _noted(find or finder_of(folder), parts), tree.report)
     if tree.faults:
         ordered = sorted(dict.fromkeys(tree.faults), key=lambda fault: (fault.line or 0, fault.column or 0))
         if changes:
@@ -108,7 +109,19 @@ def parse_mission(
         raise MissionError(file, tuple(ordered))
     as_bytes = data.encode("utf-8", "surrogatepass") if isinstance(data, str) else data
     read = cast(Mission, mission._replace(file=file, places=tree.values, data=as_bytes, changes=tuple(changes)))
+    read = read._replace(parts=tuple(parts.items()))
     return read if model is None else read._replace(allocation=read.allocation._replace(model=model))
+
+
+def _noted(find: Callable[[str], tuple[str, bytes]], files: dict[str, str]) -> Callable[[str], tuple[str, bytes]]:
+    """The same, and the file of each part is noted by its name."""
+
+    def found(name: str) -> tuple[str, bytes]:
+        file, content = find(name)
+        files[name] = file
+        return file, content
+
+    return found
 
 
 def folder_of(file: str) -> str:

@@ -144,7 +144,10 @@ class OtherError(NamedTuple):
     source: Annotated[str | None, Key(Text())] = None
 
 
-DECLARABLE = ("position", "velocity", "acceleration", "timing")
+# Kinds of error that each platform has, and the clock's.
+OF_PLATFORMS = ("position", "velocity", "acceleration", "covariance", "vibration", "imu", "random", "oscillator")
+DECLARABLE = (*OF_PLATFORMS, "timing")
+_OF_ONE = tuple(f"{name}.{kind}" for name in Platforms._fields for kind in OF_PLATFORMS)
 
 
 class Requirements(NamedTuple):
@@ -162,9 +165,10 @@ class Requirements(NamedTuple):
     declare: Annotated[
         tuple[str, ...],
         Key(
-            Words(*DECLARABLE),
-            "Errors that the file must declare, for both platforms; what is missing is not_evaluated. "
-            "timing: any term of timing_error.",
+            Words(*DECLARABLE, *_OF_ONE),
+            "Errors that the file must declare, for both platforms or for one (receiver.imu); what is missing is "
+            "not_evaluated. A zero declares; a still platform owes its position only. A covariance declares position "
+            "and velocity; timing: any term of timing_error.",
         ),
     ] = ()
 
@@ -236,8 +240,8 @@ class AllocationRules(NamedTuple):
     coverage_factor: Annotated[
         float,
         Key(
-            Quantity(units.RATIO, gt=0, ge=1e-3, le=1e3),
-            "Multiplies position, velocity, acceleration and clock errors.",
+            Quantity(units.RATIO, ge=1, le=1e3),
+            "Multiplies position, velocity, acceleration and clock errors; at least 1.",
         ),
     ] = 1.0
     warn_above: Annotated[
@@ -251,7 +255,10 @@ class Autofocus(NamedTuple):
     algorithm: Annotated[str, Key(Choice("pga", "map_drift"))] = "pga"
     n_pull: Annotated[
         float | None,
-        Key(Quantity(units.RATIO, gt=0, ge=1e-3, le=1e4), "Corrects n_pull·π radians; omitted: none."),
+        Key(
+            Quantity(units.RATIO, gt=0, ge=1e-3, le=1e4),
+            "Corrects n_pull·π radians, counts up to f₀/B; omitted: none.",
+        ),
     ] = None
 
 
@@ -276,7 +283,8 @@ class Mission(NamedTuple):
     """A mission file that can be used.
 
     `file` and `places` say where it stands: the path of each value to the parser's event. `data` is the file as
-    read, byte for byte. `changes` are the values that options put in place of the file's.
+    read, byte for byte. `changes` are the values that options put in place of the file's, `parts` name and file of
+    each part that it takes figures from.
     """
 
     schema_version: Annotated[int, Key(Version())]
@@ -305,6 +313,7 @@ class Mission(NamedTuple):
     places: Mapping[KeyPath, Any] = {}
     data: bytes = b""
     changes: tuple[SetValue, ...] = ()
+    parts: tuple[tuple[str, str], ...] = ()
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:

@@ -24,6 +24,7 @@ from bisar_budget.mission.instruments import (
     GyroBias,
     Imu,
     Oscillator,
+    Overridden,
     PhaseNoise,
     PowerLawFigures,
     VelocityRandomWalk,
@@ -101,6 +102,7 @@ class OscillatorPart(NamedTuple):
 
 
 Part = ImuPart | GnssPart | OscillatorPart
+_Read = tuple[Part, Mapping[str, Any]]  # a part, and what its file says as text
 _SECTIONS: dict[str, Section] = {
     "imu": Section(ImuPart),
     "gnss": Section(GnssPart),
@@ -161,7 +163,7 @@ def read_part(file: str) -> Part:
     return _read(file)[0]
 
 
-def _read(file: str) -> tuple[Part, Mapping[str, Any]]:
+def _read(file: str) -> _Read:
     return _parsed(file, _content(file))
 
 
@@ -172,7 +174,7 @@ def _content(file: str) -> bytes:
         raise PartError(str(error)) from None
 
 
-def _parsed(file: str, data: bytes) -> tuple[Part, Mapping[str, Any]]:
+def _parsed(file: str, data: bytes) -> _Read:
     try:
         tree = read_tree(data, file)
     except MissionError as error:
@@ -187,12 +189,21 @@ def _parsed(file: str, data: bytes) -> tuple[Part, Mapping[str, Any]]:
     if tree.faults:
         fault = tree.faults[0]
         raise PartError(f"{file}:{fault.line}:{fault.column}: {fault}")
+    if not any(_says(getattr(part, figure)) for figure in FIGURES[kind] if figure != "frequency"):
+        raise PartError(f"{file}: states no figure; accepted: one of {', '.join(FIGURES[kind])} that is not zero")
     unsourced = [
         figure for figure in FIGURES[kind] if getattr(part, figure) and evidence(part, figure).endswith(": ")
     ]
     if unsourced:
         raise PartError(f"{file}: source: says nothing of {', '.join(unsourced)}")
     return part, tree.root
+
+
+def _says(figure: Any) -> bool:
+    """Whether a figure is there, and is not zero: no sensor is without error."""
+    if isinstance(figure, tuple | list):
+        return any(_says(item) for item in figure)
+    return isinstance(figure, float) and figure != 0
 
 
 def folders(beside: str) -> list[str]:
@@ -290,9 +301,9 @@ def with_parts(mission: Mission, beside: str, find: Find, report: Report) -> Any
         if oscillator is not None and oscillator.sensor is not None:
             path = ("platforms", name, "oscillator", "sensor")
             parts = _parts_of(oscillator.sensor, path, ("oscillator",), beside, find, report)
-            oscillator = INVALID if parts is INVALID else _oscillator_of(oscillator, parts[0])
+            oscillator = INVALID if parts is INVALID else _oscillator_of(oscillator, parts[0], path, report)
             if oscillator is not INVALID and oscillator.needs_frequency and oscillator.frequency is None:
-                problem = f"{shown(parts[0].name)} states no frequency, at which the mask or the tones are stated"
+                problem = f"{shown(parts[0][0].name)} states no frequency, at which the mask or the tones are stated"
                 report(path[:-1], Problem(problem, "accepted: oscillator.frequency", at=("frequency",)))
                 oscillator = INVALID
         if INVALID in (error, oscillator):
@@ -310,13 +321,14 @@ def _parts_of(
     find: Find,
     report: Report,
 ) -> Any:
+    """Parts, and what the file of each says; `INVALID` after a report."""
     is_list = isinstance(names, tuple)
-    found: list[Part] = []
+    found: list[_Read] = []
     is_valid = True
     for index, name in enumerate(names if isinstance(names, tuple) else [names] if names else []):
         here = (*path, index) if is_list else path
         try:
-            part = _parsed(*find(name))[0]
+            part, written = _parsed(*find(name))
             if part.kind not in kinds:
                 raise PartError(f"is an {part.kind}" if part.kind != "gnss" else "is a GNSS receiver")
         except PartError as error:
@@ -325,45 +337,50 @@ def _parts_of(
             report(here, Problem(str(error), accepted, names_value=names_file))
             is_valid = False
             continue
-        if any(part.kind == other.kind for other in found):
+        if any(part.kind == other.kind for other, _ in found):
             report(here, Problem(f"is a second {part.kind}", "accepted: one part of each kind"))
             is_valid = False
-        found.append(part)
+        found.append((part, written))
     return found if is_valid else INVALID
 
 
-def _motion_of(error: MotionError, parts: Sequence[Part], path: KeyPath, report: Report) -> Any:
-    """Put figures of parts where the file has none."""
-    of_parts: dict[str, str] = {}
-    for part in parts:
+def _motion_of(error: MotionError, parts: Sequence[_Read], path: KeyPath, report: Report) -> Any:
+    """Put figures of parts where the file has none; what it has overrides exactly that figure, and says so."""
+    of_parts = dict(error.of_parts)  # an accuracy file may have been before
+    overridden = list(error.overridden)
+    for part, written in parts:
+        imu = error.imu or Imu()
+        own = imu if isinstance(part, ImuPart) else error
+        taken = {}
+        for figure in FIGURES[part.kind]:
+            if figure not in written:
+                continue
+            key = _own_key(error, own, figure)
+            if key:
+                overridden.append(Overridden(figure, key, part.name, _as_written(written[figure])))
+            else:
+                taken[figure] = getattr(part, figure)
         if isinstance(part, ImuPart):
-            own = error.imu or Imu()
-            taken = {
-                figure: getattr(part, figure)
-                for figure in IMU_KINDS
-                if getattr(own, figure) is None and getattr(part, figure) is not None
-            }
-            error = error._replace(imu=own._replace(**taken))
-        elif isinstance(part, GnssPart):
-            taken = (
-                {}
-                if error.covariance is not None
-                else {
-                    figure: getattr(part, figure)
-                    for figure in ("position", "velocity")
-                    if getattr(error, figure) is None and getattr(part, figure) is not None
-                }
-            )
-            if part.random and not error.random:
-                taken["random"] = part.random
-            if taken and error.frame != "scene":
-                report(path, Problem(f"{shown(part.name)} is stated east, north, up", "accepted: frame: scene"))
-                return INVALID
-            error = error._replace(**taken)
+            error = error._replace(imu=imu._replace(**taken))
+        elif taken and error.frame != "scene":
+            report(path, Problem(f"{shown(part.name)} is stated east, north, up", "accepted: frame: scene"))
+            return INVALID
         else:
-            continue
+            error = error._replace(**taken)
         of_parts |= {figure: evidence(part, figure) for figure in taken}
-    return error._replace(of_parts=tuple(of_parts.items()))
+    return error._replace(of_parts=tuple(of_parts.items()), overridden=tuple(overridden))
+
+
+def _own_key(error: MotionError, own: MotionError | Imu, figure: str) -> str:
+    """Key below the platform that states a figure beside a part; empty where nothing does."""
+    if figure in ("position", "velocity"):
+        if error.covariance is not None:
+            return "motion_error.covariance"
+        if figure in dict(error.of_parts):
+            return "trajectory.accuracy"
+    if getattr(own, figure) in (None, ()):
+        return ""
+    return f"motion_error.imu.{figure}" if isinstance(own, Imu) else f"motion_error.{figure}"
 
 
 class TakenFigure(NamedTuple):
@@ -403,13 +420,28 @@ def taken_figures(mission: Mission, find: Find) -> Iterator[TakenFigure]:
                     yield TakenFigure(f"platforms.{name}.oscillator.{figure}", written[figure], oscillator.sensor)
 
 
-def _oscillator_of(oscillator: Oscillator, part: Part) -> Oscillator:
-    """An oscillator with the figures of a part; a noise of the file's own replaces that of the part."""
-    has_own = any(getattr(oscillator, form) is not None for form in FORMS)
-    taken = {} if has_own else {form: getattr(part, form) for form in FORMS}
+def _oscillator_of(oscillator: Oscillator, read: _Read, path: KeyPath, report: Report) -> Any:
+    """An oscillator with the figures of a part; what the file states overrides exactly that figure, and says so.
+
+    A mask holds at the frequency it was measured at: with another one beside it, the same decibels would be those of
+    a better or a worse oscillator. The file has to state both, or neither.
+    """
+    part, written = read
+    own = next((form for form in FORMS if getattr(oscillator, form) is not None), None)
+    (form,) = [form for form in FORMS if getattr(part, form) is not None]
+    stated, overridden = getattr(part, "frequency", None), []
+    taken: dict[str, Any] = {}
+    if own is None:
+        taken = {form: getattr(part, form), "source": evidence(part, form)}
+    else:
+        overridden.append(Overridden(own, f"oscillator.{own}", part.name, f"{form} {_as_written(written[form])}"))
     if oscillator.frequency is None:
-        taken["frequency"] = getattr(part, "frequency", None)
-    if not has_own:
-        (form,) = [form for form in FORMS if getattr(part, form) is not None]
-        taken["source"] = evidence(part, form)
-    return oscillator._replace(**taken)
+        taken["frequency"] = stated
+    elif stated is not None and oscillator.frequency != stated:
+        at = _as_written(written["frequency"])
+        if own is None and form == "phase_noise":
+            problem = f"the phase noise of {shown(part.name)} is stated at its own frequency, {at}"
+            report(path[:-1], Problem(problem, "accepted: no frequency, or phase_noise beside it", at=("frequency",)))
+            return INVALID
+        overridden.append(Overridden("frequency", "oscillator.frequency", part.name, at))
+    return oscillator._replace(**taken, overridden=tuple(overridden))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from bisar_budget.faults import KeyPath, Problem
 from bisar_budget.geometry import (
+    STILL,
     STRAIGHT,
     BistaticGeometry,
     PlatformState,
@@ -15,6 +16,7 @@ from bisar_budget.geometry import (
     norm,
     state_from_angles,
 )
+from bisar_budget.mission import later
 from bisar_budget.mission.bounds import (
     ACCELERATION,
     COORDINATE,
@@ -36,10 +38,9 @@ from bisar_budget.mission.readers import Choice, Key, Late, ListOf, OneOf, Refer
 
 if TYPE_CHECKING:
     from bisar_budget.mission.covariance import Covariance
-    from bisar_budget.mission.instruments import GaussMarkov, Imu, Oscillator
+    from bisar_budget.mission.instruments import GaussMarkov, Imu, Oscillator, Overridden
     from bisar_budget.mission.routes import OrbitSource, TrajectorySource
 
-STILL = 1e-6  # m/s; slower than this no platform flies an aperture
 LEAST_BASELINE = 1.0  # m, between platforms of which one hears the other
 FARTHEST_BY = 3  # times the least baseline, that they move by in half an aperture: so far a fit of 16 nodes is true
 
@@ -75,6 +76,11 @@ class Vibration(NamedTuple):
     sinusoidal: Annotated[tuple[Sinusoid, ...], Key(ListOf(Sinusoid), "One entry per line.")] = ()
     wideband: Annotated[Wideband | None, Key(Section(Wideband))] = None
 
+    @property
+    def is_stated(self) -> bool:
+        """Whether the file says anything of it; a zero does."""
+        return bool(self.sinusoidal) or self.wideband is not None
+
 
 PART = Reference()
 PARTS = OneOf(lambda value: TextList() if isinstance(value, list) else PART, (PART, TextList()))
@@ -83,7 +89,8 @@ PARTS = OneOf(lambda value: TextList() if isinstance(value, list) else PART, (PA
 class MotionError(NamedTuple):
     """How wrong the measured motion of one platform may be. A scalar means each axis.
 
-    `of_parts` names the figures that come from parts of the catalogue, and the source of each.
+    `of_parts` names the figures that come from parts of the catalogue, and the source of each. `overridden` are the
+    figures of parts that something else in the file replaces.
     """
 
     frame: Annotated[
@@ -117,6 +124,7 @@ class MotionError(NamedTuple):
     ] = ()
     source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
     of_parts: tuple[tuple[str, str], ...] = ()
+    overridden: "tuple[Overridden, ...]" = ()
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
@@ -161,12 +169,7 @@ class CommonMotionError(NamedTuple):
     frame: Annotated[
         str,
         Key(
-            Choice(
-                "scene",
-                refused=dict.fromkeys(
-                    ("track", "look", "ric"), "each platform has its own, an error of both has none"
-                ),
-            ),
+            Choice("scene", refused=later.FRAMES),
             "east, north, up.",
         ),
     ] = "scene"
@@ -215,6 +218,10 @@ class FlownPath(NamedTuple):
     `source` says where it comes from, empty where the file states it; `file` and `sha256` are those of the file it
     was read from, `age` that of its elements [s]. Of a fit the order, the residual at most and root mean square [m],
     and the number of places of a log. `doubts` are warnings, for reports.
+
+    `doubt_m` is how far the truth may be from it by what its own source says: the age of elements, the interpolation
+    of an ephemeris, the residual of a smoothed log; `doubt_of` says which. Where the file declares no position error,
+    it counts if it `is_doubted`.
     """
 
     state: PlatformState
@@ -227,6 +234,9 @@ class FlownPath(NamedTuple):
     rms: float | None = None
     samples: int | None = None
     doubts: tuple[str, ...] = ()
+    doubt_m: float = 0.0
+    doubt_of: str = ""
+    is_doubted: bool = False
     accuracy: tuple[str, str] | None = None  # file that states its errors, and its SHA-256
 
 

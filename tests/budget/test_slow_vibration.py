@@ -32,7 +32,8 @@ def worst(cycles: float, order: int) -> float:
 
 
 def swaying(*lines: tuple[float, float], platform: str = "transmitter", **changes):
-    """Check with lines of an amplitude [m] and a number of cycles per aperture."""
+    """Check with lines of an amplitude [m] and a number of cycles per aperture; their cubic phase may be large."""
+    changes.setdefault("requirements", {"cubic_phase_error": 6})
     entries = [{"amplitude": size, "frequency": cycles / T} for size, cycles in lines]
     return findings(**{ERROR.format(platform): {"sinusoidal": entries}}, **changes)
 

@@ -141,7 +141,7 @@ def test_the_largest_effect_stands_first_and_of_a_row_if_asked() -> None:
     file = str(MISSIONS / "uav_pair_l_band.yaml")
     for row in (None, "receiver.acceleration.y"):
         found = ask(file=file, row=row)
-        effects = [abs(slope.effect) for slope in found.slopes]
+        effects = [abs(slope.even_effect) for slope in found.slopes]
         assert effects == sorted(effects, reverse=True)
         assert all((slope.row_change is None) == (row is None) for slope in found.slopes)
     assert found.row_utilization == next(
@@ -191,6 +191,36 @@ def test_levels_count_per_decibel() -> None:
     # Powers and amplitudes alike: use goes with 10^(dB/20) or 10^(dB/10); 0.25 dB is bent by 5e-4 at most.
     total = sum(one.change for one in masks) / found.utilization
     assert min(abs(total - math.log(10) / part) for part in (20, 10)) <= 1e-3 * total
+
+
+def test_numbers_are_ranked_by_the_change_that_uses_up_the_margin() -> None:
+    """A decibel was ranked beside 1 %: of power it is 23 times as much, so a mask stood above the aperture time."""
+    found = ask(file=str(MISSIONS / "ocxo_free_running.yaml"))
+    keys = [slope.key for slope in found.slopes]
+    level, time = "platforms.receiver.oscillator.phase_noise.1 Hz", "collection.aperture_time"
+    by_key = slopes(found)
+    assert by_key[level].change > 10 * by_key[time].change
+    assert keys.index(time) < keys.index(level)
+    assert by_key[level].measure == pytest.approx(math.log(10) / 10)
+
+
+@pytest.mark.parametrize(
+    "key",
+    [
+        "collection.aperture_time",
+        "radar.center_frequency",
+        "platforms.transmitter.motion_error.acceleration.0",
+    ],
+)
+def test_the_change_that_uses_up_the_margin_is_where_the_limit_is(key: str) -> None:
+    """Section V goes with powers of its numbers: at the value that is said the utilization is 1."""
+    found = ask()
+    (slope,) = [one for one in found.slopes if one.key == key]
+    change = found.to_limit(slope)
+    assert change is not None
+    at_limit = ask(f"{key}={slope.value + change!r} {slope.unit}")
+    # The power is a difference over 1 %, wrong by TRUNCATION, and taken over a factor of twelve.
+    assert at_limit.utilization == pytest.approx(1, rel=TRUNCATION * math.log(found.utilization) * 2)
 
 
 def test_a_covariance_counts_by_its_sigmas() -> None:
@@ -343,7 +373,8 @@ def test_text(run: Callable) -> None:
     assert second.startswith(SECTION_V)
     assert max(map(len, done.stdout.splitlines())) <= 80 or len(SECTION_V) > 60
     said = [line.split() for line in done.stdout.splitlines()]
-    assert ["collection.aperture_time", "6", "s", "1", "%", "+23.6"] in said
+    assert ["collection.aperture_time", "6", "s", "-70.9", "%", "1", "%", "+23.6"] in said
+    assert ["requirements.quadratic_phase_error", "45", "deg", "x", "11.8", "1", "%", "-11.8"] in said
     assert "Left out: 6 keys (a whole number, 0)." in done.stdout
 
 
@@ -357,6 +388,7 @@ def test_json(run: Callable) -> None:
     first = mission["numbers"][0]
     assert (first["key"], first["unit"], first["per"], first["value"]) == ("collection.aperture_time", "s", "1 %", 6)
     assert first["row_change"] == first["utilization_change"]
+    assert first["to_limit"] == pytest.approx(6 * (mission["utilization"] ** -0.5 - 1), rel=1e-9)
     # QPE goes with the square of T.
     assert first["utilization_change"] == pytest.approx(0.02 * mission["utilization"], rel=1e-9)
     assert mission["relaxed"] is None

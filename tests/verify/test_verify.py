@@ -400,14 +400,23 @@ class TestAutofocus:
         assert verdict.measured_residual_qpe_rad < 0.1
         assert verdict.refocused_loss_db < 0.3
 
-    @pytest.mark.parametrize(("n_pull", "verdict"), [(8, "confirmed"), (14, "optimistic")])
-    def test_range_walk_bounds_the_pull_in(self, n_pull: float, verdict: str) -> None:
-        """1 GHz at 10 GHz: half a cell of walk at n_pull 10."""
+    @pytest.mark.parametrize(("n_pull", "counts"), [(8, 8), (14, 10)])
+    def test_range_walk_bounds_the_pull_in(self, n_pull: float, counts: float) -> None:
+        """1 GHz at 10 GHz: half a cell of walk at n_pull 10, and no more counts."""
         row = verdicts(
             "mission.autofocus_pull_in", radar__bandwidth="1 GHz", autofocus={"algorithm": "pga", "n_pull": n_pull}
         )["mission.autofocus_pull_in"]
-        assert row.verdict == verdict
+        assert row.verdict == "confirmed"
+        assert row.boundary_autofocus == pytest.approx(math.pi * counts)
         assert "up to n_pull 10, f0/B" in row.reason
+
+    @pytest.mark.parametrize(("n_pull", "gain"), [(8, 32), (14, 40)])
+    def test_a_limit_is_scaled_by_the_gain_that_counts(self, n_pull: float, gain: float) -> None:
+        """A clock bends no geometry: its limit with autofocus is the gain times that without."""
+        (row,) = verdicts(
+            "timing.quadratic", radar__bandwidth="1 GHz", autofocus={"algorithm": "pga", "n_pull": n_pull}
+        ).values()
+        assert row.boundary_autofocus / row.boundary_error == pytest.approx(gain)
 
 
 def test_verdicts_do_not_depend_on_the_number_of_processes() -> None:

@@ -102,7 +102,7 @@ class TestCheckWithImages:
         one_row_verified("receiver.velocity.y")
         error = f"    motion_azimuth: 135 deg\n    motion_error: {{velocity: [0, {declared}, 0]}}\n"
         text = SECTION_V.read_text(encoding="utf-8").replace("    motion_azimuth: 135 deg\n", error)
-        text += "allocation: {warn_above: 1}\n"
+        text = text.replace("allocation:\n", "allocation:\n  warn_above: 1\n")
         path = tmp_path / "mission.yaml"
         path.write_text(text, encoding="utf-8")
         plain, verified = (

@@ -11,6 +11,8 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.report.change.comparison import Change, MissionChange, Moved
 from bisar_budget.report.words.escapes import markdown_text
 from bisar_budget.report.words.layout import table, wrapped
+from bisar_budget.report.words.quantities import row_size
+from bisar_budget.report.words.requirements import overrides_lines, overrides_words
 from bisar_budget.report.words.sentences import percent
 from bisar_budget.units import format_quantity
 
@@ -23,7 +25,8 @@ def as_text(missions: Sequence[MissionChange], tolerated: float | None, all_rows
 
 
 def _text(mission: MissionChange, tolerated: float | None, all_rows: bool) -> list[str]:
-    lines = [*wrapped(printable(f"{mission.before.file} -> {_named(mission.after)}"), "  "), ""]
+    lines = [*wrapped(printable(f"{mission.before.file} -> {_named(mission.after)}"), "  ")]
+    lines += [*overrides_lines(mission.after), ""]
     for title, moves in (("Inputs", mission.inputs), ("Geometry", mission.geometry)):
         if moves:
             texts = [
@@ -89,6 +92,8 @@ def as_markdown(missions: Sequence[MissionChange], tolerated: float | None, all_
     lines: list[str] = []
     for mission in missions:
         lines += [f"### {markdown_text(_named(mission.after))}: {_summary(mission, tolerated, all_rows)}", ""]
+        if outside := overrides_words(mission.after, with_changes=False):
+            lines += [f"From outside the file: {markdown_text(outside)}", ""]
         for title, moves in (("input", mission.inputs), ("geometry", mission.geometry)):
             for move in moves:
                 said = (
@@ -104,8 +109,8 @@ def as_markdown(missions: Sequence[MissionChange], tolerated: float | None, all_
         for change in changes:
             cells = (
                 markdown_text(change.id),
-                _values(change, "declared"),
-                _values(change, "allowable"),
+                _values(change, "declared", mission),
+                _values(change, "allowable", mission),
                 _use(change.before),
                 _use(change.after),
                 _erosion(change),
@@ -116,12 +121,12 @@ def as_markdown(missions: Sequence[MissionChange], tolerated: float | None, all_
     return "\n".join(lines).rstrip("\n") + "\n"
 
 
-def _values(change: Change, field: str) -> str:
+def _values(change: Change, field: str, mission: MissionChange) -> str:
     texts = []
-    for row in (change.before, change.after):
+    for row, found in ((change.before, mission.before), (change.after, mission.after)):
         value = getattr(row, field, None)
         rounding = "down" if field == "allowable" else "nearest"
-        texts.append("-" if row is None or value is None else format_quantity(value, row.unit, 3, rounding))
+        texts.append("-" if row is None or value is None else row_size(value, row, found, rounding))
     return texts[0] if texts[0] == texts[1] else " → ".join(texts)
 
 
@@ -138,6 +143,7 @@ def as_json(version: str, missions: Sequence[MissionChange], tolerated: float | 
                         "file": found.file,
                         "status": found.status,
                         "set": [change._asdict() for change in found.changes],
+                        "overrides": [one._asdict() for one in found.overrides],
                     }
                     for name, found in (("before", mission.before), ("after", mission.after))
                 },

@@ -13,11 +13,13 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.catalogue import EQUATIONS
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.effect import MOTION_UNITS, ErrorSource
+from bisar_budget.effects.models import END_OF_IMAGE
 from bisar_budget.effects.subject import Subject
 from bisar_budget.faults import KeyPath, changes_words
 from bisar_budget.findings.images import PointImage
 from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
-from bisar_budget.findings.row import Row, worst_first
+from bisar_budget.findings.requirement import NAMES
+from bisar_budget.findings.row import DECLARE, Row, worst_first
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import Style
@@ -54,9 +56,18 @@ from bisar_budget.report.drawing.evidence_drawings import (
 from bisar_budget.report.explain.explanation import chain, collection_chain
 from bisar_budget.report.formats import verification
 from bisar_budget.report.words.escapes import source_path
-from bisar_budget.report.words.missions import head, multiple_of_pi, narrow_gradients, path_words
+from bisar_budget.report.words.missions import doubtful_model, head, multiple_of_pi, narrow_gradients, path_words
+from bisar_budget.report.words.quantities import phase_limit, phase_unit, requirement_size, row_limit, row_size
+from bisar_budget.report.words.requirements import (
+    kind_names,
+    requirement_lines,
+    rule_words,
+    unjudged_effects,
+    unseen,
+    verdict,
+)
 from bisar_budget.report.words.sentences import matters, measure, percent
-from bisar_budget.units import format_quantity
+from bisar_budget.units import format_in, format_quantity
 
 if TYPE_CHECKING:
     from bisar_budget.findings.monte_carlo import MonteCarlo
@@ -122,26 +133,31 @@ def compliance(report: Report, style: Style) -> Compliance:
 
 
 def _verdict(status: str, waived: int) -> str:
-    """Verdict on rows, with what it owes to waivers."""
-    rows = f"{waived} rows over their limits are" if waived > 1 else "1 row over its limit is"
-    return f"{STATUS[status].verdict}; {rows} waived" if waived else STATUS[status].verdict
+    """Verdict on rows and requirements, with what it owes to waivers."""
+    waivers = f"{waived} rows or requirements are" if waived > 1 else "1 row or requirement is"
+    return f"{STATUS[status].verdict}; {waivers} waived" if waived else STATUS[status].verdict
+
+
+def _waived(found: MissionFindings) -> int:
+    """Number of rows that are waived, and of requirements that are and have no such row."""
+    return found.summary.get("waived", 0) + sum(one.status == "waived" for one in unseen(found))
 
 
 def _overall(report: Report, pages: Sequence[MissionPage]) -> str:
     """Verdict on the run: a mission that declares nothing complies with nothing."""
     usable = [mission for mission in report.missions if isinstance(mission, MissionFindings)]
-    verdict = _verdict(report.status, sum(mission.summary.get("waived", 0) for mission in usable))
+    said = _verdict(report.status, sum(map(_waived, usable)))
     empty = sum(page.verdict == _NOTHING for page in pages)
     if empty == len(pages):
         return _NOTHING
     if empty:
-        verdict = f"{verdict}; of {len(pages)} missions {empty} declare no error"
+        said = f"{said}; of {len(pages)} missions {empty} declare no error"
     if any(mission.changes for mission in usable):
-        verdict += _CHANGED
+        said += _CHANGED
     alone = sum(bool(page.alone) for page in pages)
     if not alone:
-        return verdict
-    return verdict + (_ALONE if alone == len(pages) else f"{_ALONE} in {alone} of {len(pages)} missions")
+        return said
+    return said + (_ALONE if alone == len(pages) else f"{_ALONE} in {alone} of {len(pages)} missions")
 
 
 def _unusable(found: UnusableMission, style: Style, anchor: str) -> MissionPage:
@@ -179,8 +195,8 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
             requirement_id=row.requirement_id or "",
             requirement=_requirement(mission, found, row, sources.get(row.id)),
             method=_method(found, row, evidence[row.id].verdict if row.id in evidence else None),
-            allowable=_allowable(row),
-            declared=_quantity(row.declared, row.unit),
+            allowable=_allowable(row, found),
+            declared="–" if row.declared is None else row_size(row.declared, row, found),
             use=None if row.status == "not_evaluated" or row.allowable is None else row.utilization,
             use_text=_use(row),
             margin="–" if row.status == "not_evaluated" else _margin(row),
@@ -193,24 +209,35 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
         for row in rows
         if row.status != "not_declared"
     )
-    drivers = tuple(_drivers(judged, found.status))
+    drivers = tuple(_drivers(judged, found))
+    waived = _waived(found)
     driving = {driver.id for driver in drivers}
     return MissionPage(
         anchor=anchor,
         file=file,
         sha256=_digest(mission.data),
         document=found.document,
-        alone=_ALONE if judged and found.combine == "each" else "",
+        doubt=doubtful_model(found),
+        alone=_ALONE if not found.is_empty and found.combine == "each" else "",
         narrow=narrow_gradients(found.geometry),
         status=found.status,
-        verdict=(_verdict(found.status, found.summary.get("waived", 0)) if judged else _NOTHING)
+        verdict=(_NOTHING if found.is_empty else _verdict(found.status, waived))
         + (_CHANGED if found.changes else ""),
+        is_empty=found.is_empty,
+        said=verdict(found),
+        rule=rule_words(found),
+        requirements=tuple(requirement_lines(found)),
+        effects=tuple(f"{one.text} ({', '.join(row.id for row in one.rows)})" for one in unjudged_effects(found)),
+        declared=f"{len(found.kinds.declared)} of {found.kinds.in_all} kinds of error",
+        missing=", ".join(kind_names(found.kinds.missing)),
+        without_source=", ".join(kind_names(found.kinds.without_source)),
+        overrides=found.overrides,
         name=found.name,
         counts=", ".join(f"{count} {STATUS[status].words}" for status, count in found.summary.items()),
         worst=judged[0].id if judged else "",
         worst_use=_use(judged[0]) if judged else "",
         head=tuple(head(found)),
-        tone="warn" if STATUS[found.status].is_met and found.summary.get("waived") else found.status,
+        tone="warn" if STATUS[found.status].is_met and waived else found.status,
         drivers=drivers,
         matrix=matrix,
         remarks=tuple(_grouped((row.id, row.remarks) for row in matrix)),
@@ -221,17 +248,19 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
         ),
         hidden=sum(not row.in_summary for row in matrix),
         pictures=drawings(found),
-        total=_limit(allocation.qpe_total, "rad"),
+        total=phase_limit(allocation.qpe_total, found),
         gain=allocation.autofocus_gain,
         gain_text=_gain(allocation),
-        shares=tuple(_shares(allocation)),
+        shares=tuple(_shares(found)),
         power_shares=tuple(_power_shares(mission, allocation)),
-        contributions=_contributions(analysis, found.rows, found.model),
+        contributions=_contributions(analysis, found),
         moves=_moves(found, analysis.stated),
         validity=tuple(_validity(mission, found)),
         inputs=tuple(_inputs(mission, found, file)),
         undeclared=tuple(
-            Undeclared(row.id, _allowable(row), row.equation) for row in found.rows if row.status == "not_declared"
+            Undeclared(row.id, _allowable(row, found), row.equation)
+            for row in found.rows
+            if row.status == "not_declared"
         ),
         notes=found.notes,
         warnings=tuple(
@@ -352,10 +381,10 @@ def _limit(value: float, unit: str) -> str:
     return format_quantity(value, unit, 3, "down")
 
 
-def _allowable(row: Row) -> str:
+def _allowable(row: Row, found: MissionFindings) -> str:
     if row.allowable is not None:
-        return _limit(row.allowable, row.unit)
-    is_open = row.status in ("not_evaluated", "info") or row.metric in ("pslr", "islr")
+        return row_limit(row.allowable, row, found)
+    is_open = row.status in ("not_evaluated", "info") or row.metric in ("pslr", "islr", DECLARE)
     return "–" if is_open else "no limit"
 
 
@@ -365,33 +394,42 @@ def _use(row: Row) -> str:
 
 
 def _margin(row: Row) -> str:
-    """Write allowable over declared less one, or the levels' difference, rounded down: never more than there is."""
+    """Write allowable over declared less one, or the levels' difference, rounded down: never more than there is.
+
+    From 1000 % on, how many times the declared value is allowed.
+    """
     if row.margin is None:
         return "–"
     if row.unit == "dB" and row.allowable is not None and row.declared is not None:
         tenths = math.floor(10 * (row.allowable - row.declared) + 1e-9)
         return f"{tenths / 10:+.1f} dB".replace("-", "−")
     value = 100 * row.margin
-    if value >= 1e6:
-        return "> 1e6 %"
-    size = abs(value)
-    step = 2 - math.floor(math.log10(size)) if size else 0
-    down = math.floor(value * 10.0**step * (1 + math.copysign(1e-12, value))) / 10.0**step if step < 300 else value
-    text = f"{down:+.0f}" if size >= 100 else f"{down:+.3g}"
+    if value >= 1e8:
+        return "× > 1e6"
+    if value > 1000:
+        return f"× {_down(1 + row.margin, 3):.7g}"
+    down = _down(value, 3) if value else 0.0
+    text = f"{down:+.0f}" if abs(value) >= 100 else f"{down:+.3g}"
     return ("0" if down == 0 else text).replace("-", "−") + " %"
 
 
-def _drivers(judged: Sequence[Row], status: str) -> Iterator[Driver]:
+def _down(value: float, digits: int) -> float:
+    """Round to so many digits, never up; one part in 10¹² keeps an exact number what it is."""
+    step = digits - 1 - math.floor(math.log10(abs(value)))
+    return math.floor(value * 10.0**step * (1 + math.copysign(1e-12, value))) / 10.0**step if step < 300 else value
+
+
+def _drivers(judged: Sequence[Row], found: MissionFindings) -> Iterator[Driver]:
     """Rows that a verdict rests on: what breaks, is in doubt or is waived; of a pass also what comes nearest."""
-    is_met = STATUS[status].is_met
+    is_met = STATUS[found.status].is_met
     for row in judged[:_DRIVERS]:
         if not STATUS[row.status].is_met or (is_met and row.utilization):
-            yield _driver(row)
+            yield _driver(row, found)
 
 
-def _driver(row: Row) -> Driver:
+def _driver(row: Row, found: MissionFindings) -> Driver:
     use = None if row.status == "not_evaluated" or row.allowable is None else row.utilization
-    return Driver(row.id, row.requirement_id or "", row.status, measure(row), "; ".join(row.decisive), use)
+    return Driver(row.id, row.requirement_id or "", row.status, measure(row, found), "; ".join(row.decisive), use)
 
 
 def _remarks(row: Row) -> tuple[str, ...]:
@@ -420,18 +458,22 @@ def _requirement(mission: Mission, found: MissionFindings, row: Row, source: Err
         return f"{what} ≤ {value:g} dB, {split.of(row.owner):.3g} of the power"
     if binding == "cubic_phase_error":
         value = requirements.cubic_phase_error
-        return "none stated" if value is None else f"cubic phase ≤ {_limit(value, 'rad')}"
+        return "none stated" if value is None else f"cubic phase ≤ {phase_limit(value, found)}"
+    if binding == END_OF_IMAGE:
+        return "end of the image: no ground point has the range history of a larger error"
     if binding == "location_error":
         value = requirements.location_error
         return "none stated" if value is None else f"displacement ≤ {_limit(value, 'm')}"
+    if row.metric == DECLARE:
+        return f"declared: {', '.join(requirements.declare)}"
     if row.subject.kind == "autofocus_pull_in":
         return "all QPE together within what autofocus corrects, π·N_pull"
     if row.subject.kind == "spatial_variance":  # one correction for the whole scene: no gain
-        return f"QPE differs over the scene by ≤ {_limit(allocation.qpe_total, 'rad')}"
+        return f"QPE differs over the scene by ≤ {phase_limit(allocation.qpe_total, found)}"
     owner = row.owner
     limit = allocation.qpe_limit(owner) * allocation.autofocus_gain
     share = "" if owner == "mission" else f", {allocation.qpe.of(owner):.3g} of the budget"
-    return f"QPE ≤ {_limit(limit, 'rad')}{share}"
+    return f"QPE ≤ {phase_limit(limit, found)}{share}"
 
 
 def _method(found: MissionFindings, row: Row, verdict: str | None) -> str:
@@ -451,7 +493,8 @@ def _gain(allocation: Allocation) -> str:
     return f"autofocus corrects {multiple_of_pi(allocation.n_pull)} rad: {gain}"
 
 
-def _shares(allocation: Allocation) -> Iterator[Share]:
+def _shares(found: MissionFindings) -> Iterator[Share]:
+    allocation = found.allocation
     start, gain = 0.0, allocation.autofocus_gain
     for owner in _OWNERS:
         part = getattr(allocation.qpe, owner)
@@ -459,10 +502,11 @@ def _shares(allocation: Allocation) -> Iterator[Share]:
             if owner == "clock":
                 limit = allocation.qpe_limit(owner)
                 held = "held to the receiver’s"
-                yield Share(owner, held, _limit(limit, "rad"), _limit(limit * gain, "rad"), start, 0.0)
+                yield Share(owner, held, phase_limit(limit, found), phase_limit(limit * gain, found), start, 0.0)
             continue
         limit = part * allocation.qpe_total
-        yield Share(owner, f"{part:.3g}", _limit(limit, "rad"), _limit(limit * gain, "rad"), start, part)
+        shown = (phase_limit(limit, found), phase_limit(limit * gain, found))
+        yield Share(owner, f"{part:.3g}", *shown, start, part)
         start += part
 
 
@@ -476,17 +520,17 @@ def _power_shares(mission: Mission, allocation: Allocation) -> Iterator[PowerSha
             yield PowerShare(name, f"{value:g} dB", f"{split.transmitter:.3g}", f"{split.receiver:.3g}", clock)
 
 
-def _contributions(analysis: Analysis, rows: Sequence[Row], model: str) -> tuple[Contribution, ...]:
+def _contributions(analysis: Analysis, found: MissionFindings) -> tuple[Contribution, ...]:
     """Errors as the file states them, the largest quadratic phase error first.
 
     An error that no image has comes before all others, and the others are no part of a sum with it.
     """
     phases: dict[str, dict[str, float]] = {}
     for by in (analysis.published, analysis.full):
-        phases[by.name] = {row_id: abs(found.qpe) for row_id, found in analysis.declared(by).items()}
+        phases[by.name] = {row_id: abs(effect.qpe) for row_id, effect in analysis.declared(by).items()}
         phases[by.name] |= {own.row_id: own.qpe_rad for own in analysis.own_phases(by.name)}
-    subjects = {row.id: row.subject for row in rows}
-    gating = [name for name in phases if model in (name, "strictest")]
+    subjects = {row.id: row.subject for row in found.rows}
+    gating = [name for name in phases if found.model in (name, "strictest")]
     sizes = {row_id: max(phases[name][row_id] for name in gating) for row_id in phases["full"]}
     total, largest = math.fsum(sizes.values()), max(sizes.values(), default=0.0)
     result = []
@@ -495,8 +539,8 @@ def _contributions(analysis: Analysis, rows: Sequence[Row], model: str) -> tuple
         qpe = sizes[row_id]
         part = 1.0 if qpe == largest else qpe / largest
         of_sum = percent(qpe / total) if math.isfinite(total) else "–"
-        published, full = (_phase(by_model[row_id]) for by_model in phases.values())
-        result.append(Contribution(row_id, owner, kind, axis, _phase(qpe), published, full, part, of_sum))
+        published, full = (_phase(by_model[row_id], found) for by_model in phases.values())
+        result.append(Contribution(row_id, owner, kind, axis, _phase(qpe, found), published, full, part, of_sum))
     return tuple(result)
 
 
@@ -522,8 +566,8 @@ def _kind(subject: Subject) -> tuple[str, str, str]:
     return owner, kind, axis.replace("_", " ")
 
 
-def _phase(value: float) -> str:
-    return format_quantity(value, "rad") if math.isfinite(value) else "no image"
+def _phase(value: float, found: MissionFindings) -> str:
+    return format_in(value, "rad", phase_unit(found)) if math.isfinite(value) else "no image"
 
 
 def _general(mission: Mission) -> Iterator[General]:
@@ -608,24 +652,17 @@ def _inputs(mission: Mission, found: MissionFindings, file: str) -> Iterator[Inp
     yield given(
         "aperture time", format_quantity(mission.collection.aperture_time, "s", 6), ("collection", "aperture_time")
     )
-    total = requirements.quadratic_phase_error
-    yield given(
-        "quadratic phase error, total", f"{_limit(total, 'rad')} ({math.degrees(total):.4g}°)",
-        ("requirements", "quadratic_phase_error"),
-    )  # fmt: skip
-    optional = (
-        ("cubic phase error", requirements.cubic_phase_error, "rad", "cubic_phase_error"),
-        ("PSLR", requirements.pslr, "dB", "pslr"),
-        ("ISLR", requirements.islr, "dB", "islr"),
-        ("location error", requirements.location_error, "m", "location_error"),
-    )
-    for name, value, unit, key in optional:
-        if value is None:
-            yield Input(
-                name, "none: computed, not judged" if unit != "dB" else "none: not evaluated", "not in the file"
-            )
-        else:
-            yield given(name, f"{value:g} dB" if unit == "dB" else _limit(value, unit), ("requirements", key))
+    stated = {one.key: one for one in found.requirements}
+    for key, name in NAMES.items():
+        if key == "declare":
+            continue
+        if key not in stated:
+            yield Input(name, "none: computed, not judged", "not in the file")
+            continue
+        value = requirement_size(stated[key].value, stated[key], "down")
+        if key == "quadratic_phase_error":
+            value += f" ({requirements.quadratic_phase_error:.4g} rad)"
+        yield given(name, value, ("requirements", key))
     allocation = mission.allocation
     split = allocation.split
     yield given("split", split if isinstance(split, str) else "shares of the file", ("allocation", "split"))
@@ -653,10 +690,10 @@ def _sources(rows: Sequence[Row]) -> tuple[Source, ...]:
 
 
 def _evidence(found: MissionFindings) -> Iterator[Evidence]:
-    for verdict in found.verdicts or ():
-        limit, numbers = verification.limit(verdict), verification.numbers(verdict)
-        by_autofocus = verdict.verdict_autofocus
-        refocused = (*verification.refocused_cells(verdict)[:4], by_autofocus) if by_autofocus else ()
-        with_autofocus = verdict.reason_autofocus and f"with autofocus: {verdict.reason_autofocus}"
-        reasons = tuple(reason for reason in (verdict.reason, with_autofocus) if reason)
-        yield Evidence(verdict.id, limit, *numbers, verdict.verdict, refocused, reasons)
+    for one in found.verdicts or ():
+        limit, numbers = verification.limit(one), verification.numbers(one)
+        by_autofocus = one.verdict_autofocus
+        refocused = (*verification.refocused_cells(one)[:4], by_autofocus) if by_autofocus else ()
+        with_autofocus = one.reason_autofocus and f"with autofocus: {one.reason_autofocus}"
+        reasons = tuple(reason for reason in (one.reason, with_autofocus) if reason)
+        yield Evidence(one.id, limit, *numbers, one.verdict, refocused, reasons)

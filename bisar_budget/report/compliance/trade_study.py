@@ -72,7 +72,7 @@ def _counts(study: TradeStudy) -> str:
     failing = study.cases - study.complying - study.missing
     said = [f"{study.cases} cases", f"{study.complying} comply ({percent(study.complying / study.cases)})"]
     if study.unevaluated:
-        said.append(f"{study.unevaluated} of these not evaluated")
+        said.append(f"{study.unevaluated} not evaluated")
     if failing:
         said.append(f"{failing} break a requirement")
     if study.missing:

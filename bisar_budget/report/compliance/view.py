@@ -4,8 +4,10 @@ from datetime import date
 from typing import NamedTuple
 
 from bisar_budget.findings.mission import Option
+from bisar_budget.findings.requirement import Override
 from bisar_budget.mission.model import Document
 from bisar_budget.report.explain.formulas import Step
+from bisar_budget.report.words.requirements import RequirementLine
 
 
 class Driver(NamedTuple):
@@ -236,7 +238,17 @@ class MissionPage(NamedTuple):
     verdict: str
     name: str
     document: Document = Document()
+    is_empty: bool = False  # the file declares no error
+    said: str = ""  # how many requirements are met, and judged
+    rule: str = ""  # by which model, and which rule
+    requirements: tuple[RequirementLine, ...] = ()
+    effects: tuple[str, ...] = ()  # that no requirement takes
+    declared: str = ""  # kinds of error: how many of how many
+    missing: str = ""
+    without_source: str = ""
+    overrides: tuple[Override, ...] = ()
     alone: str = ""  # behind the verdict where errors are judged one by one
+    doubt: str = ""  # where the published model judges and does not hold
     narrow: str = ""  # what gradients close to parallel do to displacements
     tone: str = ""  # of the verdict: a pass that rests on waivers looks like a warning
     counts: str = ""
@@ -275,6 +287,11 @@ class MissionPage(NamedTuple):
     probabilities: tuple[Probability, ...] = ()
     draws_remarks: tuple[str, ...] = ()
     study: Studied | None = None
+
+    @property
+    def has_waivers(self) -> bool:
+        """Whether a row of the matrix has one."""
+        return any(row.waiver for row in self.matrix)
 
     def has_annex(self, is_full: bool) -> bool:
         """Whether there is more than the summary: everything, or images, draws, a sweep that somebody asked for."""

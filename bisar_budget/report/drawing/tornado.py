@@ -1,8 +1,11 @@
-"""What each number of a mission does to its worst utilization, as bars to both sides, the largest above."""
+"""What each number of a mission does to its worst utilization, as bars to both sides, the largest above.
+
+All bars are for the same part: 1 % of a number, of a radian, of a power, of the smaller slant range.
+"""
 
 from typing import Any
 
-from bisar_budget.design.slopes import Sensitivity, Slope
+from bisar_budget.design.slopes import EVEN, Sensitivity, Slope
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.report.drawing.figure import (
     BETTER,
@@ -34,7 +37,7 @@ def figure(found: Sensitivity) -> Any:
     page = new_figure(figsize=(9.5, 2.0 + _ROW * max(len(shown), 3)))
     panel = page.subplots()
     for place, slope in enumerate(shown):
-        change = 100 * slope.effect
+        change = 100 * slope.even_effect
         dark, pale = (WORSE, PALE_BETTER) if change > 0 else (BETTER, PALE_WORSE)
         panel.barh([place, place], [change, -change], color=[dark, pale], height=0.72, lw=0, zorder=2)
     panel.set_yticks(range(len(shown)), [_label(slope) for slope in shown], fontsize=9, parse_math=False)
@@ -60,4 +63,12 @@ def figure(found: Sensitivity) -> Any:
 
 def _label(slope: Slope) -> str:
     mark = " *" if slope.is_mixed else ""
-    return f"{printable(slope.key)} = {printable(slope.given)}, {slope.per_text}{mark}"
+    return f"{printable(slope.key)} = {printable(slope.given)}, {_even(slope)}{mark}"
+
+
+def _even(slope: Slope) -> str:
+    """Write the change that its bar is for."""
+    if slope.measure == EVEN:
+        return slope.per_text
+    size, _, unit = slope.per_text.partition(" ")
+    return f"{float(size) * EVEN / slope.measure:.2g} {unit}"

@@ -1,4 +1,8 @@
-"""The rows as CSV for a spreadsheet: SI values, one line per row and file, a header."""
+"""The table of requirements and the rows as CSV for a spreadsheet: SI values, a line for each, a header.
+
+`kind` tells them apart. A requirement has the id `requirement.islr`, what is reached under `declared`, what is
+allowed under `allowable`, and the row that decides under `decided_by`.
+"""
 
 import csv
 import io
@@ -6,8 +10,10 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from bisar_budget.faults import changes_words
 from bisar_budget.findings.mission import MissionFindings, UnusableMission
+from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.report import Piece, Style
 from bisar_budget.report.words.escapes import spreadsheet_text
+from bisar_budget.report.words.requirements import overrides_words, requirement_id
 
 COLUMNS = (
     "file",
@@ -39,11 +45,14 @@ COLUMNS = (
     "cubic_rad",
     "islr_db",
     "set",
+    "kind",
+    "decided_by",
+    "overrides",
 )
 
 
 def piece(mission: MissionFindings | UnusableMission, style: Style) -> str:
-    """Write every row of a mission; an unusable file gives one line per fault with the status `error`."""
+    """Write every requirement and row of a mission; of an unusable file a line per fault, with the status `error`."""
     return _written(_faults(mission) if isinstance(mission, UnusableMission) else _rows(mission))
 
 
@@ -65,6 +74,7 @@ def _faults(mission: UnusableMission) -> Iterator[list[object]]:
             "id": spreadsheet_text(fault.key),
             "status": mission.status,
             "line": fault.line,
+            "kind": "fault",
             "reason": spreadsheet_text(str(fault)),
         }
         yield [cells.get(column) for column in COLUMNS]
@@ -73,6 +83,10 @@ def _faults(mission: UnusableMission) -> Iterator[list[object]]:
 def _rows(mission: MissionFindings) -> Iterator[list[object]]:
     file, name = spreadsheet_text(mission.file), spreadsheet_text(mission.name)
     changed = spreadsheet_text(changes_words(mission.changes)) or None
+    outside = spreadsheet_text(overrides_words(mission)) or None
+    for one in mission.requirements:
+        cells = {"file": file, "mission": name, "set": changed, "overrides": outside, **_requirement(one)}
+        yield [cells.get(column) for column in COLUMNS]
     verdicts = {verdict.id: verdict.verdict for verdict in mission.verdicts or ()}
     for row in mission.rows:
         x, y = row.displacement_m or (None, None)
@@ -106,4 +120,24 @@ def _rows(mission: MissionFindings) -> Iterator[list[object]]:
             row.cubic_rad,
             row.islr_db,
             changed,
+            "row",
+            None,
+            outside,
         ]
+
+
+def _requirement(one: JudgedRequirement) -> dict[str, object]:
+    return {
+        "id": requirement_id(one),
+        "status": one.status,
+        "metric": one.key,
+        "unit": one.unit,
+        "declared": one.reached,
+        "allowable": one.value if one.allowed is None else one.allowed,
+        "utilization": one.utilization,
+        "line": one.line,
+        "reason": one.reason,
+        "notes": "; ".join(waiver.words for waiver in one.waivers),
+        "kind": "requirement",
+        "decided_by": spreadsheet_text(one.row),
+    }

@@ -12,6 +12,7 @@ from bisar_budget.findings.row import worst_first
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report.words.escapes import command_property, command_text, markdown_text, source_path
+from bisar_budget.report.words.requirements import overrides_words, requirement_finding, requirement_id, unseen
 from bisar_budget.report.words.sentences import finding, percent
 
 _ORDER = ("error", "warning", "notice")
@@ -27,7 +28,10 @@ class _Annotation(NamedTuple):
 
 
 def render(report: Report, style: Style) -> str:
-    """Write one command per finding; a run without findings says so in a line that is no command."""
+    """Write one command per finding; a run without findings says so in a line that is no command.
+
+    A requirement is a finding where no row shows how it stands; so is what from outside a file bears on its verdict.
+    """
     annotations = sorted(_annotations(report, style), key=lambda found: _ORDER.index(found.command))
     lines = [_command(annotation) for annotation in annotations]
     return "\n".join(lines or [f"bisar-budget: {_counted(report)}, no findings"]) + "\n"
@@ -40,10 +44,15 @@ def _annotations(report: Report, style: Style) -> Iterator[_Annotation]:
             for fault in mission.faults:
                 yield _Annotation("error", file, _place(fault), "Unusable mission file", str(fault))
             continue
+        for one in unseen(mission):
+            title = f"{STATUS[one.status].text} {requirement_id(one)}"
+            yield _Annotation(STATUS[one.status].github, file, _region(one.line), title, requirement_finding(one))
+        if outside := overrides_words(mission):
+            yield _Annotation("notice", file, None, "From outside the file", outside)
         for row in worst_first(mission.rows):
             if command := STATUS[row.status].github:
                 title = f"{STATUS[row.status].text} {row.id}"
-                yield _Annotation(command, file, _region(row.line), title, finding(row))
+                yield _Annotation(command, file, _region(row.line), title, finding(row, mission))
         for warning in mission.warnings:
             yield _Annotation("warning", file, _region(warning.line), "Mission file", warning.message)
 
@@ -93,14 +102,22 @@ def step_summary(report: Report, style: Style) -> str:
             use = percent(row.utilization)
         if mission.changes:
             file += " " + markdown_text(changes_words(mission.changes))
+        if outside := overrides_words(mission, with_changes=False):
+            file += "; from outside the file: " + markdown_text(outside)
         status = STATUS[mission.status].text + ("; each error alone" if mission.combine == "each" else "")
         lines.append(f"| {status} | {file} | {markdown_text(row.id)} | {use} |")
+    usable = [mission for mission in report.missions if isinstance(mission, MissionFindings)]
     broken = [
-        f"- {markdown_text(finding(row))}"
-        for mission in report.missions
-        if isinstance(mission, MissionFindings)
+        f"- {markdown_text(requirement_finding(one))}"
+        for mission in usable
+        for one in mission.requirements
+        if STATUS[one.status].fails
+    ]
+    broken += [
+        f"- {markdown_text(finding(row, mission))}"
+        for mission in usable
         for row in mission.rows
-        if row.status == "fail"
+        if STATUS[row.status].fails
     ]
     lines += ["", *broken[:_SHOWN_IN_SUMMARY]] if broken else []
     if len(broken) > _SHOWN_IN_SUMMARY:

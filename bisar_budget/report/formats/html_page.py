@@ -15,9 +15,10 @@ from bisar_budget.report.compliance.page import compliance
 from bisar_budget.report.explain import typeset
 from bisar_budget.report.explain.formulas import Sum, WorkedEquation
 from bisar_budget.report.words.missions import document_words
+from bisar_budget.report.words.sentences import dashed, sentence
 from bisar_budget.resources import resource
 
-_AFTER = re.compile(r"([._/])(?=\w)")  # where a long name may break
+_AFTER = re.compile(r"([._/])(?=\w{2})")  # where a long name may break: an axis stays with what it is of
 
 
 def render(report: Report, style: Style) -> str:
@@ -47,7 +48,8 @@ def _template() -> Template:
     )
     environment.filters |= {
         "breakable": _breakable,
-        "sentence": _sentence,
+        "sentence": sentence,
+        "dashed": dashed,
         "css_string": _css_string,
         "document_words": document_words,
     }
@@ -68,10 +70,6 @@ def _css_string(text: str) -> Markup:
     """A string of a style sheet: every character but letters, digits and blanks of ASCII is its number."""
     safe = (c if c.isascii() and (c.isalnum() or c == " ") else f"\\{ord(c):x} " for c in printable(text))
     return Markup(f'"{"".join(safe)}"')
-
-
-def _sentence(text: str) -> str:
-    return text[:1].upper() + text[1:]
 
 
 def _equation(part: WorkedEquation | str) -> Markup:

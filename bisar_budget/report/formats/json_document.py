@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from bisar_budget.analysis.allocation import Split
 from bisar_budget.findings.mission import FileWarning, MissionFindings, UnusableMission
+from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import worst
 from bisar_budget.geometry import PlatformState
@@ -98,6 +99,8 @@ def _mission(mission: MissionFindings) -> dict[str, Any]:
         "status": mission.status,
         "set": [change._asdict() for change in mission.changes],
         "model": mission.model,
+        "model_doubt": mission.model_doubt or None,
+        "model_doubt_code": mission.model_doubt.code or None,
         "combine": mission.combine,
         "coverage_factor": mission.coverage_factor,
         "geometry": {
@@ -119,6 +122,7 @@ def _mission(mission: MissionFindings) -> dict[str, Any]:
                 "reserve": allocation.qpe.reserve * allocation.qpe_total,
             },
             "autofocus_gain": allocation.autofocus_gain,
+            "n_pull": allocation.n_pull,
             "pslr_share": _shares(allocation.pslr),
             "islr_share": _shares(allocation.islr),
         },
@@ -129,6 +133,11 @@ def _mission(mission: MissionFindings) -> dict[str, Any]:
             "autofocus_radius_m": mission.scene.autofocus_radius,
             "searched_radius_m": mission.scene.searched,
         },
+        "requirements": [_requirement(one) for one in mission.requirements],
+        "declared_kinds": mission.kinds.declared,
+        "not_declared": mission.kinds.missing,
+        "without_source": mission.kinds.without_source,
+        "overrides": [one._asdict() for one in mission.overrides],
         "summary": mission.summary,
         "rows": [_row(row) for row in mission.rows],
         "warnings": [_warning(warning) for warning in mission.warnings],
@@ -159,6 +168,11 @@ def verdict_item(verdict: "Verdict") -> dict[str, Any]:
     """Write what images say of a limit, with the codes of the reasons."""
     reasons = {"reason_code": verdict.reason, "reason_autofocus_code": verdict.reason_autofocus}
     return verdict._asdict() | {name: None if reason is None else reason.code for name, reason in reasons.items()}
+
+
+def _requirement(one: JudgedRequirement) -> dict[str, Any]:
+    found = {name: value for name, value in one._asdict().items() if name != "waivers"}
+    return found | {"reason_code": None if one.reason is None else one.reason.code}
 
 
 def _row(row: Row) -> dict[str, Any]:
@@ -196,6 +210,7 @@ def _platform(mission: MissionFindings, name: str) -> dict[str, Any]:
             "residual_max_m": path.farthest,
             "residual_rms_m": path.rms,
             "samples": path.samples,
+            "doubt_m": path.doubt_m,
             "accuracy": None if path.accuracy is None else dict(zip(("file", "sha256"), path.accuracy, strict=True)),
         }
     return found

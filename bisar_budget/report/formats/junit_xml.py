@@ -1,4 +1,4 @@
-"""The rows as JUnit XML, which GitLab, Jenkins and requirements tools read: a suite per mission, a case per row.
+"""JUnit XML, which GitLab, Jenkins and requirements tools read: a suite per mission, a case per requirement and row.
 
 What breaks a requirement is a failure, what judges nothing is skipped, a file that cannot be used is an
 error; a warning passes and says so in its output. There are no times: a report is the same in every run.
@@ -13,10 +13,17 @@ from os.path import splitext
 
 from bisar_budget.faults import changes_words
 from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
+from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report.words.escapes import source_path, xml_text
+from bisar_budget.report.words.requirements import (
+    declared_words,
+    overrides_words,
+    requirement_finding,
+    requirement_id,
+)
 from bisar_budget.report.words.sentences import cause, measure
 
 
@@ -47,22 +54,28 @@ def _unusable(mission: UnusableMission, style: Style, counts: Counter[str]) -> I
 
 
 def _mission(mission: MissionFindings, style: Style, counts: Counter[str]) -> Iterator[str]:
-    failures = sum(STATUS[row.status].junit == "failure" for row in mission.rows)
-    skipped = sum(STATUS[row.status].junit == "skipped" for row in mission.rows)
-    counts.update(tests=len(mission.rows), failures=failures)
-    yield _suite(mission.name, tests=len(mission.rows), failures=failures, errors=0, skipped=skipped)
+    statuses = [*(one.status for one in mission.requirements), *(row.status for row in mission.rows)]
+    outcomes = Counter(STATUS[name].junit for name in statuses)
+    tests, failures = outcomes.total(), outcomes["failure"]
+    counts.update(tests=tests, failures=failures)
+    yield _suite(mission.name, tests=tests, failures=failures, errors=0, skipped=outcomes["skipped"])
     yield "<properties>"
     yield _property("file", source_path(mission.file, style.root))
     yield _property("model", mission.model)
     yield _property("combine", mission.combine)
     if mission.changes:
         yield _property("set", changes_words(mission.changes))
+    if outside := overrides_words(mission):
+        yield _property("overrides", outside)
+    yield _property("declared_kinds", declared_words(mission.kinds))
     said = mission.document._asdict().items()
     yield from [_property(f"document_{name}", value) for name, value in said if value is not None]
     yield "</properties>"
     class_name, file = _class_name(mission.file, style), xml_text(source_path(mission.file, style.root))
+    for one in mission.requirements:
+        yield from _requirement(one, class_name, file)
     for row in mission.rows:
-        yield from _case(row, class_name, file)
+        yield from _case(row, mission, class_name, file)
     if mission.warnings:
         texts = "\n".join(f"{file}:{w.line or '-'}: {xml_text(w.message)}" for w in mission.warnings)
         yield f"<system-out>{texts}</system-out>"
@@ -76,7 +89,27 @@ def _suite(name: str, *, tests: int, failures: int, errors: int, skipped: int) -
     )
 
 
-def _case(row: Row, class_name: str, file: str) -> Iterator[str]:
+def _requirement(one: JudgedRequirement, class_name: str, file: str) -> Iterator[str]:
+    yield f'<testcase classname="{class_name}" name="{requirement_id(one)}" time="0">'
+    yield "<properties>"
+    values: tuple[tuple[str, object], ...] = (
+        ("budget_status", one.status),
+        ("unit", one.unit or None),
+        ("value", one.value),
+        ("allowed", one.allowed),
+        ("reached", one.reached),
+        ("utilization", one.utilization),
+        ("decided_by", one.row),
+        ("line", one.line),
+    )
+    yield from [_property(name, value) for name, value in values if value is not None]
+    yield "</properties>"
+    said = requirement_finding(one)
+    yield from _outcome(one.status, said, said, one.line, file)
+    yield "</testcase>"
+
+
+def _case(row: Row, mission: MissionFindings, class_name: str, file: str) -> Iterator[str]:
     yield f'<testcase classname="{class_name}" name="{xml_text(row.id)}" time="0">'
     yield "<properties>"
     values: tuple[tuple[str, object], ...] = (
@@ -98,23 +131,27 @@ def _case(row: Row, class_name: str, file: str) -> Iterator[str]:
         )
     yield from [_property(name, value) for name, value in values if value is not None]
     yield "</properties>"
-    status = STATUS[row.status]
-    if status.junit == "failure":
-        place = f"{file}:{row.line}: " if row.line is not None else ""
-        text = f"{place}{xml_text(measure(row))}\n{xml_text(cause(row))}\n{xml_text(row.equation)}"
-        yield f'<failure message="{xml_text(_remark(row))}" type="{status.name}">{text}</failure>'
-    elif status.junit == "skipped":
-        why = cause(row)
-        message = f"{status.junit_words}{f': {why}' if why else ''}"
-        yield f'<skipped message="{xml_text(message)}" type="{status.name}"/>'
-    elif status.junit == "remark":
-        yield f"<system-out>{xml_text(f'{status.name}: {_remark(row)}')}</system-out>"
+    why, size = cause(row), measure(row, mission)
+    remark = f"{size}. {why}" if why else size
+    if STATUS[row.status].junit == "failure":
+        yield from _outcome(row.status, remark, f"{size}\n{why}\n{row.equation}", row.line, file)
+    else:
+        yield from _outcome(row.status, why if STATUS[row.status].junit == "skipped" else remark, "", row.line, file)
     yield "</testcase>"
 
 
-def _remark(row: Row) -> str:
-    why = cause(row)
-    return f"{measure(row)}{f'. {why}' if why else ''}"
+def _outcome(status_name: str, message: str, text: str, line: int | None, file: str) -> Iterator[str]:
+    """What a case says besides its properties; nothing where it simply passes."""
+    status = STATUS[status_name]
+    if status.junit == "failure":
+        place = f"{file}:{line}: " if line is not None else ""
+        lines = "\n".join(map(xml_text, text.split("\n")))
+        yield f'<failure message="{xml_text(message)}" type="{status.name}">{place}{lines}</failure>'
+    elif status.junit == "skipped":
+        said = f"{status.junit_words}{f': {message}' if message else ''}"
+        yield f'<skipped message="{xml_text(said)}" type="{status.name}"/>'
+    elif status.junit == "remark":
+        yield f"<system-out>{xml_text(f'{status.name}: {message}')}</system-out>"
 
 
 def _property(name: str, value: object) -> str:

@@ -18,6 +18,7 @@ from bisar_budget.report.explain import typeset
 from bisar_budget.report.explain.formulas import Sum, WorkedEquation
 from bisar_budget.report.words.escapes import markdown_text, uri
 from bisar_budget.report.words.missions import document_words
+from bisar_budget.report.words.sentences import dashed, sentence
 from bisar_budget.resources import resource
 
 _BAR = 20  # characters
@@ -53,7 +54,7 @@ def _template() -> Template:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.filters["document_words"] = document_words
+    environment.filters |= {"document_words": document_words, "sentence": sentence, "dashed": dashed}
     return environment.get_template("report.md.j2")
 
 

@@ -1,20 +1,24 @@
 """What needs attention as SARIF 2.1.0, which code scanning and editors show at the value in the mission file.
 
-Only findings are results: rows that pass, judge nothing or are not declared are not in it. A waived row is
-a result with a suppression, a file that cannot be used gives notifications of the tool.
+Only findings are results: rows that pass, judge nothing or are not declared are not in it, and a requirement is where
+no row shows how it stands. What is waived is a result with a suppression, a file that cannot be used gives
+notifications of the tool.
 """
 
 import json
+from collections.abc import Sequence
 from functools import cache
 from hashlib import sha256
 from typing import Any
 
 from bisar_budget.faults import Fault, Place, printable
 from bisar_budget.findings.mission import FileWarning, MissionFindings, Report, UnusableMission
-from bisar_budget.findings.row import Row
+from bisar_budget.findings.requirement import JudgedRequirement
+from bisar_budget.findings.row import AppliedWaiver, Row
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report.words.escapes import source_path, uri
+from bisar_budget.report.words.requirements import overrides_words, requirement_finding, requirement_id, unseen
 from bisar_budget.report.words.sentences import finding
 
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
@@ -49,10 +53,20 @@ RULES = {
         "The displacement may be at most requirements.location_error. Declare smaller position, velocity or clock "
         "errors; autofocus does not help.",
     ),
+    "declare": (
+        "Everything declared that must be",
+        "requirements.declare names errors that the file must declare. What is missing is not evaluated: declare it, "
+        "a zero where there is none.",
+    ),
     "autofocus_pull_in": (
         "All errors together within what autofocus corrects",
         "Autofocus corrects one total of n_pull·π radians, not each error separately (Rigling & Moses, Section VI). "
         "Raise autofocus.n_pull if the algorithm allows, or declare smaller errors.",
+    ),
+    "declare": (
+        "Errors that the file must declare",
+        "requirements.declare names errors that the file has to declare, for both platforms; what is missing cannot "
+        "be judged. Declare them: a zero declares too.",
     ),
     "other": (
         "Declared value within its limit",
@@ -79,8 +93,12 @@ def render(report: Report, style: Style) -> str:
         if isinstance(mission, UnusableMission):
             notifications += [_notification(fault, artifact) for fault in mission.faults]
             continue
+        results += [_requirement(one, mission, artifact) for one in unseen(mission)]
         results += [_result(row, mission, artifact) for row in mission.rows if STATUS[row.status].sarif]
         results += [_warning(warning, mission, artifact) for warning in mission.warnings]
+        if outside := overrides_words(mission):
+            said = f"From outside the file: {outside}"
+            results.append(_located("mission_file", "note", said, None, artifact, "from outside the file"))
     run = {
         "tool": {"driver": _driver(report.version)},
         "columnKind": "unicodeCodePoints",
@@ -134,28 +152,53 @@ def _artifact_location(file: str, style: Style) -> dict[str, Any]:
 def _result(row: Row, mission: MissionFindings, artifact: dict[str, Any]) -> dict[str, Any]:
     rule = "autofocus_pull_in" if row.subject.kind == "autofocus_pull_in" else row.metric
     rule = rule if rule in RULES else "other"
-    result = _located(rule, STATUS[row.status].sarif, finding(row), row.line, artifact, row.id)
-    result["properties"] = {
-        key: value if not isinstance(value, str) else printable(value)
-        for key, value in (
-            ("mission", mission.name),
-            ("status", row.status),
-            ("metric", row.metric),
-            ("unit", row.unit),
-            ("declared", row.declared),
-            ("allowable", row.allowable),
-            ("binding_requirement", row.binding_requirement),
-            ("utilization", row.utilization),
-            ("margin", row.margin),
-            ("equation", row.equation),
-            ("requirement_id", row.requirement_id),
-            ("evidence", row.evidence),
-        )
+    result = _located(rule, STATUS[row.status].sarif, finding(row, mission), row.line, artifact, row.id)
+    result["properties"] = _properties(
+        mission=mission.name,
+        status=row.status,
+        metric=row.metric,
+        unit=row.unit,
+        declared=row.declared,
+        allowable=row.allowable,
+        binding_requirement=row.binding_requirement,
+        utilization=row.utilization,
+        margin=row.margin,
+        equation=row.equation,
+        requirement_id=row.requirement_id,
+        evidence=row.evidence,
+        overrides=overrides_words(mission) or None,
+    )
+    if row.status == "waived":
+        result["suppressions"] = [_suppression(row.waivers, artifact)]
+    return result
+
+
+def _requirement(one: JudgedRequirement, mission: MissionFindings, artifact: dict[str, Any]) -> dict[str, Any]:
+    level = STATUS[one.status].sarif
+    result = _located(one.key, level, requirement_finding(one), one.line, artifact, requirement_id(one))
+    result["properties"] = _properties(
+        mission=mission.name,
+        status=one.status,
+        metric=one.key,
+        unit=one.unit or None,
+        declared=one.reached,
+        allowable=one.value if one.allowed is None else one.allowed,
+        utilization=one.utilization,
+        decided_by=one.row,
+        overrides=overrides_words(mission) or None,
+    )
+    if one.status == "waived" and one.waivers:
+        result["suppressions"] = [_suppression(one.waivers, artifact)]
+    return result
+
+
+def _properties(**values: str | float | None) -> dict[str, str | float]:
+    """Return what has a value, made harmless."""
+    return {
+        key: printable(value) if isinstance(value, str) else value
+        for key, value in values.items()
         if value is not None
     }
-    if row.status == "waived":
-        result["suppressions"] = [_suppression(row, artifact)]
-    return result
 
 
 def _warning(warning: FileWarning, mission: MissionFindings, artifact: dict[str, Any]) -> dict[str, Any]:
@@ -198,9 +241,9 @@ def _region(line: int | None) -> dict[str, int]:
     return region
 
 
-def _suppression(row: Row, artifact: dict[str, Any]) -> dict[str, Any]:
+def _suppression(waivers: Sequence[AppliedWaiver], artifact: dict[str, Any]) -> dict[str, Any]:
     """Return the waiver: it stands in the file that is checked, which the standard calls `inSource`."""
-    waiver = next(one for one in row.waivers if not one.is_expired)
+    waiver = next(one for one in waivers if not one.is_expired)
     region = {"startLine": int(waiver.line or 1)}
     return {
         "kind": "inSource",

@@ -1,6 +1,7 @@
 """What the numbers of a mission do to its worst utilization: text for reading, JSON `bisar-budget/sensitivity/1`."""
 
 import json
+import math
 import re
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -10,6 +11,7 @@ from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report.words.layout import table, wrapped
+from bisar_budget.report.words.requirements import overrides_lines
 from bisar_budget.report.words.sentences import BINDING_WORDS, percent
 
 FORMAT = "bisar-budget/sensitivity/1"
@@ -26,6 +28,7 @@ def _mission(found: Sensitivity) -> dict[str, Any]:
         "file": found.file,
         "name": found.name,
         "set": [change._asdict() for change in found.changes],
+        "overrides": [one._asdict() for one in found.overrides],
         "model": found.model,
         "status": found.status,
         "worst_row": found.worst_row,
@@ -33,7 +36,7 @@ def _mission(found: Sensitivity) -> dict[str, Any]:
         "utilization": found.utilization,
         "row": found.row,
         "row_utilization": found.row_utilization,
-        "numbers": [_slope(slope) for slope in found.slopes],
+        "numbers": [_slope(slope) | {"to_limit": found.to_limit(slope)} for slope in found.slopes],
         "without_effect": list(found.unchanging),
         "skipped": [skipped._asdict() for skipped in found.skipped],
         "relaxed": [_relaxed(relaxed) for relaxed in found.relaxed] if found.is_balanced else None,
@@ -73,7 +76,7 @@ def _relaxed(relaxed: Relaxed) -> dict[str, Any]:
 
 
 def as_text(found: Sequence[Sensitivity], style: Style) -> str:
-    """Write the numbers that change something, the largest effect first."""
+    """Write the numbers that change something; first that which has to change least to use up the margin."""
     return "\n\n".join("\n".join(_lines(one, style)) for one in found) + "\n"
 
 
@@ -90,6 +93,7 @@ def _lines(found: Sensitivity, style: Style) -> Iterator[str]:
     yield from wrapped(
         f"{printable(found.file)}{changed}, {printable(found.name)}: {status.text}, {found.model} model", "  "
     )
+    yield from overrides_lines(found)
     yield ""
     yield from _table(found)
     yield from _notes(found)
@@ -104,21 +108,41 @@ def _table(found: Sensitivity) -> Iterator[str]:
         yield "No number of the file changes it."
         return
     of_row = [] if found.row is None else ["of the row"]
-    rows = [["key", "value", "per", "worst", *of_row, ""]]
+    rows = [["key", "value", "to limit", "per", "worst", *of_row, ""]]
     for slope in shown:
         in_row = [] if slope.row_change is None else [_points(slope.row_change)]
         mixed = next((row for row in (slope.row_above, slope.row_below) if row != found.worst_row), "")
         note = f"({printable(mixed)})" if slope.is_mixed else ""
         rows.append(
-            [printable(slope.key), printable(slope.given), slope.per_text, _points(slope.change), *in_row, note]
+            [
+                printable(slope.key),
+                printable(slope.given),
+                to_limit(found, slope),
+                slope.per_text,
+                _points(slope.change),
+                *in_row,
+                note,
+            ]
         )
     yield from table(rows)
     yield ""
     yield from wrapped(
-        "Change of the utilization in percentage points, if a number grows by what stands under per; a negative "
-        "number grows away from 0.",
+        "to limit: what a number has to change by, alone, until the utilization is 100 %, if that goes on as it goes "
+        "here; the least stands first. worst: change of the utilization in percentage points, if a number grows by "
+        "what stands under per; a negative number grows away from 0.",
         "  ",
     )
+
+
+def to_limit(found: Sensitivity, slope: Slope) -> str:
+    """Write the change that uses up the margin: in percent, from tenfold on as a factor, or in degrees or decibel."""
+    change = found.to_limit(slope)
+    if change is None:
+        return "-"
+    if slope.is_proportional:
+        part = change / slope.value
+        return f"{100 * part:+.3g} %" if -0.99 < part < 9 else f"x {1 + part:.3g}"
+    return f"{change:+.3g} dB" if slope.per_text.endswith("dB") else f"{math.degrees(change):+.3g} deg"
 
 
 def _points(change: float) -> str:

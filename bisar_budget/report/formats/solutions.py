@@ -11,6 +11,7 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report.formats.json_document import verdict_item
 from bisar_budget.report.words.layout import table, wrapped
+from bisar_budget.report.words.requirements import overrides_lines
 from bisar_budget.report.words.sentences import percent
 from bisar_budget.units import format_quantity
 
@@ -31,6 +32,7 @@ def _mission(solution: Solution) -> dict[str, Any]:
         "file": solution.file,
         "name": solution.name,
         "set": [change._asdict() for change in solution.changes],
+        "overrides": [one._asdict() for one in solution.overrides],
         "key": solution.key,
         "scale": solution.is_scale,
         "unit": solution.unit,
@@ -75,6 +77,7 @@ def _compared(found: Comparison) -> dict[str, Any]:
         "file": found.file,
         "name": found.name,
         "set": [change._asdict() for change in found.changes],
+        "overrides": [one._asdict() for one in found.overrides],
         "key": found.key,
         "scale": False,
         "unit": None,
@@ -148,6 +151,7 @@ def _table_of(found: Comparison, style: Style) -> Iterator[str]:
         + (", neither fails nor warns" if found.target == "warn" else ""),
         "  ",
     )
+    yield from overrides_lines(found)
     yield ""
     is_mixed = len({part.kind for part in found.parts}) > 1
     rows = [["part", *(["kind"] if is_mixed else []), "status", "use", ""]]
@@ -178,6 +182,7 @@ def _lines(solution: Solution, style: Style) -> Iterator[str]:
     yield f"\x1b[{_SGR[solution.status]}m{first}\x1b[0m" if style.color else first
     yield from rest
     yield from wrapped(f"{printable(solution.file)}{changed}, {printable(solution.name)}", "  ")
+    yield from overrides_lines(solution)
     yield ""
     for name, text in _facts(solution):
         yield from wrapped(f"{name:<12} {text}", " " * 13)

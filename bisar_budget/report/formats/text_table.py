@@ -1,18 +1,35 @@
-"""The report for a terminal: verdict, geometry, the rows that matter with the worst first, what decides them."""
+"""The report for a terminal: verdict, table of requirements, geometry, the rows that matter with the worst first."""
 
 import re
 from collections.abc import Iterator, Sequence
 from functools import cache
 
+from bisar_budget.effects.models import END_OF_IMAGE
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.mission import MissionFindings, UnusableMission
-from bisar_budget.findings.row import Row, worst_first
+from bisar_budget.findings.row import DECLARE, Row, worst_first
 from bisar_budget.findings.status import STATUS, worst
 from bisar_budget.report import Piece, Style
 from bisar_budget.report.words.layout import WIDTH, wrapped, wrapped_counts
-from bisar_budget.report.words.missions import document_words, head, narrow_gradients
+from bisar_budget.report.words.missions import document_words, doubtful_model, head, narrow_gradients
+from bisar_budget.report.words.quantities import row_limit, row_size
+from bisar_budget.report.words.requirements import (
+    COLUMNS,
+    RequirementLine,
+    declared_words,
+    is_said_with_the_table,
+    overrides_lines,
+    overrides_words,
+    requirement_lines,
+    rule_words,
+    unjudged_effects,
+    verdict,
+)
 from bisar_budget.report.words.sentences import binding_words, matters, percent
 from bisar_budget.units import format_quantity
+
+LINES = 45  # of a report, where its rows can be fewer
+_FEWEST = 3  # rows, however long the rest is
 
 
 def piece(mission: MissionFindings | UnusableMission, style: Style) -> str:
@@ -43,43 +60,120 @@ def _unusable(mission: UnusableMission, style: Style) -> list[str]:
 def _mission(mission: MissionFindings, style: Style) -> list[str]:
     if style.verbosity < 0:
         count = sum(not warning.is_of_options for warning in mission.warnings)
-        warned = f"; {count} warning{'s' if count != 1 else ''} about the file" if count else ""
-        return [_lead(_summary(mission) + warned, mission.status, style)]
-    alone = "; each error alone" if mission.combine == "each" else ""
-    said = _summary(mission) + alone
+        said = [_summary(mission), *_alone(mission)]
+        said += [f"{count} warning{'s' if count != 1 else ''} about the file"] if count else []
+        if outside := overrides_words(mission, with_changes=False):
+            said.append(f"from outside the file: {outside}")
+        return [_lead("; ".join(said), mission.status, style)]
+    lines = _verdict(mission, style)
+    lines += ["", *_requirements(mission, style)]
+    lines += ["", *(line for key, text in _head(mission) for line in wrapped(f"{key:<12} {text}", " " * 13)), ""]
+    after = list(_after(mission, style))
+    room = max(LINES - len(lines) - len(after), 0)
+    return [*lines, *_table(mission, style, room), *after]
+
+
+def _alone(mission: MissionFindings) -> list[str]:
+    return ["each error alone"] if mission.combine == "each" else []
+
+
+def _verdict(mission: MissionFindings, style: Style) -> list[str]:
+    """Whether it is met and was looked at, what was judged, and what from outside the file bears on it."""
+    said = _summary(mission)
     first, *rest = wrapped(said, "  ") if mission.changes else wrapped_counts(said)
     document = ", ".join(filter(None, (document_words(mission.document), mission.document.author)))
     name = f"{mission.name} ({document})" if document else mission.name
-    lines = [_lead(first, mission.status, style), *rest, *wrapped(name, "  ")]
+    lines = [_lead(first, mission.status, style), *rest, *wrapped(f"{name}; {rule_words(mission)}", "  ")]
+    lines += overrides_lines(mission)
+    if sentence := doubtful_model(mission):
+        lines += wrapped(sentence, "  ")
     if sentence := narrow_gradients(mission.geometry):
         lines += wrapped(sentence, "  ")
-    lines += ["", *(line for key, text in head(mission) for line in wrapped(f"{key:<12} {text}", " " * 13))]
-    lines += ["", *_table(mission, style)]
-    details = list(_details(mission, style))
-    lines += ["", *details] if details else []
-    lines += [line for text in _asides(mission, style) for line in wrapped(text, "  ")]
+    return lines
+
+
+def _requirements(mission: MissionFindings, style: Style) -> Iterator[str]:
+    """The table of requirements, effects that none takes, and how much is declared."""
+    found = list(requirement_lines(mission))
+    cells = [COLUMNS[:4], *((one.name, one.allowed, one.reached, one.use) for one in found)]
+    widths = [max(len(line[column]) for line in cells) for column in range(4)]
+    numbers = (f"{COLUMNS[0]:<{widths[0]}}", *_right(COLUMNS[1:4], widths[1:]))
+    yield f"{' '.join(numbers)} {COLUMNS[4]:<8} {COLUMNS[5]}"
+    for one in found:
+        yield from _requirement(one, widths, style)
+    for effect in unjudged_effects(mission):
+        rows = ", ".join(row.id if row.line is None else f"{row.id} of line {row.line}" for row in effect.rows)
+        yield from wrapped(f"Not judged: {effect.text} ({rows}).", "  ")
+    yield from wrapped(declared_words(mission.kinds), "  ")
+
+
+def _requirement(one: RequirementLine, widths: Sequence[int], style: Style) -> Iterator[str]:
+    """One line; what decides stands below it where it is too long."""
+    start = " ".join((f"{one.name:<{widths[0]}}", *_right((one.allowed, one.reached, one.use), widths[1:])))
+    decided = ", ".join(filter(None, (one.decided_by, one.remark)))
+    if len(start) + 10 + len(decided) <= WIDTH:
+        yield f"{start} {_word(one.status, style, 8)} {decided}"
+    else:
+        yield f"{start} {_word(one.status, style)}"
+        yield from wrapped(f"    {decided}", "    ")
+
+
+def _right(cells: Sequence[str], widths: Sequence[int]) -> list[str]:
+    return [cell.rjust(width) for cell, width in zip(cells, widths, strict=True)]
+
+
+def _head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
+    """The collection, and how many rows stand how; the model is said with the name."""
+    yield from ((key, text) for key, text in head(mission) if key != "Model")
+    yield "Rows", ", ".join(f"{count} {STATUS[status].text}" for status, count in mission.summary.items())
+
+
+def _after(mission: MissionFindings, style: Style) -> Iterator[str]:
+    """What stands below the rows: what decides them, warnings, draws and images."""
+    if details := list(_details(mission, style)):
+        yield from ("", *details)
+    yield from (line for text in _asides(mission, style) for line in wrapped(text, "  "))
     if mission.monte_carlo is not None:
         from bisar_budget.report.words.probabilities import probabilities
 
-        lines += ["", *probabilities(mission.monte_carlo)]
+        yield from ("", *probabilities(mission.monte_carlo))
     if mission.verdicts is not None:
         from bisar_budget.report.formats.verification import evidence
 
-        lines += ["", "Images with each error at its limit", "", *evidence(mission.verdicts, style)]
-    return lines
+        yield from ("", "Images with each error at its limit", "", *evidence(mission.verdicts, style))
 
 
 _HEADER = ("status", "row", "declared", "allowable", "use", "by")
 
 
-def _table(mission: MissionFindings, style: Style) -> Iterator[str]:
-    """Rows that are declared or limit something, the worst first, and how many others there are."""
+def _table(mission: MissionFindings, style: Style, room: int) -> Iterator[str]:
+    """Rows that are declared or limit something, the worst first, and how many others there are.
+
+    Of those that pass, no more than there is room for on a screen.
+    """
     rows, hidden = worst_first(mission.rows), list[Row]()
     # Where nothing is declared the allowables are the answer.
-    if not style.all_rows and style.verbosity <= 0 and any(row.status != "not_declared" for row in rows):
+    is_short = not style.all_rows and style.verbosity <= 0
+    if is_short and not mission.is_empty:
         hidden = [row for row in rows if not matters(row)]
         rows = [row for row in rows if matters(row)]
-    cells = [_row(row) for row in rows]
+    is_met = [STATUS[row.status].is_met or row.status == "info" for row in rows]
+    while True:
+        lines = [*_lines(rows, mission, style), *wrapped(_table_key(rows, hidden), "  ")]
+        if (
+            not is_short
+            or mission.is_empty
+            or len(lines) <= room
+            or len(rows) <= _FEWEST
+            or not is_met[len(rows) - 1]
+        ):
+            break
+        hidden, rows = [rows[-1], *hidden], rows[:-1]
+    yield from lines
+
+
+def _lines(rows: Sequence[Row], mission: MissionFindings, style: Style) -> Iterator[str]:
+    cells = [_row(row, mission) for row in rows]
     widths = [max(len(line[column]) for line in (_HEADER, *cells)) for column in range(len(_HEADER))]
     widths[0] = 8  # the same in every table: the eye and scripts look there
     names = [len(line[1]) for line in (_HEADER, *cells)]
@@ -94,7 +188,6 @@ def _table(mission: MissionFindings, style: Style) -> Iterator[str]:
             yield _word(row.status, style, widths[0]) + _line(line, widths)[widths[0] :]
         if row.requirement_id and (not STATUS[row.status].is_explained and style.verbosity < 1):
             yield f"{'':<{widths[0]}} [{row.requirement_id}]"  # the others have it with their reason
-    yield from wrapped(_table_key(rows, hidden), "  ")
 
 
 def _table_key(rows: Sequence[Row], hidden: Sequence[Row]) -> str:
@@ -102,9 +195,11 @@ def _table_key(rows: Sequence[Row], hidden: Sequence[Row]) -> str:
     key = "use: declared / allowable"
     if any(row.binding_requirement not in (None, "quadratic_phase_error") for row in rows):
         key += "; by: what sets the allowable; a table, an equation or a model stands for QPE"
+    left = [row for row in hidden if row.status != "not_declared"]
     counts = [
-        (sum(row.status == "not_declared" for row in hidden), "not declared"),
-        (sum(row.status != "not_declared" for row in hidden), "that limit nothing"),
+        (len(hidden) - len(left), "not declared"),
+        (sum(not matters(row) for row in left), "that limit nothing"),
+        (sum(matters(row) for row in left), "that use less"),
     ]
     others = ", ".join(f"{count} {what}" for count, what in counts if count)
     return f"{key}. Not shown (--all): {others}." if others else f"{key}."
@@ -117,16 +212,15 @@ def _line(cells: Sequence[str], widths: Sequence[int]) -> str:
     return f"{status:<{widths[0]}} {name:<{widths[1]}} {right} {last}".rstrip()
 
 
-def _row(row: Row) -> tuple[str, ...]:
-    status, limit, unit, declared = row.status, row.allowable, row.unit, row.declared
-    size = "-" if declared is None else format_quantity(declared, unit)
+def _row(row: Row, mission: MissionFindings) -> tuple[str, ...]:
+    status, limit, declared = row.status, row.allowable, row.declared
+    size = "-" if declared is None else row_size(declared, row, mission)
     use = "-"
     if limit is None:
-        is_open = status == "not_evaluated" or status == "info" or row.metric == "pslr" or row.metric == "islr"
+        is_open = status in ("not_evaluated", "info") or row.metric in ("pslr", "islr", DECLARE)
         allowable = "-" if is_open else "no limit"
     else:
-        # Rounded down, so that an allowable copied from the page into a file passes.
-        allowable = format_quantity(limit, unit, 3, "down")
+        allowable = row_limit(limit, row, mission)
         if row.utilization is not None and status != "not_evaluated":
             use = percent(row.utilization)
     return STATUS[status].text, row.id, size, allowable, use, _limited_by(row)
@@ -135,7 +229,9 @@ def _row(row: Row) -> tuple[str, ...]:
 def _limited_by(row: Row) -> str:
     """What sets the allowable: another requirement than the row's own, else the place of its equation."""
     binding = binding_words(row)
-    return binding.split()[0] if binding else _short_reference(row.equation)
+    if binding:
+        return binding if row.binding_requirement == END_OF_IMAGE else binding.split()[0]
+    return _short_reference(row.equation)
 
 
 @cache
@@ -156,7 +252,7 @@ def _details(mission: MissionFindings, style: Style) -> Iterator[str]:
     for row in worst_first(mission.rows):
         if style.verbosity > 0:
             yield from _detail([row], [*filter(None, [row.reason]), *row.notes, *_more(row)], mission, style)
-        elif STATUS[row.status].is_explained:
+        elif STATUS[row.status].is_explained and not is_said_with_the_table(row):
             groups.setdefault((row.status, row.decisive), []).append(row)
     for (_, texts), rows in groups.items():
         yield from _detail(rows, texts, mission, style)
@@ -196,9 +292,8 @@ def _asides(mission: MissionFindings, style: Style) -> Iterator[str]:
 
 
 def _summary(mission: MissionFindings) -> str:
-    counts = ", ".join(f"{count} {STATUS[status].text}" for status, count in mission.summary.items())
     changed = f" {changes_words(mission.changes)}" if mission.changes else ""
-    return f"{STATUS[mission.status].text} {printable(mission.file)}{changed}: {counts}"
+    return f"{STATUS[mission.status].text} {printable(mission.file)}{changed}: {verdict(mission)}"
 
 
 def _overall(statuses: Sequence[str], style: Style) -> str:

@@ -9,6 +9,7 @@ from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.report import Style
 from bisar_budget.report.formats.json_document import verdict_item
 from bisar_budget.report.words.layout import table, wrapped, wrapped_counts
+from bisar_budget.report.words.requirements import overrides_lines
 from bisar_budget.units import format_limit, format_quantity
 
 FORMAT = "bisar-budget/verify/1"
@@ -33,6 +34,7 @@ def as_json(version: str, missions: Sequence[VerifiedMission]) -> str:
                 "name": mission.name,
                 "status": mission.status,
                 "set": [change._asdict() for change in mission.changes],
+                "overrides": [one._asdict() for one in mission.overrides],
                 "conditions": mission.conditions,
                 "rows": [verdict_item(row) for row in mission.rows],
             }
@@ -58,6 +60,7 @@ def _mission(mission: VerifiedMission, style: Style) -> list[str]:
     conditions = wrapped(f"Images: {mission.conditions}.", "  ") if mission.conditions else []
     return [
         *wrapped(printable(mission.name), "  "),
+        *overrides_lines(mission),
         "",
         *conditions,
         "",

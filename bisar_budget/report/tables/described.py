@@ -1,6 +1,6 @@
 """What a file of cases says of itself: mission, hash, tool, and what each column holds, in which unit."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -9,6 +9,7 @@ from bisar_budget.design.cases import Cases, in_unit
 from bisar_budget.design.quantities import Number
 from bisar_budget.design.swept import Column, Part, Swept, Values
 from bisar_budget.faults import changes_words, printable
+from bisar_budget.findings.requirement import Override
 from bisar_budget.mission.model import Mission
 
 FORMAT = "bisar-budget/sweep/1"
@@ -17,7 +18,9 @@ FORMAT = "bisar-budget/sweep/1"
 class Described:
     """A sweep as a table: keys that vary stand in the unit that they were asked for in, all else in SI."""
 
-    def __init__(self, swept: Swept, cases: Cases, mission: Mission, version: str) -> None:
+    def __init__(
+        self, swept: Swept, cases: Cases, mission: Mission, version: str, overrides: Sequence[Override] = ()
+    ) -> None:
         self.swept, self.cases = swept, cases
         self.numbers = {one.key: one for one in cases.varied if isinstance(one, Number)}
         changed = changes_words(mission.changes)
@@ -26,6 +29,7 @@ class Described:
             "mission": printable(swept.mission_name),
             "mission_sha256": swept.mission_sha256,
             **({"set": changed} if changed else {}),
+            **({"overrides": _said(overrides)} if overrides else {}),
             "model": "varies" if "allocation.model" in swept.varied else mission.gating_model,
             "source": f"bisar-budget {version}",
         }
@@ -47,3 +51,8 @@ class Described:
         if name not in self.numbers:
             return values
         return in_unit(self.numbers[name], np.asarray(values, float))
+
+
+def _said(overrides: Sequence[Override]) -> str:
+    """What from outside the file bears on statuses, in a line."""
+    return "; ".join(printable(f"{one.name} {one.value} ({one.origin})") for one in overrides)

@@ -7,6 +7,7 @@ from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.mission.model import Document
 from bisar_budget.mission.platforms import FlownPath
+from bisar_budget.report.words.quantities import phase_limit
 from bisar_budget.units import format_quantity
 
 _MODELS = {
@@ -32,6 +33,12 @@ def narrow_gradients(geometry: BistaticGeometry) -> str:
         f"Range and Doppler gradients are only {_degrees(angle)} apart: displacements are {1 / math.sin(angle):.2g} "
         "times those at right angles."
     )
+
+
+def doubtful_model(mission: MissionFindings) -> str:
+    """Say where the published model judges and does not hold, as a sentence; nothing if it does hold."""
+    said = mission.model_doubt
+    return f"{said[0].upper()}{said[1:]}." if said else ""
 
 
 def head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
@@ -66,7 +73,7 @@ def head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
             f"; autofocus pulls in (corrects) up to {multiple_of_pi(allocation.n_pull)} rad: limits times "
             f"{allocation.autofocus_gain:.3g}"
         )
-    yield "Budget", f"quadratic phase error (QPE) {format_quantity(allocation.qpe_total, 'rad')}: {shares}{gain}"
+    yield "Budget", f"quadratic phase error (QPE) {phase_limit(allocation.qpe_total, mission)}: {shares}{gain}"
     yield "Model", f"{_MODELS[mission.model]}, {RULES[mission.combine]}"
     if mission.scene is not None and not mission.scene.degeneracy:
         radius = format_quantity(mission.scene.radius, "m")

@@ -2,15 +2,17 @@
 
 import math
 
-from bisar_budget.findings.row import Row
-from bisar_budget.units import format_quantity
+from bisar_budget.findings.mission import MissionFindings
+from bisar_budget.findings.row import DECLARE, Row
+from bisar_budget.report.words.quantities import row_limit, row_size
 
-# A requirement that can set an allowable, in words; the terminal has room for the first.
+# What can set an allowable, in words; of a requirement the terminal has room for the first.
 BINDING_WORDS = {
     "quadratic_phase_error": "quadratic phase error",
     "cubic_phase_error": "cubic phase error",
     "location_error": "location error",
     "islr": "ISLR",
+    "end_of_image": "end of the image",
 }
 
 
@@ -49,12 +51,14 @@ def percent(ratio: float) -> str:
     return f"{value} %"
 
 
-def measure(row: Row) -> str:
+def measure(row: Row, mission: MissionFindings) -> str:
     """Say what is declared, what is allowed and how much of it is used."""
-    declared = "not declared" if row.declared is None else f"declared {format_quantity(row.declared, row.unit)}"
+    if row.metric == DECLARE:
+        return "everything asked for is declared" if row.status == "pass" else "not everything asked for is declared"
+    declared = "not declared" if row.declared is None else f"declared {row_size(row.declared, row, mission)}"
     if row.allowable is None:
         return declared
-    text = f"{declared}, allowable {format_quantity(row.allowable, row.unit, 3, 'down')}"
+    text = f"{declared}, allowable {row_limit(row.allowable, row, mission)}"
     if binding := binding_words(row):
         text += f" (limited by the {binding})"
     return text if row.utilization is None else f"{text}, {percent(row.utilization)} of it used"
@@ -65,8 +69,19 @@ def cause(row: Row) -> str:
     return "; ".join([row.reason, *row.notes] if row.reason else row.notes)
 
 
-def finding(row: Row) -> str:
+def finding(row: Row, mission: MissionFindings) -> str:
     """Say both, and which requirement of the project it concerns."""
     why = cause(row)
     own_id = f" [{row.requirement_id}]" if row.requirement_id else ""
-    return f"{row.id}{own_id}: {measure(row)}{f'. {why}' if why else ''}"
+    return f"{row.id}{own_id}: {measure(row, mission)}{f'. {why}' if why else ''}"
+
+
+def sentence(text: str) -> str:
+    """Begin with a capital letter; what begins with the name of a row or a file keeps its letters."""
+    first = text.partition(" ")[0].rstrip(",:;")
+    return text[:1].upper() + text[1:] if first.replace("-", "").isalpha() else text
+
+
+def dashed(text: str) -> str:
+    """Write the dash of what has no value as a page does."""
+    return "–" if text == "-" else text

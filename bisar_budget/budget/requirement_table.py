@@ -1,0 +1,269 @@
+"""The table of requirements of one mission, with its words: what is asked, what is reached, what decides."""
+
+import math
+from collections.abc import Sequence
+from datetime import date
+from typing import NamedTuple
+
+import numpy as np
+
+from bisar_budget import phrases
+from bisar_budget.analysis.allocation import Allocation
+from bisar_budget.analysis.analysis import Analysis, Model
+from bisar_budget.analysis.spread import islr_db, mainlobe_energy, noise, spread_limit, tones
+from bisar_budget.analysis.together import Together
+from bisar_budget.analysis.vibration_limits import LARGEST_ECHO, echo_level
+from bisar_budget.budget.input_doubt import InputDoubt
+from bisar_budget.budget.requirements import (
+    KEYS,
+    TAKEN_BY,
+    UNITS,
+    EffectTotal,
+    RequirementState,
+    SeenRow,
+    UntakenEffect,
+    code,
+    requirement_states,
+    status_of,
+    untaken_effects,
+)
+from bisar_budget.budget.waivers import Waived, apply_waivers
+from bisar_budget.effects.combine import combine_phases
+from bisar_budget.effects.correlation import combined_phase
+from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
+from bisar_budget.findings.mission import FileWarning
+from bisar_budget.findings.requirement import JudgedRequirement
+from bisar_budget.findings.row import Row
+from bisar_budget.findings.status import STATUS
+from bisar_budget.mission.model import Mission
+from bisar_budget.phrases import NOTHING, Note
+
+_STATUSES = tuple(STATUS)
+_EXAMPLES = {CUBIC: "22.5 deg", "islr": "-20 dB", "pslr": "-30 dB"}
+
+
+class JudgedMission(NamedTuple):
+    """Rows with what they could not be judged by, the table of requirements, and what is to be said of the whole."""
+
+    rows: list[Row]
+    requirements: tuple[JudgedRequirement, ...]
+    warnings: list[FileWarning]
+    notes: list[Note]
+
+
+def judged_requirements(
+    rows: Sequence[Row], analysis: Analysis, allocation: Allocation, doubts: Sequence[InputDoubt], today: date
+) -> JudgedMission:
+    """Judge every requirement of a mission, after waivers.
+
+    Parameters
+    ----------
+    rows : sequence of Row
+        As judged, each for itself.
+    analysis : Analysis
+        Of the mission.
+    allocation : Allocation
+        Shares of the budgets, and the gain of autofocus.
+    doubts : sequence of InputDoubt
+        Of the paths, by more than the file declares.
+    today : date
+        Day on which waivers are judged, UTC.
+    """
+    mission = analysis.mission
+    gates = _gating_models(analysis)
+    untaken = untaken_effects(mission, effect_totals(analysis, gates))
+    looked_at = [_looked_at(row, mission, untaken) for row in rows]
+    misplacing = _misplacing(analysis)
+    unknown_place = phrases.place_is_not_known(misplacing) if misplacing else doubts[0].note if doubts else NOTHING
+    if unknown_place and mission.requirements.location_error is not None:
+        looked_at = [_misplaced(row, unknown_place) for row in looked_at]
+    waived = apply_waivers(looked_at, mission, today)
+    seen = [
+        _seen(waived.rows[place] if waived.rows[place].status == "waived" and is_broken(row) else row, allocation)
+        for place, row in enumerate(rows)
+    ]
+    states = requirement_states(
+        mission,
+        seen,
+        {key: True for key in KEYS if f"mission.{key}" in waived.requirements},
+        has_noise=any(noise(analysis, model.name) for model in gates)
+        or (mission.requirements.pslr is None and bool(tones(mission))),
+        is_misplaced=bool(unknown_place),
+    )
+    requirements = tuple(_entry(state, waived, analysis, allocation, unknown_place) for state in states)
+    notes = [
+        phrases.effect_is_negligible(one.kind, float(one.total[0]), list(TAKEN_BY[one.kind]))
+        for one in untaken
+        if one.is_negligible[0]
+    ]
+    return JudgedMission(waived.rows, requirements, waived.unused(requirements), notes)
+
+
+def is_broken(row: Row) -> bool:
+    """Whether a waiver could cover a row as it stands."""
+    return row.status in ("fail", "not_evaluated")
+
+
+def _gating_models(analysis: Analysis) -> list[Model]:
+    gating = analysis.mission.gating_model
+    both: tuple[Model, ...] = (analysis.published, analysis.full)
+    return [model for model in both if gating in (model.name, "strictest")]
+
+
+def effect_totals(analysis: Analysis, models: Sequence[Model]) -> list[EffectTotal]:
+    """Add up cubic phases, what spreads and tones of all declared errors; by several models the larger of each."""
+    found: dict[str, dict[str, float]] = {kind: {} for kind in TAKEN_BY}
+    totals = dict.fromkeys(TAKEN_BY, 0.0)
+    for model in models:
+        together = Together(analysis, model)
+        rule = together.rule_of_all
+        parts = {
+            "cubic": together.all_cubics(),
+            "spread": [(one.row_id, math.sqrt(one.variance)) for one in noise(analysis, model.name)],
+            "tone": [(one.subject.id, one.phase) for one in tones(analysis.mission)],
+        }
+        for kind, of_kind in parts.items():
+            total = combined_phase(of_kind, rule, together.groups) if kind == "cubic" else _combined(of_kind, rule)
+            totals[kind] = max(totals[kind], total)
+            for row_id, size in of_kind:
+                found[kind][row_id] = max(found[kind].get(row_id, 0.0), abs(size))
+    return [
+        EffectTotal(kind, np.array([totals[kind]]), [(row_id, np.array([size])) for row_id, size in of_kind.items()])
+        for kind, of_kind in found.items()
+    ]
+
+
+def _combined(parts: Sequence[tuple[str, float]], rule: str) -> float:
+    return combine_phases([size for _, size in parts], rule)
+
+
+def _looked_at(row: Row, mission: Mission, untaken: Sequence[UntakenEffect]) -> Row:
+    """A row whose effects are looked at too: what no requirement takes is not judged, or negligible."""
+    if not any(row.id in one.parts for one in untaken):
+        return row
+    status = _STATUSES[status_of(code(row.status), row.id, row.allowable is not None, untaken)[0]]
+    if status == row.status:
+        return row
+    if status == "info":
+        return row._replace(status=status, utilization=None, margin=None)
+    reason = NOTHING
+    for one in untaken:
+        if row.id in one.makers and one.makers[row.id][0]:
+            lines = [f"{key}: {_EXAMPLES[key]}" for key in TAKEN_BY[one.kind]]
+            said = phrases.effect_is_not_judged(one.kind, float(one.parts[row.id][0]), float(one.total[0]), lines)
+            reason = reason.then(said) if reason else said
+    return row._replace(status=status, reason=reason)
+
+
+def _misplacing(analysis: Analysis) -> list[str]:
+    """Rows of the errors that displace the image by an amount that no row holds: what varies at random.
+
+    Both terms of the clock, where the file declares them, stand for what oscillators and a link do to the place.
+    """
+    timing = analysis.mission.timing_error
+    is_clock_stated = timing.constant is not None and timing.linear is not None
+    found = []
+    for error in analysis.random:
+        is_clock = error.subject.kind in ("oscillator", "synchronization")
+        moves = error.published.quadratic or error.full.quadratic or error.published.cubic or error.full.cubic
+        if error.declared and moves and not (is_clock and is_clock_stated):
+            found.append(error.id)
+    return found
+
+
+def _misplaced(row: Row, unknown_place: Note) -> Row:
+    is_location = row.owner == "mission" and row.subject.kind == LOCATION
+    if not is_location or row.status in ("fail", "not_declared"):
+        return row
+    return row._replace(status="not_evaluated", reason=unknown_place)
+
+
+def _seen(row: Row, allocation: Allocation) -> SeenRow:
+    """A row as an array of one case."""
+    binding = row.binding_requirement or row.metric
+    key = binding if binding in KEYS else row.metric
+    if row.is_of_declare and row.metric != "declare":
+        key = ""  # judges nothing: it is not declared
+    qpe = row.qpe_full_rad if row.model == "full" else row.qpe_published_rad
+    use = math.nan
+    if qpe is not None and row.metric == QUADRATIC:
+        use = abs(qpe) / (allocation.qpe_limit(row.owner) * allocation.autofocus_gain)
+    return SeenRow(
+        row.id,
+        code(row.status),
+        np.array([math.nan if row.utilization is None else row.utilization]),
+        np.array([KEYS.index(key) if key in KEYS else -1], dtype=np.int8),
+        np.array([use]),
+    )
+
+
+# ---------------------------------------------------------------------- words
+def _entry(
+    state: RequirementState, waived: Waived, analysis: Analysis, allocation: Allocation, unknown_place: Note
+) -> JudgedRequirement:
+    mission, key = analysis.mission, state.key
+    rows = waived.rows
+    value = getattr(mission.requirements, key)
+    status = _STATUSES[state.status[0]]
+    decider = rows[state.decider[0]] if state.decider[0] >= 0 else None
+    allowed, reached = _sizes(decider, key, mission, allocation) if decider is not None else (None, None)
+    reason: Note | None = None
+    if status == "not_evaluated" and (decider is None or decider.status != status or key == "islr"):
+        reason = _why_not_judged(key, unknown_place)
+    elif decider is not None and status not in ("pass", "info"):
+        reason = decider.reason
+    path = ("requirements", key)
+    return JudgedRequirement(
+        key=key,
+        value=None if key == "declare" else value,
+        unit=UNITS[key],
+        is_default=path not in mission.places and not mission.is_changed(path),
+        status=status,
+        allowed=allowed,
+        reached=reached,
+        utilization=None if decider is None else decider.utilization,
+        row=None if decider is None else decider.id,
+        rows=tuple(row.id for row, judges in zip(rows, state.judges[:, 0], strict=True) if judges),
+        reason=reason,
+        line=mission.line(path),
+        waivers=waived.requirements.get(f"mission.{key}", ()),
+    )
+
+
+def _why_not_judged(key: str, unknown_place: Note) -> Note:
+    if key == LOCATION and unknown_place:
+        return unknown_place
+    return phrases.nothing_judges(key)
+
+
+def _sizes(row: Row, key: str, mission: Mission, allocation: Allocation) -> tuple[float | None, float | None]:
+    """What a row is allowed and what it reaches, in the unit of a requirement that it judges."""
+    if row.declared is None and row.metric != key:
+        return None, None
+    if row.unit == UNITS[key] and (
+        row.subject.kind in (key, QUADRATIC, "spatial_variance", "autofocus_pull_in", "other")
+        or (key == "pslr" and row.unit == "dB")
+    ):
+        return row.allowable, row.declared
+    if key == QUADRATIC:
+        qpe = row.qpe_full_rad if row.model == "full" else row.qpe_published_rad
+        limit = allocation.qpe_limit(row.owner) * allocation.autofocus_gain
+        return limit, None if qpe is None else abs(qpe)
+    if key == CUBIC:
+        return mission.requirements.cubic_phase_error, row.cubic_rad
+    if key == LOCATION:
+        moved = None if row.displacement_m is None else math.hypot(*row.displacement_m)
+        return mission.requirements.location_error, moved
+    if key == "islr":
+        model = row.model or "full"
+        limit, use = spread_limit(mission, allocation, row.owner, model) or 0.0, row.utilization or 0.0
+        sizes = [islr_db(rms**2, model, mainlobe_energy(mission)) if rms else None for rms in (limit, limit * use)]
+        return sizes[0], sizes[1]
+    k = 2 * math.pi / mission.radar.wavelength
+    levels = [None if size is None else _echo_db(k * size) for size in (row.allowable, row.declared)]
+    return levels[0], levels[1]
+
+
+def _echo_db(phase: float) -> float | None:
+    amplitude = echo_level(phase) if phase <= LARGEST_ECHO else phase / 2
+    return 20 * math.log10(amplitude) if amplitude else None

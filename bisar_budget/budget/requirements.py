@@ -1,0 +1,182 @@
+"""Whether every requirement was judged: the rows that judge each, and the effects that none takes, in many cases.
+
+Exit 0 means that every requirement was judged and is met. Each effect of each declared error is judged once: the
+quadratic phase by its requirement; the cubic by its own, else by ISLR; what spreads by ISLR; a tone by PSLR, else by
+ISLR; a displacement by the location. An effect that no requirement takes is negligible while all of it stays below a
+tenth of the quadratic requirement and below 0.08 rad. Above, the rows that make it up are `not_evaluated`.
+
+Every number is an array over the cases, (n,): a check is one case.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bisar_budget.constants import UTILIZATION_TOLERANCE
+from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
+from bisar_budget.findings.status import RANK, STATUS
+from bisar_budget.mission.model import Mission
+
+Codes = NDArray[np.int8]  # places of statuses in STATUS: the worst has the lowest
+Floats = NDArray[np.float64]
+Truths = NDArray[np.bool_]
+
+KEYS = (QUADRATIC, CUBIC, LOCATION, "pslr", "islr", "declare")
+UNITS = {QUADRATIC: "rad", CUBIC: "rad", LOCATION: "m", "pslr": "dB", "islr": "dB", "declare": ""}
+TENTH, SMALL_RAD = 0.1, 0.08  # of the quadratic requirement; and of any image
+MAKES_UP = 0.1  # of the largest part: a row with less does not make an effect up
+
+# Requirements that take an effect, in the order in which one is suggested.
+TAKEN_BY = {"cubic": (CUBIC, "islr"), "spread": ("islr",), "tone": ("pslr", "islr")}
+
+_NONE = np.int8(len(STATUS))  # of a row that judges nothing
+_BREAKS = [RANK[name] for name in ("fail", "not_evaluated")]
+_IS_JUDGED = np.array([one.is_judged for one in STATUS.values()])
+
+
+class SeenRow(NamedTuple):
+    """A row as requirements see it.
+
+    `judges` is the place in KEYS of the requirement that it is held to, -1: none. `quadratic_use` is its quadratic
+    phase over what that may be, whatever sets its allowable; NaN where it has none.
+    """
+
+    id: str
+    status: Codes
+    utilization: Floats
+    judges: NDArray[np.int8]
+    quadratic_use: Floats
+
+
+class EffectTotal(NamedTuple):
+    """One kind of effect of all declared errors: its total, and each error's part by row id. [rad]"""
+
+    kind: str  # cubic, spread or tone
+    total: Floats
+    parts: Sequence[tuple[str, Floats]]
+
+
+class UntakenEffect(NamedTuple):
+    """An effect that no requirement takes: where it is negligible, and where not, with the rows that make it up."""
+
+    kind: str
+    total: Floats
+    is_negligible: Truths
+    is_above: Truths
+    makers: Mapping[str, Truths]
+    parts: Mapping[str, Floats]
+
+
+class RequirementState(NamedTuple):
+    """How a requirement stands: its status, the place of the row that decides or -1, and the places that judge it."""
+
+    key: str
+    status: Codes
+    decider: NDArray[np.intp]
+    judges: Truths  # (rows, n)
+
+
+def required_keys(mission: Mission) -> tuple[str, ...]:
+    """Keys of the requirements that a mission has, the default of the quadratic phase included."""
+    needs = mission.requirements
+    return tuple(key for key in KEYS if (needs.declare if key == "declare" else getattr(needs, key) is not None))
+
+
+def is_taken(mission: Mission, kind: str) -> bool:
+    """Whether a requirement of the mission takes an effect."""
+    return any(getattr(mission.requirements, key) is not None for key in TAKEN_BY[kind])
+
+
+def untaken_effects(mission: Mission, effects: Sequence[EffectTotal]) -> list[UntakenEffect]:
+    """Find the effects that no requirement takes, and the rows that make them up where they are not negligible."""
+    level = np.minimum(TENTH * np.asarray(mission.requirements.quadratic_phase_error), SMALL_RAD)
+    found = []
+    for effect in effects:
+        if is_taken(mission, effect.kind):
+            continue
+        parts = {row_id: np.where(np.isfinite(size), np.abs(size), 0.0) for row_id, size in effect.parts}
+        total = np.where(np.isfinite(effect.total), effect.total, 0.0)  # one without an image fails by itself
+        if not parts:
+            continue
+        largest = np.max(list(parts.values()), axis=0)
+        is_above = (total >= level) & (largest > 0)
+        makers = {row_id: is_above & (size >= MAKES_UP * largest) & (size > 0) for row_id, size in parts.items()}
+        found.append(UntakenEffect(effect.kind, total, (total > 0) & ~is_above, is_above, makers, parts))
+    return found
+
+
+def status_of(status: Codes, row_id: str, is_limited: Any, untaken: Sequence[UntakenEffect]) -> Codes:
+    """Status of a row whose effects are looked at too.
+
+    One that makes up an effect which no requirement takes is `not_evaluated`, unless it fails. One that no
+    requirement limits, with a negligible effect, judges nothing: `info`.
+    """
+    found = status
+    for one in untaken:
+        if row_id not in one.parts:
+            continue
+        has_part = one.parts[row_id] > 0
+        unlimited = has_part & ~np.asarray(is_limited) & (found == RANK["pass"])
+        found = np.where(unlimited, RANK["info"], found)
+        is_better = (found != RANK["fail"]) & (found != RANK["not_declared"])
+        found = np.where(one.makers[row_id] & is_better, RANK["not_evaluated"], found)
+    return found.astype(np.int8)
+
+
+def requirement_states(
+    mission: Mission,
+    rows: Sequence[SeenRow],
+    waived: Mapping[str, Any],
+    *,
+    has_noise: Any,
+    is_misplaced: Any,
+) -> list[RequirementState]:
+    """Say how every requirement stands.
+
+    Parameters
+    ----------
+    mission : Mission
+        Some of its numbers may be arrays (n,).
+    rows : sequence of SeenRow
+        Judged rows, those that are waived with the status `waived`.
+    waived : mapping of str to bool
+        Keys of the requirements that a valid waiver names.
+    has_noise : (n,) bool
+        Whether something that spreads, or a tone that ISLR holds, is declared: without it ISLR is not judged.
+    is_misplaced : (n,) bool
+        Whether a declared error displaces the image by an amount that no row holds.
+    """
+    codes = np.array([row.status for row in rows])
+    uses = np.array([np.nan_to_num(row.utilization, nan=0.0, posinf=np.inf) for row in rows])
+    judges = np.array([row.judges for row in rows])
+    quadratic_use = np.array([row.quadratic_use for row in rows])
+    found = []
+    for key in required_keys(mission):
+        mine = _IS_JUDGED[codes] & (judges == KEYS.index(key))
+        levels = np.where(mine, codes, _NONE)
+        used = uses
+        if key == QUADRATIC:  # a row that another requirement binds may break this one too
+            is_other = _IS_JUDGED[codes] & ~mine & (codes != RANK["waived"])
+            breaks = is_other & (np.nan_to_num(quadratic_use) > 1 + UTILIZATION_TOLERANCE)
+            levels, used = np.where(breaks, RANK["fail"], levels), np.where(breaks, quadratic_use, uses)
+            mine = mine | breaks
+        worst = levels.min(axis=0)
+        decider = np.where(levels == worst, used, -1.0).argmax(axis=0)
+        is_unjudged = ~mine.any(axis=0)
+        decider = np.where(is_unjudged, -1, decider)
+        if key == "islr":
+            is_unjudged = is_unjudged | ~np.asarray(has_noise)
+        if key == LOCATION:
+            is_unjudged = is_unjudged | np.asarray(is_misplaced)
+        status = np.where(is_unjudged & (worst != RANK["fail"]), RANK["not_evaluated"], worst)
+        if waived.get(key):
+            status = np.where(np.isin(status, _BREAKS), RANK["waived"], status)
+        found.append(RequirementState(key, status.astype(np.int8), decider, mine))
+    return found
+
+
+def code(name: str) -> Codes:
+    """One status, as an array of one case."""
+    return np.array([RANK[name]], dtype=np.int8)

@@ -1,0 +1,222 @@
+"""What every format says of the requirements of a mission: whether each was judged and is met, and by what."""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple, Protocol
+
+from bisar_budget import phrases
+from bisar_budget.faults import printable
+from bisar_budget.findings.mission import MissionFindings
+from bisar_budget.findings.requirement import DeclaredKinds, JudgedRequirement, Override
+from bisar_budget.findings.row import Row
+from bisar_budget.findings.status import RANK, STATUS
+from bisar_budget.report.words.layout import wrapped
+from bisar_budget.report.words.quantities import requirement_size
+from bisar_budget.report.words.sentences import percent
+
+COLUMNS = ("requirement", "allowed", "reached", "use", "status", "decided by")
+MODELS = {"published": "published model", "full": "full model", "strictest": "stricter of both models"}
+RULES = {"each": "each error alone", "sum": "worst-case sum", "rss": "root-sum-square"}
+_BREAKS = ("fail", "not_evaluated")
+_SHORT = {"place-is-not-known": "random errors move the image too"}  # of reasons that rows say at length
+
+
+class HasOverrides(Protocol):
+    """What was found about a mission, by a check or another study."""
+
+    @property
+    def overrides(self) -> tuple[Override, ...]:
+        """What from outside the file bears on it."""
+
+
+class RequirementLine(NamedTuple):
+    """One line of the table of requirements, in words.
+
+    `decided_by` is the row that decides; where nothing could be judged, why. `remark` says what `allowed` is a share
+    of, and which waiver stands.
+    """
+
+    requirement: JudgedRequirement
+    name: str
+    allowed: str
+    reached: str
+    use: str
+    status: str
+    decided_by: str
+    remark: str
+
+
+def requirement_id(one: JudgedRequirement) -> str:
+    """Name of a line of the table among rows, such as `requirement.islr`."""
+    return f"requirement.{one.key}"
+
+
+def requirement_lines(mission: MissionFindings) -> Iterator[RequirementLine]:
+    """Write the table of requirements, in the order of the contract."""
+    for one in mission.requirements:
+        is_open = one.status == "not_evaluated"
+        allowed = one.value if one.allowed is None else one.allowed
+        remark = ", ".join(_remarks(one, mission))
+        yield RequirementLine(
+            requirement=one,
+            name=one.name,
+            allowed=requirement_size(allowed, one, "down"),
+            reached=requirement_size(one.reached, one),
+            use="-" if one.utilization is None or one.allowed is None or is_open else percent(one.utilization),
+            status=one.status,
+            decided_by=(_short(one.reason) if is_open and one.reason else one.row) or ("" if remark else "-"),
+            remark=remark,
+        )
+
+
+def _short(reason: phrases.Note) -> str:
+    return _SHORT.get(reason.code, reason)
+
+
+def _remarks(one: JudgedRequirement, mission: MissionFindings) -> Iterator[str]:
+    """Say what is allowed, where that is not the requirement as it stands, and which waivers hold."""
+    if one.allowed is not None and one.value is not None:
+        gain = mission.allocation.autofocus_gain if one.key == "quadratic_phase_error" else 1.0
+        is_share = abs(one.allowed - gain * one.value) > 1e-9 * abs(one.value)
+        is_gained = gain > 1 and abs(one.allowed - one.value) > 1e-9 * one.value
+        if is_share or is_gained:
+            value = requirement_size(one.value, one)
+            yield f"{'share of ' if is_share else ''}{value}{' with autofocus' if is_gained else ''}"
+    yield from (waiver.words for waiver in one.waivers)
+
+
+def requirement_finding(one: JudgedRequirement) -> str:
+    """Say in a sentence how a requirement stands."""
+    text = one.name
+    if one.value is not None:
+        text += f" of {requirement_size(one.value, one)}{' (default)' if one.is_default else ''}"
+    text += f": {STATUS[one.status].words}"
+    if one.reached is not None and one.allowed is not None and one.status != "not_evaluated":
+        text += (
+            f", {requirement_size(one.reached, one)} reached, {requirement_size(one.allowed, one, 'down')} allowed"
+        )
+    if one.row is not None:
+        text += f", decided by {one.row}"
+    return ". ".join([text, *filter(None, [one.reason]), *(waiver.words for waiver in one.waivers)])
+
+
+def verdict(mission: MissionFindings) -> str:
+    """Say whether every requirement was judged and is met; else how many are not."""
+    if mission.is_empty:
+        return "the file declares no error, so nothing is judged; the allowables follow"
+    statuses = [one.status for one in mission.requirements]
+    said = []
+    if failing := statuses.count("fail"):
+        said.append(f"{_counted(failing, 'requirement')} {'is' if failing == 1 else 'are'} not met")
+    if unjudged := statuses.count("not_evaluated"):
+        said.append(f"{_counted(unjudged, 'requirement')} cannot be judged")
+    if effects := len(unjudged_effects(mission)):
+        said.append(f"{_counted(effects, 'effect')} of errors {'is' if effects == 1 else 'are'} judged by none")
+    if said:
+        return ", ".join(said)
+    broken = [row for row in mission.rows if row.status in _BREAKS]
+    if broken:
+        return f"{_counted(len(broken), 'row')} {'fails' if len(broken) == 1 else 'fail'} or cannot be judged"
+    if mission.is_unverified:
+        return "images were asked for, and none gave a verdict"
+    return _met(mission)
+
+
+def _met(mission: MissionFindings) -> str:
+    waived = "waived" in [*(one.status for one in mission.requirements), *(row.status for row in mission.rows)]
+    text = f"every requirement is judged and {'met or waived' if waived else 'met'}"
+    if mission.status == "warn":
+        return f"{text}, with warnings"
+    return f"{text}, with autofocus" if mission.status == "pass_with_autofocus" else text
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
+class UnjudgedEffect(NamedTuple):
+    """An effect that no requirement takes: what is said of it, with the line to add, and the rows that make it up."""
+
+    text: str
+    rows: tuple[Row, ...]
+
+
+def unjudged_effects(mission: MissionFindings) -> list[UnjudgedEffect]:
+    """List the effects of declared errors that no requirement takes, above what is negligible."""
+    found: dict[str, tuple[str, list[Row]]] = {}
+    for row in mission.rows:
+        if row.status != "not_evaluated" or row.reason is None:
+            continue
+        for note in (row.reason, *(value for value in row.reason.values if isinstance(value, phrases.Note))):
+            if note.code == "effect-is-not-judged":
+                kind, _, total, lines = note.values[:4]
+                said = phrases.effect_is_not_judged(str(kind), float(str(total)), float(str(total)), _texts(lines))
+                found.setdefault(str(kind), (said, []))[1].append(row)
+    return [UnjudgedEffect(said, tuple(rows)) for said, rows in found.values()]
+
+
+def _texts(values: object) -> list[str]:
+    return [str(value) for value in values] if isinstance(values, list | tuple) else []
+
+
+def is_said_with_the_table(row: Row) -> bool:
+    """Whether all that decides a row is that no requirement takes its effect."""
+    return row.status == "not_evaluated" and row.reason is not None and row.reason.code == "effect-is-not-judged"
+
+
+def unseen(mission: MissionFindings) -> list[JudgedRequirement]:
+    """Requirements that are broken or waived while no row that judges them is: rows alone would not show it."""
+    statuses = {row.id: row.status for row in mission.rows}
+    return [
+        one
+        for one in mission.requirements
+        if one.status in (*_BREAKS, "waived") and not any(statuses.get(row) == one.status for row in one.rows)
+    ]
+
+
+def worst_requirements_first(requirements: Sequence[JudgedRequirement]) -> list[JudgedRequirement]:
+    """Sort by status; equals keep their order."""
+    return sorted(requirements, key=lambda one: RANK[one.status])
+
+
+def declared_words(kinds: DeclaredKinds) -> str:
+    """Say how many kinds of error are declared, which are not, and how many declared ones have no source."""
+    text = f"Declared {len(kinds.declared)} of {kinds.in_all} kinds of error"
+    if kinds.missing:
+        text += f"; not declared: {', '.join(kind_names(kinds.missing))}"
+    if kinds.without_source:
+        text += f"; without source: {len(kinds.without_source)}"
+    return f"{text}."
+
+
+def kind_names(kinds: Sequence[str]) -> list[str]:
+    """Write kinds of error for reading, those that both platforms have once."""
+    owners: dict[str, list[str]] = {}
+    for kind in kinds:
+        owner, _, what = kind.rpartition(".")
+        owners.setdefault(what, []).append(owner)
+    names = []
+    for what, of in owners.items():
+        owner = "both" if len(of) > 1 else of[0]
+        names.append(f"{what} ({owner})" if owner else what)
+    return names
+
+
+def rule_words(mission: MissionFindings) -> str:
+    """Say by which model, and by which rule, a mission is judged."""
+    return f"{MODELS[mission.model]}, {RULES[mission.combine]}"
+
+
+def overrides_words(found: HasOverrides, *, with_changes: bool = True) -> str:
+    """Say what from outside the file bears on the verdict; empty if nothing does. `--set` may be said elsewhere."""
+    said = [
+        f"{one.name} {printable(one.value)} ({one.origin})"
+        for one in found.overrides
+        if with_changes or one.name != "--set"
+    ]
+    return "; ".join(said)
+
+
+def overrides_lines(found: HasOverrides) -> list[str]:
+    """The same for a terminal, beside `--set`; no line if there is nothing."""
+    said = overrides_words(found, with_changes=False)
+    return wrapped(f"From outside the file: {said}", "  ") if said else []
