@@ -1,8 +1,8 @@
 """Verdicts on the limits of sensors and clocks: many time series at the limit, and images of a few of them.
 
 A sigma speaks of many flights. Whole time series go through exact ranges for it, and images of some of them say
-whether a response shows the phase that exact ranges find. What spreads is measured in the aperture, as for vibration:
-by Parseval the power beside the coherent response is the variance of the aperture's phasor.
+whether a response shows the phase that exact ranges find. What spreads is measured as for vibration, in images of as
+many time series as a verdict takes, see `noise_image`.
 """
 
 import math
@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bisar_budget.analysis.spread import shown_islr_db, spread_limit, spread_powers
+from bisar_budget.analysis.spread import islr_db, mainlobe_energy, shown_islr_db, spread_limit, spread_powers
 from bisar_budget.budget.random_rows import ISLR, limits_for, sizes_at
 from bisar_budget.effects.clocks import Spur
 from bisar_budget.effects.exact_arrays import aperture_nodes
@@ -21,12 +21,12 @@ from bisar_budget.effects.vibration_lines import sight_of
 from bisar_budget.findings.images import Verdict
 from bisar_budget.mission.model import Simulation
 from bisar_budget.simulate.collection import Errors
-from bisar_budget.simulate.phase_history import SMOOTH, Course, Floats, PathError, PathSinusoid
+from bisar_budget.simulate.phase_history import SMOOTH, Course, Floats, PathError, PathSinusoid, cell_centres
 from bisar_budget.simulate.realisations import clock_seconds, correlation_time, phase_courses, position_courses
 from bisar_budget.verify import reasons
 from bisar_budget.verify.phase_cases import TOLERANCE, compare
 from bisar_budget.verify.study import Study
-from bisar_budget.verify.vibration_cases import TOLERANCE_DB, echo
+from bisar_budget.verify.vibration_cases import MOMENTS, echo, measured_power
 
 _DRAWS, _CLOCK_DRAWS = 4000, 1000  # know a sigma to 1.1 %, and to 2.2 %
 _SYNCHRONIZED_DRAWS = 400  # whose fast tones are drawn too, because they are folded
@@ -34,8 +34,6 @@ _TURNS = 100  # of a tone per aperture, beyond which it has no quadratic phase t
 _SURE = 3.0  # standard errors of a sigma
 _IMAGES = 6
 _FINE = 513  # moments of a time series in an image
-_POWER_DRAWS = 48
-_MOMENTS = 4096  # of an aperture whose spread power is measured
 _AT_ONCE = 250  # draws in memory
 _ORDER = 3  # up to which a phase moves and defocuses; the rest spreads
 
@@ -77,10 +75,9 @@ def verify_random(study: Study, error: RandomError) -> Verdict:
         boundary_error=20 * math.log10(size) if error.unit == "dB" else size,
         unit=error.unit,
     )
-    rng = _stream(study, error.id)
     if binding == ISLR:
-        return _power(study, blank, [at_limit], size * error.effect(_model(study, error)).spread, rng)
-    return _phase(study, blank, at_limit, binding, rng)
+        return _power(study, blank, [at_limit], error.owner)
+    return _phase(study, blank, at_limit, binding, _stream(study, error.id))
 
 
 def _phase(study: Study, blank: Verdict, error: RandomError, binding: str, rng: np.random.Generator) -> Verdict:
@@ -175,11 +172,10 @@ def _series(study: Study, error: RandomError, rng: np.random.Generator) -> list[
 # ---------------------------------------------------------------------- what spreads
 def verify_islr(study: Study, of: Subject) -> Verdict:
     """Everything that spreads, scaled together to the limit of a row's owner."""
-    model = study.models[-1].name
-    limit = spread_limit(study.mission, study.allocation, of.owner, model) or 0.0
-    blank = Verdict(
-        id=of.id, model=study.model, boundary_error=shown_islr_db(study.mission, limit**2) or 0.0, unit="dB"
-    )
+    mission, model = study.mission, study.models[-1].name
+    limit = spread_limit(mission, study.allocation, of.owner, model) or 0.0
+    level = islr_db(limit**2, model, mainlobe_energy(mission))
+    blank = Verdict(id=of.id, model=study.model, boundary_error=level, unit="dB")
     powers = spread_powers(study.analysis, study.allocation, of.owner, model)
     total = math.fsum(power for _, power in powers)
     if not total:
@@ -189,42 +185,29 @@ def verify_islr(study: Study, of: Subject) -> Verdict:
     declared = [random[row_id] for row_id, _ in powers if row_id in random]
     members = [error._replace(declared=scale * (error.declared or 0.0)) for error in declared]
     white = scale * math.sqrt(math.fsum(power for row_id, power in powers if row_id not in random))
-    return _power(study, blank, members, limit, _stream(study, of.id), white)
+    return _power(study, blank, members, of.owner, white)
 
 
-def _power(
-    study: Study,
-    blank: Verdict,
-    members: Sequence[RandomError],
-    limit: float,
-    rng: np.random.Generator,
-    white: float = 0.0,
-) -> Verdict:
-    """Mean power that time series spread beside the response, in the aperture, against a limit [rad rms]."""
-    collection = study.collection
-    k = 2 * math.pi / collection.wavelength
-    times = _moments(study, _MOMENTS)
-    # Each moment stands for a step: a time series is not faster than that.
-    phases = white * rng.standard_normal((_POWER_DRAWS, times.size))
-    for error in members:
-        if error.subject.kind in ("imu", "random"):
-            moved = position_courses(study.mission, error, times, _POWER_DRAWS, rng)
-            phases += k * moved @ np.array(sight_of(study.mission, error.owner))
-        else:
-            phases += phase_courses(study.mission, error, times, _POWER_DRAWS, rng)
-    place = 2 * times / collection.aperture_time
-    fit = np.polynomial.legendre.legfit(place, phases.T, _ORDER)
-    phasor = np.exp(1j * (phases - np.polynomial.legendre.legval(place, fit)))
-    coherent = np.abs(phasor.mean(axis=1)) ** 2
-    ratios = (1 - coherent) / coherent
-    mean, spread = float(np.mean(ratios)), float(np.std(ratios, ddof=1)) / math.sqrt(_POWER_DRAWS)
-    level, required = 10 * math.log10(mean), shown_islr_db(study.mission, limit**2) or 0.0
-    excess = level - required
-    verdict = "confirmed" if abs(excess) <= TOLERANCE_DB else "optimistic" if excess > 0 else "conservative"
-    return blank._replace(
-        requirement_db=required,
-        measured_db=level,
-        measured_db_error=10 / math.log(10) * spread / mean,
-        verdict=verdict,
-        reason=reasons.mean_power_of_time_series(_POWER_DRAWS),
-    )
+def _power(study: Study, blank: Verdict, members: Sequence[RandomError], owner: str, white: float = 0.0) -> Verdict:
+    """ISLR that time series at a limit add to an image, against what an owner may add to it."""
+    mission, collection = study.mission, study.collection
+    rng = _stream(study, blank.id)
+    # Each moment stands for a step: what is faster is noise from step to step.
+    times = cell_centres(collection.aperture_time, MOMENTS)
+    legendre = np.polynomial.legendre.legvander(2 * times / collection.aperture_time, _ORDER)
+    fitted = legendre @ np.linalg.pinv(legendre)
+
+    def left(draws: int) -> Floats:
+        """Phases without what moves and defocuses the response."""
+        phases = white * rng.standard_normal((draws, times.size))
+        for error in members:
+            if error.subject.kind in ("imu", "random"):
+                moved = position_courses(mission, error, times, draws, rng)
+                phases += 2 * math.pi / collection.wavelength * moved @ np.array(sight_of(mission, error.owner))
+            else:
+                phases += phase_courses(mission, error, times, draws, rng)
+        return phases - phases @ fitted
+
+    allowed = spread_limit(mission, study.allocation, owner, "full") or 0.0  # what an image may show
+    required = shown_islr_db(mission, allowed**2) or 0.0
+    return measured_power(collection, blank._replace(requirement_db=required), left, reasons.power_of_time_series())
