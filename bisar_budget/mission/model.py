@@ -232,15 +232,18 @@ class AllocationRules(NamedTuple):
     ] = "equal"
     combine: Annotated[
         str,
-        Key(Choice("each", "sum", "rss"), "each: every error alone; sum: worst case; rss: independent errors."),
-    ] = "each"
+        Key(
+            Choice("each", "sum", "rss"),
+            "rss: independent errors together; sum: all at their worst; each: every error alone, as the paper.",
+        ),
+    ] = "rss"
     model: Annotated[
         str,
         Key(
             Choice("published", "full", "strictest"),
-            "The model that gates: the paper's, the full one, or the stricter of both for each row.",
+            "The model that gates: full: exact ranges; published: the paper's; strictest: the stricter for each row.",
         ),
-    ] = "published"
+    ] = "full"
     coverage_factor: Annotated[
         float,
         Key(
