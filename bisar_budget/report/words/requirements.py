@@ -110,7 +110,7 @@ def verdict(mission: MissionFindings) -> str:
     if unjudged := statuses.count("not_evaluated"):
         said.append(f"{_counted(unjudged, 'requirement')} cannot be judged")
     if effects := len(unjudged_effects(mission)):
-        said.append(f"{_counted(effects, 'effect')} of errors {'is' if effects == 1 else 'are'} judged by none")
+        said.append(f"{_counted(effects, 'effect')} of errors {'is' if effects == 1 else 'are'} not judged")
     if said:
         return ", ".join(said)
     broken = [row for row in mission.rows if row.status in _BREAKS]
