@@ -71,8 +71,8 @@ BASE: dict[str, Any] = {
     },
 }
 
-# What expectations written down by hand hold for: closed formulas, one error at a time. Tests of the full model and of
-# errors together say so.
+# What expectations written down by hand hold for: closed formulas, one error at a time. Tests of the full model and
+# of errors together say so.
 PAPER = {"model": "published", "combine": "each"}
 
 ANGLES = ("azimuth", "elevation", "motion_azimuth", "quadratic_phase_error", "cubic_phase_error")

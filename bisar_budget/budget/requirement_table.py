@@ -221,7 +221,7 @@ def _entry(
         status=status,
         allowed=allowed,
         reached=reached,
-        utilization=None if decider is None else decider.utilization,
+        utilization=None if decider is None or decider.utilization is None else float(state.utilization[0]),
         row=None if decider is None else decider.id,
         rows=tuple(row.id for row, judges in zip(rows, state.judges[:, 0], strict=True) if judges),
         reason=reason,

@@ -108,6 +108,25 @@ def test_a_row_that_another_requirement_binds_may_break_the_quadratic_one_too() 
     assert requirement(found, "quadratic_phase_error").row == "receiver.velocity.y"
 
 
+def test_a_row_that_another_requirement_binds_judges_the_quadratic_one_too() -> None:
+    """With a location that binds every declared error nothing was said to judge the quadratic phase."""
+    changes = {RECEIVER: {"position": "1 cm"}, "allocation": {"combine": "each", "model": "full"}}
+    found = check(requirements={"location_error": "1 m"}, **changes)
+    quadratic = requirement(found, "quadratic_phase_error")
+    binding = row(found, str(quadratic.row))
+    assert (quadratic.status, binding.binding_requirement) == ("pass", "location_error")
+    assert quadratic.utilization == pytest.approx(abs(binding.qpe_full_rad) / (math.pi / 8), rel=1e-9)
+    assert quadratic.utilization < binding.utilization
+
+
+def test_autofocus_is_not_said_to_correct_another_requirement() -> None:
+    changes = {RECEIVER: {"velocity": [0, "0.2 m/s", 0]}, "allocation": {"combine": "each", "model": "full"}}
+    needs = {"cubic_phase_error": "45 deg", "location_error": "1 km"}
+    found = check(requirements=needs, autofocus={"n_pull": 10}, **changes)
+    assert requirement(found, "quadratic_phase_error").status == "pass_with_autofocus"
+    assert {requirement(found, key).status for key in needs} == {"pass"}
+
+
 # ---------------------------------------------------------------------- the cubic
 GYRO = {f"{RECEIVER}__imu": {"gyro_bias": "100000 deg/h"}}
 

@@ -63,11 +63,6 @@ RULES = {
         "Autofocus corrects one total of n_pull·π radians, not each error separately (Rigling & Moses, Section VI). "
         "Raise autofocus.n_pull if the algorithm allows, or declare smaller errors.",
     ),
-    "declare": (
-        "Errors that the file must declare",
-        "requirements.declare names errors that the file has to declare, for both platforms; what is missing cannot "
-        "be judged. Declare them: a zero declares too.",
-    ),
     "other": (
         "Declared value within its limit",
         "A declared value is held to a limit; the message says to which and from where.",
