@@ -67,7 +67,11 @@ def _mission(mission: MissionFindings, style: Style) -> list[str]:
         return [_lead("; ".join(said), mission.status, style)]
     lines = _verdict(mission, style)
     lines += ["", *_requirements(mission, style)]
-    lines += ["", *(line for key, text in _head(mission, style) for line in wrapped(f"{key:<12} {text}", " " * 13)), ""]
+    lines += [
+        "",
+        *(line for key, text in _head(mission, style) for line in wrapped(f"{key:<12} {text}", " " * 13)),
+        "",
+    ]
     after = list(_after(mission, style))
     room = max(LINES - len(lines) - len(after), 0)
     return [*lines, *_table(mission, style, room), *after]

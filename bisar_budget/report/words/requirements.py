@@ -94,7 +94,7 @@ def requirement_finding(one: JudgedRequirement) -> str:
         text += (
             f", {requirement_size(one.reached, one)} reached, {requirement_size(one.allowed, one, 'down')} allowed"
         )
-    if one.row is not None:
+    if one.row is not None and one.status != "not_evaluated":
         text += f", decided by {one.row}"
     return ". ".join([text, *filter(None, [one.reason]), *(waiver.words for waiver in one.waivers)])
 
