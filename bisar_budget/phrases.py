@@ -672,21 +672,15 @@ def seen_of_vibration(stated: str, along: float, has_direct_path: bool) -> str:
 
 # ---------------------------------------------------------------------- images
 @phrase
-def autofocus_refuted() -> str:
+def autofocus_refuted(shown: str) -> str:
     """Of a row that passes with autofocus."""
-    return "passes only with autofocus, and the image at that limit shows that autofocus fails"
+    return f"passes only with autofocus, which the image at that limit refutes: {shown}"
 
 
 @phrase
-def location_refuted() -> str:
-    """Of the location."""
-    return "the image is not where the gating model puts it"
-
-
-@phrase
-def limit_refuted(times: float) -> str:
-    """Of a row that passes."""
-    return f"inside the limit, but {times:.3g} times what the image allows"
+def limit_refuted(limit: str, shown: str) -> str:
+    """Of a declared row, or a requirement's, whose limit an image refutes."""
+    return f"inside its limit of {limit}, which images refute: {shown}"
 
 
 @phrase

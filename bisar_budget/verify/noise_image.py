@@ -39,12 +39,20 @@ class AddedIslr(NamedTuple):
         return (self.high - self.low) / (2 * _NORMAL_95)
 
     def verdict(self, required_db: float) -> str:
-        """Verdict on a limit that was to add an ISLR; `not_evaluated` while the mean may yet have another one."""
+        """Verdict on a limit that was to add an ISLR; `not_evaluated` where the mean may have another one.
+
+        After all draws, on the border of what is confirmed and what is conservative, it is `conservative`: no limit
+        there adds too much.
+        """
         excess, doubt = self.level - required_db, _SURE * self.error
         low, high = excess - doubt, excess + doubt
+        if low > TOLERANCE_DB:
+            return "optimistic"
+        if high < -TOLERANCE_DB:
+            return "conservative"
         if low >= -TOLERANCE_DB and high <= TOLERANCE_DB:
             return "confirmed"
-        return "optimistic" if low > TOLERANCE_DB else "conservative" if high < -TOLERANCE_DB else "not_evaluated"
+        return "conservative" if self.draws >= _MOST and high < 0 else "not_evaluated"
 
 
 class Mainlobe:

@@ -10,13 +10,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bisar_budget.analysis.spread import islr_db, mainlobe_energy, shown_islr_db, spread_limit, spread_powers
+from bisar_budget.analysis.spread import islr_db, mainlobe_energy, shown_islr_db, spread_limit, spread_powers, tones
 from bisar_budget.budget.random_rows import ISLR, limits_for, sizes_at
 from bisar_budget.effects.clocks import Spur
 from bisar_budget.effects.exact_arrays import aperture_nodes
 from bisar_budget.effects.models import CUBIC
 from bisar_budget.effects.random_errors import RandomError
-from bisar_budget.effects.subject import Subject
+from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.vibration_lines import sight_of
 from bisar_budget.findings.images import Verdict
 from bisar_budget.mission.model import Simulation
@@ -181,20 +181,38 @@ def verify_islr(study: Study, of: Subject) -> Verdict:
     if not total:
         return blank._replace(reason=reasons.no_spread_declared())
     scale = limit / math.sqrt(total)
-    random = {error.id: error for error in study.analysis.random}
-    declared = [random[row_id] for row_id, _ in powers if row_id in random]
-    members = [error._replace(declared=scale * (error.declared or 0.0)) for error in declared]
-    white = scale * math.sqrt(math.fsum(power for row_id, power in powers if row_id not in random))
-    return _power(study, blank, members, of.owner, white)
+    rms = {row_id: scale * math.sqrt(power) for row_id, power in powers}
+    members = [
+        error._replace(declared=scale * (error.declared or 0.0)) for error in study.analysis.random if error.id in rms
+    ]
+    cubic = rms.pop(subject("mission", CUBIC).id, 0.0)
+    cycles = {one.subject.id: one.cycles for one in tones(mission)}
+    echoes = [(rms[row_id], turns) for row_id, turns in cycles.items() if row_id in rms]
+    known = {error.id for error in members} | cycles.keys()
+    white = math.sqrt(math.fsum(size**2 for row_id, size in rms.items() if row_id not in known))
+    return _power(study, blank, members, of.owner, white, echoes, cubic)
 
 
-def _power(study: Study, blank: Verdict, members: Sequence[RandomError], owner: str, white: float = 0.0) -> Verdict:
-    """ISLR that time series at a limit add to an image, against what an owner may add to it."""
+def _power(
+    study: Study,
+    blank: Verdict,
+    members: Sequence[RandomError],
+    owner: str,
+    white: float = 0.0,
+    echoes: Sequence[tuple[float, float]] = (),
+    cubic: float = 0.0,
+) -> Verdict:
+    """ISLR that time series at a limit add to an image, against what an owner may add to it.
+
+    Beside the errors of sensors and clocks there may be white noise, tones, each with its cycles per aperture, and a
+    cubic phase; of each the rms over the aperture. [rad]
+    """
     mission, collection = study.mission, study.collection
     rng = _stream(study, blank.id)
     # Each moment stands for a step: what is faster is noise from step to step.
     times = cell_centres(collection.aperture_time, MOMENTS)
-    legendre = np.polynomial.legendre.legvander(2 * times / collection.aperture_time, _ORDER)
+    place = 2 * times / collection.aperture_time
+    legendre = np.polynomial.legendre.legvander(place, _ORDER)
     fitted = legendre @ np.linalg.pinv(legendre)
 
     def left(draws: int) -> Floats:
@@ -206,7 +224,13 @@ def _power(study: Study, blank: Verdict, members: Sequence[RandomError], owner: 
                 phases += 2 * math.pi / collection.wavelength * moved @ np.array(sight_of(mission, error.owner))
             else:
                 phases += phase_courses(mission, error, times, draws, rng)
-        return phases - phases @ fitted
+        phases = phases - phases @ fitted
+        for rms, cycles in echoes:
+            turned = 2 * math.pi * rng.random((draws, 1))
+            phases += math.sqrt(2) * rms * np.cos(math.pi * cycles * place + turned)
+        if cubic:  # of P₃, whose mean square over the aperture is a seventh
+            phases += math.sqrt(7) * cubic * rng.standard_normal((draws, 1)) * legendre[:, 3]
+        return phases
 
     allowed = spread_limit(mission, study.allocation, owner, "full") or 0.0  # what an image may show
     required = shown_islr_db(mission, allowed**2) or 0.0

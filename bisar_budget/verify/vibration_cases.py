@@ -22,7 +22,6 @@ from bisar_budget.findings.images import Verdict
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import Note
 from bisar_budget.simulate.collection import CELLS, Errors, PointCollection
-from bisar_budget.simulate.image_formation import taylor_window
 from bisar_budget.simulate.impulse_response import upsampled
 from bisar_budget.simulate.phase_history import Floats, PathError, PathSinusoid, cell_centres
 from bisar_budget.verify import reasons
@@ -169,7 +168,7 @@ def _wideband(
     seed: int,
 ) -> Verdict:
     """Measure the ISLR that white vibration adds, over all of the repeat interval, on as many draws as it takes."""
-    slow_time = cell_centres(collection.aperture_time, MOMENTS)
+    weights, slow_time = collection.window(MOMENTS), cell_centres(collection.aperture_time, MOMENTS)
     clean = collection.paths(Errors(), slow_time)
     errors = Errors()
     for name, rms in limits.items():
@@ -195,7 +194,7 @@ def _wideband(
 
     rest_on = reasons.power_of_one_platform()
     if len(limits) == 2:
-        mainlobe = Mainlobe(_window(collection))
+        mainlobe = Mainlobe(weights)
         common = phases(np.random.default_rng([seed, 1]), _COMMON_RUNS, is_common=True)
         rest_on = reasons.power_of_both_platforms(mainlobe.added_db(float(mainlobe.lost(common).mean())))
     draw = partial(phases, np.random.default_rng(seed), is_common=False)
@@ -207,7 +206,7 @@ def measured_power(
 ) -> Verdict:
     """Verdict on the ISLR that phases add, (draws, MOMENTS), against the requirement of one that is yet blank."""
     required = blank.requirement_db or 0.0
-    found = added_islr(_window(collection), draw, required)
+    found = added_islr(collection.window(MOMENTS), draw, required)
     verdict, interval = found.verdict(required), (found.low, found.high)
     drawn = reasons.draws_decide if verdict != "not_evaluated" else reasons.draws_do_not_decide
     return blank._replace(
@@ -217,10 +216,6 @@ def measured_power(
         verdict=verdict,
         reason=rest_on.then(drawn(found.draws, *interval)),
     )
-
-
-def _window(collection: PointCollection) -> Floats:
-    return taylor_window(MOMENTS) if collection.is_tapered else np.ones(MOMENTS)
 
 
 def _compare(excess_db: float) -> str:

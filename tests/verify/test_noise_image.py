@@ -74,7 +74,31 @@ def test_what_is_on_the_border_gets_no_verdict_but_an_interval() -> None:
     assert found.high - found.low < 0.02
 
 
+def test_on_the_harmless_border_a_limit_is_conservative() -> None:
+    """Half a decibel inside what is required it is confirmed or conservative: of neither border a limit is unsafe."""
+    found = added_islr(UNIFORM, white(-20.5, 5), -20)
+    assert (found.verdict(-20), found.draws) == ("conservative", 8192)
+
+
 class TestVerdicts:
+    """Of whole missions, by the images of what they declare."""
+
+    @pytest.mark.parametrize(
+        ("error", "verdict"),
+        [
+            ({"vibration": {"wideband": {"rms": "100 um"}}}, "confirmed"),
+            ({"vibration": {"sinusoidal": [{"amplitude": "100 um", "frequency": 5}]}}, "confirmed"),
+            ({"acceleration": [0, "2 mm/s^2", 0]}, "conservative"),  # (4/175)·φ₃² is safe: an image shows 1.2 dB less
+        ],
+    )
+    def test_what_islr_holds_besides_noise_is_drawn_as_what_it_is(self, error, verdict: str) -> None:
+        """A tone without a PSLR requirement, and a cubic phase without one of its own."""
+        allocation = {"model": "full", "combine": "rss"}
+        changes = {"platforms__receiver__motion_error": error, "allocation": allocation}
+        mission = parse_mission(mission_text(requirements__islr=-20, **changes))
+        (row,) = verify_mission(mission, "mission.islr").rows
+        assert (row.verdict, row.requirement_db) == (verdict, pytest.approx(-20))
+
     def test_the_limit_of_correlated_noise_has_one_verdict_whatever_the_seed(self) -> None:
         """48 series had an error of 0.3 dB, and the verdict of a limit 0.4 dB off was that of the seed."""
         rest = "requirements: {islr: -20 dB}\nallocation: {model: full, combine: rss}\n"
