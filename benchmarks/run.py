@@ -334,7 +334,8 @@ def montecarlo(runs: int) -> None:
     transmitter: {{position: [30 km, 0, 6 km], velocity: [50, 150, 0], motion_error: {motion}}},
     receiver: {{position: [6 km, 6 km, 2 km], velocity: [-40, 40, 0], motion_error: {motion}}}}},
     timing_error: {{constant: 5 ns, linear: 1e-11, quadratic: 1e-13, cubic: 1e-13}},
-    requirements: {{cubic_phase_error: 1e-2 rad, location_error: 3 m}}}}"""
+    requirements: {{cubic_phase_error: 1e-2 rad, location_error: 3 m}},
+    allocation: {{model: published, combine: each}}}}"""
     mission = parse_mission(text)
     n, seed = 1_000_000, 1
     analysis = Analysis(mission)

@@ -103,6 +103,7 @@ class Problem(NamedTuple):
     """Something wrong with a value, before anybody knows which file it stands in.
 
     `at` is the path of the culprit below the value that was checked. `names_value`: it says the value itself.
+    `is_of_key`: the key is wrong, whatever its value.
     """
 
     problem: str
@@ -110,6 +111,7 @@ class Problem(NamedTuple):
     hint: str = ""
     at: KeyPath = ()
     names_value: bool = False
+    is_of_key: bool = False
 
 
 class InvalidValueError(ValueError):

@@ -82,11 +82,11 @@ def exchanges_are_rare(aperture_time: float) -> str:
 
 # ---------------------------------------------------------------------- autofocus
 @phrase
-def walks_over_range_cells(n_pull: float, cells: float, half_cell: float) -> str:
-    """Of a pull-in range that range walk does not leave; `half_cell` is the `n_pull` of half a cell."""
+def walks_over_range_cells(n_pull: float, cells: float, cap: str) -> str:
+    """Of a pull-in range that range walk does not leave; `cap` is the `n_pull` of half a cell, rounded down."""
     return (
-        f"autofocus.n_pull: an error of {n_pull:g}π rad walks over {cells:.3g} range cells; correction along one "
-        f"dimension then costs over 0.6 dB; half a cell is n_pull {half_cell:.4g}, f0/B"
+        f"autofocus.n_pull: {n_pull:g} counts as {cap}, f0/B, where an error walks half a range cell; one of "
+        f"{n_pull:g}π rad walks over {cells:.3g}, which correction along one dimension does not take out"
     )
 
 

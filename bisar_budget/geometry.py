@@ -18,6 +18,7 @@ _DIRECTED = 1e-300  # m/s; of what is smaller too few digits are left for a dire
 STRAIGHT: Vector = (0.0, 0.0, 0.0)  # acceleration of a platform whose path does not curve
 Axes = tuple[Vector, Vector, Vector]
 
+STILL = 1e-6  # m/s; slower than this no platform flies an aperture
 FRAME_AXES = {
     "scene": ("x", "y", "z"),
     "track": ("along", "cross", "up"),
@@ -78,6 +79,11 @@ class PlatformState:
     acceleration: Vector = STRAIGHT
     bends: tuple[Vector, ...] = ()
     radial: Axes | None = None
+
+    @property
+    def is_still(self) -> bool:
+        """Whether it stays where it is."""
+        return self.travelled(1.0) < STILL
 
     @property
     def is_straight(self) -> bool:

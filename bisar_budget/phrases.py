@@ -156,15 +156,24 @@ def place_is_not_known(row_ids: Sequence[str]) -> str:
 
 
 @phrase
-def not_all_is_declared(keys: Sequence[str]) -> str:
-    """Of `requirements.declare`."""
-    return f"the file does not declare {', '.join(keys)}"
-
-
-@phrase
 def not_declared_as_required(key: str) -> str:
     """Of an error that the file should declare."""
     return f"the file has no {key}, which requirements.declare asks for"
+
+
+@phrase
+def declarations_are_missing(keys: Sequence[str]) -> str:
+    """Of all errors that the file should declare."""
+    *others, last = keys
+    said = f"{', no '.join(others)} and no {last}" if others else last
+    return f"the file has no {said}, which requirements.declare asks for"
+
+
+@phrase
+def input_in_doubt(doubt: float, words: str, declared: float | None, key: str) -> str:
+    """Of a position error that is less than the doubt of the platform's path. [m]"""
+    stated = "no position error is declared" if declared is None else f"{_size(declared, 'm')} is declared"
+    return f"the path may be {_size(doubt, 'm')} off ({words}), {stated}: state it in {key}"
 
 
 # ---------------------------------------------------------------------- over the limit
@@ -193,6 +202,12 @@ def location_over(moved: float | None, limit: float, equation: str) -> str:
     """Of one error; None: there is no image of it. [m]"""
     where = "out of sight" if moved is None else f"by {format_quantity(moved, 'm')}"
     return f"moves the image {where}, {format_limit(limit, 'm')} allowed ({equation})"
+
+
+@phrase
+def beyond_the_image(end: float, unit: str) -> str:
+    """Of one error that is larger than any with an image."""
+    return f"the image ends at {format_limit(end, unit)}: no ground point has the range history of a larger error"
 
 
 @phrase
@@ -265,6 +280,21 @@ def other_model_allows(model: str, limit: float, unit: str) -> str:
 def other_model_spreads(model: str, level_db: float) -> str:
     """Of noise."""
     return f"the {model} model says fail: it spreads {_level(level_db)}"
+
+
+@phrase
+def published_model_does_not_hold(
+    row_id: str, published: float | None, full: float | None, unit: str, others: int
+) -> str:
+    """Of a mission that the published model judges; None: no limit. How many other errors it does not hold of."""
+    by_published, by_full = (
+        "without limit" if size is None else format_limit(size, unit) for size in (published, full)
+    )
+    text = f"the published model does not hold here: it allows {row_id} {by_published}, the full model {by_full}"
+    if not others:
+        return text
+    more = "1 other declared error is" if others == 1 else f"{others} other declared errors are"
+    return f"{text}; {more} over 5 % apart too"
 
 
 @phrase
@@ -627,12 +657,6 @@ def both_platforms_vibrate(other: str, apart: float, level_db: float, is_more: b
 
 
 @phrase
-def published_rule_is_exact() -> str:
-    """Of a limit of a vibration."""
-    return "the published rule is that of first principles, to 0.01 dB"
-
-
-@phrase
 def published_rule_is_off(margin_db: float) -> str:
     """Of a limit of a vibration."""
     side = "inside" if margin_db >= 0 else "beyond"
@@ -648,21 +672,15 @@ def seen_of_vibration(stated: str, along: float, has_direct_path: bool) -> str:
 
 # ---------------------------------------------------------------------- images
 @phrase
-def autofocus_refuted() -> str:
+def autofocus_refuted(shown: str) -> str:
     """Of a row that passes with autofocus."""
-    return "passes only with autofocus, and the image at that limit shows that autofocus fails"
+    return f"passes only with autofocus, which the image at that limit refutes: {shown}"
 
 
 @phrase
-def location_refuted() -> str:
-    """Of the location."""
-    return "the image is not where the gating model puts it"
-
-
-@phrase
-def limit_refuted(times: float) -> str:
-    """Of a row that passes."""
-    return f"inside the limit, but {times:.3g} times what the image allows"
+def limit_refuted(limit: str, shown: str) -> str:
+    """Of a declared row, or a requirement's, whose limit an image refutes."""
+    return f"inside its limit of {limit}, which images refute: {shown}"
 
 
 @phrase
@@ -681,6 +699,12 @@ def optimistic_limit_with_autofocus(shown: str) -> str:
 def images_formed(conditions: str) -> str:
     """Of a mission with images."""
     return f"images: {conditions}"
+
+
+@phrase
+def overrides_a_part(key: str, text: str, part: str) -> str:
+    """Of a figure of a part that the file replaces; of its rows and of a mission."""
+    return f"{key} stands in place of {text} of {part}"
 
 
 # ---------------------------------------------------------------------- the collection

@@ -29,7 +29,7 @@ collection: {{ aperture_time: {aperture_time} }}
 platforms:
   transmitter: {transmitter}
   receiver: {receiver}
-allocation: {{ model: full }}
+allocation: {{ model: full, combine: each }}
 """
     )
 

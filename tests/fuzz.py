@@ -453,7 +453,7 @@ def _section(tree: Any, node: Any, key: Any, random: Random) -> None:
                 "split": random.choice(("equal", "balanced")),
                 "combine": random.choice(("each", "sum", "rss")),
                 "model": random.choice(("published", "full", "strictest")),
-                "coverage_factor": str(number),
+                "coverage_factor": str(number if number >= 1 else 1 + number),
             }
         ),
         "autofocus": lambda: tree.update(autofocus={"n_pull": str(number)}),

@@ -40,7 +40,7 @@ _GEOMETRY = "bisar_budget/geometry.py"
 _POINT = "bisar_budget/simulate/point.py"
 _PIECES = "bisar_budget/effects/pieces.py"
 _PHASES = "bisar_budget/verify/phase_cases.py"
-_VIBRATION = "bisar_budget/verify/vibration_cases.py"
+_NOISE = "bisar_budget/verify/noise_image.py"
 
 _PLOT = "bisar_budget/report/drawing/point_plot.py"
 _FIGURES = "bisar_budget/report/drawing/point_figures.py"
@@ -260,14 +260,14 @@ MUTANTS = (
     ),
     Mutant(
         "verify: vibration confirmed within 2 dB, where it is conservative",
-        _VIBRATION,
+        _NOISE,
         "TOLERANCE_DB = 0.5",
         "TOLERANCE_DB = 2.0",
         (f"{_BORDERS}TestVibration::test_noise_1_db_inside_is_conservative",),
     ),
     Mutant(
         "verify: vibration confirmed within 2 dB, where it is optimistic",
-        _VIBRATION,
+        _NOISE,
         "TOLERANCE_DB = 0.5",
         "TOLERANCE_DB = 2.0",
         (f"{_BORDERS}TestVibration::test_noise_that_the_rule_of_small_phases_underrates_is_optimistic",),

@@ -40,13 +40,17 @@ EQUAL = Split(transmitter=0.5, receiver=0.5)
 
 
 class Allocation(NamedTuple):
-    """The budgets as divided. `qpe_total` and limits in [rad], before autofocus; PSLR and ISLR share power."""
+    """The budgets as divided. `qpe_total` and limits in [rad], before autofocus; PSLR and ISLR share power.
+
+    `n_pull` is what counts of the file's `autofocus.n_pull`, see `effective_n_pull`; `n_pull_stated` is the file's.
+    """
 
     qpe_total: float
     qpe: Split
     pslr: Split
     islr: Split
     n_pull: float | None
+    n_pull_stated: float | None
 
     @property
     def autofocus_gain(self) -> float:
@@ -58,9 +62,25 @@ class Allocation(NamedTuple):
         return self.qpe.of(owner) * self.qpe_total
 
     def n_pull_needed(self, qpe: float, owner: str) -> float:
-        """Smallest N_pull that makes a QPE pass, rounded up to hundredths."""
-        exact = qpe / (self.qpe.of(owner) * math.pi)
-        return math.ceil(exact * 100 * (1 - 1e-12)) / 100
+        """Smallest N_pull that makes a QPE pass."""
+        return qpe / (self.qpe.of(owner) * math.pi)
+
+
+def range_walk_cap(mission: Mission) -> float:
+    """Largest N_pull that counts, f₀/B; a number, or an array of many cases.
+
+    A phase of π·N at the aperture edge walks N·B/2f₀ range cells, of which correction along one dimension takes half
+    a cell (`budget.pull_in`).
+    """
+    return mission.radar.center_frequency / mission.radar.bandwidth
+
+
+def effective_n_pull(mission: Mission) -> float | None:
+    """N_pull that autofocus counts with: the file's, up to the cap of range walk; None: no autofocus is declared."""
+    stated, cap = mission.autofocus.n_pull, range_walk_cap(mission)
+    if stated is None:
+        return None
+    return stated * (stated <= cap) + cap * (stated > cap)  # the smaller one, of arrays too
 
 
 def allocate(
@@ -86,7 +106,8 @@ def allocate(
         qpe=_divide(metrics.quadratic_phase_error if metrics else split, mission, stated, phases, own),
         pslr=_divide_power(metrics.pslr if metrics else split),
         islr=_divide_power(metrics.islr if metrics else split),
-        n_pull=mission.autofocus.n_pull,
+        n_pull=effective_n_pull(mission),
+        n_pull_stated=mission.autofocus.n_pull,
     )
 
 

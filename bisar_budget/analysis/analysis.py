@@ -26,8 +26,8 @@ class Analysis:
     """One mission, analysed once.
 
     `is_brief` leaves out what a terminal does not show: allowables of errors that nobody declared, and of the model
-    that does not gate. `is_bare` leaves out how far one autofocus correction serves the scene. Nothing is judged by
-    them.
+    that does not gate. `is_bare` leaves out how far one autofocus correction serves the scene, and whether the
+    published model holds. Nothing is judged by them.
     """
 
     mission: Mission

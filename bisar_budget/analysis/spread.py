@@ -3,24 +3,29 @@
 Independent powers add, whatever `allocation.combine` says of phases. Each effect is judged once: a tone by PSLR, and
 without that requirement its power φ²/2 by ISLR; a cubic phase by its own requirement, and without one its power by
 ISLR, since it is in the image's sidelobes.
+
+Noise of a phase variance σ² leaves exp(-σ²) of the energy in the response and spreads the rest over the image. Of the
+response a share E lies within the first nulls, which an image counts as its mainlobe, so that noise adds
+(exp(σ²) - 1)/E to the ISLR. The paper's rule takes σ² for it.
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.together import Together
-from bisar_budget.analysis.vibration_limits import spread_phase
+from bisar_budget.constants import MAINLOBE_ENERGY
 from bisar_budget.effects.clocks import spurs_of
 from bisar_budget.effects.echoes import SLOWEST
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.models import CUBIC
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.vibration_lines import counted, lines_of
-from bisar_budget.mission.model import Mission, has_instruments
+from bisar_budget.mission.model import Mission, Simulation, has_instruments
 
 CUBIC_POWER = 4 / 175  # of a cubic phase φ₃ at the edge: its Legendre part 2/5·φ₃, whose mean square is (4/25)/7·φ₃²
+SMALLEST_CUBIC_RAD = 1e-6  # of a power of -136 dB; below, exact ranges are rounding
 NOISE = ("velocity_random_walk", "angle_random_walk")  # figures of an inertial sensor that spread
 
 
@@ -32,7 +37,7 @@ class Tone(NamedTuple):
     cycles: float
 
 
-class Spread(NamedTuple):
+class SpreadPhase(NamedTuple):
     """A row, whose share it counts against, and the variance of the phase that it spreads. [rad²]"""
 
     row_id: str
@@ -40,12 +45,49 @@ class Spread(NamedTuple):
     variance: float
 
 
+def mainlobe_energy(mission: Mission) -> float:
+    """Share E of the error-free response's energy within its first nulls, under the window of the images."""
+    return MAINLOBE_ENERGY[(mission.simulation or Simulation()).window]
+
+
+def spread_phase(ratio: Any, model: str, energy: float, xp: Any = math) -> Any:
+    """Rms phase of noise that adds an ISLR, inverse of `islr_db`. [rad]
+
+    Parameters
+    ----------
+    ratio : float or array
+        ISLR, a power ratio.
+    model : str
+        `published` for the paper's rule; any other is what an image shows.
+    energy : float
+        Share E, see `mainlobe_energy`.
+    xp : module
+        `math` for floats, `numpy` for arrays.
+    """
+    return xp.sqrt(ratio if model == "published" else xp.log1p(ratio * energy))
+
+
+def islr_db(variance: Any, model: str, energy: float, xp: Any = math) -> Any:
+    """ISLR that noise of a phase variance [rad²], above 0, adds: σ² by the paper's rule, else as an image shows. [dB]
+
+    Parameters are those of `spread_phase`.
+    """
+    if model == "published":
+        return 10 * xp.log10(variance)
+    # Of (exp(σ²) - 1)/E, without exp(σ²), which overflows.
+    return 10 / math.log(10) * (variance + xp.log(-xp.expm1(-variance)) - math.log(energy))
+
+
+def shown_islr_db(mission: Mission, variance: float) -> float | None:
+    """ISLR that noise of a phase variance [rad²] adds to an image; None where there is none. [dB]"""
+    return islr_db(variance, "full", mainlobe_energy(mission)) if variance else None
+
+
 def spread_limit(mission: Mission, allocation: Allocation, owner: str, model: str) -> float | None:
-    """Rms phase that an owner may spread: the paper's rule, its square is the power, or first principles. [rad]"""
+    """Rms phase that an owner may spread, by the paper's rule or as an image shows it. [rad]"""
     if mission.requirements.islr is None:
         return None
-    power = 10 ** (mission.requirements.islr / 10)
-    whole = math.sqrt(power) if model == "published" else spread_phase(power)
+    whole: float = spread_phase(10 ** (mission.requirements.islr / 10), model, mainlobe_energy(mission))
     return whole * math.sqrt(allocation.islr.of(owner))
 
 
@@ -65,7 +107,7 @@ def tones(mission: Mission) -> list[Tone]:
     return found
 
 
-def noise(analysis: Analysis, model: str) -> list[Spread]:
+def noise(analysis: Analysis, model: str) -> list[SpreadPhase]:
     """List what spreads beyond the cubic: wideband vibration, noise of sensors, phase noise, links."""
     mission, found = analysis.mission, []
     for name in PLATFORMS:
@@ -73,10 +115,10 @@ def noise(analysis: Analysis, model: str) -> list[Spread]:
         if wideband is not None:
             rms = counted(mission, name, wideband.rms, "islr")
             variance = (2 * math.pi * rms / mission.radar.wavelength) ** 2
-            found.append(Spread(subject(name, "vibration", "wideband").id, name, variance))
+            found.append(SpreadPhase(subject(name, "vibration", "wideband").id, name, variance))
     for one in analysis.random:
         if one.declared is not None and (one.subject.kind != "imu" or one.subject.axis in NOISE):
-            found.append(Spread(one.id, one.owner, (one.effect(model).spread * one.declared) ** 2))
+            found.append(SpreadPhase(one.id, one.owner, (one.effect(model).spread * one.declared) ** 2))
     return found
 
 
@@ -88,7 +130,7 @@ def spread_powers(analysis: Analysis, allocation: Allocation, owner: str, model:
     needs = analysis.mission.requirements
     found = noise(analysis, model)
     if needs.pslr is None:
-        found += [Spread(one.subject.id, one.subject.owner, one.phase**2 / 2) for one in tones(analysis.mission)]
+        found += [SpreadPhase(one.subject.id, one.subject.owner, one.phase**2 / 2) for one in tones(analysis.mission)]
     powers = [
         (one.row_id, one.variance)
         for one in found
@@ -97,6 +139,6 @@ def spread_powers(analysis: Analysis, allocation: Allocation, owner: str, model:
     if needs.cubic_phase_error is None:
         together = Together(analysis, analysis.full if model == "full" else analysis.published)
         cubic = together.cubic_without_coverage(allocation.islr, owner)
-        if 0 < cubic < math.inf:
+        if SMALLEST_CUBIC_RAD < cubic < math.inf:
             powers.append((subject("mission", CUBIC).id, CUBIC_POWER * cubic**2))
     return powers

@@ -2,13 +2,14 @@
 
 A motion of amplitude A along the line of sight is a phase of peak φ = 2πA/λ. A sinusoid makes paired echoes of
 J₁(φ)/J₀(φ) of the response, about φ/2; Gaussian noise of rms σ leaves exp(-σ²) of the power in the response and
-spreads the rest, so that its ISLR is exp(σ²) - 1. Derived here, checked against the transform of the phase.
+spreads the rest, so that an image shows an ISLR of (exp(σ²) - 1)/E, see `spread`. Derived here, checked against the
+transform of the phase.
 
 What a platform may have, so that both within their shares meet the requirement: where both vibrate at one frequency
 their echoes add in amplitude in the worst phase, so that amplitudes are divided, in the ratio that the shares of
 power set; where the motions are noise, which is independent from platform to platform, variances add and powers are
-divided. The paper's rule, φ² ≤ PSLR·share and σ² ≤ ISLR·share, stays 3 dB inside the first at equal shares and equals
-the second where σ² is small; the same noise on both platforms would add 3 dB.
+divided. The paper's rule, φ² ≤ PSLR·share and σ² ≤ ISLR·share, stays 3 dB inside the first at equal shares; it is
+beyond the second by 1/E, 0.44 dB with a uniform window; the same noise on both platforms would add 3 dB.
 
 Between one and three cycles per aperture a vibration is a quadratic phase as well, and counts as echoes; slower ones
 make none, see `slow_vibration`.
@@ -19,11 +20,11 @@ from typing import NamedTuple
 
 from bisar_budget import evaluators
 from bisar_budget.analysis.allocation import Allocation, Split
+from bisar_budget.analysis.spread import mainlobe_energy, spread_phase
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.models import CUBIC, QUADRATIC
 from bisar_budget.effects.slow_vibration import cubic_part, quadratic_part
 from bisar_budget.mission.model import Mission
-
 
 LARGEST_ECHO = 2.0  # rad; beyond, echoes are above the response
 
@@ -63,11 +64,6 @@ def echo_phase(level: float) -> float:
     return phase
 
 
-def spread_phase(ratio: float) -> float:
-    """Rms phase of noise that spreads so much power, over the response's: exp(σ²) - 1. [rad]"""
-    return math.sqrt(math.log1p(ratio))
-
-
 def vibration_limits(mission: Mission, allocation: Allocation, metric: str) -> dict[str, VibrationLimits]:
     """Limits of each platform for `pslr` or `islr`; empty without a requirement."""
     requirement_db = mission.requirements.pslr if metric == "pslr" else mission.requirements.islr
@@ -80,7 +76,7 @@ def vibration_limits(mission: Mission, allocation: Allocation, metric: str) -> d
     if metric == "pslr":
         all_of_it, part = echo_phase(math.sqrt(power * (split.transmitter + split.receiver))), amplitude_share
     else:
-        all_of_it, part = spread_phase(power), power_share
+        all_of_it, part = spread_phase(power, "full", mainlobe_energy(mission)), power_share
     found = {}
     for name in PLATFORMS:
         published = evaluators.vibration_limit(wavelength, power, split.of(name))

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.analysis.allocation import Split
+from bisar_budget.analysis.allocation import Split, effective_n_pull
 from bisar_budget.arrays.collections import Floats
 from bisar_budget.arrays.declared import DeclaredErrors
 from bisar_budget.arrays.judgement import BOUND, CODE, Judging
@@ -52,6 +52,22 @@ class ManyTogether:
         """Cubic phases of motion, the clock, slow vibrations and sensors."""
         found = [(error.subject.id, self.errors.does(self.model, error).cubic) for error in self.motion]
         return self._with(found, self.own, [(one.row_id, one.cubic) for one in self.own])
+
+    def cubic_without_coverage(self, split: Split, owner: str) -> Floats:
+        """Cubic phase of what counts against an owner's share, at the declared sigmas; as of `Together`. [rad]"""
+        factor = self.errors.mission.allocation.coverage_factor
+        found = [
+            (error.subject.id, self.errors.does(self.model, error).cubic / (factor if error.is_covered else 1.0))
+            for error in self.motion
+            if is_owed(error.subject.owner, owner, split)
+        ]
+        found += [(one.row_id, one.cubic / one.coverage) for one in self.own if is_owed(one.owner, owner, split)]
+        return self.errors.array(combined_phase(found, self.rule_of_all, self.groups))
+
+    @property
+    def rule_of_all(self) -> str:
+        """Rule by which all declared errors add up; as of `Together`."""
+        return "rss" if self.rule == "each" else self.rule
 
     def _with(self, phases: Phases, own: Own, of_own: Phases) -> Owed:
         is_there = [np.full(self.errors.cases, bool(phases)), *(one.is_there for one in own)]
@@ -170,7 +186,7 @@ class Aggregates:
 
     def _pull_in(self, mine: ManyTogether, theirs: ManyTogether) -> Judged:
         (phases, is_declared), what = mine.owed("mission"), subject("mission", "autofocus_pull_in")
-        pull_in = self.errors.array(math.pi * np.asarray(self.errors.mission.autofocus.n_pull))
+        pull_in = self.errors.array(math.pi * np.asarray(effective_n_pull(self.errors.mission)))
         by_other = theirs.combined(theirs.owed("mission").phases, "sum")
         doubt = self.errors.doubts(theirs.model, by_other > pull_in * BOUND)
         total = mine.combined(phases, "sum")

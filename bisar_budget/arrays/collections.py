@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from bisar_budget.constants import ROUNDING
 from bisar_budget.effects.exact_ranges import NODES
-from bisar_budget.geometry import FRAME_AXES
+from bisar_budget.geometry import FRAME_AXES, STILL
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import Platform
 
@@ -82,6 +82,11 @@ class Paths:
         """Bound of the way it makes from the midpoint in a time. [m]"""
         way = norm(self.velocity) * duration_s + norm(self.acceleration) * duration_s**2 / 2
         return way + sum(norm(bend) * duration_s**power for power, bend in enumerate(self.bends, 3))
+
+    @property
+    def is_still(self) -> Any:
+        """Whether it stays where it is."""
+        return self.travelled(1.0) < STILL
 
     def sinks(self, duration_s: Any) -> Any:
         """Bound of how much lower than at the midpoint it is within a time. [m]"""

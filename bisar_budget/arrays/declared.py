@@ -15,7 +15,7 @@ from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, ROUNDING, SPEED_OF_LI
 from bisar_budget.effects import models
 from bisar_budget.effects.effect import CLOCK_UNITS, MOTION_UNITS, PLATFORMS
 from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
-from bisar_budget.effects.subject import Subject, subject
+from bisar_budget.effects.subject import MOTION, Subject, subject
 from bisar_budget.geometry import FRAME_AXES
 from bisar_budget.mission.covariance import Covariance
 from bisar_budget.mission.model import Mission
@@ -39,6 +39,11 @@ class ManyErrors(NamedTuple):
     moves: tuple[int, ...]
     direction: Vectors
     is_shown_again: bool = False
+
+    @property
+    def is_covered(self) -> bool:
+        """Whether the coverage factor is in what is declared."""
+        return self.subject.kind in (*MOTION, "timing")
 
     @property
     def is_motion(self) -> bool:
@@ -363,6 +368,15 @@ class DeclaredErrors:
             smallest, farthest = (np.where(is_found, found, before) for before in (smallest, farthest))
             first = np.minimum(first, smallest)
         return smallest
+
+    def ends_image(self, error: ManyErrors, size: Floats) -> Truths:
+        """Whether allowables, as found, are where the image ends; as `FullModel.ends_image`."""
+        found = np.zeros(self.cases, dtype=bool)
+        for sign in (1.0, -1.0):
+            path = self._paths.get((error.subject.id, sign))
+            if path is not None:
+                found |= path.end == size
+        return found
 
     def farthest(self, error: ManyErrors) -> Any:
         """Size beyond which an error is none of navigation; infinite: it has no effect whatever its size."""

@@ -11,7 +11,7 @@ from bisar_budget.arrays.declared import DeclaredErrors, ManyErrors
 from bisar_budget.arrays.judgement import BOUND, Judging
 from bisar_budget.arrays.rows import REQUIREMENTS, Judged
 from bisar_budget.effects import models
-from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
+from bisar_budget.effects.models import CUBIC, END_OF_IMAGE, LOCATION, QUADRATIC
 
 
 class ErrorRows:
@@ -71,7 +71,12 @@ class ErrorRows:
         cubic = (
             np.where(np.isfinite(mine.cubic), np.abs(mine.cubic), math.nan) if error.is_motion else array(math.nan)
         )
-        return judged._replace(binding=binding, qpe_published_rad=np.abs(published.qpe), cubic_rad=cubic)
+        return judged._replace(
+            binding=binding,
+            qpe_published_rad=np.abs(published.qpe),
+            cubic_rad=cubic,
+            quadratic_use=np.abs(mine.qpe) / limit,
+        )
 
     def _held(self, error: ManyErrors) -> list[tuple[str, Floats]]:
         """What an error is held to: requirements and their limits."""
@@ -107,6 +112,8 @@ class ErrorRows:
                 smallest = np.where(is_less, sized, smallest)
                 binding[is_less] = REQUIREMENTS.index(name)
         smallest[~np.isfinite(smallest)] = math.nan
+        if model == "full":
+            binding[self.errors.ends_image(error, smallest)] = REQUIREMENTS.index(END_OF_IMAGE)
         return smallest, binding
 
     def _sized(

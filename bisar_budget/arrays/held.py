@@ -13,11 +13,12 @@ from bisar_budget.arrays.declared import SAFE
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.subject import MOTION
+from bisar_budget.geometry import STILL
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.covariance import EIGENVALUE_TOLERANCE
 from bisar_budget.mission.instruments import RISE, STEEPEST
 from bisar_budget.mission.model import PLACE_KEYS, WHOLE, MetricSplits, Mission, Shares, flies_on_earth
-from bisar_budget.mission.platforms import BASELINE_PLACES, FARTHEST_BY, LEAST_BASELINE, STILL, MotionError, Platform
+from bisar_budget.mission.platforms import BASELINE_PLACES, FARTHEST_BY, LEAST_BASELINE, MotionError, Platform
 
 
 def not_held(mission: Mission, keys: Mapping[str, bool]) -> str:
@@ -36,7 +37,9 @@ def _is_held(mission: Mission, key: str, is_stated: bool) -> bool:
         if parts[1] == "motion_error":
             return _is_held_of_error(platform.motion_error, parts[2:], is_stated)
         if parts[1] == "oscillator":
-            return platform.oscillator is not None and (is_stated or parts[2] in ("frequency", "bandwidth"))
+            if platform.oscillator is None or (parts[2] == "frequency" and platform.oscillator.sensor is not None):
+                return False  # a part holds at the frequency of its own
+            return is_stated or parts[2] in ("frequency", "bandwidth")
         return not flies_on_earth(mission) and _is_held_of_path(platform, parts[1], is_stated)
     if key == "collection.aperture_time" or (section == "scene" and parts[0] in PLACE_KEYS):
         return not flies_on_earth(mission)

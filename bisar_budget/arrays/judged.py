@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import evaluators
-from bisar_budget.analysis.allocation import Allocation, Split, allocate
+from bisar_budget.analysis.allocation import Allocation, Split, allocate, effective_n_pull
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.arrays.aggregates import Aggregates, ManyTogether, is_owed
 from bisar_budget.arrays.collections import Geometries, norm
@@ -27,21 +27,34 @@ from bisar_budget.arrays.random_rows import RandomRows
 from bisar_budget.arrays.rim import ManyScenePhases
 from bisar_budget.arrays.rows import Judged
 from bisar_budget.arrays.shares import is_balanced, shares_of
-from bisar_budget.arrays.together import ManyOwnPhases
-from bisar_budget.arrays.vibrating import judged_one_by_one, many_slow_phases
+from bisar_budget.arrays.together import ManyOwnPhases, combined_phase
+from bisar_budget.arrays.vibrating import judged_one_by_one, many_slow_phases, many_tones
+from bisar_budget.budget.input_doubt import declared_position_error, is_in_doubt, least_doubt
 from bisar_budget.budget.orbit import FASTEST_FLIGHT
-from bisar_budget.budget.random_rows import spur_rows
-from bisar_budget.budget.required import is_asked_for, missing_declarations
+from bisar_budget.budget.random_rows import pslr_row, spur_rows
+from bisar_budget.budget.required import DECLARATIONS, Missing, is_asked_for, missing_declarations
+from bisar_budget.budget.requirements import (
+    KEYS,
+    TAKEN_BY,
+    EffectTotal,
+    RequirementState,
+    SeenRow,
+    requirement_states,
+    status_of,
+    untaken_effects,
+)
 from bisar_budget.budget.vibration_rows import vibration_rows
-from bisar_budget.budget.waivers import named_by
+from bisar_budget.budget.waivers import is_waived
 from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.models import LOCATION
 from bisar_budget.effects.subject import Subject, subject
-from bisar_budget.findings.row import Row
+from bisar_budget.findings.row import DECLARE, Row
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.model import Mission
 
 MODELS = ("published", "full")
 _STATUSES = tuple(STATUS)
+_BROKEN = [CODE["fail"], CODE["not_evaluated"]]  # what a waiver covers
 
 
 class Checked(NamedTuple):
@@ -51,6 +64,7 @@ class Checked(NamedTuple):
     is_left_out: NDArray[np.bool_]
     floor: NDArray[np.int8]
     geometries: Geometries
+    requirements: tuple[RequirementState, ...]
 
 
 def check_arrays(
@@ -99,15 +113,18 @@ class _Check:
         self.array, self.does, self.combine = errors.array, errors.does, errors.mission.allocation.combine
         self.judging = Judging(errors.cases, errors.mission.allocation.warn_above)
         self.random = many_random_errors(errors.mission, errors.geometries, errors.cases)
+        oscillators = [getattr(self.mission.platforms, name).oscillator for name in PLATFORMS]
+        self.has_spurs = any(oscillator is not None and oscillator.spurs for oscillator in oscillators)
+        self.tones = many_tones(errors.cases, one) if has_lines or self.has_spurs else {}
         self.stated_random = [error for error in self.random if error.declared is not None]
 
     def _own(self, model: str) -> list[ManyOwnPhases]:
         """Phases of what displaces nothing: slow vibrations, and the declared errors of sensors and clocks."""
-        found = list(self.slow)
+        found, factor = list(self.slow), self.mission.allocation.coverage_factor
         for error in self.stated_random:
             quadratic, cubic, _ = (self.array(part * error.declared) for part in error.effect(model))
             always = np.ones(self.cases, dtype=bool)
-            found.append(ManyOwnPhases(error.subject.id, error.subject.owner, quadratic, cubic, always))
+            found.append(ManyOwnPhases(error.subject.id, error.subject.owner, quadratic, cubic, always, factor))
         return found
 
     def checked(self) -> Checked:
@@ -120,7 +137,7 @@ class _Check:
         own = {model: self._own(model) for model in MODELS}
         self.split = shares_of(self.errors, gates, [own[model] for model in gates])
         total = self.array(self.mission.requirements.quadratic_phase_error)
-        n_pull = self.mission.autofocus.n_pull
+        n_pull = effective_n_pull(self.mission)
         self.gain = np.ones(self.cases)
         if n_pull is not None:
             self.gain = np.maximum(1.0, self.array(evaluators.autofocus_gain(n_pull, total)))  # type: ignore[arg-type]
@@ -130,14 +147,105 @@ class _Check:
         together = {model: ManyTogether(self.errors, model, own[model], self.split) for model in MODELS}
         self.error_rows = ErrorRows(self.judging, self.errors, self.limits, self.gain, is_brief=self.is_brief)
         self.aggregates = Aggregates(self.judging, self.errors, together, self.limits, self.gain)
+        self.random_rows = RandomRows(
+            self.judging,
+            self.mission,
+            self.errors.geometries,
+            self.random,
+            self.limits,
+            self.gain,
+            allocate(self.mission, (), {}).islr,
+            self.tones,
+        )
+        self.together = together
         by_model = [self._rows(model) for model in gates]
         rows = _stricter(*by_model) if len(by_model) > 1 else by_model[0]
-        return Checked(
-            tuple(self._waived(self._required(row)) for row in rows),
-            self.errors.is_left_out,
+        rows = with_required([*self._undeclared(rows), *rows], self.mission, self.errors.geometries, self.cases)
+        rows = [self._doubted(row) for row in rows]
+        rows, states = self._judged_requirements(rows, gates)
+        floors = [
             self._floor(),
-            self.errors.geometries,
+            *(np.where(state.status == CODE["waived"], CODE["pass"], state.status) for state in states),
+        ]
+        floor = np.min(floors, axis=0)
+        return Checked(tuple(rows), self.errors.is_left_out, floor, self.errors.geometries, tuple(states))
+
+    # ---------------------------------------------------------------- requirements
+    def _judged_requirements(
+        self, rows: Sequence[Judged], gates: Sequence[str]
+    ) -> tuple[list[Judged], list[RequirementState]]:
+        """Rows with what they could not be judged by, after waivers, and how each requirement stands."""
+        mission = self.mission
+        untaken = untaken_effects(mission, self._effect_totals(gates))
+        is_misplaced = np.any([self._is_misplaced(), *self._in_doubt.values()], axis=0)
+        noise = [one.variance for model in gates for one in self.random_rows.noise(model)]
+        noise += list(self.tones.values()) if mission.requirements.pslr is None else []
+        has_noise = np.any([np.zeros(self.cases, bool), *(~np.isnan(one) for one in noise)], axis=0)
+        found, seen = [], []
+        for row in rows:
+            status = status_of(row.status, row.subject.id, ~np.isnan(row.allowable), untaken)
+            if row.subject.id == f"mission.{LOCATION}" and mission.requirements.location_error is not None:
+                is_known = np.isin(status, [CODE["fail"], CODE["not_declared"]])
+                status = np.where(is_misplaced & ~is_known, CODE["not_evaluated"], status)
+            if row.subject.kind == "islr":  # of a cubic phase alone, ISLR is not judged
+                is_known = has_noise | np.isin(status, [CODE["fail"], CODE["not_declared"]])
+                status = np.where(is_known, status, CODE["not_evaluated"])
+            after = waived(row._replace(status=status), mission, self.today)
+            found.append(after)
+            is_covered = (after.status == CODE["waived"]) & np.isin(row.status, _BROKEN)
+            judges = np.where((row.binding >= 0) & (row.binding < len(KEYS)), row.binding, KEYS.index(row.metric))
+            if row.is_of_declare and row.metric != DECLARE:  # judges nothing where it is not declared
+                judges = np.where(row.status == CODE["not_evaluated"], -1, judges)
+            seen.append(
+                SeenRow(
+                    row.subject.id,
+                    np.where(is_covered, CODE["waived"], row.status),
+                    row.utilization,
+                    judges.astype(np.int8),
+                    row.quadratic_use,
+                )
+            )
+        states = requirement_states(
+            mission,
+            seen,
+            {key: is_waived(mission, self.today, [f"mission.{key}"]) for key in KEYS},
+            has_noise=has_noise,
+            is_misplaced=is_misplaced,
         )
+        return found, states
+
+    def _effect_totals(self, gates: Sequence[str]) -> list[EffectTotal]:
+        """Add up cubic phases, what spreads and tones; as `effect_totals`."""
+        found: dict[str, dict[str, Any]] = {kind: {} for kind in TAKEN_BY}
+        totals: dict[str, Any] = {kind: self.array(0.0) for kind in TAKEN_BY}
+        for model in gates:
+            together = self.together[model]
+            parts: dict[str, Sequence[tuple[str, Any]]] = {
+                "cubic": together.all_cubics().phases,
+                "spread": [
+                    (one.row_id, np.sqrt(np.nan_to_num(one.variance))) for one in self.random_rows.noise(model)
+                ],
+                "tone": [(what.id, np.nan_to_num(phase)) for what, phase in self.tones.items()],
+            }
+            for kind, of_kind in parts.items():
+                groups = together.groups if kind == "cubic" else ()
+                total = self.array(combined_phase(of_kind, together.rule_of_all, groups))
+                totals[kind] = np.fmax(totals[kind], total)
+                for row_id, size in of_kind:
+                    found[kind][row_id] = np.fmax(found[kind].get(row_id, 0.0), np.abs(self.array(size)))
+        return [EffectTotal(kind, totals[kind], list(of_kind.items())) for kind, of_kind in found.items()]
+
+    def _is_misplaced(self) -> NDArray[np.bool_]:
+        """Whether errors that vary at random displace the image; as `requirement_table` has it."""
+        timing = self.mission.timing_error
+        is_clock_stated = timing.constant is not None and timing.linear is not None
+        found = np.zeros(self.cases, dtype=bool)
+        for error in self.stated_random:
+            if error.subject.kind in ("oscillator", "synchronization") and is_clock_stated:
+                continue
+            parts = [self.array(part) for model in MODELS for part in error.effect(model)[:2]]
+            found |= (self.array(error.declared) > 0) & np.any([part > 0 for part in parts], axis=0)
+        return found
 
     def _rows(self, gating: str) -> list[Judged]:
         other = "published" if gating == "full" else "full"
@@ -172,18 +280,19 @@ class _Check:
         return judged_one_by_one(np.flatnonzero(~self.errors.is_left_out), self.cases, of_case)
 
     def _instruments(self, gating: str) -> Iterator[Judged]:
-        """Rows of sensors and clocks, which few missions name."""
-        if not self.random:
-            return
-        islr = allocate(self.mission, (), {}).islr
-        rows = RandomRows(
-            self.judging, self.mission, self.errors.geometries, self.random, self.limits, self.gain, islr
-        )
+        """Rows of sensors and clocks, and of all that echoes and spreads together."""
+        rows, needs = self.random_rows, self.mission.requirements
         yield from rows.rows(gating)
-        oscillators = [getattr(self.mission.platforms, name).oscillator for name in PLATFORMS]
-        if any(one is not None and one.spurs for one in oscillators):
+        if self.has_spurs:
             yield from self._one_by_one(lambda mission, allocation: spur_rows(Analysis(mission), gating, allocation))
-        yield from rows.islr_rows(gating)
+        if needs.pslr is not None:
+            if self.tones:
+                yield from self._one_by_one(lambda mission, _: pslr_row(mission, gating))
+            else:
+                level = self.array(needs.pslr)
+                yield self.judging.row(subject("mission", "pslr"), None, level)._replace(metric="pslr")
+        together = self.together[gating]
+        yield from rows.islr_rows(gating, lambda owner: together.cubic_without_coverage(rows.islr, owner))
 
     @cached_property
     def _edges(self) -> ManySceneEdges | None:
@@ -216,36 +325,86 @@ class _Check:
         nothing.status[:] = CODE["not_evaluated"]
         return judged.where(np.isinf(edges.difference), nothing)
 
-    def _waived(self, row: Judged) -> Judged:
-        """Waive a row where it fails and a waiver that holds names it."""
-        names = [row.subject.id]
-        if not any(self.today <= one.until and named_by(one.id, names) for one in self.mission.waivers):
-            return row
-        return row._replace(status=np.where(row.status == CODE["fail"], CODE["waived"], row.status))
+    @cached_property
+    def _in_doubt(self) -> dict[str, NDArray[np.bool_]]:
+        """Platforms with a path, and in which cases that is in doubt by more than the file declares."""
+        found = {}
+        for name in PLATFORMS:
+            platform = getattr(self.mission.platforms, name)
+            if platform.path is not None:
+                least = least_doubt(platform.path, declared_position_error(platform.motion_error))
+                found[name] = platform.path.doubt_m > self.array(least)
+        return found
 
-    def _required(self, row: Judged) -> Judged:
-        """Turn a row that the file should declare and does not from `not_declared` into `not_evaluated`."""
-        if not any(is_asked_for(row.subject, one) for one in missing_declarations(self.mission)):
-            return row
-        is_missing = row.status == CODE["not_declared"]
-        return row._replace(status=np.where(is_missing, CODE["not_evaluated"], row.status))
+    def _doubted(self, row: Judged) -> Judged:
+        """Turn a row of a position error of a path in doubt into `not_evaluated`; one that fails stays so."""
+        for name, is_doubtful in self._in_doubt.items():
+            if is_in_doubt(row.subject, name, self.mission):
+                is_open = is_doubtful & (row.status != CODE["fail"])
+                row = row._replace(status=np.where(is_open, CODE["not_evaluated"], row.status))
+        return row
+
+    def _undeclared(self, rows: Sequence[Judged]) -> Iterator[Judged]:
+        """Rows of position errors that nobody declared, of paths in doubt: they are not evaluated."""
+        known = {row.subject.id for row in rows}
+        for name, is_doubtful in self._in_doubt.items():
+            own = [subject(name, "position", axis) for axis in "xyz"]
+            if is_doubtful.any():
+                yield from (
+                    Judged.of_none(one, self.cases)
+                    for one in own
+                    if one.id not in known and is_in_doubt(one, name, self.mission)
+                )
 
     def _floor(self) -> NDArray[np.int8]:
-        """Best status that each case can have: paths may be in doubt, and errors missing that must be declared."""
+        """Best status that each case can have: paths may be in doubt, and nothing declared."""
         floor = np.full(self.cases, CODE["pass"])
         for name, path in zip(
             PLATFORMS, (self.errors.geometries.transmitter, self.errors.geometries.receiver), strict=True
         ):
             platform = getattr(self.mission.platforms, name)
             if platform.path is not None and platform.path.doubts:
-                floor[:] = CODE["warn"]
+                floor[~self._in_doubt[name] | bool(platform.path.samples)] = CODE["warn"]
             if platform.acceleration is None and not platform.is_of_the_earth:
                 floor[np.broadcast_to(norm(path.velocity) > FASTEST_FLIGHT, floor.shape)] = CODE["warn"]
-        if not (self.errors.stated or self._vibrates or self.stated_random) or any(
-            missing_declarations(self.mission)
-        ):
+        if not (self.errors.stated or self._vibrates or self.stated_random):
             floor[:] = CODE["not_evaluated"]
         return floor
+
+
+def with_required(rows: Sequence[Judged], mission: Mission, geometries: Geometries, cases: int) -> list[Judged]:
+    """Put the row of what must be declared before the others; as `budget.required.with_required`."""
+    if not mission.requirements.declare:
+        return list(rows)
+    still = np.array(
+        [np.broadcast_to(path.is_still, (cases,)) for path in (geometries.transmitter, geometries.receiver)]
+    )
+    whole = Judged.of_none(DECLARATIONS, cases)._replace(metric=DECLARE, is_of_declare=True)
+    whole.status[:] = CODE["pass"]
+    found = [whole, *rows]
+    for which in np.unique(still, axis=1).T:  # nearly always one: a platform that moves does in every case
+        these = (still == which[:, None]).all(axis=0)
+        names = [name for name, is_still in zip(PLATFORMS, which, strict=True) if is_still]
+        missing = missing_declarations(mission, names)
+        whole.status[these] = CODE["not_evaluated" if missing else "pass"]
+        found = [_required(row, missing, these) for row in found]
+    return found
+
+
+def _required(row: Judged, missing: Sequence[Missing], these: NDArray[np.bool_]) -> Judged:
+    """Turn a row that these cases should declare and do not from `not_declared` into `not_evaluated`."""
+    is_missing = these & (row.status == CODE["not_declared"])
+    if not is_missing.any() or not any(is_asked_for(row.subject, one) for one in missing):
+        return row
+    return row._replace(status=np.where(is_missing, CODE["not_evaluated"], row.status), is_of_declare=True)
+
+
+def waived(row: Judged, mission: Mission, today: date) -> Judged:
+    """Waive a row where it fails or is not evaluated and a waiver that holds names it."""
+    names = [row.subject.id, *([DECLARATIONS.id] if row.is_of_declare else [])]
+    if not is_waived(mission, today, names):
+        return row
+    return row._replace(status=np.where(np.isin(row.status, _BROKEN), CODE["waived"], row.status))
 
 
 def _stricter(published: Sequence[Judged], full: Sequence[Judged]) -> list[Judged]:

@@ -43,7 +43,7 @@ class Judging(NamedTuple):
         unknown = np.full(self.cases, -1, dtype=np.int8)
         if declared is None:
             status = np.full(self.cases, CODE["not_declared"])
-            return Judged(what, status, none, allowed, none, unknown, none, none, never_fails)
+            return Judged(what, status, none, allowed, none, unknown, none, none, none, never_fails)
         with np.errstate(all="ignore"):
             use = np.where(np.isnan(allowed), 0.0, declared / allowed)
         if is_info:
@@ -59,4 +59,4 @@ class Judging(NamedTuple):
                 [CODE["warn" if never_fails else "fail"], CODE["warn"], CODE["pass_with_autofocus"], CODE["warn"]],
                 CODE["pass"],
             ).astype(np.int8)
-        return Judged(what, status, declared, allowed, use, unknown, none, none, never_fails)
+        return Judged(what, status, declared, allowed, use, unknown, none, none, none, never_fails)

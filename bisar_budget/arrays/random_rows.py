@@ -1,12 +1,20 @@
 """Rows of sensors and clocks in many cases: the arrays beside `budget.random_rows`."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from bisar_budget.analysis.allocation import Split
+from bisar_budget.analysis.spread import (
+    CUBIC_POWER,
+    NOISE,
+    SMALLEST_CUBIC_RAD,
+    islr_db,
+    mainlobe_energy,
+    spread_phase,
+)
 from bisar_budget.arrays.collections import Floats, Geometries, axes_of, dot
 from bisar_budget.arrays.instruments import ManyRandomErrors
 from bisar_budget.arrays.judgement import BOUND, Judging
@@ -14,7 +22,7 @@ from bisar_budget.arrays.rows import REQUIREMENTS, Judged
 from bisar_budget.constants import ROUNDING
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.models import QUADRATIC
-from bisar_budget.effects.subject import subject
+from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.mission.model import Mission
 
 _HELD = (QUADRATIC, "cubic_phase_error", "islr")  # requirements, in the order of what an error does
@@ -29,7 +37,7 @@ class Limits(NamedTuple):
 
 
 class Spreads(NamedTuple):
-    """What spreads: row id, owner and phase variance, 0 where nothing does. [rad²]"""
+    """What spreads: row id, owner and phase variance; NaN where it is not declared. [rad²]"""
 
     row_id: str
     owner: str
@@ -55,6 +63,8 @@ class RandomRows:
         Of autofocus.
     islr : Split
         Shares of the power that may spread.
+    tones : mapping of Subject to (cases,)
+        Peak phases of what makes echoes; NaN where one makes none. [rad]
     """
 
     def __init__(
@@ -66,9 +76,10 @@ class RandomRows:
         held: Mapping[str, Floats],
         gain: Floats,
         islr: Split,
+        tones: Mapping[Subject, Floats],
     ) -> None:
         self.judging, self.mission, self.geometries, self.errors = judging, mission, geometries, errors
-        self.held, self.gain, self.islr = held, gain, islr
+        self.held, self.gain, self.islr, self.tones = held, gain, islr, tones
 
     def rows(self, gating: str) -> Iterator[Judged]:
         """Rows of every error of a sensor or a clock, declared or not."""
@@ -81,8 +92,7 @@ class RandomRows:
         if self.mission.requirements.islr is None:
             return None
         power = 10 ** (np.asarray(self.mission.requirements.islr) / 10)
-        whole = np.sqrt(power) if model == "published" else np.sqrt(np.log1p(power))
-        return whole * np.sqrt(self.islr.of(owner))
+        return spread_phase(power, model, mainlobe_energy(self.mission), np) * np.sqrt(self.islr.of(owner))
 
     def _sizes(self, error: ManyRandomErrors, model: str) -> Floats:
         """Size at which an error reaches each requirement, (3, cases); infinite where it does not. [unit]"""
@@ -92,7 +102,11 @@ class RandomRows:
             self._spread_limit(error.subject.owner, model),
         )
         array = self.judging.array
-        per_unit = np.array([array(part) for part in error.effect(model)])
+        quadratic, cubic, spread = error.effect(model)
+        if self.mission.requirements.cubic_phase_error is None:  # ISLR holds it, at one sigma
+            at_one_sigma = np.asarray(cubic) / self.mission.allocation.coverage_factor
+            spread = np.sqrt(np.asarray(spread) ** 2 + CUBIC_POWER * at_one_sigma**2)
+        per_unit = np.array([array(part) for part in (quadratic, cubic, spread)])
         required = np.array([array(math.inf if limit is None else limit) for limit in limits])
         return np.where(per_unit > 0, required / per_unit, math.inf)
 
@@ -119,37 +133,67 @@ class RandomRows:
                 is_info=self.mission.allocation.combine != "each",
             )
             judged = judged._replace(
-                qpe_published_rad=array(error.published.quadratic) * size, cubic_rad=array(mine.cubic) * size
+                qpe_published_rad=array(error.published.quadratic) * size,
+                cubic_rad=array(mine.cubic) * size,
+                quadratic_use=qpe / (limit * self.gain),
             )
         judged = judged._replace(binding=binding)
         return _in_decibel(judged) if error.unit == "dB" else judged
 
     # ---------------------------------------------------------------- powers together
-    def islr_rows(self, gating: str) -> Iterator[Judged]:
-        """What all independent noise spreads, for each platform and the mission; none where only vibration does."""
-        if self.mission.requirements.islr is None or all(error.declared is None for error in self.errors):
+    def islr_rows(self, gating: str, cubic: Callable[[str], Floats]) -> Iterator[Judged]:
+        """What spreads: of the mission where ISLR is required, and of each owner unless only wideband vibration does.
+
+        `cubic` gives the cubic phase of an owner at one sigma, which ISLR holds where nothing else does. [rad]
+        """
+        needs = self.mission.requirements
+        if needs.islr is None:
             return
-        owners = ["transmitter", "receiver", *(["clock"] if self.islr.clock is not None else []), "mission"]
         other = "full" if gating == "published" else "published"
-        spreads = [*self._of_vibration(), *self._of_errors(gating)]
-        array = self.judging.array
-        for owner in owners:
+        spreads, array = self.noise(gating), self.judging.array
+        if needs.pslr is None:
+            spreads += [Spreads(what.id, what.owner, phase**2 / 2) for what, phase in self.tones.items()]
+        is_vibration_alone = array(1.0) > 0
+        for one in spreads:
+            if not one.row_id.endswith("vibration.wideband"):
+                is_vibration_alone &= np.isnan(one.variance)
+        has_cubic = needs.cubic_phase_error is None
+        if has_cubic:
+            is_vibration_alone &= ~(cubic("mission") > SMALLEST_CUBIC_RAD)
+        for owner in ("transmitter", "receiver", *(["clock"] if self.islr.clock is not None else []), "mission"):
             members = [one.variance for one in spreads if owner == "mission" or self.islr.includes(one.owner, owner)]
-            variance = array(sum(members))
+            is_declared = np.any([array(False) > 0, *(~np.isnan(one) for one in members)], axis=0)
+            variance = array(sum(np.nan_to_num(one) for one in members))
+            if has_cubic:
+                phase = cubic(owner)
+                counts = (phase > SMALLEST_CUBIC_RAD) & np.isfinite(phase)
+                is_declared = is_declared | counts
+                variance = variance + CUBIC_POWER * np.where(counts, phase, 0.0) ** 2
             limit, by_other = (array(self._spread_limit(owner, model)) for model in (gating, other))
             rms, what = np.sqrt(variance), subject(owner, "islr")
             judged = self.judging.row(what, rms, limit, doubt=rms > by_other * BOUND)
-            if not self._has_wideband(owner):  # what is declared may spread nothing
-                judged = judged.where(variance == 0, self.judging.row(what, None, limit))
-            yield _as_islr(judged)
+            judged = judged.where(~is_declared, self.judging.row(what, None, limit))
+            if owner != "mission":
+                judged = judged.where(is_vibration_alone, Judged.of_none(what, self.judging.cases))
+            yield self._as_islr(judged, gating)
 
-    def _has_wideband(self, owner: str) -> bool:
-        owners = PLATFORMS if owner == "mission" else [name for name in PLATFORMS if name == owner]
-        return any(getattr(self.mission.platforms, name).motion_error.vibration.wideband for name in owners)
+    def _as_islr(self, row: Judged, model: str) -> Judged:
+        """Write rms phases as the ISLR that they add, by a model."""
+        energy = mainlobe_energy(self.mission)
+        declared, allowable = (
+            np.where(column > 0, islr_db(column**2, model, energy, np), math.nan)
+            for column in (row.declared, row.allowable)
+        )
+        binding = np.full_like(row.binding, REQUIREMENTS.index("islr"))
+        return row._replace(declared=declared, allowable=allowable, binding=binding, metric="islr")
+
+    def noise(self, model: str) -> list[Spreads]:
+        """What spreads beyond the cubic; as `noise` of `analysis.spread`."""
+        return [*self._of_vibration(), *self._of_errors(model)]
 
     def _of_errors(self, model: str) -> Iterator[Spreads]:
         for error in self.errors:
-            if error.declared is not None:
+            if error.declared is not None and (error.subject.kind != "imu" or error.subject.axis in NOISE):
                 spread = self.judging.array(error.effect(model).spread * error.declared)
                 yield Spreads(error.subject.id, error.subject.owner, spread**2)
 
@@ -179,16 +223,3 @@ def _in_decibel(row: Judged) -> Judged:
         np.where(column > 0, 20 * np.log10(column), math.nan) for column in (row.declared, row.allowable)
     )
     return row._replace(declared=declared, allowable=allowable)
-
-
-def _as_islr(row: Judged) -> Judged:
-    """Write rms phases as the ISLR that they add."""
-    declared, allowable = (_islr_db(column**2) for column in (row.declared, row.allowable))
-    binding = np.full_like(row.binding, REQUIREMENTS.index("islr"))
-    return row._replace(declared=declared, allowable=allowable, binding=binding, metric="islr")
-
-
-def _islr_db(variance: Floats) -> Floats:
-    """ISLR that noise of a phase variance adds; as `islr_db`. [dB]"""
-    level = 10 / math.log(10) * (variance + np.log(-np.expm1(-variance)))
-    return np.where(variance > 0, level, math.nan)

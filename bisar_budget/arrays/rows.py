@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.arrays.collections import Floats
-from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
+from bisar_budget.effects.models import CUBIC, END_OF_IMAGE, LOCATION, QUADRATIC
 from bisar_budget.effects.subject import Subject
 from bisar_budget.findings.status import RANK
 
-REQUIREMENTS = (QUADRATIC, CUBIC, LOCATION, "pslr", "islr")
+REQUIREMENTS = (QUADRATIC, CUBIC, LOCATION, "pslr", "islr", END_OF_IMAGE)
 
 
 class Judged(NamedTuple):
@@ -25,15 +25,17 @@ class Judged(NamedTuple):
     binding: NDArray[np.int8]  # place in REQUIREMENTS of what sets the allowable, or -1: the row's metric
     qpe_published_rad: Floats
     cubic_rad: Floats
+    quadratic_use: Floats  # quadratic phase over its limit, whatever sets the allowable; NaN where it has none
     never_fails: bool = False
     metric: str = QUADRATIC
+    is_of_declare: bool = False  # as `Row.is_of_declare`, in some of the cases
 
     @classmethod
     def of_none(cls, what: Subject, cases: int) -> "Judged":
         """A row that is not declared in any case."""
         status, binding = np.full(cases, RANK["not_declared"], np.int8), np.full(cases, -1, np.int8)
-        declared, allowable, utilization, qpe, cubic = (np.full(cases, math.nan) for _ in range(5))
-        return cls(what, status, declared, allowable, utilization, binding, qpe, cubic)
+        declared, allowable, utilization, qpe, cubic, use = (np.full(cases, math.nan) for _ in range(6))
+        return cls(what, status, declared, allowable, utilization, binding, qpe, cubic, use)
 
     def where(self, is_other: Any, other: "Judged") -> "Judged":
         """This row, but in some cases the other."""
@@ -46,8 +48,10 @@ class Judged(NamedTuple):
             np.where(is_other, other.binding, self.binding),
             np.where(is_other, other.qpe_published_rad, self.qpe_published_rad),
             np.where(is_other, other.cubic_rad, self.cubic_rad),
+            np.where(is_other, other.quadratic_use, self.quadratic_use),
             self.never_fails,
             self.metric,
+            self.is_of_declare,
         )
 
     @property

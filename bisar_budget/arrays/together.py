@@ -25,6 +25,7 @@ class ManyOwnPhases(NamedTuple):
     qpe: Floats
     cubic: Floats
     is_there: NDArray[np.bool_]
+    coverage: Any = 1.0  # the factor that both phases have in them
 
 
 class ManyCorrelated(NamedTuple):

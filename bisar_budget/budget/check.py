@@ -11,18 +11,19 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.aggregates import aggregate_rows
 from bisar_budget.budget.collection_notes import collection_notes
 from bisar_budget.budget.error_rows import error_rows
+from bisar_budget.budget.input_doubt import InputDoubt, input_doubts, with_input_doubts
 from bisar_budget.budget.judgement import judged
-from bisar_budget.budget.overrides import NOTHING_OUTSIDE, Outside, overrides
+from bisar_budget.budget.model_doubt import model_doubt
 from bisar_budget.budget.orbit import straight_orbits
+from bisar_budget.budget.overrides import NOTHING_OUTSIDE, Outside, overrides
 from bisar_budget.budget.pull_in import pull_in_caps
 from bisar_budget.budget.random_rows import islr_rows, pslr_row, random_rows, spur_rows
-from bisar_budget.budget.declared_kinds import declared_kinds
-from bisar_budget.budget.required import with_required
+from bisar_budget.budget.required import declared_kinds, with_required
 from bisar_budget.budget.requirement_table import judged_requirements
 from bisar_budget.budget.vibration_rows import vibration_rows
 from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
 from bisar_budget.effects.correlation import unused_correlations
-from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.effect import PLATFORMS, override_notes
 from bisar_budget.effects.subject import subject
 from bisar_budget.faults import changes_words
 from bisar_budget.findings.mission import FileWarning, MissionFindings, Resolution
@@ -54,10 +55,11 @@ def check_mission(
     today : date
         Day on which waivers are judged, UTC.
     is_brief : bool
-        Leave out what a terminal does not show: allowables of errors that nobody declared, and of the model that does
-        not gate. Statuses are the same.
+        Leave out what a terminal does not show: allowables of errors that nobody declared, and by the model that does
+        not gate, but for what `model_doubt` compares. Statuses are the same.
     is_bare : bool
-        Leave out what decides nothing and is searched for: how far one autofocus correction serves the scene.
+        Leave out what decides nothing and is searched for: how far one autofocus correction serves the scene, and
+        whether the published model holds.
     outside : Outside
         What from outside the file bears on the verdict, besides what the mission itself carries.
 
@@ -72,7 +74,9 @@ def check_mission(
         checked = stricter(_checked(analysis, "published"), _checked(analysis, "full"))
     else:
         checked = _checked(analysis, gating)
-    verdict = judged_requirements(with_required(checked.rows, mission), analysis, analysis.allocation, today)
+    doubts = input_doubts(mission)
+    asked = with_input_doubts(with_required(checked.rows, mission), doubts, mission)
+    verdict = judged_requirements(asked, analysis, analysis.allocation, doubts, today)
     rows = verdict.rows
     geometry = analysis.geometry
     resolution = Resolution(
@@ -103,7 +107,7 @@ def check_mission(
             *verdict.warnings,
             *_unused_correlations(mission),
             *straight_orbits(mission),
-            *_doubtful_paths(mission),
+            *_doubtful_paths(mission, doubts),
             *_of_instruments(analysis),
             *pull_in_caps(mission, resolution),
             *_nothing_declared(rows),
@@ -111,9 +115,10 @@ def check_mission(
         place=_place(mission),
         paths=tuple((name, path) for name, path in _paths(mission) if path.source),
         scene=checked.scene,
-        notes=(*verdict.notes, *collection_notes(analysis), *_unused_keys(mission)),
+        notes=(*verdict.notes, *collection_notes(analysis), *_unused_keys(mission), *_overridden(mission)),
         document=mission.document,
         changes=mission.changes,
+        model_doubt=model_doubt(analysis, rows),
     )
 
 
@@ -236,7 +241,7 @@ def _overruled_model(mission: Mission) -> Iterator[FileWarning]:
 
 
 def _nothing_declared(rows: Sequence[Row]) -> Iterator[FileWarning]:
-    if all(row.status == "not_declared" for row in rows):
+    if all(row.status == "not_declared" or row.is_of_declare for row in rows):
         yield FileWarning(line=None, message=file_warnings.nothing_declared())
 
 
@@ -262,11 +267,21 @@ def _paths(mission: Mission) -> Iterator[tuple[str, FlownPath]]:
             yield name, path
 
 
-def _doubtful_paths(mission: Mission) -> Iterator[FileWarning]:
+def _doubtful_paths(mission: Mission, said: Sequence[InputDoubt]) -> Iterator[FileWarning]:
+    """Warn of paths in doubt where rows do not say it; a place that strays is no part of a log's residual."""
+    owners = {one.owner for one in said}
     for name, path in _paths(mission):
-        for doubt in path.doubts:
+        for doubt in path.doubts if name not in owners or path.samples else ():
             place = mission.line(("platforms", name, getattr(mission.platforms, name).way))
             yield FileWarning(line=place, message=file_warnings.path_is_doubtful(name, doubt), is_doubt=True)
+
+
+def _overridden(mission: Mission) -> Iterator[Note]:
+    """Say which figures of parts the file replaces."""
+    for name in PLATFORMS:
+        platform = getattr(mission.platforms, name)
+        for section in filter(None, (platform.motion_error, platform.oscillator)):
+            yield from override_notes(name, section.overridden)
 
 
 def _unused_keys(mission: Mission) -> Iterator[Note]:

@@ -11,7 +11,7 @@ from bisar_budget.budget.judgement import judgement
 from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.effects.effect import ErrorSource
-from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC, Declared
+from bisar_budget.effects.models import CUBIC, END_OF_IMAGE, LOCATION, QUADRATIC, Declared
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import FRAME_AXES
 from bisar_budget.phrases import NOTHING, Note
@@ -20,7 +20,7 @@ from bisar_budget.phrases import NOTHING, Note
 class Allowed(NamedTuple):
     """How large one error may be by one model [unit]: by its quadratic phase alone, and by every requirement.
 
-    None: no limit. `binding` is the requirement that sets the smallest.
+    None: no limit. `binding` is the requirement that sets the smallest, or that the image ends there.
     """
 
     quadratic: float | None
@@ -54,8 +54,12 @@ def error_rows(analysis: Analysis, model: Model, other: Model, allocation: Alloc
         if is_brief and (declared is None or not source.is_independent):
             yield _unseen(analysis, model, source, declared)
             continue
-        allowed = allowed_by(analysis, model, source, limit)
-        allowed_other = NOT_ASKED if is_brief else allowed_by(analysis, other, source, limit)
+        allowed, allowed_other = allowed_by(analysis, model, source, limit), NOT_ASKED
+        if not is_brief:
+            allowed_other = allowed_by(analysis, other, source, limit)
+        elif model.name == "published" and not analysis.is_bare:  # whether it holds is said beside the verdict
+            allowed = allowed._replace(quadratic=model.allowable(source, QUADRATIC, limit))
+            allowed_other = NOT_ASKED._replace(quadratic=other.allowable(source, QUADRATIC, limit))
         published, full = (allowed, allowed_other) if model.name == "published" else (allowed_other, allowed)
         info = over = doubt = NOTHING
         notes = source.notes
@@ -134,7 +138,9 @@ def allowed_by(analysis: Analysis, model: Model, source: ErrorSource, limit: flo
             quadratic = size
         if size is not None and size < smallest:
             smallest, binding = size, name
-    return Allowed(quadratic, None if binding is None else smallest, binding)
+    if binding is None:
+        return Allowed(quadratic, None, None)
+    return Allowed(quadratic, smallest, END_OF_IMAGE if model.ends_image(source, smallest) else binding)
 
 
 def _over(
@@ -148,6 +154,8 @@ def _over(
 ) -> Note:
     """Say which requirement the declared error breaks, should it break one."""
     requirements = analysis.mission.requirements
+    if allowed.binding == END_OF_IMAGE and allowed.smallest is not None:
+        return phrases.beyond_the_image(allowed.smallest, source.unit)
     if allowed.binding == CUBIC and requirements.cubic_phase_error is not None:
         return phrases.cubic_phase_over(mine.cubic, requirements.cubic_phase_error, model.equation(source))
     if allowed.binding == LOCATION and requirements.location_error is not None:

@@ -12,17 +12,20 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from bisar_budget import file_warnings, phrases
+from bisar_budget.analysis.allocation import range_walk_cap
 from bisar_budget.findings.mission import FileWarning, Resolution
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import Note
 from bisar_budget.units import format_quantity
 
-WALK_CELLS = 0.5
 ROOM = {"pga": 3.0, "map_drift": 1.5}  # patch over smear
 
 
 class Caps(NamedTuple):
-    """Largest N_pull by range walk, f₀/B, and by the scene's size; None where the file gives none."""
+    """Largest N_pull by range walk, f₀/B, and by the scene's size; None where the file gives none.
+
+    No gain goes beyond that of range walk; beyond that of the scene a warning stands.
+    """
 
     walk: float
     scene: float | None = None
@@ -30,7 +33,7 @@ class Caps(NamedTuple):
 
 def caps(mission: Mission) -> Caps:
     """What no autofocus of a mission goes beyond."""
-    walk = 2 * WALK_CELLS * mission.radar.center_frequency / mission.radar.bandwidth
+    walk = range_walk_cap(mission)
     if mission.scene.radius is None:
         return Caps(walk)
     cell = mission.geometry.cross_range_resolution(mission.radar.wavelength, mission.collection.aperture_time)
@@ -43,7 +46,7 @@ def needed_sentence(n_pull: float, caps: Caps) -> Note:
     Parameters
     ----------
     n_pull : float
-        N_pull that the error needs.
+        Smallest N_pull with which the error passes.
     caps : Caps
         What `caps` says of the mission.
     """
@@ -52,7 +55,7 @@ def needed_sentence(n_pull: float, caps: Caps) -> Note:
     elif n_pull > caps.walk:
         allowed = f"range walk allows {_down(caps.walk)}"
     else:
-        return phrases.passes_from(n_pull)
+        return phrases.passes_from(math.ceil(n_pull * 100 * (1 - 1e-12)) / 100)
     return phrases.beyond_autofocus(_up(n_pull), allowed)
 
 
@@ -72,15 +75,15 @@ def _down(number: float) -> str:
 
 
 def pull_in_caps(mission: Mission, resolution: Resolution) -> Iterator[FileWarning]:
-    """Warn where `autofocus.n_pull` asks for more than range walk or the scene's size leaves."""
+    """Warn where `autofocus.n_pull` is more than counts, by range walk, or than the scene's size leaves."""
     n_pull, algorithm = mission.autofocus.n_pull, mission.autofocus.algorithm
     if n_pull is None:
         return
     line = mission.line(("autofocus", "n_pull"))
     limit = caps(mission)
-    ratio = limit.walk / (2 * WALK_CELLS)
     if n_pull > limit.walk:
-        message = file_warnings.walks_over_range_cells(n_pull, n_pull / ratio / 2, ratio)
+        cells = n_pull / limit.walk / 2
+        message = file_warnings.walks_over_range_cells(n_pull, cells, _down(limit.walk))
         yield FileWarning(line=line, message=message)
     radius = mission.scene.radius
     smear = 4 * n_pull * resolution.cross_range

@@ -5,24 +5,34 @@ of sensors and phase noise spread is held together to each platform's share of I
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.analysis.spread import CUBIC_POWER, spread_limit, spread_powers, tones
+from bisar_budget.analysis.spread import (
+    CUBIC_POWER,
+    islr_db,
+    mainlobe_energy,
+    shown_islr_db,
+    spread_limit,
+    spread_powers,
+    tones,
+)
 from bisar_budget.analysis.vibration_limits import LARGEST_ECHO, echo_level, tone_limits
 from bisar_budget.budget.judgement import judged
 from bisar_budget.budget.pull_in import caps, needed_sentence
-from bisar_budget.budget.vibration_rows import ECHO_CYCLES, islr_db
+from bisar_budget.budget.vibration_rows import ECHO_CYCLES
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.effects.clocks import spurs_of
 from bisar_budget.effects.echoes import near_lines, worst_phases
+from bisar_budget.effects.effect import override_notes
 from bisar_budget.effects.models import CUBIC, QUADRATIC
 from bisar_budget.effects.random_errors import RandomEffect, RandomError
 from bisar_budget.effects.subject import subject
 from bisar_budget.findings.row import Row
+from bisar_budget.mission.instruments import Oscillator
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import NOTHING, Note
 
@@ -79,8 +89,8 @@ def _row(analysis: Analysis, error: RandomError, gating: str, other: str, alloca
         if mission.allocation.combine != "each":
             info = phrases.aggregate_decides(mission.allocation.combine)
         elif allowable is not None and size > allowable:
-            over = _over(mission, error, held, limits, binding or "", allocation).then(error.extrapolated)
-        doubt = _doubt(other, held_by_other, others, size)
+            over = _over(mission, error, gating, limits, binding or "", allocation).then(error.extrapolated)
+        doubt = _doubt(mission, other, held_by_other, others, size)
     by_model = (mine, theirs) if gating == "published" else (theirs, mine)
     row = judged(
         mission,
@@ -105,7 +115,7 @@ def _row(analysis: Analysis, error: RandomError, gating: str, other: str, alloca
     row = row._replace(
         binding_requirement=binding,
         cubic_rad=cubic,
-        islr_db=None if size is None else islr_db((mine.spread * size) ** 2),
+        islr_db=None if size is None else shown_islr_db(mission, (mine.spread * size) ** 2),
         model=gating,
     )
     return in_decibel(row) if error.unit == "dB" else row
@@ -141,31 +151,33 @@ def in_decibel(row: Row) -> Row:
 
 
 def _over(
-    mission: Mission, error: RandomError, effect: RandomEffect, limits: Limits, binding: str, allocation: Allocation
+    mission: Mission, error: RandomError, model: str, limits: Limits, binding: str, allocation: Allocation
 ) -> Note:
-    size = error.declared or 0.0
+    effect, size = held_effect(mission, error.effect(model)), error.declared or 0.0
     if binding == CUBIC:
         return phrases.cubic_phase_over(effect.cubic * size, limits.cubic or 0.0)
     if binding == ISLR:
-        return phrases.spreads_too_much(_level(effect.spread * size), _level(limits.spread or 0.0))
+        level = _levels(mission, model)
+        return phrases.spreads_too_much(level(effect.spread * size), level(limits.spread or 0.0))
     qpe = effect.quadratic * size
     needed = needed_sentence(allocation.n_pull_needed(qpe, error.owner), caps(mission))
     return phrases.quadratic_phase_over(qpe, limits.quadratic).then(needed)
 
 
-def _level(rms: float) -> float:
-    """ISLR of a phase. [dB]"""
-    return islr_db(rms**2) or 0.0
+def _levels(mission: Mission, model: str) -> Callable[[float], float]:
+    """ISLR of an rms phase [rad] by a model, whatever the size that it is compared with. [dB]"""
+    energy = mainlobe_energy(mission)
+    return lambda rms: islr_db(rms**2, model, energy) if rms else 0.0
 
 
-def _doubt(other: str, effect: RandomEffect, limits: Limits, size: float) -> Note:
+def _doubt(mission: Mission, other: str, effect: RandomEffect, limits: Limits, size: float) -> Note:
     """Say that the model that does not gate fails a declared error; else nothing."""
     sizes = sizes_at(effect, limits)
     if not sizes or size <= min(sizes.values()) * (1 + UTILIZATION_TOLERANCE):
         return NOTHING
     name = min(sizes, key=lambda one: sizes[one])
     if name == ISLR:
-        return phrases.other_model_spreads(other, _level(effect.spread * size))
+        return phrases.other_model_spreads(other, _levels(mission, other)(effect.spread * size))
     if name == QUADRATIC:
         return phrases.other_model_fails(other, effect.quadratic * size, limits.quadratic, "rad", "QPE")
     return phrases.other_model_fails(other, effect.cubic * size, limits.cubic or 0.0, "rad", "cubic phase")
@@ -179,6 +191,7 @@ def spur_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterat
     other = "full" if gating == "published" else "published"
     k = 2 * math.pi / mission.radar.wavelength
     for spur in spurs_of(mission):
+        oscillator: Oscillator = getattr(mission.platforms, spur.name).oscillator
         cycles = spur.frequency * mission.collection.aperture_time
         allowed = limits.get(spur.name)
         over = doubt = NOTHING
@@ -205,11 +218,14 @@ def spur_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterat
             over=over,
             doubt=doubt,
             limits=(None, None) if allowed is None else (k * allowed.published / 2, k * allowed.full / 2),
-            evidence=getattr(mission.platforms, spur.name).oscillator.source,
-            notes=(phrases.tone_lies(spur.frequency, cycles),),
+            evidence=oscillator.source,
+            notes=(
+                phrases.tone_lies(spur.frequency, cycles),
+                *override_notes(spur.name, oscillator.overridden, "frequency"),
+            ),
         )
         row = in_decibel(row._replace(model=gating))
-        yield row._replace(islr_db=islr_db(spur.phase**2 / 2)) if metric == ISLR else row
+        yield row._replace(islr_db=shown_islr_db(mission, spur.phase**2 / 2)) if metric == ISLR else row
 
 
 def _echo(phase: float) -> float:
@@ -219,7 +235,7 @@ def _echo(phase: float) -> float:
 
 # ---------------------------------------------------------------------- powers together
 def islr_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterator[Row]:
-    """What spreads, for the mission where ISLR is required, and for each owner whose noise no other row holds whole."""
+    """What spreads: of the mission where ISLR is required, and of each owner unless only wideband vibration does."""
     mission = analysis.mission
     if mission.requirements.islr is None:
         return
@@ -227,6 +243,7 @@ def islr_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterat
     if allocation.islr.clock is not None:
         owners.insert(2, "clock")
     other = "full" if gating == "published" else "published"
+    level = _levels(mission, gating)  # by one rule: what is required of the whole reads as required
     powers = {owner: spread_powers(analysis, allocation, owner, gating) for owner in owners}
     is_vibration_alone = all(row_id.endswith("vibration.wideband") for row_id, _ in powers["mission"])
     for owner, members in powers.items():
@@ -238,9 +255,9 @@ def islr_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterat
         over = doubt = NOTHING
         if rms > limit and members:
             row_id, largest = max(members, key=lambda member: member[1])
-            over = phrases.noise_spreads_too_much(_level(rms), _level(limit), row_id, _level(math.sqrt(largest)))
+            over = phrases.noise_spreads_too_much(level(rms), level(limit), row_id, level(math.sqrt(largest)))
         if rms > by_other * (1 + UTILIZATION_TOLERANCE):
-            doubt = phrases.other_model_allows(other, _level(by_other), "dB")
+            doubt = phrases.other_model_allows(other, level(by_other), "dB")
         row = judged(
             mission,
             subject=subject(owner, ISLR),
@@ -254,7 +271,7 @@ def islr_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterat
             doubt=doubt,
             limits=(limit, by_other) if gating == "published" else (by_other, limit),
         )
-        yield _as_islr(row, variance, gating)
+        yield _as_islr(row, shown_islr_db(mission, variance), gating, level)
 
 
 def pslr_row(mission: Mission, gating: str) -> Iterator[Row]:
@@ -297,18 +314,18 @@ def _db(amplitude: float) -> float:
     return 20 * math.log10(amplitude)
 
 
-def _as_islr(row: Row, variance: float, gating: str) -> Row:
-    """Write rms phases as the ISLR that they add."""
+def _as_islr(row: Row, shown: float | None, gating: str, of_rms: Callable[[float], float]) -> Row:
+    """Write rms phases as the ISLR that they add; `shown` is that of an image, whatever model gates. [dB]"""
 
     def level(rms: float | None) -> float | None:
-        return islr_db(rms**2) if rms else None
+        return of_rms(rms) if rms else None
 
     return row._replace(
         declared=level(row.declared),
         allowable=level(row.allowable),
         allowable_published=level(row.allowable_published),
         allowable_full=level(row.allowable_full),
-        islr_db=None if row.declared is None else islr_db(variance),
+        islr_db=shown,
         binding_requirement=ISLR,
         model=gating,
     )

@@ -10,10 +10,10 @@ import numpy as np
 from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis, Model
-from bisar_budget.analysis.spread import noise, spread_limit, tones
+from bisar_budget.analysis.spread import islr_db, mainlobe_energy, noise, spread_limit, tones
 from bisar_budget.analysis.together import Together
 from bisar_budget.analysis.vibration_limits import LARGEST_ECHO, echo_level
-from bisar_budget.budget.required import missing_declarations
+from bisar_budget.budget.input_doubt import InputDoubt
 from bisar_budget.budget.requirements import (
     KEYS,
     TAKEN_BY,
@@ -27,7 +27,6 @@ from bisar_budget.budget.requirements import (
     status_of,
     untaken_effects,
 )
-from bisar_budget.budget.vibration_rows import islr_db
 from bisar_budget.budget.waivers import Waived, apply_waivers
 from bisar_budget.effects.combine import combine_phases
 from bisar_budget.effects.correlation import combined_phase
@@ -43,7 +42,7 @@ _STATUSES = tuple(STATUS)
 _EXAMPLES = {CUBIC: "22.5 deg", "islr": "-20 dB", "pslr": "-30 dB"}
 
 
-class Verdict(NamedTuple):
+class JudgedMission(NamedTuple):
     """Rows with what they could not be judged by, the table of requirements, and what is to be said of the whole."""
 
     rows: list[Row]
@@ -52,7 +51,9 @@ class Verdict(NamedTuple):
     notes: list[Note]
 
 
-def judged_requirements(rows: Sequence[Row], analysis: Analysis, allocation: Allocation, today: date) -> Verdict:
+def judged_requirements(
+    rows: Sequence[Row], analysis: Analysis, allocation: Allocation, doubts: Sequence[InputDoubt], today: date
+) -> JudgedMission:
     """Judge every requirement of a mission, after waivers.
 
     Parameters
@@ -63,6 +64,8 @@ def judged_requirements(rows: Sequence[Row], analysis: Analysis, allocation: All
         Of the mission.
     allocation : Allocation
         Shares of the budgets, and the gain of autofocus.
+    doubts : sequence of InputDoubt
+        Of the paths, by more than the file declares.
     today : date
         Day on which waivers are judged, UTC.
     """
@@ -71,8 +74,14 @@ def judged_requirements(rows: Sequence[Row], analysis: Analysis, allocation: All
     untaken = untaken_effects(mission, effect_totals(analysis, gates))
     looked_at = [_looked_at(row, mission, untaken) for row in rows]
     misplacing = _misplacing(analysis)
-    if misplacing and mission.requirements.location_error is not None:
-        looked_at = [_misplaced(row, misplacing) for row in looked_at]
+    unknown_place = phrases.place_is_not_known(misplacing) if misplacing else doubts[0].note if doubts else NOTHING
+    if unknown_place and mission.requirements.location_error is not None:
+        looked_at = [_misplaced(row, unknown_place) for row in looked_at]
+    has_noise = any(noise(analysis, model.name) for model in gates) or (
+        mission.requirements.pslr is None and bool(tones(mission))
+    )
+    if not has_noise:
+        looked_at = [_of_a_cubic_alone(row) for row in looked_at]
     waived = apply_waivers(looked_at, mission, today)
     seen = [
         _seen(waived.rows[place] if waived.rows[place].status == "waived" and is_broken(row) else row, allocation)
@@ -82,17 +91,16 @@ def judged_requirements(rows: Sequence[Row], analysis: Analysis, allocation: All
         mission,
         seen,
         {key: True for key in KEYS if f"mission.{key}" in waived.requirements},
-        has_noise=any(noise(analysis, model.name) for model in gates)
-        or (mission.requirements.pslr is None and bool(tones(mission))),
-        is_misplaced=bool(misplacing),
+        has_noise=has_noise,
+        is_misplaced=bool(unknown_place),
     )
-    requirements = tuple(_entry(state, waived, analysis, allocation, misplacing) for state in states)
+    requirements = tuple(_entry(state, waived, analysis, allocation, unknown_place) for state in states)
     notes = [
         phrases.effect_is_negligible(one.kind, float(one.total[0]), list(TAKEN_BY[one.kind]))
         for one in untaken
         if one.is_negligible[0]
     ]
-    return Verdict(waived.rows, requirements, waived.unused(requirements), notes)
+    return JudgedMission(waived.rows, requirements, waived.unused(requirements), notes)
 
 
 def is_broken(row: Row) -> bool:
@@ -151,6 +159,13 @@ def _looked_at(row: Row, mission: Mission, untaken: Sequence[UntakenEffect]) -> 
     return row._replace(status=status, reason=reason)
 
 
+def _of_a_cubic_alone(row: Row) -> Row:
+    """A sum of powers without anything that spreads: it shows the cubic phase, and does not judge ISLR."""
+    if row.subject.kind != "islr" or row.status in ("fail", "not_declared"):
+        return row
+    return row._replace(status="not_evaluated", reason=phrases.nothing_judges("islr"))
+
+
 def _misplacing(analysis: Analysis) -> list[str]:
     """Rows of the errors that displace the image by an amount that no row holds: what varies at random.
 
@@ -167,17 +182,19 @@ def _misplacing(analysis: Analysis) -> list[str]:
     return found
 
 
-def _misplaced(row: Row, misplacing: Sequence[str]) -> Row:
+def _misplaced(row: Row, unknown_place: Note) -> Row:
     is_location = row.owner == "mission" and row.subject.kind == LOCATION
     if not is_location or row.status in ("fail", "not_declared"):
         return row
-    return row._replace(status="not_evaluated", reason=phrases.place_is_not_known(misplacing))
+    return row._replace(status="not_evaluated", reason=unknown_place)
 
 
 def _seen(row: Row, allocation: Allocation) -> SeenRow:
     """A row as an array of one case."""
     binding = row.binding_requirement or row.metric
     key = binding if binding in KEYS else row.metric
+    if row.is_of_declare and row.metric != "declare":
+        key = ""  # judges nothing: it is not declared
     qpe = row.qpe_full_rad if row.model == "full" else row.qpe_published_rad
     use = math.nan
     if qpe is not None and row.metric == QUADRATIC:
@@ -193,7 +210,7 @@ def _seen(row: Row, allocation: Allocation) -> SeenRow:
 
 # ---------------------------------------------------------------------- words
 def _entry(
-    state: RequirementState, waived: Waived, analysis: Analysis, allocation: Allocation, misplacing: Sequence[str]
+    state: RequirementState, waived: Waived, analysis: Analysis, allocation: Allocation, unknown_place: Note
 ) -> JudgedRequirement:
     mission, key = analysis.mission, state.key
     rows = waived.rows
@@ -203,7 +220,7 @@ def _entry(
     allowed, reached = _sizes(decider, key, mission, allocation) if decider is not None else (None, None)
     reason: Note | None = None
     if status == "not_evaluated" and (decider is None or decider.status != status or key == "islr"):
-        reason = _why_not_judged(key, analysis, misplacing)
+        reason = _why_not_judged(key, unknown_place)
     elif decider is not None and status not in ("pass", "info"):
         reason = decider.reason
     path = ("requirements", key)
@@ -215,7 +232,7 @@ def _entry(
         status=status,
         allowed=allowed,
         reached=reached,
-        utilization=None if decider is None else decider.utilization,
+        utilization=None if decider is None or decider.utilization is None else float(state.utilization[0]),
         row=None if decider is None else decider.id,
         rows=tuple(row.id for row, judges in zip(rows, state.judges[:, 0], strict=True) if judges),
         reason=reason,
@@ -224,11 +241,9 @@ def _entry(
     )
 
 
-def _why_not_judged(key: str, analysis: Analysis, misplacing: Sequence[str]) -> Note:
-    if key == "declare":
-        return phrases.not_all_is_declared([one[2] for one in missing_declarations(analysis.mission)])
-    if key == LOCATION and misplacing:
-        return phrases.place_is_not_known(misplacing)
+def _why_not_judged(key: str, unknown_place: Note) -> Note:
+    if key == LOCATION and unknown_place:
+        return unknown_place
     return phrases.nothing_judges(key)
 
 
@@ -251,11 +266,13 @@ def _sizes(row: Row, key: str, mission: Mission, allocation: Allocation) -> tupl
         moved = None if row.displacement_m is None else math.hypot(*row.displacement_m)
         return mission.requirements.location_error, moved
     if key == "islr":
-        limit = spread_limit(mission, allocation, row.owner, row.model or "full")
-        return None if limit is None else islr_db(limit**2), row.islr_db
+        model = row.model or "full"
+        limit, use = spread_limit(mission, allocation, row.owner, model) or 0.0, row.utilization or 0.0
+        sizes = [islr_db(rms**2, model, mainlobe_energy(mission)) if rms else None for rms in (limit, limit * use)]
+        return sizes[0], sizes[1]
     k = 2 * math.pi / mission.radar.wavelength
-    allowed, reached = (None if size is None else _echo_db(k * size) for size in (row.allowable, row.declared))
-    return allowed, reached
+    levels = [None if size is None else _echo_db(k * size) for size in (row.allowable, row.declared)]
+    return levels[0], levels[1]
 
 
 def _echo_db(phase: float) -> float | None:

@@ -70,18 +70,22 @@ class UntakenEffect(NamedTuple):
 
 
 class RequirementState(NamedTuple):
-    """How a requirement stands: its status, the place of the row that decides or -1, and the places that judge it."""
+    """How a requirement stands: its status, the place of the row that decides or -1, and the places that judge it.
+
+    `utilization` is that of the requirement by the deciding row.
+    """
 
     key: str
     status: Codes
     decider: NDArray[np.intp]
+    utilization: Floats
     judges: Truths  # (rows, n)
 
 
 def required_keys(mission: Mission) -> tuple[str, ...]:
     """Keys of the requirements that a mission has, the default of the quadratic phase included."""
     needs = mission.requirements
-    return tuple(key for key in KEYS if getattr(needs, key) not in (None, ()))
+    return tuple(key for key in KEYS if (needs.declare if key == "declare" else getattr(needs, key) is not None))
 
 
 def is_taken(mission: Mission, kind: str) -> bool:
@@ -155,15 +159,19 @@ def requirement_states(
     found = []
     for key in required_keys(mission):
         mine = _IS_JUDGED[codes] & (judges == KEYS.index(key))
-        levels = np.where(mine, codes, _NONE)
-        used = uses
-        if key == QUADRATIC:  # a row that another requirement binds may break this one too
-            is_other = _IS_JUDGED[codes] & ~mine & (codes != RANK["waived"])
-            breaks = is_other & (np.nan_to_num(quadratic_use) > 1 + UTILIZATION_TOLERANCE)
-            levels, used = np.where(breaks, RANK["fail"], levels), np.where(breaks, quadratic_use, uses)
-            mine = mine | breaks
+        levels, used = np.where(mine, codes, _NONE), uses
+        if key == QUADRATIC:  # a row that another requirement binds is held to this one too
+            is_other = _IS_JUDGED[codes] & ~mine & (codes != RANK["waived"]) & ~np.isnan(quadratic_use)
+            by_autofocus = np.where(codes == RANK["pass_with_autofocus"], codes, RANK["pass"])
+            breaks = np.nan_to_num(quadratic_use) > 1 + UTILIZATION_TOLERANCE
+            levels = np.where(is_other, np.where(breaks, RANK["fail"], by_autofocus), levels)
+            used = np.where(is_other, quadratic_use, uses)
+            mine = mine | is_other
+        else:  # autofocus corrects a quadratic phase alone
+            levels = np.where(levels == RANK["pass_with_autofocus"], RANK["pass"], levels)
         worst = levels.min(axis=0)
         decider = np.where(levels == worst, used, -1.0).argmax(axis=0)
+        utilization = np.take_along_axis(used, decider[None], axis=0)[0]
         is_unjudged = ~mine.any(axis=0)
         decider = np.where(is_unjudged, -1, decider)
         if key == "islr":
@@ -173,7 +181,7 @@ def requirement_states(
         status = np.where(is_unjudged & (worst != RANK["fail"]), RANK["not_evaluated"], worst)
         if waived.get(key):
             status = np.where(np.isin(status, _BREAKS), RANK["waived"], status)
-        found.append(RequirementState(key, status.astype(np.int8), decider, mine))
+        found.append(RequirementState(key, status.astype(np.int8), decider, utilization, mine))
     return found
 
 

@@ -1,80 +1,148 @@
 """What follows from images for the rows of a check, and which of the images are worth showing."""
 
+from collections.abc import Mapping, Sequence
+from datetime import date
+
 from bisar_budget import file_warnings, phrases
-from bisar_budget.constants import UTILIZATION_TOLERANCE
+from bisar_budget.budget.waivers import apply_waivers
 from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.findings.mission import FileWarning, MissionFindings
-from bisar_budget.findings.row import Row
+from bisar_budget.findings.requirement import JudgedRequirement
+from bisar_budget.findings.row import AppliedWaiver, Row
 from bisar_budget.findings.status import RANK
+from bisar_budget.phrases import NOTHING
 from bisar_budget.units import format_limit
 
 _SHOWN = 4  # rows of a mission
 
 
-def with_verdicts(findings: MissionFindings, verified: VerifiedMission) -> MissionFindings:
-    """Add verdicts to findings: a limit that the image shows to be optimistic is said at its row.
+def with_verdicts(findings: MissionFindings, verified: VerifiedMission, today: date | None = None) -> MissionFindings:
+    """Add verdicts to findings: a declared row, or a requirement's, whose limit an image refutes fails.
 
-    A row that passes a limit it would fail as measured becomes a warning, and so does one that passes by an autofocus
-    that the image refutes: the model that gates says pass, but a gate must not be silent about what it knows. That no
-    image gave a verdict is a warning too.
+    So does a row that passes by an autofocus that the image refutes. The refuted limit of a row of which the file
+    declares nothing is said at the row, one of no row of the check as a warning. That no image gave a verdict is a
+    warning too.
+
+    Parameters
+    ----------
+    findings : MissionFindings
+        Of the check.
+    verified : VerifiedMission
+        What its images say.
+    today : date, optional
+        Day on which waivers cover what fails by an image, UTC; omitted: none does.
     """
-    rows = verified.rows
-    by_id = {verdict.id: verdict for verdict in rows}
-    judged = tuple(_with_verdict(row, by_id[row.id]) if row.id in by_id else row for row in findings.rows)
-    known = {row.id for row in findings.rows}
-    warnings = tuple(
-        FileWarning(line=None, message=file_warnings.limit_is_optimistic(verdict.id, _shown(verdict)))
-        for verdict in rows
-        if verdict.id not in known and verdict.verdict == "optimistic"
+    verdicts = verified.rows
+    by_id = {verdict.id: verdict for verdict in verdicts}
+    rows = [_with_verdict(row, by_id[row.id]) if row.id in by_id else row for row in findings.rows]
+    places = [
+        place
+        for place, (before, row) in enumerate(zip(findings.rows, rows, strict=True))
+        if row.status != before.status
+    ]
+    used: set[str] = set()
+    requirement_waivers: Mapping[str, tuple[AppliedWaiver, ...]] = {}
+    if today is not None and findings.mission is not None:
+        waived = apply_waivers([rows[place] for place in places], findings.mission, today)
+        requirement_waivers = waived.requirements
+        for place, row in zip(places, waived.rows, strict=True):
+            rows[place] = row
+        used = {
+            waiver.id
+            for waiver, (_, covered) in zip(findings.mission.waivers, waived.covered, strict=True)
+            if covered
+        }
+    requirements = tuple(
+        _with_refuted(one, [rows[place] for place in places], requirement_waivers.get(one.id, ()))
+        for one in findings.requirements
     )
+    known = {row.id for row in findings.rows}
+    warnings = [
+        one for one in findings.warnings if one.message.code != "waiver-not-used" or one.message.values[0] not in used
+    ]
     if verified.doubt:
-        warnings = (FileWarning(line=None, message=verified.doubt), *warnings)
+        warnings.append(FileWarning(line=None, message=verified.doubt))
+    warnings += [
+        FileWarning(line=None, message=file_warnings.limit_is_optimistic(verdict.id, _shown(verdict)))
+        for verdict in verdicts
+        if verdict.id not in known and verdict.verdict == "optimistic"
+    ]
     images = (phrases.images_formed(verified.conditions),) if verified.conditions else ()
     return findings._replace(
-        rows=judged,
-        warnings=(*findings.warnings, *warnings),
+        rows=tuple(rows),
+        requirements=requirements,
+        warnings=tuple(warnings),
         notes=(*findings.notes, *images),
-        verdicts=rows,
+        verdicts=verdicts,
         is_unverified=bool(verified.doubt),
     )
 
 
 def _with_verdict(row: Row, verdict: Verdict) -> Row:
-    refuted = row.refuted
-    if verdict.verdict == "optimistic":
-        refuted = (*refuted, phrases.optimistic_limit(_shown(verdict)))
+    said = []
+    reason = NOTHING
     if verdict.verdict_autofocus == "optimistic":
-        refuted = (*refuted, phrases.optimistic_limit_with_autofocus(str(verdict.reason_autofocus)))
         if row.status == "pass_with_autofocus":
-            return row._replace(status="warn", reason=phrases.autofocus_refuted(), refuted=refuted)
-    if row.metric == "location_error" and row.status == "pass" and verdict.verdict == "optimistic":
-        return row._replace(status="warn", reason=phrases.location_refuted(), refuted=refuted)
-    excess = _excess(verdict)
-    if (
-        row.status in ("pass", "pass_with_autofocus")
-        and (row.utilization or 0.0) * excess > 1 + UTILIZATION_TOLERANCE
-    ):
-        reason = phrases.limit_refuted((row.utilization or 0.0) * excess)
-        return row._replace(status="warn", reason=reason, refuted=refuted)
-    return row._replace(refuted=refuted)
+            reason = phrases.autofocus_refuted(str(verdict.reason_autofocus))
+        else:
+            said.append(phrases.optimistic_limit_with_autofocus(str(verdict.reason_autofocus)))
+    if verdict.verdict == "optimistic":
+        if not reason and _is_gate(row):
+            reason = phrases.limit_refuted(format_limit(verdict.boundary_error, verdict.unit), _shown(verdict))
+        else:
+            said.insert(0, phrases.optimistic_limit(_shown(verdict)))
+    refuted = (*row.refuted, *said)
+    return row._replace(status="fail", reason=reason, refuted=refuted) if reason else row._replace(refuted=refuted)
 
 
-def _excess(verdict: Verdict) -> float:
-    """What the image shows at the limit, over what the limit promises; 1 where it promises no less."""
-    if verdict.verdict != "optimistic":
-        return 1.0
-    if verdict.measured_db is not None and verdict.requirement_db is not None:
-        return 10 ** ((verdict.measured_db - verdict.requirement_db) / 20)
-    measured = verdict.measured_cubic_rad if verdict.measured_cubic_rad is not None else verdict.measured_qpe_rad
-    return measured / verdict.budget_rad if measured is not None and verdict.budget_rad else 1.0
+def _is_gate(row: Row) -> bool:
+    """Whether a row fails by its image: something is declared that uses the limit, and it does not fail anyway.
+
+    Along the scene's axes an error of another frame is only shown again. The pull-in range of autofocus is no
+    requirement: where it is stated too large, gains count up to what range walk leaves.
+    """
+    return (
+        bool(row.utilization)
+        and row.status not in ("fail", "waived", "not_declared")
+        and row.subject.kind != "autofocus_pull_in"
+        and row.is_independent
+    )
+
+
+def _with_refuted(
+    requirement: JudgedRequirement, refuted: Sequence[Row], waivers: tuple[AppliedWaiver, ...]
+) -> JudgedRequirement:
+    """A requirement of which images refute a row that judges it, or that it limits."""
+    judges = [
+        row
+        for row in refuted
+        if row.id in requirement.rows or requirement.key in (row.binding_requirement, row.metric)
+    ]
+    if not judges or RANK[requirement.status] <= RANK["fail"]:
+        return requirement
+    row = min(judges, key=lambda one: RANK[one.status])
+    status = "waived" if waivers and row.status == "fail" else row.status
+    if RANK[status] > RANK[requirement.status]:
+        return requirement
+    found = requirement._replace(status=status, row=row.id, reason=row.reason, waivers=waivers or row.waivers)
+    if row.id == requirement.row:
+        return found
+    is_alike = row.unit == requirement.unit
+    return found._replace(
+        allowed=row.allowable if is_alike else None,
+        reached=row.declared if is_alike else None,
+        utilization=row.utilization,
+    )
 
 
 def _shown(verdict: Verdict) -> str:
-    if verdict.measured_db is not None:
-        return f"the image shows {verdict.measured_db:.1f} dB at it"
-    if verdict.measured_qpe_rad is not None and verdict.budget_rad is not None:
-        budget = format_limit(verdict.budget_rad, "rad")
-        return f"the image shows {verdict.measured_qpe_rad:.3g} rad at it, the budget is {budget}"
+    if verdict.measured_db is not None and verdict.requirement_db is not None:
+        digits = 1 if verdict.measured_db_interval is None else 2  # of noise half a decibel decides
+        levels = [f"{level:.{digits}f} dB" for level in (verdict.measured_db, verdict.requirement_db)]
+        return f"the image shows {levels[0]} at it, {levels[1]} allowed"
+    measured = verdict.measured_qpe_rad if verdict.measured_cubic_rad is None else verdict.measured_cubic_rad
+    if measured is not None and verdict.budget_rad is not None:
+        return f"the image shows {measured:.3g} rad at it, the budget is {format_limit(verdict.budget_rad, 'rad')}"
     return verdict.reason or "the image shows more than it promises"
 
 

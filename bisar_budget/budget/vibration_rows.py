@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
+from bisar_budget.analysis.spread import shown_islr_db
 from bisar_budget.analysis.vibration_limits import (
     LARGEST_ECHO,
     VibrationLimits,
@@ -88,7 +89,7 @@ def _as_spread(mission: Mission, case: VibrationCase) -> VibrationCase:
     if case.declared is None:
         return case._replace(metric="islr", over=over)
     phase = 2 * math.pi * case.declared / mission.radar.wavelength
-    return case._replace(metric="islr", over=over, islr_db=islr_db(phase**2 / 2))
+    return case._replace(metric="islr", over=over, islr_db=shown_islr_db(mission, phase**2 / 2))
 
 
 def _slow_row(mission: Mission, allocation: Allocation, name: str, index: int, line: Line) -> Row:
@@ -256,23 +257,14 @@ def _noise(mission: Mission, allowed: VibrationLimits | None, name: str, error: 
     rms = counted(mission, name, wideband.rms, "islr")
     notes = (*projected(mission, wideband.rms, error, rms), *case.notes)
     variance = (2 * math.pi * rms / mission.radar.wavelength) ** 2
-    case = case._replace(declared=rms, notes=notes, islr_db=islr_db(variance))
+    case = case._replace(declared=rms, notes=notes, islr_db=shown_islr_db(mission, variance))
     return _with_doubt(case, mission)
-
-
-def islr_db(variance: float) -> float | None:
-    """ISLR that noise of a phase variance [rad²] adds, exp(σ²) - 1; None where there is none. [dB]"""
-    if not variance:
-        return None
-    return 10 / math.log(10) * (variance + math.log(-math.expm1(-variance)))  # without exp(σ²), which overflows
 
 
 def _margin(allowed: VibrationLimits | None) -> tuple[Note, ...]:
     """How far the published rule stays inside first principles, said of every limit."""
     if allowed is None:
         return ()
-    if abs(allowed.margin_db) < 0.005:
-        return (phrases.published_rule_is_exact(),)
     return (phrases.published_rule_is_off(allowed.margin_db),)
 
 

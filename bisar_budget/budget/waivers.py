@@ -1,4 +1,4 @@
-"""Waivers: rows and requirements that may be broken until a date. What is waived, expired or useless is always said."""
+"""Waivers: rows and requirements that may be broken until a date. What is waived, expired or useless is said."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -10,9 +10,8 @@ from bisar_budget import file_warnings
 from bisar_budget.budget.requirements import KEYS
 from bisar_budget.findings.mission import FileWarning
 from bisar_budget.findings.requirement import JudgedRequirement
-from bisar_budget.findings.row import AppliedWaiver, Row
+from bisar_budget.findings.row import DECLARE, AppliedWaiver, Row
 from bisar_budget.mission.model import Mission
-
 
 _BROKEN = ("fail", "not_evaluated")  # statuses that a waiver covers
 
@@ -20,9 +19,8 @@ _BROKEN = ("fail", "not_evaluated")  # statuses that a waiver covers
 class Waived(NamedTuple):
     """Rows after waivers, and the waivers that name requirements.
 
-    Rows that fail or are not evaluated, and that a valid waiver names, are `waived`; one with expired waivers keeps its
-    status and has the last of them. `requirements` are the valid waivers of each requirement, by its id, of which the
-    first counts. `covered` are, for each waiver of the file, the rows that it could cover.
+    Rows that fail or are not evaluated, and that a valid waiver names, are `waived`; one with expired waivers keeps
+    its status and has the last of them. `requirements` has the first valid waiver of each requirement, by its id.
     """
 
     mission: Mission
@@ -62,6 +60,7 @@ def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> Waived:
     ids = [row.id for row in rows]
     broken = {position for position, row in enumerate(rows) if row.status in _BROKEN}
     requirements = [f"mission.{key}" for key in KEYS]
+    missing = [n for n, row in enumerate(rows) if row.is_of_declare and row.status == "not_evaluated"]
     # A thousand waivers of one row would fill a report: it has the first that holds and the one that held longest.
     holding: dict[int, AppliedWaiver] = {}
     of_requirements: dict[str, tuple[AppliedWaiver, ...]] = {}
@@ -70,6 +69,8 @@ def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> Waived:
     for index, waiver in enumerate(mission.waivers):
         line = mission.line(("waivers", index, "id"))
         named = named_by(waiver.id, ids)
+        if any(rows[position].metric == DECLARE for position in named):  # it stands for all that is missing
+            named = sorted({*named, *missing})
         failing = broken.intersection(named)
         covered.append((len(named), len(failing)))
         applied = AppliedWaiver(line, waiver.until, waiver.reason, is_expired=today > waiver.until)
@@ -90,6 +91,11 @@ def _waived(row: Row, holding: AppliedWaiver | None, last: AppliedWaiver | None)
     applied = [one for one in (holding, last) if one is not None]
     status = row.status if holding is None else "waived"
     return row._replace(status=status, waivers=(*row.waivers, *applied)) if applied else row
+
+
+def is_waived(mission: Mission, today: date, ids: Sequence[str]) -> bool:
+    """Whether a waiver that holds names one of some ids."""
+    return any(today <= one.until and named_by(one.id, ids) for one in mission.waivers)
 
 
 def named_by(pattern: str, ids: Sequence[str]) -> list[int]:

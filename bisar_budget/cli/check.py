@@ -372,12 +372,12 @@ def check_all(
         files, today, model, keep, drawn=drawn, changes=changes, outside=from_outside or NOTHING_OUTSIDE
     )
     if verifying:
-        missions = _with_images(missions, illustrated)
+        missions = _with_images(missions, today, illustrated)
     return Report(version=__version__, missions=tuple(missions))
 
 
 def _with_images(
-    missions: "Sequence[MissionFindings | UnusableMission]", illustrated: bool
+    missions: "Sequence[MissionFindings | UnusableMission]", today: date, illustrated: bool
 ) -> "list[MissionFindings | UnusableMission]":
     """Add the verdicts of images, and the images of the rows that decide most."""
     from bisar_budget.budget.fleet import without_analysis
@@ -389,7 +389,7 @@ def _with_images(
     verified = verify_all([found.analysed().mission for found in usable.values()], "*", None) if usable else []
     result = list(missions)
     for (place, found), images in zip(usable.items(), verified, strict=True):
-        judged = with_verdicts(found, images)
+        judged = with_verdicts(found, images, today)
         if illustrated:
             from bisar_budget.verify.evidence import form_image_evidence
 

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 from bisar_budget import units
 from bisar_budget.faults import InvalidValueError, shown
+from bisar_budget.mission import later
 from bisar_budget.mission.bounds import DIRECTION, ELEVATION, LATITUDE
 from bisar_budget.mission.changes import apply_changes, next_name, parts_of
 from bisar_budget.mission.keys import nearest_keys
@@ -171,6 +172,8 @@ def _found(tree: dict[str, Any], key: str) -> tuple[Reader, Any]:
         inner = reader.below(part)
         if inner is None and isinstance(value, str):
             raise QuestionError(f"{shown(key)}: the file has {shown(value)!r} there, which has no {shown(part)!r}")
+        if isinstance(reader, Section) and part in reader.later:
+            raise QuestionError(f"{key}: {later.PROBLEM}; {reader.later[part]}")
         if inner is None:
             known = f"; accepted: {', '.join(reader.keys)}" if isinstance(reader, Section) else ""
             hint = nearest_keys(key)

@@ -20,10 +20,9 @@ from bisar_budget.arrays import judged
 from bisar_budget.arrays.collections import Geometries, paths_of
 from bisar_budget.arrays.held import is_image, not_held
 from bisar_budget.arrays.judged import check_arrays, statuses
-from bisar_budget.arrays.rows import REQUIREMENTS
+from bisar_budget.arrays.rows import REQUIREMENTS, Judged
 from bisar_budget.arrays.varied import varied
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.required import is_asked_for, missing_declarations
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.design.cases import Cases, words_of
 from bisar_budget.design.quantities import Choices, Number, QuestionError, number_of, tree_of
@@ -485,14 +484,17 @@ class Engine:
             if one.row in rows:
                 found[one.name][to] = judged.field(rows[one.row], one.field)[sure]
             elif one.field == "status":
-                found[one.name][to] = self._status_of_nothing(one.row)
+                of_nothing = self._status_of_nothing(one.row, mission, geometries, some.size)
+                found[one.name][to] = np.broadcast_to(of_nothing, some.shape)[sure]
         return sure
 
-    def _status_of_nothing(self, row: str) -> str:
-        """Status of a row that is not declared."""
-        what, missing = self.subjects.get(row), missing_declarations(self.mission)
-        is_asked = what is not None and any(is_asked_for(what, one) for one in missing)
-        return "not_evaluated" if is_asked else "not_declared"
+    def _status_of_nothing(self, row_id: str, mission: Mission, geometries: Geometries, cases: int) -> Any:
+        """Status of a row that is not declared in any case."""
+        what = self.subjects.get(row_id)
+        if what is None:
+            return "not_declared"
+        row = judged.with_required([Judged.of_none(what, cases)], mission, geometries, cases)[-1]
+        return judged.statuses(judged.waived(row, mission, self.question.today).status)
 
     def _one(self, found: Mapping[str, Values], some: NDArray[Any], place: int) -> Mission:
         """The mission of one case of some, with its numbers."""
@@ -549,6 +551,8 @@ def _verdict(checked: judged.Checked, row_id: str | None, breaks: Container[str]
         status = codes[0]
     may_decide = np.array([[not one.never_fails or "warn" in breaks] for one in rows])
     decides = may_decide & judged[codes] & (does_break[codes] | ~does_break[status])
+    has_number = np.array([~np.isnan(one.utilization) for one in rows])
+    decides &= has_number | (codes != RANK["not_evaluated"])
     use = np.array([np.nan_to_num(one.utilization, nan=-1.0, posinf=math.inf) for one in rows])
     use = np.where(decides, use, -2.0)
     highest = use.max(axis=0)
@@ -559,11 +563,15 @@ def _verdict(checked: judged.Checked, row_id: str | None, breaks: Container[str]
     binding = np.take_along_axis(np.array([row.binding for row in rows]), worst[None], axis=0)[0]
     requirement = np.where(binding >= 0, np.array(REQUIREMENTS, dtype=object)[binding], metrics[worst])
     utilization = np.take_along_axis(np.array([row.utilization for row in rows]), worst[None], axis=0)[0]
+    unmet = np.full(status.shape, "", dtype=object)  # where no row decides, the requirement that breaks
+    if row_id is None:
+        for one in reversed(checked.requirements):
+            unmet = np.where((one.status == status) & does_break[status], one.key, unmet)
     return {
         "status": statuses(status),
         "worst_row": np.where(has_one, ids[worst], ""),
         "utilization": np.where(has_one, utilization, math.nan),
-        "binding_requirement": np.where(has_one, requirement, ""),
+        "binding_requirement": np.where(has_one, requirement, unmet),
     }
 
 

@@ -74,14 +74,16 @@ def standing(found: MissionFindings, row_id: str | None, breaks: Container[str])
     complies = status not in breaks
     worst = deciding_row(rows, breaks, complies)
     if worst is None:
-        return Standing(complies, status)
+        broken = [one.key for one in found.requirements if one.status == status and row_id is None and not complies]
+        return Standing(complies, status, requirement=broken[0] if broken else None)
     return Standing(complies, status, worst.id, worst.binding_requirement or worst.metric, worst.utilization)
 
 
 def deciding_row(rows: Sequence[Row], breaks: Container[str], complies: bool) -> Row | None:
     """Find the row that binds: of the rows that are judged the one that uses most of its limit.
 
-    Of rows that use as much of it, but for rounding, the first.
+    Of rows that use as much of it, but for rounding, the first. One that is not evaluated and has no number binds
+    nothing.
 
     Parameters
     ----------
@@ -93,6 +95,7 @@ def deciding_row(rows: Sequence[Row], breaks: Container[str], complies: bool) ->
         Whether the rows do; where they do not, only those that break are looked at.
     """
     judged = [row for row in rows if STATUS[row.status].is_judged and row.status != "waived"]
+    judged = [row for row in judged if row.status != "not_evaluated" or row.utilization is not None]
     if "warn" not in breaks:  # what only ever warns decides nothing
         judged = [row for row in judged if row.subject.kind != "autofocus_pull_in"]
     if not complies:

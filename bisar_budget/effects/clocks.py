@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from bisar_budget import file_warnings, phrases
-from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.effect import PLATFORMS, override_notes
 from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.effects.random_errors import RandomEffect, RandomError
 from bisar_budget.effects.spectra import link_parts, parts, synchronized_parts
@@ -31,10 +31,11 @@ def clock_noise(mission: Mission) -> Iterator[RandomError]:
 def _of_oscillator(mission: Mission, name: str, oscillator: Oscillator, sync: Synchronization | None) -> RandomError:
     T, factor = mission.collection.aperture_time, mission.allocation.coverage_factor
     noise = noise_of(oscillator, mission.radar.center_frequency, T)
-    notes = [note for note in (noise.extrapolated, *noise.notes) if note]
+    replaced = override_notes(name, oscillator.overridden)
+    notes = [note for note in (*replaced, noise.extrapolated, *noise.notes) if note]
     no_limit, warning = phrases.no_phase_noise(), phrases.NOTHING
     if sync is not None and sync.is_direct_path:
-        found, no_limit, notes = Parts(0.0, 0.0, 0.0), phrases.oscillators_drop_out(), []
+        found, no_limit, notes = Parts(0.0, 0.0, 0.0), phrases.oscillators_drop_out(), [*replaced]
     else:
         if sync is not None and sync.interval is not None:
             notes.append(phrases.left_by_exchanges(sync.interval))

@@ -5,7 +5,8 @@ counts what the displacement of the image adds (`exact_ranges`).
 """
 
 import math
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 from bisar_budget import evaluators, phrases
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG
@@ -14,10 +15,22 @@ from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import BistaticGeometry, GroundVector, Vector, angle_between_lines
 from bisar_budget.phrases import NOTHING, Note
 
+if TYPE_CHECKING:
+    from bisar_budget.mission.instruments import Overridden
+
 PLATFORMS = ("transmitter", "receiver")
 MOTION_UNITS = dict(zip(MOTION, ("m", "m/s", "m/s^2"), strict=True))
 CLOCK_UNITS = {"constant": "s", "linear": "s/s", "quadratic": "1/s", "cubic": "1/s^2"}
 NOWHERE: Vector = (0.0, 0.0, 0.0)  # direction of what is no motion
+
+
+def override_notes(platform: str, overridden: Sequence["Overridden"], *figures: str) -> tuple[Note, ...]:
+    """Say which figures of parts the file replaces, of these or of all."""
+    return tuple(
+        phrases.overrides_a_part(f"platforms.{platform}.{one.key}", one.text, one.part)
+        for one in overridden
+        if not figures or one.figure in figures
+    )
 
 
 class Effect(NamedTuple):

@@ -16,6 +16,7 @@ from bisar_budget.geometry import BistaticGeometry, GroundVector
 from bisar_budget.phrases import Note
 
 QUADRATIC, CUBIC, LOCATION = "quadratic_phase_error", "cubic_phase_error", "location_error"
+END_OF_IMAGE = "end_of_image"  # no requirement: no ground point has the range history of a larger error
 
 # No navigation error: it takes the platform, within the aperture, farther than this part of its slant range.
 FARTHEST = 0.1
@@ -92,6 +93,10 @@ class PublishedModel:
         """Largest size of an error within a limit [rad], or [m] for the location; None: no limit, or none `upto`."""
         found = _size(limit, _per_unit(source.effect, self.plane, requirement))
         return found if found is not None and found <= upto else None
+
+    def ends_image(self, source: ErrorSource, size: float) -> bool:
+        """Whether an image ends at an allowable: to a linear model none does."""
+        return False
 
 
 class FullModel:
@@ -172,6 +177,11 @@ class FullModel:
             return None if linear is None or linear > farthest else linear
         signed = {QUADRATIC: source.full.qpe, CUBIC: source.full.cubic}.get(requirement)
         return self._smallest(source, requirement, limit, per_unit if signed is None else signed, first, farthest)
+
+    def ends_image(self, source: ErrorSource, size: float) -> bool:
+        """Whether an allowable, as found, is where the image ends: the search stopped there short of its limit."""
+        paths = (self._paths.get((source.id, sign)) for sign in (1.0, -1.0))
+        return any(path is not None and path.end == size for path in paths)
 
     def is_linear_at(self, source: ErrorSource, requirement: str, limit: float) -> bool:
         """Whether effects of an error are proportional to its size up to a limit."""

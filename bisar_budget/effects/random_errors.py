@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from bisar_budget import evaluators, phrases
 from bisar_budget.constants import ROUNDING, STANDARD_GRAVITY
-from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.effect import PLATFORMS, override_notes
 from bisar_budget.effects.exact_ranges import ExactRanges
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.tones import Parts, gauss_markov
@@ -144,6 +144,7 @@ def _of_imu(mission: Mission, name: str, state: PlatformState, exact: ExactRange
             equation="inertial sensor",
             evidence=(imu.source if key == kind else None) or error.evidence(kind),
             no_limit=phrases.across_the_line_of_sight(),
+            notes=override_notes(name, error.overridden, kind),
         )
 
 
@@ -229,6 +230,7 @@ def _of_position(mission: Mission, name: str, state: PlatformState) -> Iterator[
             equation="Gauss-Markov",
             evidence=process.source or error.evidence("random"),
             no_limit=phrases.across_the_line_of_sight(),
+            notes=override_notes(name, error.overridden, "random"),
         )
 
 

@@ -18,6 +18,7 @@ from bisar_budget.effects.effect import (
     PLATFORMS,
     Effect,
     ErrorSource,
+    override_notes,
 )
 from bisar_budget.effects.exact_ranges import ExactRanges
 from bisar_budget.effects.subject import Subject, subject
@@ -67,6 +68,7 @@ def _motion(mission: Mission, name: str, state: PlatformState, full_effects: lis
         declared = None if values is None else tuple([value * factor for value in values])
         key = "covariance" if covariance is not None else error.key_of(kind)
         path: KeyPath = ("platforms", name, "motion_error", key)
+        notes = override_notes(name, error.overridden, kind)
         for axis, (what, own_path, equation, no_limit) in enumerate(_scene_axes(name, kind)):
             on_axis = None
             if declared is not None:
@@ -90,6 +92,7 @@ def _motion(mission: Mission, name: str, state: PlatformState, full_effects: lis
                 no_limit=no_limit,
                 evidence=error.evidence(kind),
                 is_independent=in_scene,
+                notes=notes,
             )
         if in_scene or declared is None:
             continue
@@ -105,6 +108,7 @@ def _motion(mission: Mission, name: str, state: PlatformState, full_effects: lis
                 equation=_equation(kind, None),
                 no_limit=_no_limit(kind, f"the {error.frame} frame's {axis_name} axis"),
                 evidence=error.evidence(kind),
+                notes=notes,
             )
 
 

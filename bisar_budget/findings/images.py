@@ -21,9 +21,9 @@ class Verdict(NamedTuple):
     Phases are magnitudes at the aperture edge [rad]: by Table II, by the full model's closed form, predicted from
     exact ranges, and measured, `…_inside` and `…_beyond` at 0.9 and 1.1 times the limit. Displacements are on the
     ground (east, north) [m]: `displacement_m` by exact ranges, `…_published_m` by (25), `…_full_m` by the full
-    model. The smear azimuth is that of a line, from 0 to π; `…_published_rad` by (31). For vibration
-    `measured_db` stands against `requirement_db`. With autofocus the row is formed again at
-    `boundary_autofocus` and refocused.
+    model. The smear azimuth is that of a line, from 0 to π; `…_published_rad` by (31). For vibration and noise
+    `measured_db` stands against `requirement_db`, of noise with its standard error and its interval at 95 %. With
+    autofocus the row is formed again at `boundary_autofocus` and refocused.
     """
 
     id: str
@@ -46,6 +46,7 @@ class Verdict(NamedTuple):
     requirement_db: float | None = None
     measured_db: float | None = None
     measured_db_error: float | None = None
+    measured_db_interval: tuple[float, float] | None = None
     displacement_m: GroundVector | None = None
     displacement_published_m: GroundVector | None = None
     displacement_full_m: GroundVector | None = None

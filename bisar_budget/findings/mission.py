@@ -11,7 +11,7 @@ from bisar_budget.findings.status import STATUSES, worst
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Document, Mission
 from bisar_budget.mission.platforms import FlownPath
-from bisar_budget.phrases import Note
+from bisar_budget.phrases import NOTHING, Note
 
 if TYPE_CHECKING:
     from bisar_budget.analysis.analysis import Analysis
@@ -75,6 +75,7 @@ class MissionFindings(NamedTuple):
     requirements: tuple[JudgedRequirement, ...] = ()
     kinds: DeclaredKinds = DeclaredKinds()
     overrides: tuple[Override, ...] = ()  # what from outside the file bears on the verdict
+    model_doubt: Note = NOTHING  # where the published model judges and does not hold
 
     @property
     def mission(self) -> Mission | None:
@@ -96,7 +97,7 @@ class MissionFindings(NamedTuple):
     @property
     def is_empty(self) -> bool:
         """The file declares no error at all: nothing was judged."""
-        return all(row.status == "not_declared" for row in self.rows)
+        return all(row.status == "not_declared" or row.is_of_declare for row in self.rows)
 
     @property
     def status(self) -> str:
@@ -107,7 +108,8 @@ class MissionFindings(NamedTuple):
         """
         doubts = ["not_evaluated"] if self.is_unverified or self.is_empty else []
         doubts += ["warn" for warning in self.warnings if warning.is_doubt]
-        return worst([*(one.status for one in (*self.rows, *self.requirements)), *doubts])
+        statuses = [row.status for row in self.rows] + [one.status for one in self.requirements]
+        return worst([*statuses, *doubts])
 
     @property
     def summary(self) -> dict[str, int]:

@@ -19,9 +19,9 @@ NAMES = {
 class JudgedRequirement(NamedTuple):
     """A requirement of the mission and how it stands. Numbers in SI, radians and decibel; None where there is none.
 
-    `value` is what the file, or the default, requires in all; `allowed` what the deciding row is held to (the share of
-    a platform, autofocus included) and `reached` what is declared there, in the unit of the requirement. `row` is the
-    deciding one, `rows` are all that judge it. `reason` says why it cannot be judged, or why it is not met.
+    `value` is what the file, or the default, requires in all; `allowed` what the deciding row is held to (the share
+    of a platform, autofocus included) and `reached` what is declared there, in the unit of the requirement. `row` is
+    the deciding one, `rows` are all that judge it. `reason` says why it cannot be judged, or why it is not met.
     """
 
     key: str
@@ -60,7 +60,7 @@ class DeclaredKinds(NamedTuple):
     without_source: tuple[str, ...] = ()
 
     @property
-    def count(self) -> int:
+    def in_all(self) -> int:
         """Number of kinds in all."""
         return len(self.declared) + len(self.missing)
 

@@ -10,6 +10,8 @@ from bisar_budget.findings.status import RANK
 from bisar_budget.geometry import GroundVector
 from bisar_budget.phrases import Note
 
+DECLARE = "declare"  # requirements.declare, and the metric of its row
+
 
 class AppliedWaiver(NamedTuple):
     """A waiver that names a failing row: line of the file, last day, reason; expired if that day is over."""
@@ -75,6 +77,13 @@ class Row(NamedTuple):
     def owner(self) -> str:
         """Whose share it counts against: transmitter, receiver, clock or mission."""
         return self.subject.owner
+
+    @property
+    def is_of_declare(self) -> bool:
+        """Whether its status says what `requirements.declare` asks for, and nothing of an error's size."""
+        return self.metric == DECLARE or (
+            isinstance(self.reason, Note) and self.reason.code == "not-declared-as-required"
+        )
 
     @property
     def decisive(self) -> tuple[Note, ...]:

@@ -96,7 +96,7 @@ def worst(statuses: Iterable[str]) -> str:
 
 
 def exit_code(statuses: Container[str], strict: bool) -> int:
-    """Return 2 if a file is unusable, 1 if a requirement is broken or not judged, else 0; `strict` breaks on doubt too."""
+    """Return 2 if a file is unusable, 1 if a requirement is broken or not judged, else 0; `strict`: on doubt too."""
     if "error" in statuses:
         return 2
     breaks = (one.name for one in _WORST_FIRST if one.fails or (strict and one.fails_strict))

@@ -7,6 +7,7 @@ __all__ = [
     "covariance",
     "instruments",
     "keys",
+    "later",
     "load",
     "model",
     "named",

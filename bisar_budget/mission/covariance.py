@@ -219,7 +219,7 @@ class _CorrelationReader(Reader):
             pair = frozenset((first, second))
             if first is None or second is None:
                 accepted = "accepted: two errors joined by -, such as position.x-velocity.x"
-                report((*path, key), Problem("is not a known key", accepted))
+                report((*path, key), Problem("is not a known key", accepted, is_of_key=True))
             elif first == second:
                 report((*path, key), Problem("an error's correlation with itself is 1", hint="Remove it"))
             elif pair in named:
@@ -292,5 +292,6 @@ def misplaced_axes(covariance: Covariance, frame: str) -> Iterator[Problem]:
                     "is not a known key",
                     f"accepted in the {frame} frame: {', '.join(FRAME_AXES[frame])}",
                     at=("covariance", "correlation", pair),
+                    is_of_key=True,
                 )
                 break

@@ -8,6 +8,7 @@ from typing import Annotated, Any, NamedTuple
 from bisar_budget import units
 from bisar_budget.faults import InvalidValueError, KeyPath, Problem
 from bisar_budget.geometry import Vector
+from bisar_budget.mission import later
 from bisar_budget.mission.readers import (
     INVALID,
     Choice,
@@ -44,6 +45,18 @@ VelocityRandomWalk = Annotated[Vector | None, Key(_VELOCITY_WALK, "Noise of the 
 AngleRandomWalk = Annotated[Vector | None, Key(_ANGLE_WALK, "Noise of the gyros.")]
 
 
+class Overridden(NamedTuple):
+    """A figure of a part, or of the accuracy of a log, that something in the file replaces.
+
+    `key` is what replaces it, below the platform, `text` the figure as its file has it.
+    """
+
+    figure: str
+    key: str
+    part: str
+    text: str
+
+
 class Imu(NamedTuple):
     """Figures of an inertial sensor, 1 sigma. A scalar means each axis; three values follow the error's frame."""
 
@@ -53,6 +66,11 @@ class Imu(NamedTuple):
     velocity_random_walk: VelocityRandomWalk = None
     angle_random_walk: AngleRandomWalk = None
     source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
+
+    @property
+    def is_stated(self) -> bool:
+        """Whether the file states any of its figures; a zero does."""
+        return any(getattr(self, kind) is not None for kind in IMU_KINDS)
 
 
 class GaussMarkov(NamedTuple):
@@ -136,7 +154,8 @@ class _PowerLawReader(Reader):
         is_valid = True
         for key, item in value.items():
             if key not in read:
-                report((*path, key), Problem("is not a known key", f"accepted: {', '.join(_POWERS)}"))
+                accepted = f"accepted: {', '.join(_POWERS)}"
+                report((*path, key), Problem("is not a known key", accepted, is_of_key=True))
                 is_valid = False
                 continue
             read[key] = item if item is INVALID else _COEFFICIENT.read(item, (*path, key), report)
@@ -189,7 +208,10 @@ PowerLawFigures = Annotated[
 
 
 class Oscillator(NamedTuple):
-    """An oscillator and its noise, in one of three forms or as a part of the catalogue."""
+    """An oscillator and its noise, in one of three forms or as a part of the catalogue.
+
+    `overridden` are the figures of the part that keys beside it replace.
+    """
 
     frequency: Frequency = None
     phase_noise: PhaseNoise = None
@@ -218,6 +240,7 @@ class Oscillator(NamedTuple):
         str | None, Key(Reference(), "A part of the catalogue, or a file; keys beside it override.")
     ] = None
     source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
+    overridden: tuple[Overridden, ...] = ()
 
     @property
     def needs_frequency(self) -> bool:
@@ -256,7 +279,7 @@ class Synchronization(NamedTuple):
     """How the receiver follows the transmitter's oscillator."""
 
     error: Annotated[
-        float, Key(Quantity(units.ANGLE, ge=0, le=math.pi), "Phase error of the link, 1 sigma, each time.")
+        float, Key(Quantity(units.ANGLE, ge=0, lt=math.pi / 2), "Phase error of the link, 1 sigma, each time.")
     ]
     interval: Annotated[
         float | None, Key(Quantity(units.TIME, gt=0, ge=1e-9, le=1e6), "Between exchanged pulses.")
@@ -264,7 +287,7 @@ class Synchronization(NamedTuple):
     method: Annotated[
         str,
         Key(
-            Choice(*METHODS),
+            Choice(*METHODS, refused=later.METHODS),
             "linear: pulses are exchanged, between them the phase is interpolated; "
             "direct_path: the receiver hears the transmitter and takes it as its clock.",
         ),

@@ -144,7 +144,10 @@ class OtherError(NamedTuple):
     source: Annotated[str | None, Key(Text())] = None
 
 
-DECLARABLE = ("position", "velocity", "acceleration", "timing")
+# Kinds of error that each platform has, and the clock's.
+OF_PLATFORMS = ("position", "velocity", "acceleration", "covariance", "vibration", "imu", "random", "oscillator")
+DECLARABLE = (*OF_PLATFORMS, "timing")
+_OF_ONE = tuple(f"{name}.{kind}" for name in Platforms._fields for kind in OF_PLATFORMS)
 
 
 class Requirements(NamedTuple):
@@ -162,9 +165,14 @@ class Requirements(NamedTuple):
     declare: Annotated[
         tuple[str, ...],
         Key(
-            Words(*DECLARABLE),
-            "Errors that the file must declare, for both platforms; what is missing is not_evaluated. "
-            "timing: any term of timing_error.",
+            Words(
+                *DECLARABLE,
+                *_OF_ONE,
+                accepted=f"{', '.join(DECLARABLE)}; of one platform receiver.imu and the like",
+            ),
+            "Errors that the file must declare, for both platforms or for one (receiver.imu); what is missing is "
+            "not_evaluated. A zero declares; a still platform owes its position only. A covariance declares position "
+            "and velocity; timing: any term of timing_error.",
         ),
     ] = ()
 
@@ -224,20 +232,23 @@ class AllocationRules(NamedTuple):
     ] = "equal"
     combine: Annotated[
         str,
-        Key(Choice("each", "sum", "rss"), "each: every error alone; sum: worst case; rss: independent errors."),
-    ] = "each"
+        Key(
+            Choice("each", "sum", "rss"),
+            "rss: independent errors together; sum: all at their worst; each: every error alone, as the paper.",
+        ),
+    ] = "rss"
     model: Annotated[
         str,
         Key(
             Choice("published", "full", "strictest"),
-            "The model that gates: the paper's, the full one, or the stricter of both for each row.",
+            "The model that gates: full: exact ranges; published: the paper's; strictest: the stricter for each row.",
         ),
-    ] = "published"
+    ] = "full"
     coverage_factor: Annotated[
         float,
         Key(
-            Quantity(units.RATIO, gt=0, ge=1e-3, le=1e3),
-            "Multiplies position, velocity, acceleration and clock errors.",
+            Quantity(units.RATIO, ge=1, le=1e3),
+            "Multiplies position, velocity, acceleration and clock errors; at least 1.",
         ),
     ] = 1.0
     warn_above: Annotated[
@@ -251,7 +262,10 @@ class Autofocus(NamedTuple):
     algorithm: Annotated[str, Key(Choice("pga", "map_drift"))] = "pga"
     n_pull: Annotated[
         float | None,
-        Key(Quantity(units.RATIO, gt=0, ge=1e-3, le=1e4), "Corrects n_pull·π radians; omitted: none."),
+        Key(
+            Quantity(units.RATIO, gt=0, ge=1e-3, le=1e4),
+            "Corrects n_pull·π radians, counts up to f₀/B; omitted: none.",
+        ),
     ] = None
 
 
@@ -379,6 +393,18 @@ def names_parts(mission: Mission) -> bool:
     return any(
         platform.motion_error.sensor or (platform.oscillator is not None and platform.oscillator.sensor)
         for platform in mission.platforms
+    )
+
+
+def names_files(root: Mapping[str, Any]) -> bool:
+    """Whether what a file says, mission or not, names a part, an orbit or a log."""
+    platforms = root.get("platforms")
+    sections = platforms.values() if isinstance(platforms, dict) else ()
+    return any(
+        key in ("orbit", "trajectory") or (isinstance(item, dict) and "sensor" in item)
+        for section in sections
+        if isinstance(section, dict)
+        for key, item in section.items()
     )
 
 

@@ -15,6 +15,7 @@ from bisar_budget.mission.bounds import COORDINATE, VELOCITY
 from bisar_budget.mission.instruments import (
     FORMS,
     IMU_KINDS,
+    OSCILLATOR,
     AccelerometerBias,
     AllanDeviation,
     AngleRandomWalk,
@@ -24,12 +25,13 @@ from bisar_budget.mission.instruments import (
     GyroBias,
     Imu,
     Oscillator,
+    Overridden,
     PhaseNoise,
     PowerLawFigures,
     VelocityRandomWalk,
 )
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.platforms import MotionError
+from bisar_budget.mission.platforms import MotionError, Platforms
 from bisar_budget.mission.readers import (
     INVALID,
     Choice,
@@ -49,6 +51,7 @@ from bisar_budget.settings import SettingsError, project_settings
 
 Find = Callable[[str], tuple[str, bytes]]  # file and content of a part by its name
 
+MOTION_ERROR = Section(MotionError)
 _NAME = Text()
 _SOURCE = OneOf(lambda value: TextMap() if isinstance(value, dict) else _NAME, (_NAME, TextMap()))
 _SAYS = Key(_NAME, "What its figures are in their source.")
@@ -101,6 +104,7 @@ class OscillatorPart(NamedTuple):
 
 
 Part = ImuPart | GnssPart | OscillatorPart
+_Read = tuple[Part, Mapping[str, Any]]  # a part, and what its file says as text
 _SECTIONS: dict[str, Section] = {
     "imu": Section(ImuPart),
     "gnss": Section(GnssPart),
@@ -110,7 +114,11 @@ FIGURES = {"imu": IMU_KINDS, "gnss": ("position", "velocity", "random"), "oscill
 
 
 class PartError(Exception):
-    """A part that cannot be used; the message says why."""
+    """A part that cannot be used; each of its arguments says what is wrong."""
+
+    def __str__(self) -> str:
+        """Say all of it."""
+        return "; ".join(map(str, self.args))
 
 
 def evidence(part: Part, figure: str) -> str:
@@ -161,7 +169,7 @@ def read_part(file: str) -> Part:
     return _read(file)[0]
 
 
-def _read(file: str) -> tuple[Part, Mapping[str, Any]]:
+def _read(file: str) -> _Read:
     return _parsed(file, _content(file))
 
 
@@ -172,11 +180,11 @@ def _content(file: str) -> bytes:
         raise PartError(str(error)) from None
 
 
-def _parsed(file: str, data: bytes) -> tuple[Part, Mapping[str, Any]]:
+def _parsed(file: str, data: bytes) -> _Read:
     try:
         tree = read_tree(data, file)
     except MissionError as error:
-        raise PartError(f"{file}: {error.faults[0]}") from None
+        raise PartError(*(f"{file}: {fault}" for fault in error.faults)) from None
     kind = tree.root.get("kind")
     section = _SECTIONS.get(kind) if isinstance(kind, str) else None
     part: Any = INVALID
@@ -185,14 +193,22 @@ def _parsed(file: str, data: bytes) -> tuple[Part, Mapping[str, Any]]:
     with suppress(UnusableError):
         part = section.read(tree.root, (), tree.report)
     if tree.faults:
-        fault = tree.faults[0]
-        raise PartError(f"{file}:{fault.line}:{fault.column}: {fault}")
+        raise PartError(*(f"{file}:{fault.line}:{fault.column}: {fault}" for fault in tree.faults))
+    if not any(_says(getattr(part, figure)) for figure in FIGURES[kind] if figure != "frequency"):
+        raise PartError(f"{file}: states no figure; accepted: one of {', '.join(FIGURES[kind])} that is not zero")
     unsourced = [
         figure for figure in FIGURES[kind] if getattr(part, figure) and evidence(part, figure).endswith(": ")
     ]
     if unsourced:
         raise PartError(f"{file}: source: says nothing of {', '.join(unsourced)}")
     return part, tree.root
+
+
+def _says(figure: Any) -> bool:
+    """Whether a figure is there, and is not zero: no sensor is without error."""
+    if isinstance(figure, tuple | list):
+        return any(_says(item) for item in figure)
+    return isinstance(figure, float) and figure != 0
 
 
 def folders(beside: str) -> list[str]:
@@ -281,20 +297,13 @@ def with_parts(mission: Mission, beside: str, find: Find, report: Report) -> Any
     """
     is_valid = True
     platforms = mission.platforms
+    sources = _Sources(beside, find, report)
     for name in platforms._fields:
         platform = getattr(platforms, name)
-        error, path = platform.motion_error, ("platforms", name, "motion_error", "sensor")
-        parts = _parts_of(error.sensor, path, ("imu", "gnss"), beside, find, report)
-        error = INVALID if parts is INVALID else _motion_of(error, parts, path, report)
-        oscillator = platform.oscillator
-        if oscillator is not None and oscillator.sensor is not None:
-            path = ("platforms", name, "oscillator", "sensor")
-            parts = _parts_of(oscillator.sensor, path, ("oscillator",), beside, find, report)
-            oscillator = INVALID if parts is INVALID else _oscillator_of(oscillator, parts[0])
-            if oscillator is not INVALID and oscillator.needs_frequency and oscillator.frequency is None:
-                problem = f"{shown(parts[0].name)} states no frequency, at which the mask or the tones are stated"
-                report(path[:-1], Problem(problem, "accepted: oscillator.frequency", at=("frequency",)))
-                oscillator = INVALID
+        error = _with_sensors(platform.motion_error, ("platforms", name, "motion_error"), sources)
+        oscillator = platform.oscillator and _with_sensor(
+            platform.oscillator, ("platforms", name, "oscillator"), sources
+        )
         if INVALID in (error, oscillator):
             is_valid = False
             continue
@@ -302,68 +311,126 @@ def with_parts(mission: Mission, beside: str, find: Find, report: Report) -> Any
     return mission._replace(platforms=platforms) if is_valid else INVALID
 
 
-def _parts_of(
-    names: str | tuple[str, ...] | None,
-    path: KeyPath,
-    kinds: Sequence[str],
-    beside: str,
-    find: Find,
-    report: Report,
-) -> Any:
+def report_parts(root: Any, beside: str, find: Find, report: Report) -> None:
+    """Say what is wrong with the parts that a file names, which is no mission for other reasons.
+
+    A section whose values are right is held to its parts as that of a mission is; of another one the names are looked
+    at. The parameters are those of `with_parts`, `root` is what the file says.
+    """
+    sources = _Sources(beside, find, report)
+    platforms = root.get("platforms")
+    for name in Platforms._fields:
+        platform = platforms.get(name) if isinstance(platforms, dict) else None
+        if not isinstance(platform, dict):
+            continue
+        path: KeyPath = ("platforms", name)
+        if motion := _stand_in(MOTION_ERROR, platform.get("motion_error")):
+            _with_sensors(MotionError(**motion), (*path, "motion_error"), sources)
+        if oscillator := _stand_in(OSCILLATOR, platform.get("oscillator")):
+            _with_sensor(Oscillator(**oscillator), (*path, "oscillator"), sources)
+
+
+def _stand_in(section: Section, value: Any) -> dict[str, Any]:
+    """What a section says, if all of it is right; else the names of its parts."""
+    values = section.each(value)
+    if INVALID not in values.values():
+        return values
+    return {key: found for key, found in values.items() if key == "sensor" and found is not INVALID}
+
+
+class _Sources(NamedTuple):
+    """The folder of a mission file, what finds its parts, and what takes their faults."""
+
+    beside: str
+    find: Find
+    report: Report
+
+
+def _with_sensors(error: MotionError, path: KeyPath, sources: _Sources) -> Any:
+    """A motion error with the figures of its parts; `INVALID` after a report."""
+    path = (*path, "sensor")
+    parts = _parts_of(error.sensor, path, ("imu", "gnss"), sources)
+    return INVALID if parts is INVALID else _motion_of(error, parts, path, sources.report)
+
+
+def _with_sensor(oscillator: Oscillator, path: KeyPath, sources: _Sources) -> Any:
+    """An oscillator with the figures of its part; `INVALID` after a report."""
+    if oscillator.sensor is None:
+        return oscillator
+    parts = _parts_of(oscillator.sensor, (*path, "sensor"), ("oscillator",), sources)
+    found = INVALID if parts is INVALID else _oscillator_of(oscillator, parts[0], path, sources.report)
+    if found is not INVALID and found.needs_frequency and found.frequency is None:
+        problem = f"{shown(parts[0][0].name)} states no frequency, at which the mask or the tones are stated"
+        sources.report(path, Problem(problem, "accepted: oscillator.frequency", at=("frequency",)))
+        return INVALID
+    return found
+
+
+def _parts_of(names: str | tuple[str, ...] | None, path: KeyPath, kinds: Sequence[str], sources: _Sources) -> Any:
+    """Parts, and what the file of each says; `INVALID` after a report."""
+    beside, find, report = sources
     is_list = isinstance(names, tuple)
-    found: list[Part] = []
+    found: list[_Read] = []
     is_valid = True
     for index, name in enumerate(names if isinstance(names, tuple) else [names] if names else []):
         here = (*path, index) if is_list else path
         try:
-            part = _parsed(*find(name))[0]
+            part, written = _parsed(*find(name))
             if part.kind not in kinds:
                 raise PartError(f"is an {part.kind}" if part.kind != "gnss" else "is a GNSS receiver")
         except PartError as error:
             accepted = f"accepted: parts of the kind {' or '.join(kinds)}"
-            names_file = str(error).startswith(os.path.join(beside, name))
-            report(here, Problem(str(error), accepted, names_value=names_file))
+            for said in map(str, error.args):
+                report(here, Problem(said, accepted, names_value=said.startswith(os.path.join(beside, name))))
             is_valid = False
             continue
-        if any(part.kind == other.kind for other in found):
+        if any(part.kind == other.kind for other, _ in found):
             report(here, Problem(f"is a second {part.kind}", "accepted: one part of each kind"))
             is_valid = False
-        found.append(part)
+        found.append((part, written))
     return found if is_valid else INVALID
 
 
-def _motion_of(error: MotionError, parts: Sequence[Part], path: KeyPath, report: Report) -> Any:
-    """Put figures of parts where the file has none."""
-    of_parts: dict[str, str] = {}
-    for part in parts:
+def _motion_of(error: MotionError, parts: Sequence[_Read], path: KeyPath, report: Report) -> Any:
+    """Put figures of parts where the file has none; what it has overrides exactly that figure, and says so."""
+    of_parts = dict(error.of_parts)  # an accuracy file may have been before
+    overridden = list(error.overridden)
+    for part, written in parts:
+        imu = error.imu or Imu()
+        own = imu if isinstance(part, ImuPart) else error
+        taken = {}
+        for figure in FIGURES[part.kind]:
+            if figure not in written:
+                continue
+            key = _own_key(error, own, figure)
+            if key:
+                overridden.append(Overridden(figure, key, part.name, _as_written(written[figure])))
+            else:
+                taken[figure] = getattr(part, figure)
         if isinstance(part, ImuPart):
-            own = error.imu or Imu()
-            taken = {
-                figure: getattr(part, figure)
-                for figure in IMU_KINDS
-                if getattr(own, figure) is None and getattr(part, figure) is not None
-            }
-            error = error._replace(imu=own._replace(**taken))
-        elif isinstance(part, GnssPart):
-            taken = (
-                {}
-                if error.covariance is not None
-                else {
-                    figure: getattr(part, figure)
-                    for figure in ("position", "velocity")
-                    if getattr(error, figure) is None and getattr(part, figure) is not None
-                }
-            )
-            if part.random and not error.random:
-                taken["random"] = part.random
-            if taken and error.frame != "scene":
-                report(path, Problem(f"{shown(part.name)} is stated east, north, up", "accepted: frame: scene"))
-                return INVALID
-            error = error._replace(**taken)
+            error = error._replace(imu=imu._replace(**taken))
+        elif taken and error.frame != "scene":
+            report(path, Problem(f"{shown(part.name)} is stated east, north, up", "accepted: frame: scene"))
+            return INVALID
+        elif taken.keys() & {"position", "velocity"} and error.distribution != "normal":
+            report(path, Problem(f"{shown(part.name)} is stated as one sigma", "accepted: distribution: normal"))
+            return INVALID
         else:
-            continue
+            error = error._replace(**taken)
         of_parts |= {figure: evidence(part, figure) for figure in taken}
-    return error._replace(of_parts=tuple(of_parts.items()))
+    return error._replace(of_parts=tuple(of_parts.items()), overridden=tuple(overridden))
+
+
+def _own_key(error: MotionError, own: MotionError | Imu, figure: str) -> str:
+    """Key below the platform that states a figure beside a part; empty where nothing does."""
+    if figure in ("position", "velocity"):
+        if error.covariance is not None:
+            return "motion_error.covariance"
+        if figure in dict(error.of_parts):
+            return "trajectory.accuracy"
+    if getattr(own, figure) in (None, ()):
+        return ""
+    return f"motion_error.imu.{figure}" if isinstance(own, Imu) else f"motion_error.{figure}"
 
 
 class TakenFigure(NamedTuple):
@@ -403,13 +470,28 @@ def taken_figures(mission: Mission, find: Find) -> Iterator[TakenFigure]:
                     yield TakenFigure(f"platforms.{name}.oscillator.{figure}", written[figure], oscillator.sensor)
 
 
-def _oscillator_of(oscillator: Oscillator, part: Part) -> Oscillator:
-    """An oscillator with the figures of a part; a noise of the file's own replaces that of the part."""
-    has_own = any(getattr(oscillator, form) is not None for form in FORMS)
-    taken = {} if has_own else {form: getattr(part, form) for form in FORMS}
+def _oscillator_of(oscillator: Oscillator, read: _Read, path: KeyPath, report: Report) -> Any:
+    """An oscillator with the figures of a part; what the file states overrides exactly that figure, and says so.
+
+    A mask holds at the frequency it was measured at: with another one beside it, the same decibels would be those of
+    a better or a worse oscillator. The file has to state both, or neither.
+    """
+    part, written = read
+    own = next((form for form in FORMS if getattr(oscillator, form) is not None), None)
+    (form,) = [form for form in FORMS if getattr(part, form) is not None]
+    stated, overridden = getattr(part, "frequency", None), []
+    taken: dict[str, Any] = {}
+    if own is None:
+        taken = {form: getattr(part, form), "source": evidence(part, form)}
+    else:
+        overridden.append(Overridden(own, f"oscillator.{own}", part.name, f"{form} {_as_written(written[form])}"))
     if oscillator.frequency is None:
-        taken["frequency"] = getattr(part, "frequency", None)
-    if not has_own:
-        (form,) = [form for form in FORMS if getattr(part, form) is not None]
-        taken["source"] = evidence(part, form)
-    return oscillator._replace(**taken)
+        taken["frequency"] = stated
+    elif stated is not None and oscillator.frequency != stated:
+        at = _as_written(written["frequency"])
+        if own is None and form == "phase_noise":
+            problem = f"the phase noise of {shown(part.name)} is stated at its own frequency, {at}"
+            report(path, Problem(problem, "accepted: no frequency, or phase_noise beside it", at=("frequency",)))
+            return INVALID
+        overridden.append(Overridden("frequency", "oscillator.frequency", part.name, at))
+    return oscillator._replace(**taken, overridden=tuple(overridden))

@@ -3,27 +3,41 @@
 import hashlib
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
 from bisar_budget.faults import Problem
 from bisar_budget.geometry import STRAIGHT, PlatformState
 from bisar_budget.mission import routes
+from bisar_budget.mission.instruments import Overridden
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.platforms import FlownPath, MotionError, Platform, without_image
+from bisar_budget.mission.platforms import FlownPath, MotionError, Platform, Platforms, without_image
 from bisar_budget.mission.readers import INVALID, Report
 from bisar_budget.paths import earth
-from bisar_budget.paths.flight import Fitted, Log, Orbit, PathFileError, interpolated, slow_times, smoothed
+from bisar_budget.paths.flight import (
+    Fitted,
+    Log,
+    Orbit,
+    PathDoubt,
+    PathFileError,
+    interpolated,
+    slow_times,
+    smoothed,
+)
 from bisar_budget.paths.instant import Instant
 from bisar_budget.resources import UnreadableError, content
+from bisar_budget.units import format_quantity
 
 Beside = Callable[[str], bytes]  # content of a file that a mission names
 
+_FILES = ("tle", "omm", "oem", "file", "accuracy")  # keys of a path that name one
 _MOST_BYTES = 500_000_000
 _LOGS_KEPT = 2  # of a mission that is read again and again, such as by `solve`
 _logs: dict[tuple[object, ...], Log] = {}  # by what they were read from; the bytes themselves are let go
 _FARTHEST_M = 4.1e8  # of a satellite from the Earth's centre
+_LOST = 0.1  # of the slant range: a satellite that may be farther off leaves nothing of the geometry
+_NOISE_M = 1.0  # residual of a log that is doubted where the file declares no position error; as of an ephemeris
 _PLACE = "accepted: scene.latitude, scene.longitude and scene.height"
 
 
@@ -51,6 +65,35 @@ def reader_of(folder: str) -> Beside:
         return data
 
     return read
+
+
+def report_files(root: Any, read: Beside, report: Report) -> None:
+    """Say which orbits and logs cannot be read, of a file that is no mission for other reasons.
+
+    What they say is looked at where the rest of the mission is there: a path depends on its scene, time and aperture.
+
+    Parameters
+    ----------
+    root : dict
+        What the file says.
+    read : callable
+        Content of a file that the mission names; raises `PathFileError`.
+    report : callable
+        Takes what is wrong, and where.
+    """
+    platforms = root.get("platforms")
+    for name in Platforms._fields:
+        platform = platforms.get(name) if isinstance(platforms, dict) else None
+        for key, section in (("orbit", routes.ORBIT), ("trajectory", routes.TRAJECTORY)):
+            named = section.each(platform.get(key)) if isinstance(platform, dict) else {}
+            for form in _FILES:
+                file = named.get(form)
+                if not isinstance(file, str):
+                    continue
+                try:
+                    read(file)
+                except PathFileError as error:
+                    report(("platforms", name, key, form), _of_file(file, error))
 
 
 def with_paths(mission: Mission, read: Beside, report: Report) -> Any:
@@ -114,7 +157,7 @@ def _of_file(file: str | None, error: PathFileError) -> Problem:
     """What is wrong with a file, which is the value of a key and is named once."""
     said = str(error)
     said = f"{file} {said}" if file is not None and said.startswith("has ") else said
-    return Problem(said, names_value=file is not None and said.startswith(file))
+    return Problem(said, error.accepted, error.hint, names_value=file is not None and said.startswith(file))
 
 
 def _known(axes: earth.SceneAxes | None, key: str) -> earth.SceneAxes:
@@ -158,12 +201,30 @@ def _of_orbit(mission: Mission, route: routes.OrbitSource, axes: earth.SceneAxes
         half = mission.collection.aperture_time / 2
         fitted = interpolated(lambda tau: axes.place(orbit.place(center.after(tau))), 2 * half, widest)
         # An interpolation is worst between the places of a file.
-        of_orbit = max((orbit.doubts(center.after(part * half)) for part in (0.0, -0.5, 0.5, -1.0, 1.0)), key=len)
+        instants = [center.after(part * half) for part in (0.0, -0.5, 0.5, -1.0, 1.0)]
+        of_orbit = max((orbit.doubts(instant) for instant in instants), key=len)
+        doubt = max(orbit.doubt(instant) for instant in instants)
+        _hold_to_range(doubt, fitted.state.slant_range, of_orbit, orbit.remedy, name)
     except PathFileError as error:
         raise _UnusablePathError(("orbit", form), _of_file(file, error)) from None
     age = None if orbit.epoch is None else center.since(orbit.epoch)
     path = _flown(fitted, orbit.words, file, hashlib.sha256(data).hexdigest())
-    return path._replace(age=age, doubts=(*of_orbit, *fitted.doubts))
+    doubts = (*of_orbit, *fitted.doubts)
+    return path._replace(
+        age=age, doubts=doubts, doubt_m=doubt.size + fitted.farthest, doubt_of=doubt.words, is_doubted=bool(doubts)
+    )
+
+
+def _hold_to_range(doubt: PathDoubt, slant_range: float, said: Sequence[str], remedy: str, name: str) -> None:
+    """Refuse an orbit that may be elsewhere by more than a tenth of the slant range: the geometry is not known."""
+    if not doubt.size <= _LOST * slant_range:
+        away, known, size = (format_quantity(one, "m", 4) for one in (slant_range, _LOST * slant_range, doubt.size))
+        words = said[0] if said else f"{name}: {doubt.words}"
+        raise PathFileError(
+            f"{words}; a doubt of {size} is more than a tenth of the slant range, {away}",
+            f"accepted: an orbit that is known to {known}",
+            remedy,
+        )
 
 
 def _read_orbit(form: str, data: bytes, name: str, wanted: str | None, center: Instant) -> Orbit:
@@ -183,6 +244,8 @@ def _read_orbit(form: str, data: bytes, name: str, wanted: str | None, center: I
 def _of_log(
     mission: Mission, route: routes.TrajectorySource, axes: earth.SceneAxes | None, read: Beside
 ) -> FlownPath:
+    from bisar_budget.paths import log_motion
+
     aperture_time = mission.collection.aperture_time
     try:
         data = read(route.file)
@@ -192,13 +255,16 @@ def _of_log(
             known = _known(axes, "trajectory")
             log = log._replace(places=known.places(log.places), is_earth_fixed=False)
         times = slow_times(log, mission.collection.center_time, route.center, aperture_time, route.file)
+        log_motion.hold_to_motion(times, log.places, aperture_time, route.file)
         fitted = smoothed(times, log.places, aperture_time)
     except PathFileError as error:
         raise _UnusablePathError(("trajectory", "file"), _of_file(route.file, error)) from None
     words = log.words
     if log.start is None:
         words += f", {route.center or 0.0:.12g} s of it at mid-aperture"
-    return _flown(fitted, words, route.file, digest)
+    path = _flown(fitted, words, route.file, digest)
+    # The root mean square is what a sigma is compared with: the largest of thousands of places is four of them.
+    return path._replace(doubt_of="residual of the smoothed log, root mean square", is_doubted=fitted.rms > _NOISE_M)
 
 
 def _log(route: routes.TrajectorySource, data: bytes, digest: str) -> Log:
@@ -247,12 +313,18 @@ def _by_accuracy(
         )
     except PathFileError as unusable:
         raise _UnusablePathError(key, _of_file(file, unusable)) from None
-    if error.covariance is None:
-        source = f"accuracy file {file}"
-        if error.position is None:
-            error = error._replace(position=stated.position, of_parts=(*error.of_parts, ("position", source)))
-        if error.velocity is None:
-            error = error._replace(velocity=stated.velocity, of_parts=(*error.of_parts, ("velocity", source)))
+    if error.distribution != "normal" and error.covariance is None and None in (error.position, error.velocity):
+        raise _UnusablePathError(key, Problem("states one sigma", "accepted: motion_error.distribution: normal"))
+    source = f"accuracy file {file}"
+    for kind, unit in (("position", "m"), ("velocity", "m/s")):
+        figure = getattr(stated, kind)
+        if error.covariance is None and getattr(error, kind) is None:
+            error = error._replace(**{kind: figure}, of_parts=(*error.of_parts, (kind, source)))
+        else:
+            own = "covariance" if error.covariance is not None else kind
+            text = f"[{', '.join(format_quantity(sigma, unit) for sigma in figure)}]"
+            replaced = Overridden(kind, f"motion_error.{own}", source, text)
+            error = error._replace(overridden=(*error.overridden, replaced))
     return error, hashlib.sha256(data).hexdigest()
 
 
@@ -279,4 +351,7 @@ def _flown(fitted: Fitted, words: str, file: str | None = None, digest: str | No
         rms=fitted.rms,
         samples=fitted.samples or None,
         doubts=fitted.doubts,
+        doubt_m=fitted.rms if fitted.samples else fitted.farthest,
+        doubt_of="polynomial that is flown",
+        is_doubted=bool(fitted.doubts),
     )

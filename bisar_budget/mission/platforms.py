@@ -1,12 +1,13 @@
 """Platforms of a mission file: where they fly, in one of five ways, and how wrong their motion is measured."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from bisar_budget.faults import KeyPath, Problem
 from bisar_budget.geometry import (
+    STILL,
     STRAIGHT,
     BistaticGeometry,
     PlatformState,
@@ -15,6 +16,7 @@ from bisar_budget.geometry import (
     norm,
     state_from_angles,
 )
+from bisar_budget.mission import later
 from bisar_budget.mission.bounds import (
     ACCELERATION,
     COORDINATE,
@@ -36,10 +38,9 @@ from bisar_budget.mission.readers import Choice, Key, Late, ListOf, OneOf, Refer
 
 if TYPE_CHECKING:
     from bisar_budget.mission.covariance import Covariance
-    from bisar_budget.mission.instruments import GaussMarkov, Imu, Oscillator
+    from bisar_budget.mission.instruments import GaussMarkov, Imu, Oscillator, Overridden
     from bisar_budget.mission.routes import OrbitSource, TrajectorySource
 
-STILL = 1e-6  # m/s; slower than this no platform flies an aperture
 LEAST_BASELINE = 1.0  # m, between platforms of which one hears the other
 FARTHEST_BY = 3  # times the least baseline, that they move by in half an aperture: so far a fit of 16 nodes is true
 
@@ -75,6 +76,11 @@ class Vibration(NamedTuple):
     sinusoidal: Annotated[tuple[Sinusoid, ...], Key(ListOf(Sinusoid), "One entry per line.")] = ()
     wideband: Annotated[Wideband | None, Key(Section(Wideband))] = None
 
+    @property
+    def is_stated(self) -> bool:
+        """Whether the file says anything of it; a zero does."""
+        return bool(self.sinusoidal) or self.wideband is not None
+
 
 PART = Reference()
 PARTS = OneOf(lambda value: TextList() if isinstance(value, list) else PART, (PART, TextList()))
@@ -83,7 +89,8 @@ PARTS = OneOf(lambda value: TextList() if isinstance(value, list) else PART, (PA
 class MotionError(NamedTuple):
     """How wrong the measured motion of one platform may be. A scalar means each axis.
 
-    `of_parts` names the figures that come from parts of the catalogue, and the source of each.
+    `of_parts` names the figures that come from parts of the catalogue, and the source of each. `overridden` are the
+    figures of parts that something else in the file replaces.
     """
 
     frame: Annotated[
@@ -117,6 +124,7 @@ class MotionError(NamedTuple):
     ] = ()
     source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
     of_parts: tuple[tuple[str, str], ...] = ()
+    overridden: "tuple[Overridden, ...]" = ()
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
@@ -161,12 +169,7 @@ class CommonMotionError(NamedTuple):
     frame: Annotated[
         str,
         Key(
-            Choice(
-                "scene",
-                refused=dict.fromkeys(
-                    ("track", "look", "ric"), "each platform has its own, an error of both has none"
-                ),
-            ),
+            Choice("scene", refused=later.FRAMES),
             "east, north, up.",
         ),
     ] = "scene"
@@ -215,6 +218,10 @@ class FlownPath(NamedTuple):
     `source` says where it comes from, empty where the file states it; `file` and `sha256` are those of the file it
     was read from, `age` that of its elements [s]. Of a fit the order, the residual at most and root mean square [m],
     and the number of places of a log. `doubts` are warnings, for reports.
+
+    `doubt_m` is how far the truth may be from it by what its own source says: the age of elements, the interpolation
+    of an ephemeris, the residual of a smoothed log; `doubt_of` says which. Where the file declares no position error,
+    it counts if it `is_doubted`.
     """
 
     state: PlatformState
@@ -227,6 +234,9 @@ class FlownPath(NamedTuple):
     rms: float | None = None
     samples: int | None = None
     doubts: tuple[str, ...] = ()
+    doubt_m: float = 0.0
+    doubt_of: str = ""
+    is_doubted: bool = False
     accuracy: tuple[str, str] | None = None  # file that states its errors, and its SHA-256
 
 
@@ -263,16 +273,18 @@ class Platform(NamedTuple):
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
         """Hold it to one complete geometry, above the ground, off the scene centre."""
-        if not values.keys() >= set(_PATH_KEYS):
-            return  # one of them is wrong by itself
-        platform = Platform(**{key: values[key] for key in _PATH_KEYS})
-        unclear = platform._unclear_geometry()
+        wrong = [key for key in _PATH_KEYS if key not in values]  # by themselves, and given all the same
+        given = [key for key in _PATH_KEYS if key in wrong or values[key] is not None]
+        unclear = _unclear_geometry(given, is_fixed=values.get("speed") == 0, may_be_fixed="speed" in wrong)
         if unclear is not None:
             yield unclear
-        if platform.position is not None and platform.position[2] < 0:
+        position: Vector | None = values.get("position")
+        if position is not None and position[2] < 0:
             yield Problem("puts the platform below the ground, z < 0", at=("position", 2))
-        if unclear is None and not platform.is_of_the_earth:
-            yield from platform.without_image(values.get("motion_error"))
+        if unclear is None and not wrong:
+            platform = Platform(**{key: values[key] for key in _PATH_KEYS})
+            if not platform.is_of_the_earth:
+                yield from platform.without_image(values.get("motion_error"))
 
     def without_image(self, error: MotionError | None) -> Iterator[Problem]:
         """Say what keeps its path from forming an image, and its errors from their frame."""
@@ -285,21 +297,6 @@ class Platform(NamedTuple):
                 state.frame(error.frame)
             except UndefinedFrameError as undefined:
                 yield Problem(str(undefined), "accepted: scene", at=("motion_error", "frame"))
-
-    def _unclear_geometry(self) -> Problem | None:
-        given = [key for key in _PATH_KEYS if getattr(self, key) is not None]
-        ways = [way for way in WAYS if any(key in way.own for key in given)] or WAYS[-1:]
-        known = (*ways[0].keys, *ways[0].optional)
-        strange = [key for key in given if key not in known]
-        if strange:
-            own = next(key for key in given if key in ways[0].own)
-            other = next((key for key in strange if any(key in way.own for way in ways[1:])), strange[0])
-            return Problem(f"mixes {own} with {other}", ACCEPTED_WAYS, at=(other,))
-        is_fixed, direction = self.speed == 0, ways[0].direction
-        if is_fixed and direction in given:
-            return Problem("a platform with speed 0 has none", ACCEPTED_WAYS, at=(direction,))
-        missing = [key for key in ways[0].keys if key not in given and not (is_fixed and key == direction)]
-        return Problem(f"lacks {', '.join(missing)}", ACCEPTED_WAYS) if missing else None
 
     @property
     def way(self) -> str:
@@ -322,6 +319,23 @@ class Platform(NamedTuple):
             return _state_from_vectors(self.position, self.velocity, *curves)
         polar = (self.slant_range, self.azimuth, self.elevation, self.speed, self.motion_azimuth, self.climb)
         return _state_from_angles(*polar, *curves)
+
+
+def _unclear_geometry(given: Sequence[str], *, is_fixed: bool, may_be_fixed: bool) -> Problem | None:
+    """Say what keeps the keys that a file gives from being one complete way."""
+    ways = [way for way in WAYS if any(key in way.own for key in given)] or WAYS[-1:]
+    known = (*ways[0].keys, *ways[0].optional)
+    strange = [key for key in given if key not in known]
+    if strange:
+        own = next(key for key in given if key in ways[0].own)
+        other = next((key for key in strange if any(key in way.own for way in ways[1:])), strange[0])
+        return Problem(f"mixes {own} with {other}", ACCEPTED_WAYS, at=(other,))
+    direction = ways[0].direction
+    if is_fixed and direction in given:
+        return Problem("a platform with speed 0 has none", ACCEPTED_WAYS, at=(direction,))
+    needless = direction if is_fixed or may_be_fixed else ""
+    missing = [key for key in ways[0].keys if key not in given and key != needless]
+    return Problem(f"lacks {', '.join(missing)}", ACCEPTED_WAYS) if missing else None
 
 
 def _bends(jerk: Vector | None, snap: Vector | None) -> tuple[Vector, ...]:

@@ -13,8 +13,9 @@ from importlib import import_module
 from typing import Any, NamedTuple
 
 from bisar_budget.faults import InvalidValueError, KeyPath, Problem
+from bisar_budget.mission import later
 from bisar_budget.resources import docstring
-from bisar_budget.units import Dimension, format_quantity, parse_quantity
+from bisar_budget.units import ANGLE, Dimension, format_quantity, parse_quantity
 
 INVALID: Any = object()  # in place of a value that was reported
 Report = Callable[[KeyPath, Problem], None]
@@ -96,9 +97,10 @@ class Quantity(Reader):
             )
             if not holds
         )
-        raise InvalidValueError(
-            f"must be {words} {format_quantity(bound, self.dimension.si)}", hint=self._meant(value)
-        )
+        said = format_quantity(bound, self.dimension.si)
+        if self.dimension is ANGLE:  # three digits of a radian are not 90 deg
+            said = f"{math.degrees(bound):.6g} deg"
+        raise InvalidValueError(f"must be {words} {said}", hint=self._meant(value))
 
     def _meant(self, value: Any) -> str:
         """Hint at the unit that a bare number may lack."""
@@ -198,19 +200,23 @@ class Glob(Text):
 
 
 class Choice(Reader):
-    """One of a few words; `refused` maps words that mean something elsewhere to why not here."""
+    """One of a few words; `refused` maps words that mean something elsewhere to why not here.
+
+    `accepted` says which there are; omitted: all of them.
+    """
 
     is_word = True
 
-    def __init__(self, *names: str, refused: Mapping[str, str] | None = None) -> None:
+    def __init__(self, *names: str, refused: Mapping[str, str] | None = None, accepted: str = "") -> None:
         self.names = names
         self.refused = refused or {}
+        self.accepted = accepted or ", ".join(names)
 
     def leaf(self, value: Any) -> str:
         """Refuse other words, with the nearest."""
         if isinstance(value, str) and value in self.names:
             return value
-        accepted = f"accepted: {', '.join(self.names)}"
+        accepted = f"accepted: {self.accepted}"
         if isinstance(value, str) and value in self.refused:
             raise InvalidValueError(self.refused[value], accepted)
         raise InvalidValueError("is not a known choice", accepted, did_you_mean(value, self.names))
@@ -223,13 +229,13 @@ class Choice(Reader):
 class Words(Reader):
     """A list of some of a few words, each once."""
 
-    def __init__(self, *names: str) -> None:
-        self.word = Choice(*names)
+    def __init__(self, *names: str, accepted: str = "") -> None:
+        self.word = Choice(*names, accepted=accepted)
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
         """Read each word at its own place."""
         if not isinstance(value, list):
-            report(path, Problem("must be a list", f"accepted: some of {', '.join(self.word.names)}"))
+            report(path, Problem("must be a list", f"accepted: some of {self.word.accepted}"))
             return INVALID
         words = tuple([_read(self.word, word, (*path, index), report) for index, word in enumerate(value)])
         for index, word in enumerate(words):
@@ -358,6 +364,7 @@ class Section(Reader):
         }
         self.defaults: dict[str, Any] = kind._field_defaults
         self.required = [name for name in self.keys if name not in self.defaults]
+        self.later = later.KEYS.get(kind.__name__, {})
         self.problems = getattr(kind, "problems", None)
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
@@ -369,27 +376,38 @@ class Section(Reader):
         values = {}
         for name, item in value.items():
             key = self.keys.get(name)
+            if name in self.later:
+                report((*path, name), Problem(later.PROBLEM, self.later[name], is_of_key=True))
+                is_valid = False
+                continue
             if key is None:
                 known = f"accepted: {', '.join(self.keys)}"
                 hint = _POINT if name[:1].isdigit() else did_you_mean(name, tuple(self.keys))
-                report((*path, name), Problem("is not a known key", known, hint))
+                report((*path, name), Problem("is not a known key", known, hint, is_of_key=True))
                 is_valid = False
                 continue
             values[name] = item if item is INVALID else key.reader.read(item, (*path, name), report)
         if INVALID in values.values():
             is_valid = False
+        # What is to come may stand in the place of another key, or of a default.
+        is_whole = self.later.keys().isdisjoint(value)
         for name in self.required:
-            if name not in value:
+            if name not in value and is_whole:
                 report((*path, name), Problem("is missing"))
                 is_valid = False
         if self.problems is not None:
-            right = self.defaults | values
+            right = self.defaults | values if is_whole else values
             if not is_valid:
                 right = {name: item for name, item in right.items() if item is not INVALID}
             for problem in self.problems(right):
                 report(path, problem)
                 is_valid = False
         return self.kind(**values) if is_valid else INVALID
+
+    def each(self, value: Any) -> dict[str, Any]:
+        """Read each known key by itself, and say nothing: `INVALID` stands for what is wrong."""
+        given = value.items() if isinstance(value, dict) else ()
+        return {name: _read(self.keys[name].reader, item, (), _unsaid) for name, item in given if name in self.keys}
 
     def below(self, part: str) -> Reader | None:
         """Give the reader of a key."""
@@ -493,6 +511,10 @@ def is_place(part: str) -> bool:
 
 def _read(reader: Reader, value: Any, path: KeyPath, report: Report) -> Any:
     return INVALID if value is INVALID else reader.read(value, path, report)
+
+
+def _unsaid(path: KeyPath, problem: Problem) -> None:
+    """Take what is said elsewhere."""
 
 
 def did_you_mean(given: object, known: tuple[str, ...]) -> str:

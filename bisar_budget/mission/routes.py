@@ -5,6 +5,7 @@ from typing import Annotated, Any, NamedTuple
 
 from bisar_budget import units
 from bisar_budget.faults import InvalidValueError, Problem
+from bisar_budget.mission import later
 from bisar_budget.mission.readers import (
     INVALID,
     Choice,
@@ -90,7 +91,9 @@ class TrajectorySource(NamedTuple):
     """A log of a flight."""
 
     file: Annotated[str, Key(_FILE, "Beside the mission file.")]
-    format: Annotated[str | None, Key(Choice(*FORMATS), "Omitted: by the name's ending; .out is sbet.")] = None
+    format: Annotated[
+        str | None, Key(Choice(*FORMATS, refused=later.FORMATS), "Omitted: by the name's ending; .out is sbet.")
+    ] = None
     week: Annotated[int | None, Key(Whole(0, 9999), "GPS week in which an SBET begins, not rolled over.")] = None
     center: Annotated[
         float | None,

@@ -98,7 +98,7 @@ class Tree:
             except (KeyError, IndexError, TypeError):
                 value = None
                 break
-        is_key = value is None or problem.problem == "is not a known key"
+        is_key = value is None or problem.is_of_key
         place = (self.keys if is_key else self.values).get(path)
         for length in range(len(path) - 1, 0, -1):
             if place is not None:

@@ -8,6 +8,7 @@ __all__ = [
     "flight",
     "flight_log",
     "instant",
+    "log_motion",
     "mean_elements",
     "polynomials",
     "sbet",

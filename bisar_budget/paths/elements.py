@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from bisar_budget.faults import shown
 from bisar_budget.geometry import Vector
-from bisar_budget.paths.flight import Orbit, PathFileError
+from bisar_budget.paths.flight import Orbit, PathDoubt, PathFileError
 from bisar_budget.paths.instant import DAY, Instant
 from bisar_budget.paths.interpolation import Sample, interpolate
 from bisar_budget.paths.turning import INSTALL, from_teme
@@ -24,6 +24,7 @@ _NODES, _STEP_S = 8, 30.0
 _FRESH_DAYS = 7.0
 _FARTHEST_DAYS = 36525.0  # SGP4 steps through the time to a resonant orbit
 _AT_EPOCH_KM, _PER_DAY_KM = 1, (1, 3)
+_USUAL_PER_DAY_KM = 2.0  # middle of what the sources say
 _LISTED = 10  # objects that an error names
 PLAIN_TYPES = ("", "0", "2")  # CCSDS 502.0-B-3, EPHEMERIS_TYPE; 0 is SGP4 in all that is distributed, 4 is SGP4-XP
 # The error codes of Satrec.sgp4; 5 is no longer in use.
@@ -141,6 +142,11 @@ def orbit_of(elements: Elements, name: str) -> Orbit:
     inertial = smooth(teme(elements))
     inertial(elements.epoch)  # what SGP4 refuses is known before anybody asks
 
+    def doubt(instant: Instant) -> PathDoubt:
+        days = abs(instant.since(elements.epoch)) / DAY
+        words = f"elements {days:.3g} days from their epoch: {_AT_EPOCH_KM} km there, {_USUAL_PER_DAY_KM:g} km a day"
+        return PathDoubt(1e3 * (_AT_EPOCH_KM + _USUAL_PER_DAY_KM * days), words)
+
     def doubts(instant: Instant) -> Sequence[str]:
         days = instant.since(elements.epoch) / DAY
         if abs(days) <= _FRESH_DAYS:
@@ -156,6 +162,8 @@ def orbit_of(elements: Elements, name: str) -> Orbit:
         words=f"{elements.kind} of {elements.object}, epoch {elements.epoch.as_text()}, SGP4",
         epoch=elements.epoch,
         doubts=doubts,
+        doubt=doubt,
+        remedy="Take elements whose epoch is nearer to collection.center_time",
     )
 
 

@@ -6,6 +6,7 @@ other years differ by, centimetres, is not seen. Those of the stars are turned w
 
 import math
 import re
+from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import NamedTuple
@@ -13,7 +14,7 @@ from typing import NamedTuple
 from bisar_budget.faults import shown
 from bisar_budget.geometry import Vector
 from bisar_budget.paths.fields import LATEST, decoded, epoch_in, hold_to_size, number_in
-from bisar_budget.paths.flight import Orbit, PathFileError
+from bisar_budget.paths.flight import Orbit, PathDoubt, PathFileError
 from bisar_budget.paths.instant import DAY, Instant
 from bisar_budget.paths.interpolation import Sample, interpolate
 from bisar_budget.paths.leap_seconds import FIRST_DAY, TAI_LESS, has_leap_second, tai, tai_less_utc, utc
@@ -28,7 +29,10 @@ _SYSTEMS = ("UTC", *TAI_LESS)
 _DEGREE = 7  # where the message says none
 _HIGHEST_DEGREE = 31
 _APART = 0.9e-3  # s; nearer samples are one, and differences of times of two centuries are rounded to 1e-6 s
-_SEEN_M, _LOST_M = 1.0, 100_000.0  # errors of an interpolation that are said, and that are refused: gaps
+# Errors of an interpolation that are said, and that are refused whatever the slant range: the lowest satellites are
+# 500 km away, and a tenth of that is lost.
+_SEEN_M, _LOST_M = 1.0, 50_000.0
+_MORE_OFTEN = "Write the ephemeris more often"
 _EDGE = 1e-9  # s; a time at the end of a span is inside
 _OWN_VELOCITY = 0.001  # of the speed; one against the stars is up to 7 % off in a low orbit
 _SLOW = 100.0  # m/s; slower ones over the ground are held to a tenth of a metre a second
@@ -118,14 +122,39 @@ def _orbit(segment: _Segment, where: str, center: Instant) -> Orbit:
         found = inside(instant)
         return turn(found, instant) if turn else found
 
-    def off(instant: Instant) -> float:
+    more = min(nodes + (1 if segment.is_hermite else 2), len(segment.samples))
+    times = [one.time for one in segment.samples]
+
+    def misses(time: Instant) -> float:
         """How far the interpolation is from one of two more degrees: about its error. [m]"""
-        more = min(nodes + (1 if segment.is_hermite else 2), len(segment.samples))
-        better = interpolate(segment.samples, tai(instant), more, segment.is_hermite)
-        return math.dist(inside(instant), better)
+        usual, better = (interpolate(segment.samples, time, count, segment.is_hermite) for count in (nodes, more))
+        error = math.dist(usual, better)
+        return error if math.isfinite(error) else math.inf
+
+    @lru_cache(maxsize=16)
+    def off(instant: Instant) -> float:
+        """Error of the interpolation at an instant, or between the samples around it: at a sample it is none. [m]
+
+        What is missed between two samples is a wrong velocity beside them.
+        """
+        time = tai(instant)
+        behind = min(max(bisect_right(times, time), 1), len(times) - 1)
+        before, after = times[behind - 1 : behind + 1]
+        return max(misses(time), misses(before.after(after.since(before) / 2)))
 
     if not off(center) < _LOST_M:
-        raise PathFileError(f"{where}: the ephemeris is too sparse around {center.as_text()} to interpolate")
+        raise PathFileError(
+            f"{where}: the ephemeris is too sparse around {center.as_text()} to interpolate",
+            f"accepted: an interpolation that is less than {_LOST_M / 1e3:g} km off",
+            _MORE_OFTEN,
+        )
+
+    def doubt(instant: Instant) -> PathDoubt:
+        if turn is None:
+            return PathDoubt(off(instant), "interpolation of the ephemeris")
+        # The three are of other causes; at their worst they add.
+        size = off(instant) + sum(unknown_rotation(inside(instant)))
+        return PathDoubt(size, "interpolation of the ephemeris, 0.1 s of UT1 - UTC and polar motion")
 
     def doubts(instant: Instant) -> Sequence[str]:
         said = []
@@ -145,7 +174,7 @@ def _orbit(segment: _Segment, where: str, center: Instant) -> Orbit:
             f" off for each 0.1 s of UT1 - UTC, and up to {moved:.0f} m; an ephemeris in ITRF has neither",
         )
 
-    return Orbit(place=place, words=segment.words, span=span, doubts=doubts)
+    return Orbit(place=place, words=segment.words, span=span, doubts=doubts, doubt=doubt, remedy=_MORE_OFTEN)
 
 
 def _turn(frame: str, where: str) -> Turn | None:

@@ -29,14 +29,32 @@ _ROUNDED = 1 + 1e-6  # of an interval whose ends are rounded
 
 
 class PathFileError(Exception):
-    """A file that gives no path. The message names the file, and its line, byte or record."""
+    """A file that gives no path. The message names the file, and its line, byte or record.
+
+    `accepted` says what a file would have instead, `hint` what may be done.
+    """
+
+    def __init__(self, message: str, accepted: str = "", hint: str = "") -> None:
+        super().__init__(message)
+        self.accepted, self.hint = accepted, hint
+
+
+class PathDoubt(NamedTuple):
+    """How far the truth may be from a path, by what is known of its own source [m], and what that is."""
+
+    size: float
+    words: str
+
+
+NO_DOUBT = PathDoubt(0.0, "")
 
 
 class Orbit(NamedTuple):
     """A path that is known at any instant of a span.
 
     `place` takes an instant and gives Earth-fixed coordinates [m]. `words` says what it is, for reports; `epoch` is
-    that of the elements. `doubts` are warnings about it at an instant.
+    that of the elements. `doubt` says at an instant how far the truth may be; `doubts` are warnings of it, where it
+    is more than usual, and `remedy` is what makes it less.
     """
 
     place: Callable[[Instant], Vector]
@@ -44,6 +62,8 @@ class Orbit(NamedTuple):
     span: tuple[Instant, Instant] | None = None
     epoch: Instant | None = None
     doubts: Callable[[Instant], Sequence[str]] = lambda _: ()
+    doubt: Callable[[Instant], PathDoubt] = lambda _: NO_DOUBT
+    remedy: str = ""
 
 
 class Log(NamedTuple):

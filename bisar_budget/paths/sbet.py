@@ -131,8 +131,8 @@ def read_accuracy(
     Raises
     ------
     PathFileError
-        Names the file, and the record or byte of the fault. The records do not cover the aperture, or have a gap in
-        it.
+        Names the file, and the record or byte of the fault. The records do not cover the aperture, have a gap in it,
+        or state an error of zero all over it.
     """
     records = _records(data, name, 10, _SIGMAS)
     times, start = _risen(records[:, 0], name), None
@@ -143,7 +143,11 @@ def read_accuracy(
     half = aperture_time_s / 2
     first = max(int(np.searchsorted(slow, -half, "right")) - 1, 0)
     inside = records[first : int(np.searchsorted(slow, half, "left")) + 1]
-    north, east, down, north_rate, east_rate, down_rate = inside[:, 1:7].max(axis=0).tolist()
+    largest = inside[:, 1:7].max(axis=0)
+    if not largest.all():
+        empty = ", ".join(field for (field, *_), sigma in zip(_SIGMAS[1:], largest, strict=True) if not sigma)
+        raise PathFileError(f"{name}: {empty}: 0 in the whole aperture; no trajectory is without error")
+    north, east, down, north_rate, east_rate, down_rate = largest.tolist()
     return Accuracy((east, north, down), (east_rate, north_rate, down_rate), len(inside))
 
 

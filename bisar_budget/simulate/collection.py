@@ -164,6 +164,10 @@ class PointCollection:
         """Over the centre frequency: range cells that a wavelength of range error walks."""
         return self.radar.bandwidth / self.radar.center_frequency
 
+    def window(self, count: int) -> Floats:
+        """Weights over the aperture, or the band, at the centres of equal cells."""
+        return taylor_window(count) if self.is_tapered else np.ones(count)
+
     def paths(self, errors: Errors, slow_time: Floats, rng: np.random.Generator | None = None) -> tuple[Path, Path]:
         """Fly both platforms."""
         ways = direct_path_ways(self.geometry, slow_time) if self.has_direct_path else (None, None)
@@ -252,7 +256,7 @@ class PointCollection:
             clock_error=clock,
         )
         if self.is_tapered:
-            history.samples[:] *= np.outer(taylor_window(slow_time.size), taylor_window(frequencies))
+            history.samples[:] *= np.outer(self.window(slow_time.size), self.window(frequencies))
         image = backprojection(history, grid, self.kernel) * baseband(self.flown(errors), grid, self.wavelength)
         return Chip(image, grid, spacing)
 

@@ -200,11 +200,12 @@ def phase_courses(
     if sync is None:
         pieces = tuple(piece._replace(high=min(piece.high, highest)) for piece in pieces if piece.low < highest)
     tones = _Tones(pieces, T)
+    waves = _slow_waves(tones.slow, times)
     interval = sync.interval if sync is not None and sync.method == "linear" else None
     found = np.empty((draws, times.size))
     for index in range(draws):
         drawn = tones.draw(rng)
-        found[index] = drawn.at(times)
+        found[index] = drawn.at(times, waves)
         if interval is not None:
             # Pulses that follow each other faster take the phase away to nothing that an image shows.
             knots = _knots(times, max(interval, T / _MOST_KNOTS), rng)
@@ -232,11 +233,17 @@ class _Drawn(NamedTuple):
     rest: float
     rng: np.random.Generator
 
-    def at(self, times: Floats) -> Floats:
-        """Sum of the tones. [rad]"""
-        turn = 2 * math.pi * np.multiply.outer(times, self.frequency)
-        found: Floats = np.cos(turn) @ self.cosine + np.sin(turn) @ self.sine + self.fast.at(times)
+    def at(self, times: Floats, waves: tuple[Floats, Floats] | None = None) -> Floats:
+        """Sum of the tones; `waves` are those of the slow ones at these times, where they are known. [rad]"""
+        cosines, sines = waves or _slow_waves(self.frequency, times)
+        found: Floats = cosines @ self.cosine + sines @ self.sine + self.fast.at(times)
         return found + self.rest * self.rng.standard_normal(times.size) if self.rest else found
+
+
+def _slow_waves(frequency: Floats, times: Floats) -> tuple[Floats, Floats]:
+    """Cosines and sines of tones at some times, (times, tones) each."""
+    turn = 2 * math.pi * np.multiply.outer(times, frequency)
+    return np.cos(turn), np.sin(turn)
 
 
 class _Tones:

@@ -310,14 +310,14 @@ def vibration() -> Table:
     """Vibration from first principles: what a phase of peak φ or rms σ does, and the motion that does it.
 
     A sinusoid's echoes are J₁(φ)/J₀(φ) of the response, φ/2 to first order. Of Gaussian noise exp(-σ²) of the power
-    stays in the response, so that the rest over it is exp(σ²) - 1. Both platforms at one frequency divide amplitudes,
-    both with noise of their own divide powers.
+    stays in the response, and a share E of that within its first nulls, so that the rest over it is (exp(σ²) - 1)/E.
+    Both platforms at one frequency divide amplitudes, both with noise of their own divide powers.
     """
-    amplitude, rms, phase, part = positive("A"), positive("sigma"), positive("phi"), positive("a")
+    amplitude, rms, phase, part, energy = (positive(name) for name in ("A", "sigma", "phi", "a", "E"))
     over, under = (series(besselj(n, phase), phase, 0, 2).removeO() for n in (1, 0))
     echo = over / under
     (largest,) = solve(Eq(echo, sqrt(pslr)), phase)
-    spread = exp(phase**2) - 1
+    spread = (exp(phase**2) - 1) / energy
     (noise,) = (root for root in solve(Eq(spread, islr), phase) if root.is_nonnegative is not False)
     rows = (
         (amplitude, echo**2, motion_of_phase(largest), "one platform alone"),
@@ -331,5 +331,8 @@ def vibration() -> Table:
         rows=tuple(
             TableRow(number=None, error=e, label=e, cells=(p, limit), note=note) for e, p, limit, note in rows
         ),
-        notes=("Derived here. The tool takes J₁(φ)/J₀(φ) as it is; a = √s_k/(√s_t + √s_r) of PSLR·(s_t + s_r).",),
+        notes=(
+            "Derived here. The tool takes J₁(φ)/J₀(φ) as it is; a = √s_k/(√s_t + √s_r) of PSLR·(s_t + s_r).",
+            "E: share of the error-free response's energy within its first nulls, 0.903 uniform, 0.998 Taylor.",
+        ),
     )

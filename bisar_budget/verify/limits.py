@@ -110,8 +110,6 @@ def _order(one: Subject) -> tuple[int, int]:
 
 def _of_instruments(study: Study) -> Iterator[tuple[str, Case]]:
     """Sensors and clocks that have a limit, and what all noise spreads together."""
-    if not study.analysis.random:
-        return
     from bisar_budget.budget.random_rows import islr_rows
     from bisar_budget.effects.clocks import spurs_of
     from bisar_budget.verify.random_cases import limits_of, verify_islr, verify_random, verify_spur

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from bisar_budget.analysis.allocation import range_walk_cap
 from bisar_budget.analysis.vibration_limits import slow_limits
 from bisar_budget.budget.collection_notes import COARSE_CELL_RAD, phase_across_a_cell
 from bisar_budget.budget.pull_in import ROOM
@@ -25,7 +26,6 @@ from bisar_budget.verify.study import Sizes, Study
 
 TOLERANCE = 0.05  # of the budget: nearer than this a limit is confirmed
 INSIDE, BEYOND = 0.9, 1.1  # of the limit: through it the phase must grow with the error
-HALF_CELL = 0.5  # of range walk; beyond, one-dimensional autofocus leaves a loss (0.34 dB there, uniform)
 FOCUSED_CELLS, FOCUSED_RAD = 2 * CELLS, 12.0  # a phase up to which a response is read in so many cells
 _PEAK_CELLS = 3  # of range around the lines that autofocus reads: the peak is between two lines
 _BESIDE_CELLS = 64  # of smear; beyond, no images are formed on both sides of a limit
@@ -171,7 +171,7 @@ def cubic(study: Study, requirement: float) -> Verdict:
 
 
 def pull_in(study: Study, n_pull: float) -> Verdict:
-    """A clock error of π·N_pull, which bends no geometry, refocused; range walk bounds what can work."""
+    """A clock error of π·N_pull, which bends no geometry, refocused; no N_pull goes beyond the cap of range walk."""
     phase, budget, radar = math.pi * n_pull, study.allocation.qpe_total, study.mission.radar
     walk = n_pull * radar.bandwidth / radar.center_frequency / 2  # λN/2 over c/B
     blank = Verdict(
@@ -179,14 +179,8 @@ def pull_in(study: Study, n_pull: float) -> Verdict:
     )
     clock = next(s for s in study.sources if s.id == "timing.quadratic")
     found = refocused(study, [(clock, phase / abs(clock.effect.qpe))], budget)
-    verdict = str(found["verdict_autofocus"])
-    bound = radar.center_frequency / radar.bandwidth
-    reason = reasons.range_walk(walk, bound)
-    if verdict == "confirmed" and walk > HALF_CELL:
-        verdict = "optimistic"
-    return blank._replace(
-        boundary_autofocus=phase, **{**found, "verdict_autofocus": verdict}, verdict=verdict, reason=reason
-    )
+    reason = reasons.range_walk(walk, range_walk_cap(study.mission))
+    return blank._replace(boundary_autofocus=phase, **found, verdict=found["verdict_autofocus"], reason=reason)
 
 
 def refocused(study: Study, sizes: Sizes, budget: float) -> dict[str, Any]:

@@ -1,8 +1,8 @@
 """Verdicts on the limits of sensors and clocks: many time series at the limit, and images of a few of them.
 
 A sigma speaks of many flights. Whole time series go through exact ranges for it, and images of some of them say
-whether a response shows the phase that exact ranges find. What spreads is measured in the aperture, as for vibration:
-by Parseval the power beside the coherent response is the variance of the aperture's phasor.
+whether a response shows the phase that exact ranges find. What spreads is measured as for vibration, in images of as
+many time series as a verdict takes, see `noise_image`.
 """
 
 import math
@@ -10,24 +10,23 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bisar_budget.analysis.spread import spread_limit, spread_powers
+from bisar_budget.analysis.spread import islr_db, mainlobe_energy, shown_islr_db, spread_limit, spread_powers, tones
 from bisar_budget.budget.random_rows import ISLR, limits_for, sizes_at
-from bisar_budget.budget.vibration_rows import islr_db
 from bisar_budget.effects.clocks import Spur
 from bisar_budget.effects.exact_arrays import aperture_nodes
 from bisar_budget.effects.models import CUBIC
 from bisar_budget.effects.random_errors import RandomError
-from bisar_budget.effects.subject import Subject
+from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.vibration_lines import sight_of
 from bisar_budget.findings.images import Verdict
 from bisar_budget.mission.model import Simulation
 from bisar_budget.simulate.collection import Errors
-from bisar_budget.simulate.phase_history import SMOOTH, Course, Floats, PathError, PathSinusoid
+from bisar_budget.simulate.phase_history import SMOOTH, Course, Floats, PathError, PathSinusoid, cell_centres
 from bisar_budget.simulate.realisations import clock_seconds, correlation_time, phase_courses, position_courses
 from bisar_budget.verify import reasons
 from bisar_budget.verify.phase_cases import TOLERANCE, compare
 from bisar_budget.verify.study import Study
-from bisar_budget.verify.vibration_cases import TOLERANCE_DB, echo
+from bisar_budget.verify.vibration_cases import MOMENTS, echo, measured_power
 
 _DRAWS, _CLOCK_DRAWS = 4000, 1000  # know a sigma to 1.1 %, and to 2.2 %
 _SYNCHRONIZED_DRAWS = 400  # whose fast tones are drawn too, because they are folded
@@ -35,8 +34,6 @@ _TURNS = 100  # of a tone per aperture, beyond which it has no quadratic phase t
 _SURE = 3.0  # standard errors of a sigma
 _IMAGES = 6
 _FINE = 513  # moments of a time series in an image
-_POWER_DRAWS = 48
-_MOMENTS = 4096  # of an aperture whose spread power is measured
 _AT_ONCE = 250  # draws in memory
 _ORDER = 3  # up to which a phase moves and defocuses; the rest spreads
 
@@ -78,10 +75,9 @@ def verify_random(study: Study, error: RandomError) -> Verdict:
         boundary_error=20 * math.log10(size) if error.unit == "dB" else size,
         unit=error.unit,
     )
-    rng = _stream(study, error.id)
     if binding == ISLR:
-        return _power(study, blank, [at_limit], size * error.effect(_model(study, error)).spread, rng)
-    return _phase(study, blank, at_limit, binding, rng)
+        return _power(study, blank, [at_limit], error.owner)
+    return _phase(study, blank, at_limit, binding, _stream(study, error.id))
 
 
 def _phase(study: Study, blank: Verdict, error: RandomError, binding: str, rng: np.random.Generator) -> Verdict:
@@ -176,54 +172,66 @@ def _series(study: Study, error: RandomError, rng: np.random.Generator) -> list[
 # ---------------------------------------------------------------------- what spreads
 def verify_islr(study: Study, of: Subject) -> Verdict:
     """Everything that spreads, scaled together to the limit of a row's owner."""
-    model = study.models[-1].name
-    limit = spread_limit(study.mission, study.allocation, of.owner, model) or 0.0
-    blank = Verdict(id=of.id, model=study.model, boundary_error=islr_db(limit**2) or 0.0, unit="dB")
+    mission, model = study.mission, study.models[-1].name
+    limit = spread_limit(mission, study.allocation, of.owner, model) or 0.0
+    level = islr_db(limit**2, model, mainlobe_energy(mission))
+    blank = Verdict(id=of.id, model=study.model, boundary_error=level, unit="dB")
     powers = spread_powers(study.analysis, study.allocation, of.owner, model)
     total = math.fsum(power for _, power in powers)
     if not total:
         return blank._replace(reason=reasons.no_spread_declared())
     scale = limit / math.sqrt(total)
-    random = {error.id: error for error in study.analysis.random}
-    declared = [random[row_id] for row_id, _ in powers if row_id in random]
-    members = [error._replace(declared=scale * (error.declared or 0.0)) for error in declared]
-    white = scale * math.sqrt(math.fsum(power for row_id, power in powers if row_id not in random))
-    return _power(study, blank, members, limit, _stream(study, of.id), white)
+    rms = {row_id: scale * math.sqrt(power) for row_id, power in powers}
+    members = [
+        error._replace(declared=scale * (error.declared or 0.0)) for error in study.analysis.random if error.id in rms
+    ]
+    cubic = rms.pop(subject("mission", CUBIC).id, 0.0)
+    cycles = {one.subject.id: one.cycles for one in tones(mission)}
+    echoes = [(rms[row_id], turns) for row_id, turns in cycles.items() if row_id in rms]
+    known = {error.id for error in members} | cycles.keys()
+    white = math.sqrt(math.fsum(size**2 for row_id, size in rms.items() if row_id not in known))
+    return _power(study, blank, members, of.owner, white, echoes, cubic)
 
 
 def _power(
     study: Study,
     blank: Verdict,
     members: Sequence[RandomError],
-    limit: float,
-    rng: np.random.Generator,
+    owner: str,
     white: float = 0.0,
+    echoes: Sequence[tuple[float, float]] = (),
+    cubic: float = 0.0,
 ) -> Verdict:
-    """Mean power that time series spread beside the response, in the aperture, against a limit [rad rms]."""
-    collection = study.collection
-    k = 2 * math.pi / collection.wavelength
-    times = _moments(study, _MOMENTS)
-    # Each moment stands for a step: a time series is not faster than that.
-    phases = white * rng.standard_normal((_POWER_DRAWS, times.size))
-    for error in members:
-        if error.subject.kind in ("imu", "random"):
-            moved = position_courses(study.mission, error, times, _POWER_DRAWS, rng)
-            phases += k * moved @ np.array(sight_of(study.mission, error.owner))
-        else:
-            phases += phase_courses(study.mission, error, times, _POWER_DRAWS, rng)
+    """ISLR that time series at a limit add to an image, against what an owner may add to it.
+
+    Beside the errors of sensors and clocks there may be white noise, tones, each with its cycles per aperture, and a
+    cubic phase; of each the rms over the aperture. [rad]
+    """
+    mission, collection = study.mission, study.collection
+    rng = _stream(study, blank.id)
+    # Each moment stands for a step: what is faster is noise from step to step.
+    times = cell_centres(collection.aperture_time, MOMENTS)
     place = 2 * times / collection.aperture_time
-    fit = np.polynomial.legendre.legfit(place, phases.T, _ORDER)
-    phasor = np.exp(1j * (phases - np.polynomial.legendre.legval(place, fit)))
-    coherent = np.abs(phasor.mean(axis=1)) ** 2
-    ratios = (1 - coherent) / coherent
-    mean, spread = float(np.mean(ratios)), float(np.std(ratios, ddof=1)) / math.sqrt(_POWER_DRAWS)
-    level, required = 10 * math.log10(mean), islr_db(limit**2) or 0.0
-    excess = level - required
-    verdict = "confirmed" if abs(excess) <= TOLERANCE_DB else "optimistic" if excess > 0 else "conservative"
-    return blank._replace(
-        requirement_db=required,
-        measured_db=level,
-        measured_db_error=10 / math.log(10) * spread / mean,
-        verdict=verdict,
-        reason=reasons.mean_power_of_time_series(_POWER_DRAWS),
-    )
+    legendre = np.polynomial.legendre.legvander(place, _ORDER)
+    fitted = legendre @ np.linalg.pinv(legendre)
+
+    def left(draws: int) -> Floats:
+        """Phases without what moves and defocuses the response."""
+        phases = white * rng.standard_normal((draws, times.size))
+        for error in members:
+            if error.subject.kind in ("imu", "random"):
+                moved = position_courses(mission, error, times, draws, rng)
+                phases += 2 * math.pi / collection.wavelength * moved @ np.array(sight_of(mission, error.owner))
+            else:
+                phases += phase_courses(mission, error, times, draws, rng)
+        phases = phases - phases @ fitted
+        for rms, cycles in echoes:
+            turned = 2 * math.pi * rng.random((draws, 1))
+            phases += math.sqrt(2) * rms * np.cos(math.pi * cycles * place + turned)
+        if cubic:  # of P₃, whose mean square over the aperture is a seventh
+            phases += math.sqrt(7) * cubic * rng.standard_normal((draws, 1)) * legendre[:, 3]
+        return phases
+
+    allowed = spread_limit(mission, study.allocation, owner, "full") or 0.0  # what an image may show
+    required = shown_islr_db(mission, allowed**2) or 0.0
+    return measured_power(collection, blank._replace(requirement_db=required), left, reasons.power_of_time_series())

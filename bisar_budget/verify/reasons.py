@@ -194,9 +194,21 @@ def sigma_of_time_series(draws: int, factor: float, images: int, is_cubic: bool)
 
 
 @phrase
-def mean_power_of_time_series(draws: int) -> str:
+def power_of_time_series() -> str:
     """Of what spreads."""
-    return f"mean power that {draws} time series spread"
+    return "ISLR that time series add to the mean of their images"
+
+
+@phrase
+def draws_decide(draws: int, low: float, high: float) -> str:
+    """Of noise, how many draws its verdict took, and the interval of what images show. [dB]"""
+    return f"{low:.2f} to {high:.2f} dB at 95 %, by {draws} draws"
+
+
+@phrase
+def draws_do_not_decide(draws: int, low: float, high: float) -> str:
+    """Of noise so near the border of two verdicts that as many draws as are made do not tell them apart. [dB]"""
+    return f"{low:.2f} to {high:.2f} dB at 95 %, by {draws} draws, which is too near the border of two verdicts"
 
 
 # ---------------------------------------------------------------------- autofocus

@@ -46,7 +46,7 @@ class TestOutputs:
         received = []
         reader = threading.Thread(target=lambda: received.append(fifo.read_text()))
         reader.start()
-        assert run("check", mission, "-q", "-o", fifo).exit_code == 0
+        assert run("check", mission, "-q", "-o", fifo).exit_code == 1
         reader.join(10)
         assert "NOT EVAL" in received[0]
         assert stat.S_ISFIFO(fifo.stat().st_mode)
@@ -81,7 +81,7 @@ class TestOutputs:
             done = subprocess.run(
                 [*COMMAND, "check", odd, "--format", format_name, "-o", target], capture_output=True
             )
-            assert done.returncode == 0, done.stderr
+            assert done.returncode == 1, done.stderr
             assert target.read_text()
         assert sorted(p.name for p in tmp_path.iterdir() if p.name.startswith(".")) == []
 
@@ -187,7 +187,7 @@ class TestModelOption:
     def test_overrides_the_file_also_where_that_has_no_allocation(self, run, in_file) -> None:
         for model in ("published", "full"):
             result = run("check", "-", "--model", model, "--format", "json", input=mission_text(**in_file))
-            assert result.exit_code == 0
+            assert result.exit_code == 1  # nothing is declared
             assert json.loads(result.stdout)["missions"][0]["model"] == model
 
 

@@ -107,7 +107,7 @@ _KEYS = {
     "platforms__transmitter__position__2": _FACTORS,
     "timing_error__quadratic": _FACTORS,
     "requirements__quadratic_phase_error": _FACTORS,
-    "allocation__coverage_factor": _FACTORS,
+    "allocation__coverage_factor": st.lists(st.floats(1.0, 3.0), min_size=2, max_size=2),  # at least 1
     "scene__radius": _FACTORS,
 }
 MASK = """
@@ -129,6 +129,14 @@ _RULES = {
     "scene.radius": ("100 m", "3 km"),
     "timing_error.quadratic": ("1e-12 /s",),
     "requirements.islr": ("-25 dB",),
+    "requirements.pslr": ("-30 dB",),
+    "requirements.declare": ("[position, imu]", "[receiver.oscillator, timing]"),
+    "waivers": ("[{id: 'mission.*', until: 2030-01-01, reason: tried}]",),
+    "platforms.transmitter.motion_error.vibration": (
+        "{wideband: {rms: 50 um}}",
+        "{sinusoidal: [{amplitude: 100 um, frequency: 20 Hz}, {amplitude: 1 um, frequency: 0.1 Hz}]}",
+    ),
+    "platforms.receiver.motion_error.vibration": ("{sinusoidal: [{amplitude: 3 um, frequency: 20.5 Hz}]}",),
     "platforms.transmitter.motion_error.imu": ("{attitude: 0.01 deg, velocity_random_walk: 0.05 m/s/sqrt(h)}",),
     "platforms.receiver.motion_error.random": ("[{name: GNSS, sigma: [1 mm, 2 mm, 0], correlation_time: 2 s}]",),
     "platforms.receiver.motion_error": (COVARIANCE,),
@@ -275,6 +283,17 @@ def test_vibrations_may_be_slow(rule) -> None:
     assert_as_checked(mission, cases, whole, columns)
 
 
+def test_the_end_of_the_image_binds() -> None:
+    """A transmitter of 30 m of doubt along the line of sight, of which the image ends at 10.8 m."""
+    mission = parse_mission(of_family("aircraft", 3), "m.yaml", "full")
+    T = mission.collection.aperture_time
+    cases = grid(mission, collection__aperture_time=[0.9 * T, T, 1.1 * T])
+    whole, by_case = swept(mission, cases, model="full")
+    assert by_case == 0
+    assert list(whole["binding_requirement"]) == ["end_of_image"] * 3
+    assert_as_checked(mission, cases, whole, model="full")
+
+
 def test_what_arrays_do_not_hold_is_checked_one_by_one() -> None:
     """A path that the Earth decides is found anew for every aperture."""
     mission = load_mission(str(MISSIONS / "sentinel1_elements_besancon.yaml"))
@@ -285,11 +304,11 @@ def test_what_arrays_do_not_hold_is_checked_one_by_one() -> None:
 
 
 _LINK = "{error: 1 deg, interval: 0.3 s}"
-_FIGURES = f"""
-synchronization: {_LINK}
-requirements: {{islr: -25 dB, pslr: -30 dB, quadratic_phase_error: 45 deg}}
-allocation: {{split: {{transmitter: 0.3, receiver: 0.5, clock: 0.2}}, combine: rss}}
-"""
+_FIGURES: dict[str, Any] = {
+    "synchronization": {"error": "1 deg", "interval": "0.3 s"},
+    "requirements": {"islr": "-25 dB", "pslr": "-30 dB", "quadratic_phase_error": "45 deg"},
+    "allocation": {"split": {"transmitter": 0.3, "receiver": 0.5, "clock": 0.2}, "combine": "rss"},
+}
 
 
 @pytest.mark.parametrize(("rule", "model"), [("each", "published"), ("rss", "full"), ("sum", "strictest")])
@@ -359,7 +378,7 @@ def test_figures_of_sensors_clocks_and_covariances_vary(axes) -> None:
         "platforms.receiver.motion_error": COVARIANCE,
         "platforms.transmitter.motion_error": "{frame: track, imu: {attitude: 0.01 deg}}",
     }
-    mission = parse_mission(mission_text() + _FIGURES, "m.yaml", changes=[SetValue(*one) for one in changes.items()])
+    mission = parse_mission(mission_text(**_FIGURES), "m.yaml", changes=[SetValue(*one) for one in changes.items()])
     cases = grid(mission, **axes)
     columns = ["receiver.oscillator.allowable", "mission.quadratic_phase_error.declared", "receiver.islr.margin"]
     whole, by_case = swept(mission, cases, columns)
@@ -408,6 +427,20 @@ def test_a_fixed_platform_that_moves_has_no_direction() -> None:
     assert "lacks motion_azimuth" in whole["reason"][1]
 
 
+@pytest.mark.parametrize("rule", ["each", "rss"])
+def test_autofocus_counts_up_to_range_walk(rule) -> None:
+    """f₀/B varies from 10 to 100 and n_pull from below to above it."""
+    text = mission_text(timing_error__quadratic="2e-12 /s", autofocus__n_pull=2, allocation__combine=rule)
+    mission = parse_mission(text, "m.yaml")
+    cases = grid(mission, radar__bandwidth=[100e6, 300e6, 1e9], autofocus__n_pull=[1.0, 9.99, 10.0, 33.4, 1e4])
+    columns = ["timing.quadratic.allowable", "mission.autofocus_pull_in.allowable", "timing.quadratic.status"]
+    whole, by_case = swept(mission, cases, columns)
+    assert by_case == 0
+    assert_as_checked(mission, cases, whole, columns)
+    counts = np.minimum(whole["autofocus.n_pull"], 10e9 / whole["radar.bandwidth"])
+    assert whole["mission.autofocus_pull_in.allowable"] == pytest.approx(math.pi * counts)
+
+
 def test_both_sides_of_the_limit() -> None:
     """An error set a part in 10⁸ below its allowable passes (with a warning: it is near), one above fails."""
     mission = parse_mission(mission_text(timing_error__quadratic="1e-12 /s"), "m.yaml")
@@ -439,6 +472,53 @@ def test_what_must_be_declared_and_is_not() -> None:
     whole, by_case = swept(mission, cases, column)
     assert by_case == 0
     assert list(whole["status"]) == list(whole[column[0]]) == ["not_evaluated"] * 2
+    assert_as_checked(mission, cases, whole, column)
+
+
+@pytest.mark.parametrize("asked", ["[imu, receiver.oscillator]", "[timing]", "[transmitter.velocity]"])
+@pytest.mark.parametrize("waived", [None, "mission.declare", "transmitter.*"])
+def test_what_must_be_declared_and_has_no_row_is_said_in_every_case(asked, waived) -> None:
+    """A kind that nobody declares has no row of its own; a waiver of the whole covers the rows that there are."""
+    changes = [SetValue("requirements.declare", asked)]
+    waivers = [{"id": waived, "until": "2999-01-01", "reason": "known"}] if waived else []
+    text = mission_text(timing_error__quadratic="1e-13 /s", waivers=waivers)
+    mission = parse_mission(text, "m.yaml", changes=changes)
+    cases = grid(mission, collection__aperture_time=[1.0, 4.0])
+    column = ["transmitter.velocity.y.status", "mission.declare.status"]
+    whole, by_case = swept(mission, cases, column)
+    assert by_case == 0
+    is_met = asked == "[timing]" or waived == "mission.declare"
+    assert list(whole["status"]) == ["pass" if is_met else "not_evaluated"] * 2
+    assert_as_checked(mission, cases, whole, column)
+
+
+def test_a_frequency_that_would_relabel_the_mask_of_a_part_is_an_error_of_each_case() -> None:
+    text = mission_text(platforms__receiver__oscillator={"sensor": "sit5358", "frequency": "10 MHz"})
+    mission = parse_mission(text, "m.yaml")
+    cases = grid(mission, platforms__receiver__oscillator__frequency=[5e6, 10e6, 100e6])
+    whole, _ = swept(mission, cases)
+    assert [status == "error" for status in whole["status"]] == [True, False, True]
+    assert "is stated at its own frequency, 10 MHz" in whole["reason"][0]
+    assert_as_checked(mission, cases, whole)
+
+
+def test_a_platform_that_stands_still_in_some_cases_owes_less_in_them() -> None:
+    receiver = {
+        "position": ["6 km", "6 km", "2 km"],
+        "velocity": [0, "1 m/s", 0],
+        "motion_error": {"position": "1 cm"},
+    }
+    text = mission_text(
+        platforms__receiver=receiver,
+        platforms__transmitter__motion_error={"velocity": "1 mm/s"},
+        requirements__declare=["velocity"],
+    )
+    mission = parse_mission(text, "m.yaml")
+    cases = grid(mission, platforms__receiver__velocity__1=[0.0, 1.0, 5.0])
+    column = ["mission.declare.status", "receiver.velocity.x.status"]
+    whole, by_case = swept(mission, cases, column)
+    assert by_case == 0
+    assert list(whole[column[0]]) == ["pass", "not_evaluated", "not_evaluated"]
     assert_as_checked(mission, cases, whole, column)
 
 
@@ -614,7 +694,11 @@ class TestWords:
             ("motion_error.sensor=[stim300", r"sensor=\[stim300: is not valid YAML"),
             ("orbit.tle=[a, b],[c, d]", "tle: no value of it makes a mission: .* mixes orbit"),
             ("motion_error.frame=track,ric", "frame=ric: the ric frame needs the scene's latitude"),
-            ("trajectory.file=a.csv,b.csv", "file: no value of it makes a mission: .* mixes trajectory"),
+            (
+                "trajectory.file=tandem_x.yaml,tandem_l.yaml",
+                "file: no value of it makes a mission: .* mixes trajectory",
+            ),
+            ("trajectory.file=a.csv,b.csv", "file=a.csv: a.csv cannot be read"),
         ],
     )
     def test_what_no_number_can_mend_is_said_at_once(self, text: str, said: str) -> None:

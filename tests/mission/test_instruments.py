@@ -1,17 +1,21 @@
 """Figures of data sheets in a mission file, and the parts of the catalogue."""
 
+import html
 import math
 import os
 from pathlib import Path
 
 import pytest
 
+from bisar_budget.budget.check import check_mission
 from bisar_budget.constants import STANDARD_GRAVITY
 from bisar_budget.effects.sources import error_sources
 from bisar_budget.faults import MissionError
+from bisar_budget.findings.mission import Report
 from bisar_budget.mission.instruments import PowerLaw
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.parts import FIGURES, PartError, catalogue, entries, evidence, folders, read_part
+from bisar_budget.report import Style, render
 from bisar_budget.resources import resource
 from bisar_budget.units import (
     ANGLE_RANDOM_WALK,
@@ -21,6 +25,7 @@ from bisar_budget.units import (
     format_quantity,
     parse_quantity,
 )
+from tests.conftest import TODAY
 
 MISSION = """schema_version: 1
 name: Instruments
@@ -154,6 +159,8 @@ def test_a_mask_is_sorted_by_frequency() -> None:
         ("motion_error: {sensor: [stim300, hg1700]}", "hg1700", "sensor[1]: is a second imu"),
         ("motion_error: {sensor: [stim300, stim300]}", "stim300]", "is in the list twice"),
         ("motion_error: {sensor: mosaic-x5-rtk, frame: track}", "mosaic", "is stated east, north, up"),
+        ("motion_error: {sensor: mosaic-x5-rtk, distribution: uniform}", "mosaic", "is stated as one sigma"),
+        ("motion_error: {sensor: mosaic-x5-rtk, velocity: 1 cm/s, distribution: bound}", "mosaic", "one sigma"),
         ("motion_error: {sensor: nowhere/mine.yaml}", "nowhere", "cannot be read: No such file or directory"),
     ],
 )  # fmt: skip
@@ -169,6 +176,10 @@ def test_exchanged_pulses_have_an_interval() -> None:
     assert (
         parse_mission(MISSION + "synchronization: {error: 1 deg, method: direct_path}\n").synchronization is not None
     )
+
+
+def _name(part: str) -> str:
+    return read_part(str(resource("specs", "sensors") / f"{part}.yaml")).name
 
 
 class TestCatalogue:
@@ -230,6 +241,108 @@ class TestCatalogue:
         assert oscillator.phase_noise is None
         assert oscillator.power_law == PowerLaw(white=1e-24)
 
+    def test_what_the_file_overrides_is_shown_beside_what_the_part_says(self) -> None:
+        """A report showed the file's value alone, as if the part had none."""
+        text = receiver(
+            "motion_error:\n  sensor: [stim300, mosaic-x5-dgnss]\n  velocity: 1 cm/s\n  imu: {gyro_bias: 2 deg/h}\n"
+        )
+        found = check_mission(parse_mission(text), TODAY)
+        at, gnss, imu = "platforms.receiver.motion_error", "Septentrio mosaic-X5, DGNSS", _name("stim300")
+        of_velocity = f"{at}.velocity stands in place of 0.03 m/s of {gnss}"
+        of_gyro = f"{at}.imu.gyro_bias stands in place of 0.5 deg/h of {imu}"
+        noted = {row.id: row.remarks for row in found.rows if any("in place of" in one for one in row.remarks)}
+        assert noted.keys() == {*(f"receiver.velocity.{axis}" for axis in "xyz"), "receiver.imu.gyro_bias"}
+        assert all((of_velocity in noted[one]) == (one != "receiver.imu.gyro_bias") for one in noted)
+        assert of_gyro in noted["receiver.imu.gyro_bias"]
+        assert {of_velocity, of_gyro} <= set(found.notes)
+        for name in ("html", "markdown", "json"):
+            said = html.unescape(render(name, Report("", (found,)), Style())).replace("\\", "").replace("<wbr>", "")
+            assert "in place of 0.03 m/s of" in said, name
+            assert "in place of 0.5 deg/h of" in said, name
+
+    def test_without_a_key_beside_it_a_part_is_overridden_by_nothing(self) -> None:
+        found = check_mission(parse_mission(receiver("motion_error: {sensor: [stim300, mosaic-x5-rtk]}")), TODAY)
+        assert not [note for note in found.notes if "in place of" in note]
+
+    def test_a_covariance_says_what_it_replaces_of_a_part_and_leaves_the_rest(self, tmp_path) -> None:
+        """It used to drop the position and the velocity of a GNSS receiver without a word."""
+        file = tmp_path / "gnss.yaml"
+        file.write_text(
+            "kind: gnss\nname: Ours\nsource: test 7\nposition: 2 cm\nvelocity: [1 cm/s, 1 cm/s, 2 cm/s]\n"
+            "random: [{name: multipath, sigma: 1 mm, correlation_time: 30 s}]\n"
+        )
+        covariance = "covariance: {position: 1 mm, velocity: 1 mm/s}"
+        mission = parse_mission(receiver(f"motion_error: {{sensor: {file}, {covariance}}}"))
+        error = mission.platforms.receiver.motion_error
+        assert (error.position, error.velocity) == (None, None)
+        assert [one.name for one in error.random] == ["multipath"]
+        found = check_mission(mission, TODAY)
+        key = "platforms.receiver.motion_error.covariance"
+        said = {
+            "position": f"{key} stands in place of 2 cm of Ours",
+            "velocity": f"{key} stands in place of [1 cm/s, 1 cm/s, 2 cm/s] of Ours",
+        }
+        for kind, words in said.items():
+            assert all(words in row.remarks for row in found.rows if row.id.startswith(f"receiver.{kind}."))
+            assert words in found.notes
+        (random,) = (row for row in found.rows if row.id == "receiver.random.multipath")
+        assert random.evidence == "Ours: test 7"
+        assert random.remarks == ()
+
+    @pytest.mark.parametrize("distribution", ["normal", "uniform", "bound"])
+    def test_a_distribution_is_that_of_the_files_own_figures(self, distribution: str) -> None:
+        """One sigma of a part is no bound; figures of an IMU are one sigma whatever stands beside them."""
+        own = f"position: 1 cm, velocity: 1 cm/s, distribution: {distribution}"
+        error = parse_mission(
+            receiver(f"motion_error: {{sensor: [stim300, mosaic-x5-rtk], {own}}}")
+        ).platforms.receiver
+        assert error.motion_error.distribution == distribution
+
+    def test_random_errors_of_the_file_replace_those_of_a_part(self, tmp_path) -> None:
+        file = tmp_path / "gnss.yaml"
+        part = "{name: multipath, sigma: 1 mm, correlation_time: 30 s}"
+        file.write_text(f"kind: gnss\nname: Ours\nsource: test 7\nrandom: [{part}]\n")
+        own = "random: [{name: noise, sigma: 2 mm, correlation_time: 1 s}]"
+        found = check_mission(parse_mission(receiver(f"motion_error: {{sensor: {file}, {own}}}")), TODAY)
+        (row,) = (row for row in found.rows if row.subject.kind == "random")
+        assert row.id == "receiver.random.noise"
+        (said,) = row.remarks
+        assert "motion_error.random stands in place of [name: multipath, sigma: 1 mm" in said
+
+    @pytest.mark.parametrize(
+        ("text", "said"),
+        [
+            ("sensor: sit5358, frequency: 100 MHz", "the phase noise of {} is stated at its own frequency, 10 MHz"),
+            ("sensor: sit5358, frequency: 1 MHz, spurs: {50 Hz: -90 dBc}", "is stated at its own frequency, 10 MHz"),
+            ("sensor: sit5358, frequency: 10 MHz", ""),
+            ("sensor: sit5358, frequency: 10000 kHz, spurs: {50 Hz: -90 dBc}", ""),
+            ("sensor: sit5358, frequency: 100 MHz, phase_noise: {1 Hz: -80 dBc/Hz, 9 Hz: -90 dBc/Hz}", ""),
+            ("sensor: sit5358, frequency: 100 MHz, power_law: {h0: 1e-24}", ""),
+            ("sensor: wenzel-5mhz, frequency: 10 MHz, spurs: {50 Hz: -90 dBc}", ""),
+        ],
+    )
+    def test_a_frequency_does_not_relabel_the_mask_of_a_part(self, text: str, said: str) -> None:
+        """`frequency: 100 MHz` beside a mask at 10 MHz made the oscillator 20 dB better than it is."""
+        text = f"oscillator: {{{text}}}"
+        if not said:
+            assert parse_mission(receiver(text)).platforms.receiver.oscillator is not None
+            return
+        (found,) = faults(receiver(text)).splitlines()
+        assert found.startswith(f"10:{len(INDENT) + text.index('frequency:') + 12}: ")
+        assert said.format(_name("sit5358")) in found
+        assert "accepted: no frequency, or phase_noise beside it" in found
+
+    def test_what_is_replaced_of_an_oscillator_is_said(self) -> None:
+        text = "oscillator: {sensor: wenzel-5mhz, frequency: 10 MHz, spurs: {50 Hz: -90 dBc}}"
+        found = check_mission(parse_mission(receiver(text)), TODAY)
+        said = f"platforms.receiver.oscillator.frequency stands in place of 5 MHz of {_name('wenzel-5mhz')}"
+        for row_id in ("receiver.oscillator", "receiver.oscillator.spur.0"):
+            assert [said in row.remarks for row in found.rows if row.id == row_id] == [True]
+        text = "oscillator: {sensor: wenzel-5mhz, allan_deviation: {1 s: 1e-12}}"
+        found = check_mission(parse_mission(receiver(text)), TODAY)
+        (noise,) = (note for note in found.notes if "in place of" in note)
+        assert "oscillator.allan_deviation stands in place of power_law h-1: 1.268e-26" in noise
+
     def test_own_parts_stand_in_a_folder_of_the_project_or_anywhere(self, tmp_path, monkeypatch) -> None:
         monkeypatch.chdir(tmp_path)
         own = 'kind: imu\nname: Ours\naccelerometer_bias: 1 mg\nsource: "test report 7"\n'
@@ -256,6 +369,10 @@ class TestCatalogue:
             ("kind: imu\nname: x\nsource: y\naccelerometer_bias: 1 deg\n", "4:21: accelerometer_bias: must be"),
             ("kind: oscillator\nname: x\nsource: y\nfrequency: 10 MHz\n", "says nothing of its noise"),
             ("a: &a b\n", "kind: must be one of"),
+            ("kind: imu\nname: x\nsource: y\n", "states no figure; accepted: one of accelerometer_bias"),
+            ("kind: gnss\nname: x\nsource: y\nrandom: []\n", "states no figure; accepted: one of position"),
+            ("kind: imu\nname: x\nsource: y\ngyro_bias: 0\nattitude: [0, 0, 0]\n", "that is not zero"),
+            ("kind: oscillator\nname: x\nsource: y\npower_law: {h0: 0}\n", "that is not zero"),
         ],
     )  # fmt: skip
     def test_a_part_that_cannot_be_used_says_where(self, tmp_path, text: str, said: str) -> None:

@@ -4,6 +4,7 @@ import hashlib
 import html
 import json
 import math
+import re
 import struct
 import sys
 from collections.abc import Callable
@@ -13,17 +14,22 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bisar_budget.budget.check import check_mission
+from bisar_budget.faults import MissionError
 from bisar_budget.geometry import Vector
 from bisar_budget.mission import paths
 from bisar_budget.mission.load import load_mission
 from bisar_budget.paths import earth, flight_log, two_lines
+from bisar_budget.paths.ephemeris import read_oem
 from bisar_budget.paths.instant import Instant
-from tests.conftest import mission_text
+from bisar_budget.units import format_quantity
+from tests.conftest import TODAY, mission_text
 from tests.paths.flown import flight, geodetic_csv, sbet, smrmsg
-from tests.paths.orbit_files import CENTER, EPOCH, LINE_1, LINE_2, TLE, oem, omm_json, on_circle
+from tests.paths.orbit_files import CENTER, EPOCH, LINE_1, LINE_2, START, TLE, oem, omm_json, on_circle
 from tests.report.test_report_diff import git
 
 BELOW_FLIGHT = {"latitude": "48.1 deg", "longitude": "11.3 deg", "height": "600 m"}  # beside `flown.flight`
+LINEAR = ("INTERPOLATION = LINEAR", "INTERPOLATION_DEGREE = 1")
 needs_links = pytest.mark.skipif(sys.platform == "win32", reason="needs links without rights to make them")
 FLIGHT = {"latitude": "48.2 deg", "longitude": "11.1 deg", "altitude": "3 km", "heading": "60 deg", "speed": "120 kn"}
 
@@ -48,6 +54,15 @@ def aircraft(**changes: Any) -> str:
     trajectory = {"trajectory": {"file": "flight.csv"}}
     scene = {**BELOW_FLIGHT, "height": changes.pop("height", "600 m")}
     return _text(transmitter, trajectory, scene, "2026-06-01T05:20:06.250Z", **changes)
+
+
+def ephemeris(center: str, text: str, **changes: Any) -> str:
+    """A mission whose transmitter has the ephemeris a.oem, some 300 km from the scene; `text` is a good one."""
+    last = START.after(1199.0)
+    below = earth.geodetic(read_oem(text.encode(), "x", None, last).place(last))
+    scene = {"latitude": f"{below.latitude} rad", "longitude": f"{below.longitude + 0.05} rad", "height": 0}
+    receiver = {**FLIGHT, "latitude": f"{below.latitude + 0.001} rad", "longitude": f"{below.longitude + 0.05} rad"}
+    return _text({"orbit": {"oem": "a.oem"}}, receiver, scene, center, **changes)
 
 
 def _text(transmitter: Any, receiver: Any, scene: Any, center: str, **changes: Any) -> str:
@@ -139,6 +154,33 @@ class TestEveryKindOfPath:
         assert error.position == pytest.approx((0.03, 0.02, 0.05))  # east, north, up
         assert error.velocity == pytest.approx((0.01,) * 3)
         assert error.evidence("position") == "accuracy file smrmsg.out"
+        found = check_mission(load_mission(str(folder / "m.yaml")), TODAY)
+        said = (
+            "platforms.receiver.motion_error.velocity stands in place of [5 mm/s, 4 mm/s, 6 mm/s] of accuracy file "
+            "smrmsg.out"
+        )
+        assert said in found.notes
+        assert {row.id for row in found.rows if said in row.remarks} == {f"receiver.velocity.{one}" for one in "xyz"}
+
+    def test_an_accuracy_file_stands_before_a_part_and_behind_a_covariance_and_says_so(self, folder: Path) -> None:
+        """The evidence of the accuracy file was lost beside a part, and a covariance replaced it in silence."""
+        route = {"file": "sbet.out", "week": 2421, "accuracy": "smrmsg.out"}
+        stated = {"trajectory": route, "motion_error": {"sensor": ["stim300", "mosaic-x5-rtk"]}}
+        (folder / "m.yaml").write_text(aircraft(platforms__receiver=stated))
+        mission = load_mission(str(folder / "m.yaml"))
+        error = mission.platforms.receiver.motion_error
+        assert error.position == pytest.approx((0.03, 0.02, 0.05))
+        assert error.evidence("position") == error.evidence("velocity") == "accuracy file smrmsg.out"
+        said = [note for note in check_mission(mission, TODAY).notes if "in place of" in note]
+        assert [note.partition(" of ")[0] for note in said] == [
+            "platforms.receiver.trajectory.accuracy stands in place"
+        ] * 2
+        stated["motion_error"] = {"covariance": {"position": "1 cm", "velocity": "1 cm/s"}}
+        (folder / "m.yaml").write_text(aircraft(platforms__receiver=stated))
+        said = [note for note in check_mission(load_mission(str(folder / "m.yaml")), TODAY).notes if "smrmsg" in note]
+        assert [note.partition(" of ")[0] for note in said] == [
+            "platforms.receiver.motion_error.covariance stands in place"
+        ] * 2
 
 
 class TestWhatIsSaid:
@@ -166,18 +208,18 @@ class TestWhatIsSaid:
             satellite(EPOCH.after(7.1 * 86400), platforms__receiver__motion_error={"position": "1 mm"})
         )
         found = json.loads(run("check", folder / "m.yaml", "--format", "json").stdout)["missions"][0]
-        (doubt,) = [one["message"] for one in found["warnings"] if "days" in one["message"]]
-        assert "7.1 days" in doubt
-        assert found["status"] == "warn"
+        (doubt,) = {one["reason"] for one in found["rows"] if "days" in (one["reason"] or "")}
+        assert "elements 7.1 days from their epoch" in doubt
+        assert found["status"] == "not_evaluated"
 
     def test_a_place_that_strays_is_a_doubt(self, run: Callable[..., Any], folder: Path) -> None:
-        """One height of 501 is wrong by 6 km: the path is smooth all the same, and wrong."""
-        stated = {"trajectory": {"file": "flight.csv"}, "motion_error": {"position": "1 mm"}}
+        """One height of 501 is wrong by 9 cm; of what is wrong by more see the logs that jump."""
+        stated = {"trajectory": {"file": "flight.csv"}, "motion_error": {"position": "1 cm"}}
         (folder / "m.yaml").write_text(aircraft(platforms__receiver=stated))
         assert run("check", "--strict", folder / "m.yaml").exit_code == 0
         header, *rest = geodetic_csv(flight()).split(b"\n")
         cells = rest[240].split(b",")
-        rest[240] = b",".join([*cells[:3], b"9000"])
+        rest[240] = b",".join([*cells[:3], b"3000.09"])
         (folder / "flight.csv").write_bytes(b"\n".join([header, *rest]))
         found = run("check", "--strict", folder / "m.yaml")
         assert found.exit_code == 1
@@ -186,19 +228,18 @@ class TestWhatIsSaid:
     def test_chords_of_an_ephemeris_are_a_doubt_wherever_the_middle_is(
         self, run: Callable[..., Any], folder: Path
     ) -> None:
-        (folder / "a.oem").write_text(oem(interpolation=("INTERPOLATION = LINEAR", "INTERPOLATION_DEGREE = 1")))
-        place, _ = on_circle(1200.0)
-        below = earth.geodetic(place)
-        scene = {"latitude": f"{below.latitude} rad", "longitude": f"{below.longitude + 0.05} rad", "height": 0}
-        receiver = {
-            **FLIGHT,
-            "latitude": f"{below.latitude + 0.001} rad",
-            "longitude": f"{below.longitude + 0.05} rad",
-        }
+        (folder / "a.oem").write_text(oem(interpolation=LINEAR))
         for center in ("2026-06-01T05:19:00Z", "2026-06-01T05:19:30Z"):  # at a place of the file, and between two
-            (folder / "m.yaml").write_text(_text({"orbit": {"oem": "a.oem"}}, receiver, scene, center))
+            declared = {"platforms__receiver__motion_error": {"position": "1 mm"}}
+            (folder / "m.yaml").write_text(ephemeris(center, oem(), **declared))
             found = json.loads(run("check", folder / "m.yaml", "--format", "json").stdout)["missions"][0]
-            assert found["warnings"], found
+            assert found["status"] == "not_evaluated"
+            (reason,) = {one["reason"] for one in found["rows"] if one["id"].startswith("transmitter.position")}
+            said = re.fullmatch(
+                r"the path may be (.*) km off \(interpolation of the ephemeris\), no position error is declared: .*",
+                reason,
+            )
+            assert float(said[1]) == pytest.approx(3.587, rel=0.02)  # r(ωh)²/8 of a chord of 60 s
 
     def test_the_accuracy_of_a_log_is_hashed_too(self, run: Callable[..., Any], folder: Path) -> None:
         route = {"file": "sbet.out", "week": 2421, "accuracy": "smrmsg.out"}
@@ -262,6 +303,19 @@ def rows(keep: Callable[[list[bytes]], list[bytes]]) -> bytes:
     return b"\n".join([header, *keep(rest)])
 
 
+def replaced(change: Callable[[int, list[bytes]], list[bytes]]) -> bytes:
+    """The log of the flight with other places: `change` takes the number of a row, and its cells."""
+    header, *rest = geodetic_csv(flight()).split(b"\n")
+    cells = [change(n, one.split(b",")) if one else [one] for n, one in enumerate(rest)]
+    return b"\n".join([header, *(b",".join(one) for one in cells)])
+
+
+FIRST = geodetic_csv(flight()).split(b"\n")[1].split(b",")
+
+
+LATER = [one.split(b",")[1:] for one in geodetic_csv(flight()).split(b"\n")[1:]]
+
+
 def in_metres(seconds: float) -> tuple[Vector, Vector]:
     place, velocity = on_circle(seconds)
     return tuple(1000 * one for one in place), velocity
@@ -317,6 +371,32 @@ BROKEN: dict[str, tuple[Callable[[], str], dict[str, bytes | str], str]] = {
         {"flight.csv": rows(lambda rest: rest[:240] + rest[270:])},
         "flight.csv: has a gap of",
     ),
+    "elements ten years old": (
+        lambda: satellite(EPOCH.after(3652.2 * 86400)),
+        {},
+        "3652.2 days before the aperture; SGP4 may place it 3653 to 10958 km off; a doubt of 7305 km is more",
+    ),
+    "an ephemeris that is missed by 80 km": (
+        lambda: ephemeris("2026-06-01T05:20:00Z", oem()),
+        {"a.oem": oem(interpolation=LINEAR, step=282.0)},
+        "too sparse around 2026-06-01T05:20:00.000Z to interpolate",
+    ),
+    "a log that stands still": (
+        aircraft,
+        {"flight.csv": replaced(lambda _, cells: [cells[0], *FIRST[1:]])},
+        "flight.csv: stands still: its 101 places in the aperture are the same to 1 mm; accepted: the log of a "
+        "platform that moves. A fixed platform needs no log: give its place, and speed 0",
+    ),
+    "a log that repeats places": (
+        aircraft,
+        {"flight.csv": replaced(lambda n, cells: [cells[0], *LATER[5 * (n // 5)]])},
+        "flight.csv: repeats places: 80 of 101 in the aperture are the place before",
+    ),
+    "a log that jumps": (
+        aircraft,
+        {"flight.csv": replaced(lambda n, cells: [*cells[:3], b"9000" if n == 240 else cells[3]])},
+        "flight.csv: jumps by 6 km within 0.02 s",
+    ),
     "a log of three places": (
         aircraft,
         {"flight.csv": rows(lambda rest: rest[::100])},
@@ -353,6 +433,23 @@ BROKEN: dict[str, tuple[Callable[[], str], dict[str, bytes | str], str]] = {
         ),
         {},
         "sbet.out",
+    ),
+    "an accuracy of zeros": (
+        lambda: aircraft(
+            platforms__receiver={"trajectory": {"file": "sbet.out", "week": 2421, "accuracy": "zeros.out"}}
+        ),
+        {"zeros.out": smrmsg(np.arange(61.0), north=0, east=0, down=0, rates=(0, 0, 0))},
+        "no trajectory is without error",
+    ),
+    "an accuracy that is no bound": (
+        lambda: aircraft(
+            platforms__receiver={
+                "trajectory": {"file": "sbet.out", "week": 2421, "accuracy": "smrmsg.out"},
+                "motion_error": {"distribution": "uniform", "velocity": "1 cm/s"},
+            }
+        ),
+        {},
+        "states one sigma",
     ),
     "an accuracy in another frame": (
         lambda: aircraft(
@@ -421,3 +518,50 @@ def test_a_report_says_where_and_when(run: Callable[..., Any], folder: Path) -> 
     place = "48.10000° N, 11.30000° E, 600 m above the ellipsoid, mid-aperture 2026-06-01T05:20:06.250Z"
     assert place in " ".join(run("check", folder / "m.yaml").stdout.split())
     assert place in html.unescape(run("check", folder / "m.yaml", "--format", "html").stdout)
+
+
+@pytest.mark.parametrize("days", [30.0, 36.0, 38.0, 40.0, 42.0, 50.0])
+def test_elements_are_refused_from_a_tenth_of_the_slant_range_on(folder: Path, days: float) -> None:
+    """A kilometre and two a day, against the distance of the satellite, by the places of both on the Earth."""
+    center = EPOCH.after(days * 86400)
+    (folder / "m.yaml").write_text(satellite(center))
+    scene = earth.earth_fixed(overpass(center))
+    away = math.dist(two_lines.read_tle(TLE, "x", None, center).place(center), scene)
+    if 1e3 + 2e3 * days <= away / 10:
+        assert load_mission(str(folder / "m.yaml")).platforms.transmitter.path.doubt_m > 6e4
+        return
+    with pytest.raises(MissionError) as error:
+        load_mission(str(folder / "m.yaml"))
+    (fault,) = error.value.faults
+    assert (fault.line, fault.key) == (12, "platforms.transmitter.orbit.tle")
+    assert fault.accepted == f"accepted: an orbit that is known to {format_quantity(away / 10, 'm', 4)}"
+    assert f"is more than a tenth of the slant range, {format_quantity(away, 'm', 4)}" in fault.problem
+    assert fault.hint == "Take elements whose epoch is nearer to collection.center_time"
+
+
+@pytest.mark.parametrize("step", [200.0, 215.0, 230.0, 240.0])
+def test_an_ephemeris_is_refused_from_50_km_on(folder: Path, step: float) -> None:
+    """Chords, at a place of the file too: the velocity is wrong there. r(ωh)²/8 is 50 km from h = 224 s on."""
+    missed = 7_071_000.0 * (1.0617e-3 * step) ** 2 / 8
+    (folder / "a.oem").write_text(oem(interpolation=LINEAR, step=step))
+    for seconds in (5 * step, 5.5 * step):
+        (folder / "m.yaml").write_text(ephemeris(START.after(seconds).as_text(), oem()))
+        if missed < 49e3:
+            path = load_mission(str(folder / "m.yaml")).platforms.transmitter.path
+            assert path.doubt_m == pytest.approx(missed, rel=0.05)
+            continue
+        with pytest.raises(MissionError) as error:
+            load_mission(str(folder / "m.yaml"))
+        assert [fault.hint for fault in error.value.faults] == ["Write the ephemeris more often"]
+
+
+def test_faults_of_both_paths_are_said_at_once(folder: Path) -> None:
+    (folder / "flight.csv").write_bytes(replaced(lambda n, cells: [*cells[:3], b"9000" if n == 240 else cells[3]]))
+    (folder / "held.csv").write_bytes(replaced(lambda _, cells: [cells[0], *FIRST[1:]]))
+    transmitter = {"trajectory": {"file": "held.csv"}}
+    (folder / "m.yaml").write_text(aircraft(platforms__transmitter=transmitter))
+    with pytest.raises(MissionError) as error:
+        load_mission(str(folder / "m.yaml"))
+    assert [fault.key.split(".")[1] for fault in error.value.faults] == ["transmitter", "receiver"]
+    assert "stands still" in error.value.faults[0].problem
+    assert "jumps by 6 km" in error.value.faults[1].problem

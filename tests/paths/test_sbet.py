@@ -273,6 +273,20 @@ def test_the_worst_sigmas_of_the_aperture_count() -> None:
     assert read_accuracy(data, "a.out", None, None, SECOND + 8.5, 0.2).position[1] == 0.04
 
 
+def test_an_error_of_zero_all_over_the_aperture_is_no_accuracy() -> None:
+    """Zeros of a file that nobody filled in declared that the trajectory has no error at all."""
+    for zeros, says in (
+        ({"north": 0}, "north position RMS"),
+        ({"rates": (0.1, 0, 0)}, "east velocity RMS, down velocity RMS"),
+        ({"down": np.where(TIMES < 14, 0, 0.05)}, "down position RMS"),
+    ):
+        with pytest.raises(PathFileError) as error:
+            read_accuracy(smrmsg(TIMES, **zeros), "a.out", None, None, SECOND + 10.5, 5.0)
+        assert str(error.value) == f"a.out: {says}: 0 in the whole aperture; no trajectory is without error"
+    one = smrmsg(TIMES, down=np.where(TIMES < 13, 0, 0.05))  # the record at the end of the aperture is not zero
+    assert read_accuracy(one, "a.out", None, None, SECOND + 10.5, 5.0).position == (0.03, 0.02, 0.05)
+
+
 @pytest.mark.parametrize(
     ("data", "center", "says"),
     [

@@ -7,6 +7,7 @@ import pytest
 
 from bisar_budget.budget.pull_in import ROOM, Caps, caps, needed_sentence
 from bisar_budget.mission.load import parse_mission
+from bisar_budget.report.explain.explanation import explain
 from bisar_budget.simulate.autofocus import ALGORITHMS
 from bisar_budget.simulate.collection import Errors
 from bisar_budget.verify.limits import Study
@@ -55,7 +56,7 @@ class TestWarnings:
         found = warnings(autofocus={"n_pull": n_pull})
         assert bool(found) == warns
         if warns:
-            assert "half a cell is n_pull 33.33" in found[0]
+            assert "33.4 counts as 33.3, f0/B" in found[0]
 
     @pytest.mark.parametrize(("algorithm", "room"), [("pga", 3.0), ("map_drift", 1.5)])
     def test_smear_against_the_scene(self, algorithm: str, room: float) -> None:
@@ -68,6 +69,48 @@ class TestWarnings:
 
     def test_no_autofocus_no_warning(self) -> None:
         assert not warnings(scene={"radius": 1})
+
+
+class TestGain:
+    """N_pull counts up to f₀/B, 33.33 in the base mission; `n_pull: 1e4` passed an error of 20 g."""
+
+    @pytest.mark.parametrize(("n_pull", "counts"), [(33.3, 33.3), (33.4, 100 / 3), (1e4, 100 / 3)])
+    def test_gain_of_what_counts(self, n_pull: float, counts: float) -> None:
+        found = findings(autofocus__n_pull=n_pull)
+        assert found.allocation.n_pull == pytest.approx(counts, rel=1e-12)
+        assert found.allocation.autofocus_gain == pytest.approx(4 * counts, rel=1e-12)
+        assert row(found, "mission.autofocus_pull_in").allowable == pytest.approx(math.pi * counts, rel=1e-12)
+
+    def test_twenty_g_fails_whatever_the_file_claims(self) -> None:
+        acceleration = {"platforms__receiver__motion_error__acceleration": ["196 m/s^2", 0, 0]}
+        for rule, row_id in (("each", "receiver.acceleration.x"), ("rss", "receiver.quadratic_phase_error")):
+            found = findings(autofocus__n_pull=1e4, allocation__combine=rule, **acceleration)
+            failed = row(found, row_id)
+            assert failed.status == found.status == "fail"
+            assert "no autofocus corrects this: N_pull would have to be" in failed.reason
+            assert failed.reason.endswith("range walk allows 33.3")
+
+    @pytest.mark.parametrize("rule", ["each", "rss"])
+    @pytest.mark.parametrize(("factor", "status"), [(0.999, "pass_with_autofocus"), (1.001, "fail")])
+    def test_both_sides_of_the_cap(self, rule: str, factor: float, status: str) -> None:
+        """A clock's quadratic phase of half of π·f₀/B: its share of what the cap corrects."""
+        size = factor * (math.pi * 100 / 3) / (math.pi * F0_MHZ * 1e6 * 6**2 / 2) / 2
+        error = {"timing_error__quadratic": f"{size!r} 1/s", "allocation__combine": rule}
+        row_id = "timing.quadratic" if rule == "each" else "receiver.quadratic_phase_error"
+        assert row(findings(autofocus__n_pull=1e4, **error), row_id).status == status
+        assert row(findings(autofocus__n_pull=33.2, **error), row_id).status == "fail"
+
+    def test_explained(self) -> None:
+        explained = self.explained(1e4)
+        assert "autofocus.n_pull of 10000 counts up to half a range cell of range walk, f0/B" in explained
+        assert "N_pull = 33.3333" in explained
+        assert "counts up to" not in self.explained(33.3)
+
+    @staticmethod
+    def explained(n_pull: float) -> str:
+        found = findings(autofocus__n_pull=n_pull)
+        assert found.mission is not None
+        return explain(found.mission, found, "timing.quadratic")
 
 
 class TestNeeded:

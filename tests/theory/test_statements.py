@@ -15,7 +15,7 @@ from bisar_budget.mission.load import load_mission
 from bisar_budget.simulate.exact import exact_effect
 from bisar_budget.simulate.phase_history import Path, PathError, path
 from bisar_budget.theory import full, published
-from bisar_budget.theory.symbols import TRANSMITTER, T, islr, pslr, share, total_qpe, wavelength
+from bisar_budget.theory.symbols import TRANSMITTER, T, islr, positive, pslr, share, total_qpe, wavelength
 from tests.conftest import ROOT, findings, row
 
 SECTION_V = load_mission(str(ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml"))
@@ -201,8 +201,8 @@ def test_the_emitted_steps_are_the_derived_ones() -> None:
 
 def test_noise_of_first_principles_is_the_derived_root() -> None:
     """`spread_phase` needs a logarithm, which no emitted function has: its root is that of the derived row."""
-    from bisar_budget.analysis.vibration_limits import spread_phase
+    from bisar_budget.analysis.spread import spread_phase
 
     noise = full.vibration().rows[2].cells[1]
-    want = float(noise.subs({islr: 0.2, share: 0.3, wavelength: 0.03}))
-    assert evaluators.motion_of_phase(0.03, math.sqrt(0.3) * spread_phase(0.2)) == pytest.approx(want)
+    want = float(noise.subs({islr: 0.2, share: 0.3, wavelength: 0.03, positive("E"): 0.9}))
+    assert evaluators.motion_of_phase(0.03, math.sqrt(0.3) * spread_phase(0.2, "full", 0.9)) == pytest.approx(want)

@@ -14,12 +14,13 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.catalogue import EQUATIONS
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.effect import MOTION_UNITS, ErrorSource
+from bisar_budget.effects.models import END_OF_IMAGE
 from bisar_budget.effects.subject import Subject
 from bisar_budget.faults import KeyPath, changes_words
 from bisar_budget.findings.images import PointImage
 from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
 from bisar_budget.findings.requirement import NAMES
-from bisar_budget.findings.row import Row, worst_first
+from bisar_budget.findings.row import DECLARE, Row, worst_first
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import Style
@@ -56,7 +57,7 @@ from bisar_budget.report.drawing.evidence_drawings import (
 from bisar_budget.report.explain.explanation import chain, collection_chain
 from bisar_budget.report.formats import verification
 from bisar_budget.report.words.escapes import source_path
-from bisar_budget.report.words.missions import head, multiple_of_pi, narrow_gradients, path_words
+from bisar_budget.report.words.missions import doubtful_model, head, multiple_of_pi, narrow_gradients, path_words
 from bisar_budget.report.words.quantities import phase_limit, phase_unit, requirement_size, row_limit, row_size
 from bisar_budget.report.words.requirements import (
     kind_names,
@@ -229,6 +230,7 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
         file=file,
         sha256=_digest(mission.data),
         document=found.document,
+        doubt=doubtful_model(found),
         alone=_ALONE if not found.is_empty and found.combine == "each" else "",
         narrow=narrow_gradients(found.geometry),
         status=found.status,
@@ -239,7 +241,7 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
         rule=rule_words(found),
         requirements=tuple(requirement_lines(found)),
         effects=tuple(f"{one.text} ({', '.join(row.id for row in one.rows)})" for one in unjudged_effects(found)),
-        declared=f"{len(found.kinds.declared)} of {found.kinds.count} kinds of error",
+        declared=f"{len(found.kinds.declared)} of {found.kinds.in_all} kinds of error",
         missing=", ".join(kind_names(found.kinds.missing)),
         without_source=", ".join(kind_names(found.kinds.without_source)),
         overrides=found.overrides,
@@ -395,7 +397,7 @@ def _limit(value: float, unit: str) -> str:
 def _allowable(row: Row, found: MissionFindings) -> str:
     if row.allowable is not None:
         return row_limit(row.allowable, row, found)
-    is_open = row.status in ("not_evaluated", "info") or row.metric in ("pslr", "islr")
+    is_open = row.status in ("not_evaluated", "info") or row.metric in ("pslr", "islr", DECLARE)
     return "–" if is_open else "no limit"
 
 
@@ -470,9 +472,13 @@ def _requirement(mission: Mission, found: MissionFindings, row: Row, source: Err
     if binding == "cubic_phase_error":
         value = requirements.cubic_phase_error
         return "none stated" if value is None else f"cubic phase ≤ {phase_limit(value, found)}"
+    if binding == END_OF_IMAGE:
+        return "end of the image: no ground point has the range history of a larger error"
     if binding == "location_error":
         value = requirements.location_error
         return "none stated" if value is None else f"displacement ≤ {_limit(value, 'm')}"
+    if row.metric == DECLARE:
+        return f"declared: {', '.join(requirements.declare)}"
     if row.subject.kind == "autofocus_pull_in":
         return "all QPE together within what autofocus corrects, π·N_pull"
     if row.subject.kind == "spatial_variance":  # one correction for the whole scene: no gain

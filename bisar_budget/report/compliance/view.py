@@ -248,6 +248,7 @@ class MissionPage(NamedTuple):
     without_source: str = ""
     overrides: tuple[Override, ...] = ()
     alone: str = ""  # behind the verdict where errors are judged one by one
+    doubt: str = ""  # where the published model judges and does not hold
     narrow: str = ""  # what gradients close to parallel do to displacements
     tone: str = ""  # of the verdict: a pass that rests on waivers looks like a warning
     counts: str = ""

@@ -26,6 +26,9 @@ def autofocus_gain(allocation: Allocation) -> Iterator[Step]:
     if allocation.n_pull is None:
         yield from step("No autofocus (autofocus.n_pull): gain = 1")
         return
+    if allocation.n_pull_stated != allocation.n_pull:
+        title = f"autofocus.n_pull of {allocation.n_pull_stated:g} counts up to half a range cell of range walk, f0/B"
+        yield from step(title, f"N_pull = {allocation.n_pull:.6g}")
     values = {"N_pull": allocation.n_pull, "q": allocation.qpe_total}
     raw = math.pi * allocation.n_pull / allocation.qpe_total
     lines = equation("gain", formulas.AUTOFOCUS_GAIN, values, raw, "")

@@ -145,6 +145,15 @@ def at_the_allowable(
     yield from step(f"At {size}, the smallest size of either sign that reaches the limit, exact ranges give", moved)
 
 
+def end_of_the_image(size: float, unit: str) -> Iterator[Step]:
+    """Say what it means that an image ends."""
+    yield from step(
+        "End of the image: no ground point has the range history of a larger error, of one sign or the other",
+        "The point is followed as the error grows, to where range and Doppler gradients become parallel there",
+        f"by_image = {with_unit(size, unit)}, a limit whatever phase or displacement is allowed",
+    )
+
+
 def _placed(left: Left) -> Sequence[str]:
     if left.place is None or left.place == (0.0, 0.0):
         return ("the scene centre itself",)

@@ -5,8 +5,8 @@ from collections.abc import Iterator, Sequence
 
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.analysis.spread import spread_powers
-from bisar_budget.analysis.vibration_limits import spread_phase, vibration_limits
+from bisar_budget.analysis.spread import mainlobe_energy, spread_phase, spread_powers
+from bisar_budget.analysis.vibration_limits import vibration_limits
 from bisar_budget.constants import STANDARD_GRAVITY
 from bisar_budget.effects.clocks import spurs_of
 from bisar_budget.effects.models import CUBIC, QUADRATIC
@@ -263,10 +263,10 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
         yield from step(f"Allowable by requirements.{CUBIC}, without share and gain", *lines)
     if effect.spread and required.islr is not None:
         power, share = 10 ** (required.islr / 10), allocation.islr.of(error.owner)
-        rule = "sqrt(ISLR)" if model == "published" else "sqrt(log(ISLR + 1))"
-        whole = math.sqrt(power) if model == "published" else spread_phase(power)
-        rms = whole * math.sqrt(share)
-        lines = equation("rms", f"{rule}*sqrt(s)", {"ISLR": power, "s": share}, rms, "rad")
+        energy = mainlobe_energy(mission)
+        rule, values = _allowed_variance(model, power, energy)
+        rms = spread_phase(power, model, energy) * math.sqrt(share)
+        lines = equation("rms", f"sqrt({rule})*sqrt(s)", {**values, "s": share}, rms, "rad")
         yield from step(
             f"Phase that may be left, requirements.islr {required.islr:g} dB, share s of its power", *lines
         )
@@ -297,11 +297,29 @@ def _unit(error: RandomError) -> str:
     return "" if error.unit == "dB" else error.unit
 
 
+def _allowed_variance(model: str, power: float, energy: float) -> tuple[str, dict[str, float]]:
+    """Formula of the variance that an ISLR allows by a model, and its values."""
+    if model == "published":
+        return "ISLR", {"ISLR": power}
+    return "log(E*ISLR + 1)", {"ISLR": power, "E": energy}
+
+
+def _level(model: str, variance: str) -> str:
+    """Formula of the ISLR of a variance by a model. [dB]"""
+    ratio = variance if model == "published" else f"(e^{variance} - 1)/E"
+    return f"10*log({ratio})/log(10)"
+
+
 def explained_islr(analysis: Analysis, allocation: Allocation, row: Row) -> Iterator[Step]:
     """Powers of everything that spreads, together."""
     mission, model, owner = analysis.mission, row.model or "published", row.owner
     members = spread_powers(analysis, allocation, owner, model)
-    total = math.fsum(power for _, power in members)
+    total, energy = math.fsum(power for _, power in members), mainlobe_energy(mission)
+    known: dict[str, float] = {}
+    rule = "the published rule takes the variance for it"
+    if model != "published":
+        known = {"e": math.e, "E": energy}
+        rule = "a phase of variance v leaves e^-v of the response, of which a share E lies within its first nulls"
     if row.declared is None:
         yield from step("Nothing that spreads is declared")
     else:
@@ -310,16 +328,16 @@ def explained_islr(analysis: Analysis, allocation: Allocation, row: Row) -> Iter
         terms = " + ".join(number(power) for _, power in members)
         yield from step("Squares of the rms phases that are left after the cubic: independent, so they add", *listed,
                         Sum(f"v = {terms} = {with_unit(total, 'rad²')}"))  # fmt: skip
-        lines = equation("declared", "10*log(e^v - 1)/log(10)", {"v": total, "e": math.e}, row.declared, "dB")
-        yield from step("As ISLR: a phase of variance v leaves e^-v of the power in the response", *lines)
+        lines = equation("declared", _level(model, "v"), {"v": total, **known}, row.declared, "dB")
+        yield from step(f"As ISLR: {rule}", *lines)
     if row.allowable is None:
         return
     power, share = 10 ** ((mission.requirements.islr or 0.0) / 10), allocation.islr.of(owner)
-    rule, whole = ("ISLR", power) if model == "published" else ("log(ISLR + 1)", spread_phase(power) ** 2)
-    limit = whole * share
-    lines = equation("v_max", f"{rule}*s", {"ISLR": power, "s": share}, limit, "rad²")
+    formula, values = _allowed_variance(model, power, energy)
+    limit = spread_phase(power, model, energy) ** 2 * share
+    lines = equation("v_max", f"{formula}*s", {**values, "s": share}, limit, "rad²")
     yield from step("Variance that requirements.islr allows, share s of the power", *lines)
-    lines = equation("allowable", "10*log(e^v_max - 1)/log(10)", {"v_max": limit, "e": math.e}, row.allowable, "dB")
+    lines = equation("allowable", _level(model, "v_max"), {"v_max": limit, **known}, row.allowable, "dB")
     yield from step("As ISLR", *lines)
     if row.utilization is not None:
         values = {"v": total, "v_max": limit}

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.scene import ScenePhases, at
+from bisar_budget.analysis.spread import mainlobe_energy
 from bisar_budget.analysis.together import Together
 from bisar_budget.analysis.vibration_limits import amplitude_share, echo_phase, slow_limits
 from bisar_budget.constants import ROUNDING
@@ -24,7 +25,7 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.report.explain import formulas
 from bisar_budget.report.explain.explained_budget import limit_steps
 from bisar_budget.report.explain.explained_error import as_written, declaration, effect, missing, place
-from bisar_budget.report.explain.explained_full import at_the_allowable
+from bisar_budget.report.explain.explained_full import at_the_allowable, end_of_the_image
 from bisar_budget.report.explain.formulas import Step, Sum, WorkedEquation, equation, number, step, with_unit
 from bisar_budget.report.words.layout import wrapped
 from bisar_budget.report.words.sentences import percent
@@ -132,7 +133,9 @@ def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]
     model = analysis.full if row.model == "full" else analysis.published
     by_quadratic = row.allowable_full if row.model == "full" else row.allowable_published
     sizes: dict[str, float] = {}
-    if by_quadratic is not None:
+    if by_quadratic is not None and model.ends_image(source, by_quadratic):
+        sizes["by_image"] = by_quadratic
+    elif by_quadratic is not None:
         sizes["by_QPE"] = by_quadratic
         if row.model == "full" and source.is_motion and not analysis.full.is_linear_at(source, QUADRATIC, limit):
             yield from at_the_allowable(analysis, source, by_quadratic)
@@ -152,6 +155,9 @@ def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]
             size = row.allowable  # the search of the check began elsewhere: in the last digits it may differ
         if required is None or size is None:
             continue
+        if model.ends_image(source, size):
+            sizes["by_image"] = size
+            continue
         sizes[symbol] = size
         title = f"Allowable by requirements.{name}, {with_unit(required, unit)}, without share and gain"
         if row.model == "full" and not analysis.full.is_linear_at(source, name, required):
@@ -160,6 +166,8 @@ def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]
         else:
             values = {"limit": required, "effect/unit": required / model.small(source, name, required)}
             yield from step(title, *equation(symbol, "limit/(effect/unit)", values, size, row.unit))
+    if "by_image" in sizes:
+        yield from end_of_the_image(sizes["by_image"], row.unit)
     if row.allowable is None:
         yield from step("Allowable: no limit", printable(row.reason or "no requirement limits this error"))
         return
@@ -235,7 +243,8 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[S
             WorkedEquation("φ", "", {}, values["φ"], "rad"),
         ]
     else:
-        title = "First principles, independent on both platforms; a phase of σ rad has the ISLR exp(σ²) − 1"
+        title = "First principles, independent on both platforms; a phase of σ rad has the ISLR (exp(σ²) − 1)/E"
+        values = {**values, "E": mainlobe_energy(mission)}
         known = []
     lines = equation("full", formulas.FULL_VIBRATION[row.metric], values, row.allowable_full, "m")
     yield from step(title, *known, *lines)

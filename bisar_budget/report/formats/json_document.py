@@ -99,6 +99,8 @@ def _mission(mission: MissionFindings) -> dict[str, Any]:
         "status": mission.status,
         "set": [change._asdict() for change in mission.changes],
         "model": mission.model,
+        "model_doubt": mission.model_doubt or None,
+        "model_doubt_code": mission.model_doubt.code or None,
         "combine": mission.combine,
         "coverage_factor": mission.coverage_factor,
         "geometry": {
@@ -120,6 +122,7 @@ def _mission(mission: MissionFindings) -> dict[str, Any]:
                 "reserve": allocation.qpe.reserve * allocation.qpe_total,
             },
             "autofocus_gain": allocation.autofocus_gain,
+            "n_pull": allocation.n_pull,
             "pslr_share": _shares(allocation.pslr),
             "islr_share": _shares(allocation.islr),
         },
@@ -208,6 +211,7 @@ def _platform(mission: MissionFindings, name: str) -> dict[str, Any]:
             "residual_max_m": path.farthest,
             "residual_rms_m": path.rms,
             "samples": path.samples,
+            "doubt_m": path.doubt_m,
             "accuracy": None if path.accuracy is None else dict(zip(("file", "sha256"), path.accuracy, strict=True)),
         }
     return found

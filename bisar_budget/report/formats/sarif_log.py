@@ -53,15 +53,15 @@ RULES = {
         "The displacement may be at most requirements.location_error. Declare smaller position, velocity or clock "
         "errors; autofocus does not help.",
     ),
+    "declare": (
+        "Everything declared that must be",
+        "requirements.declare names errors that the file must declare. What is missing is not evaluated: declare it, "
+        "a zero where there is none.",
+    ),
     "autofocus_pull_in": (
         "All errors together within what autofocus corrects",
         "Autofocus corrects one total of n_pull·π radians, not each error separately (Rigling & Moses, Section VI). "
         "Raise autofocus.n_pull if the algorithm allows, or declare smaller errors.",
-    ),
-    "declare": (
-        "Errors that the file must declare",
-        "requirements.declare names errors that the file has to declare, for both platforms; what is missing cannot "
-        "be judged. Declare them: a zero declares too.",
     ),
     "other": (
         "Declared value within its limit",

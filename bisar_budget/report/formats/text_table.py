@@ -4,13 +4,14 @@ import re
 from collections.abc import Iterator, Sequence
 from functools import cache
 
+from bisar_budget.effects.models import END_OF_IMAGE
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.mission import MissionFindings, UnusableMission
-from bisar_budget.findings.row import Row, worst_first
+from bisar_budget.findings.row import DECLARE, Row, worst_first
 from bisar_budget.findings.status import STATUS, worst
 from bisar_budget.report import Piece, Style
 from bisar_budget.report.words.layout import WIDTH, wrapped, wrapped_counts
-from bisar_budget.report.words.missions import document_words, head, narrow_gradients
+from bisar_budget.report.words.missions import document_words, doubtful_model, head, narrow_gradients
 from bisar_budget.report.words.quantities import row_limit, row_size
 from bisar_budget.report.words.requirements import (
     COLUMNS,
@@ -66,7 +67,11 @@ def _mission(mission: MissionFindings, style: Style) -> list[str]:
         return [_lead("; ".join(said), mission.status, style)]
     lines = _verdict(mission, style)
     lines += ["", *_requirements(mission, style)]
-    lines += ["", *(line for key, text in _head(mission, style) for line in wrapped(f"{key:<12} {text}", " " * 13)), ""]
+    lines += [
+        "",
+        *(line for key, text in _head(mission, style) for line in wrapped(f"{key:<12} {text}", " " * 13)),
+        "",
+    ]
     after = list(_after(mission, style))
     room = max(LINES - len(lines) - len(after), 0)
     return [*lines, *_table(mission, style, room), *after]
@@ -84,6 +89,8 @@ def _verdict(mission: MissionFindings, style: Style) -> list[str]:
     name = f"{mission.name} ({document})" if document else mission.name
     lines = [_lead(first, mission.status, style), *rest, *wrapped(f"{name}; {rule_words(mission)}", "  ")]
     lines += overrides_lines(mission)
+    if sentence := doubtful_model(mission):
+        lines += wrapped(sentence, "  ")
     if sentence := narrow_gradients(mission.geometry):
         lines += wrapped(sentence, "  ")
     return lines
@@ -214,7 +221,7 @@ def _row(row: Row, mission: MissionFindings) -> tuple[str, ...]:
     size = "-" if declared is None else row_size(declared, row, mission)
     use = "-"
     if limit is None:
-        is_open = status == "not_evaluated" or status == "info" or row.metric == "pslr" or row.metric == "islr"
+        is_open = status in ("not_evaluated", "info") or row.metric in ("pslr", "islr", DECLARE)
         allowable = "-" if is_open else "no limit"
     else:
         allowable = row_limit(limit, row, mission)
@@ -226,7 +233,9 @@ def _row(row: Row, mission: MissionFindings) -> tuple[str, ...]:
 def _limited_by(row: Row) -> str:
     """What sets the allowable: another requirement than the row's own, else the place of its equation."""
     binding = binding_words(row)
-    return binding.split()[0] if binding else _short_reference(row.equation)
+    if binding:
+        return binding if row.binding_requirement == END_OF_IMAGE else binding.split()[0]
+    return _short_reference(row.equation)
 
 
 @cache

@@ -35,6 +35,12 @@ def narrow_gradients(geometry: BistaticGeometry) -> str:
     )
 
 
+def doubtful_model(mission: MissionFindings) -> str:
+    """Say where the published model judges and does not hold, as a sentence; nothing if it does hold."""
+    said = mission.model_doubt
+    return f"{said[0].upper()}{said[1:]}." if said else ""
+
+
 def head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
     """Say in a few lines what was checked: geometry, resolution, budget, model."""
     geometry, allocation = mission.geometry, mission.allocation

@@ -96,7 +96,7 @@ def requirement_finding(one: JudgedRequirement) -> str:
         text += (
             f", {requirement_size(one.reached, one)} reached, {requirement_size(one.allowed, one, 'down')} allowed"
         )
-    if one.row is not None:
+    if one.row is not None and one.status != "not_evaluated":
         text += f", decided by {one.row}"
     return ". ".join([text, *filter(None, [one.reason]), *(waiver.words for waiver in one.waivers)])
 
@@ -184,7 +184,7 @@ def worst_requirements_first(requirements: Sequence[JudgedRequirement]) -> list[
 
 def declared_words(kinds: DeclaredKinds) -> str:
     """Say how many kinds of error are declared, which are not, and how many declared ones have no source."""
-    text = f"Declared {len(kinds.declared)} of {kinds.count} kinds of error"
+    text = f"Declared {len(kinds.declared)} of {kinds.in_all} kinds of error"
     if kinds.missing:
         text += f"; not declared: {', '.join(kind_names(kinds.missing))}"
     if kinds.without_source:

@@ -3,15 +3,16 @@
 import math
 
 from bisar_budget.findings.mission import MissionFindings
-from bisar_budget.findings.row import Row
+from bisar_budget.findings.row import DECLARE, Row
 from bisar_budget.report.words.quantities import row_limit, row_size
 
-# A requirement that can set an allowable, in words; the terminal has room for the first.
+# What can set an allowable, in words; of a requirement the terminal has room for the first.
 BINDING_WORDS = {
     "quadratic_phase_error": "quadratic phase error",
     "cubic_phase_error": "cubic phase error",
     "location_error": "location error",
     "islr": "ISLR",
+    "end_of_image": "end of the image",
 }
 
 
@@ -52,6 +53,8 @@ def percent(ratio: float) -> str:
 
 def measure(row: Row, mission: MissionFindings) -> str:
     """Say what is declared, what is allowed and how much of it is used."""
+    if row.metric == DECLARE:
+        return "everything asked for is declared" if row.status == "pass" else "not everything asked for is declared"
     declared = "not declared" if row.declared is None else f"declared {row_size(row.declared, row, mission)}"
     if row.allowable is None:
         return declared

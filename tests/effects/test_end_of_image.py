@@ -1,0 +1,168 @@
+"""Where the image ends: the limit beyond which no ground point has the range history, and what every output calls it.
+
+Exact ranges are those of `tests.reference`, which have nothing from the package's own search.
+"""
+
+import csv
+import io
+import json
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from bisar_budget.arrays.collections import Geometries, paths_of
+from bisar_budget.arrays.judged import Checked, check_arrays
+from bisar_budget.arrays.rows import REQUIREMENTS
+from bisar_budget.budget.check import check_mission
+from bisar_budget.effects.models import END_OF_IMAGE, QUADRATIC
+from bisar_budget.effects.subject import Subject
+from bisar_budget.findings.mission import MissionFindings, Report
+from bisar_budget.findings.row import Row
+from bisar_budget.mission.load import parse_mission
+from bisar_budget.mission.model import Mission
+from bisar_budget.report import Style, render
+from bisar_budget.report.explain.explanation import explain
+from tests import reference
+from tests.conftest import TODAY, row
+from tests.families import mission_text
+
+# Every family has such missions; the allowables are of all kinds of error, with and without autofocus.
+WHERE = [
+    ("drones", 28),
+    ("aircraft", 3),
+    ("jets", 12),
+    ("satellite_aircraft", 32),
+    ("satellite_fixed", 3),
+    ("geostationary_drone", 27),
+]
+
+
+def mission_of(family: str, seed: int) -> Mission:
+    return parse_mission(mission_text(family, seed), "m.yaml", "full")
+
+
+def ending(found: MissionFindings) -> list[Row]:
+    return [one for one in found.rows if one.binding_requirement == END_OF_IMAGE]
+
+
+@pytest.mark.parametrize(("family", "seed"), WHERE)
+def test_a_point_is_there_just_inside_and_none_beyond(family: str, seed: int) -> None:
+    """Inside the phases of both signs are below what is allowed: no requirement is what sets the size."""
+    mission = mission_of(family, seed)
+    found = check_mission(mission, TODAY)
+    rows = ending(found)
+    assert rows
+    errors = {error.id: error for error in reference.errors_of(mission)}
+    lanes = reference.Lanes(mission, [errors[one.id] for one in rows])
+    parts = np.append(np.linspace(0.02, 0.98, 49), 1.02)
+    sizes = np.outer([one.allowable for one in rows], parts)
+    both = [lanes.follow(sign * sizes) for sign in (1.0, -1.0)]
+    inside = np.array([np.isfinite(one.qpe[:, :-1]).all(axis=1) for one in both])
+    beyond = np.array([np.isfinite(one.qpe[:, -1]) for one in both])
+    assert inside.all()
+    assert not beyond.all(axis=0).any(), "of one sign at least no point is left"
+    allocation = found.allocation
+    for index, one in enumerate(rows):
+        limit = allocation.qpe_limit(one.owner) * allocation.autofocus_gain
+        assert max(np.abs(of.qpe[index, :-1]).max() for of in both) < limit
+
+
+@pytest.mark.parametrize(("family", "seed"), WHERE)
+def test_where_a_requirement_is_reached_first_it_binds(family: str, seed: int) -> None:
+    """A tenth of the phase that a point has just inside is reached before: the size is smaller, and the phase's."""
+    mission = mission_of(family, seed)
+    found = check_mission(mission, TODAY)
+    analysis = found.analysed()
+    sources = {source.id: source for source in analysis.sources}
+    for one in ending(found)[:4]:
+        source = sources[one.id]
+        inside = [analysis.full.at(source, sign * 0.98 * one.allowable) for sign in (1.0, -1.0)]
+        phase = max(abs(there.quadratic) for there in inside if there is not None)
+        size = analysis.full.allowable(source, QUADRATIC, phase / 10)
+        assert size is not None
+        assert size < one.allowable
+        assert not analysis.full.ends_image(source, size)
+
+
+def by_arrays(mission: Mission, shown: Mapping[str, Subject], *, is_brief: bool) -> Checked:
+    """The mission as the one case of arrays."""
+    platforms = mission.platforms
+    geometries = Geometries(paths_of(platforms.transmitter), paths_of(platforms.receiver))
+    (nodes,) = geometries.nodes(np.array([mission.collection.aperture_time]), has_direct_path=mission.has_direct_path)
+    with np.errstate(all="ignore"):
+        return check_arrays(mission, 1, TODAY, int(nodes), geometries, shown, lambda _: mission, is_brief=is_brief)
+
+
+@pytest.mark.parametrize("is_brief", [False, True])
+@pytest.mark.parametrize(("family", "seed"), WHERE)
+def test_arrays_call_it_the_same(family: str, seed: int, is_brief: bool) -> None:
+    """Row by row: what sets each allowable that both have."""
+    mission = mission_of(family, seed)
+    found = check_mission(mission, TODAY, is_brief=is_brief)
+    rows = {one.id: one for one in found.rows if one.allowable is not None and one.subject.kind != "vibration"}
+    checked = by_arrays(
+        mission, {} if is_brief else {one.id: one.subject for one in rows.values()}, is_brief=is_brief
+    )
+    assert not checked.is_left_out.any()
+    bound = {}
+    for one in checked.rows:
+        if one.subject.id in rows and not np.isnan(one.allowable[0]):
+            place = one.binding[0]
+            bound[one.subject.id] = one.metric if place < 0 else REQUIREMENTS[place]
+            assert one.allowable[0] == pytest.approx(rows[one.subject.id].allowable, rel=1e-9)
+    want = {row_id: one.binding_requirement or one.metric for row_id, one in rows.items()}
+    assert bound == want
+    assert is_brief or END_OF_IMAGE in bound.values()
+
+
+@pytest.fixture(scope="module")
+def aircraft() -> MissionFindings:
+    """A transmitter position of 30 m where the image ends at 10.8 m, judged by itself."""
+    return check_mission(mission_of("aircraft", 3), TODAY)
+
+
+OVER = "transmitter.position.line_of_sight"
+
+
+def test_a_row_over_it_says_so(aircraft: MissionFindings) -> None:
+    """It said `QPE without a value`, and that a phase is what binds."""
+    one = row(aircraft, OVER)
+    assert one.status == "fail"
+    said = "the image ends at 10.7 m: no ground point has the range history of a larger error"
+    assert one.reason == said
+    assert one.reason.code == "beyond-the-image"
+
+
+@pytest.mark.parametrize("name", ["text", "json", "csv", "markdown", "html", "junit", "sarif"])
+def test_every_format_names_it(aircraft: MissionFindings, name: str) -> None:
+    text = render(name, Report(version="", missions=(aircraft,)), Style())
+    assert isinstance(text, str)
+    if name == "json":
+        rows = {one["id"]: one for one in json.loads(text)["missions"][0]["rows"]}
+        assert rows[OVER]["binding_requirement"] == "end_of_image"
+    elif name == "csv":
+        rows = {one["id"]: one for one in csv.DictReader(io.StringIO(text))}
+        assert rows[OVER]["binding_requirement"] == "end_of_image"
+    elif name in ("junit", "sarif"):
+        assert "end_of_image" in text
+    else:
+        assert "end of the image" in text
+
+
+def test_a_terminal_has_it_in_the_column_of_what_binds(aircraft: MissionFindings) -> None:
+    lines = render("text", Report(version="", missions=(aircraft,)), Style()).splitlines()
+    (line,) = (lines[place + 1] for place, text in enumerate(lines) if text == f"FAIL     {OVER}")
+    assert line.split(" % ")[1] == "end of the image"
+    assert all(len(text) <= 80 for text in lines)
+
+
+def test_the_explanation_says_what_it_means(aircraft: MissionFindings) -> None:
+    assert aircraft.mission is not None
+    text = " ".join(explain(aircraft.mission, aircraft, OVER).split())
+    assert "End of the image: no ground point has the range history of a larger error" in text
+    assert "by_image = 10.7993 m" in text
+    assert "Allowable: the smallest, by by_image" in text
+    other = explain(aircraft.mission, aircraft, "receiver.acceleration.y")
+    assert "End of the image" not in other
+    assert row(aircraft, "receiver.acceleration.y").binding_requirement == QUADRATIC
