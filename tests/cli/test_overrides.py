@@ -50,7 +50,12 @@ def test_nothing_from_outside(run, folder) -> None:
         ([], "", {"BISAR_BUDGET_EXIT_ZERO": "1"}, ("--exit-zero", "yes", "environment, BISAR_BUDGET_EXIT_ZERO")),
         ([], "strict = true", {}, ("--strict", "yes", "pyproject.toml")),
         (["--no-strict"], "strict = true", {}, ("--strict", "no", "command line")),
-        (["--set", "collection.aperture_time=5 s"], "", {}, ("--set", "collection.aperture_time=5 s", "command line")),
+        (
+            ["--set", "collection.aperture_time=5 s"],
+            "",
+            {},
+            ("--set", "collection.aperture_time=5 s", "command line"),
+        ),
         (["--date", "2027-01-01"], "", {}, ("--date", "2027-01-01", "command line")),
     ],
 )

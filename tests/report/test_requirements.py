@@ -111,7 +111,7 @@ class TestText:
             "base; full model, root-sum-square",
             "",
         ]
-        assert lines[3].split() == "requirement allowed reached use status decided by".split()
+        assert " ".join(lines[3].split()) == "requirement allowed reached use status decided by"
 
     def test_every_requirement_met(self) -> None:
         changes = {**UNJUDGED, "requirements": {"location_error": "10 m"}}
