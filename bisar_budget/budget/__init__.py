@@ -13,7 +13,7 @@ __all__ = [
     "pull_in",
     "random_rows",
     "required",
-    "requirements",
+    "requirement_states",
     "verdicts",
     "vibration_rows",
     "waivers",

@@ -272,8 +272,13 @@ class TestInit:
         assert count == 22
         path = tmp_path / "m.yaml"
         path.write_text(text)
-        result = run("check", path)
-        assert result.exit_code == 0, result.output
+        result = run("check", path, "--format", "json")
+        assert result.exit_code == 1, result.output  # it asks for more than it declares
+        (mission,) = json.loads(result.stdout)["missions"]
+        stands = {one["key"]: one["status"] for one in mission["requirements"]}
+        assert stands.pop("quadratic_phase_error") == "pass_with_autofocus"
+        assert stands.pop("location_error") == stands.pop("declare") == "not_evaluated"
+        assert set(stands.values()) <= {"pass", "warn"}
 
     def test_the_other_ways_to_state_a_path_are_those_of_a_mission(self, run, tmp_path) -> None:
         """It did not mention orbits, logs and places. Files are asked for: all keys are known."""

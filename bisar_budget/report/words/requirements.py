@@ -10,8 +10,8 @@ from bisar_budget.findings.requirement import DeclaredKinds, JudgedRequirement, 
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import RANK, STATUS
 from bisar_budget.report.words.layout import wrapped
-from bisar_budget.report.words.quantities import requirement_size
 from bisar_budget.report.words.sentences import percent
+from bisar_budget.report.words.sizes import requirement_size
 
 COLUMNS = ("requirement", "allowed", "reached", "use", "status", "decided by")
 MODELS = {"published": "published model", "full": "full model", "strictest": "stricter of both models"}
