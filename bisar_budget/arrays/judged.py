@@ -178,12 +178,18 @@ class _Check:
         mission = self.mission
         untaken = untaken_effects(mission, self._effect_totals(gates))
         is_misplaced = np.any([self._is_misplaced(), *self._in_doubt.values()], axis=0)
+        noise = [one.variance for model in gates for one in self.random_rows.noise(model)]
+        noise += list(self.tones.values()) if mission.requirements.pslr is None else []
+        has_noise = np.any([np.zeros(self.cases, bool), *(~np.isnan(one) for one in noise)], axis=0)
         found, seen = [], []
         for row in rows:
             status = status_of(row.status, row.subject.id, ~np.isnan(row.allowable), untaken)
             if row.subject.id == f"mission.{LOCATION}" and mission.requirements.location_error is not None:
                 is_known = np.isin(status, [CODE["fail"], CODE["not_declared"]])
                 status = np.where(is_misplaced & ~is_known, CODE["not_evaluated"], status)
+            if row.subject.kind == "islr":  # of a cubic phase alone, ISLR is not judged
+                is_known = has_noise | np.isin(status, [CODE["fail"], CODE["not_declared"]])
+                status = np.where(is_known, status, CODE["not_evaluated"])
             after = waived(row._replace(status=status), mission, self.today)
             found.append(after)
             is_covered = (after.status == CODE["waived"]) & np.isin(row.status, _BROKEN)
@@ -199,13 +205,11 @@ class _Check:
                     row.quadratic_use,
                 )
             )
-        noise = [one.variance for model in gates for one in self.random_rows.noise(model)]
-        noise += list(self.tones.values()) if mission.requirements.pslr is None else []
         states = requirement_states(
             mission,
             seen,
             {key: is_waived(mission, self.today, [f"mission.{key}"]) for key in KEYS},
-            has_noise=np.any([np.zeros(self.cases, bool), *(~np.isnan(one) for one in noise)], axis=0),
+            has_noise=has_noise,
             is_misplaced=is_misplaced,
         )
         return found, states

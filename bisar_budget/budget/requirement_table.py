@@ -77,6 +77,11 @@ def judged_requirements(
     unknown_place = phrases.place_is_not_known(misplacing) if misplacing else doubts[0].note if doubts else NOTHING
     if unknown_place and mission.requirements.location_error is not None:
         looked_at = [_misplaced(row, unknown_place) for row in looked_at]
+    has_noise = any(noise(analysis, model.name) for model in gates) or (
+        mission.requirements.pslr is None and bool(tones(mission))
+    )
+    if not has_noise:
+        looked_at = [_of_a_cubic_alone(row) for row in looked_at]
     waived = apply_waivers(looked_at, mission, today)
     seen = [
         _seen(waived.rows[place] if waived.rows[place].status == "waived" and is_broken(row) else row, allocation)
@@ -86,8 +91,7 @@ def judged_requirements(
         mission,
         seen,
         {key: True for key in KEYS if f"mission.{key}" in waived.requirements},
-        has_noise=any(noise(analysis, model.name) for model in gates)
-        or (mission.requirements.pslr is None and bool(tones(mission))),
+        has_noise=has_noise,
         is_misplaced=bool(unknown_place),
     )
     requirements = tuple(_entry(state, waived, analysis, allocation, unknown_place) for state in states)
@@ -153,6 +157,13 @@ def _looked_at(row: Row, mission: Mission, untaken: Sequence[UntakenEffect]) -> 
             said = phrases.effect_is_not_judged(one.kind, float(one.parts[row.id][0]), float(one.total[0]), lines)
             reason = reason.then(said) if reason else said
     return row._replace(status=status, reason=reason)
+
+
+def _of_a_cubic_alone(row: Row) -> Row:
+    """A sum of powers without anything that spreads: it shows the cubic phase, and does not judge ISLR."""
+    if row.subject.kind != "islr" or row.status in ("fail", "not_declared"):
+        return row
+    return row._replace(status="not_evaluated", reason=phrases.nothing_judges("islr"))
 
 
 def _misplacing(analysis: Analysis) -> list[str]:

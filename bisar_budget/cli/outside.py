@@ -25,7 +25,7 @@ def origin_of(parameter: click.Parameter) -> str:
         return "command line"
     if source is ParameterSource.ENVIRONMENT:
         return f"environment, {parameter.envvar}"
-    return f"[tool.bisar-budget] of {_settings_file()}" if source is ParameterSource.DEFAULT_MAP else "default"
+    return _settings_file() if source is ParameterSource.DEFAULT_MAP else "default"
 
 
 def _settings_file() -> str:
@@ -49,7 +49,7 @@ def day_origin(today: datetime | None) -> str:
     """Say where the day of waivers comes from."""
     if today is not None:
         return "command line"
-    return "environment, SOURCE_DATE_EPOCH" if os.environ.get("SOURCE_DATE_EPOCH") else "the clock, UTC"
+    return "environment, SOURCE_DATE_EPOCH" if os.environ.get("SOURCE_DATE_EPOCH") else "the day of the run"
 
 
 def day(today: datetime | None) -> date:

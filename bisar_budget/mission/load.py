@@ -10,7 +10,7 @@ from contextlib import suppress
 from typing import BinaryIO, cast
 
 from bisar_budget.faults import Fault, MissionError, SetValue, changes_words
-from bisar_budget.mission.model import MISSION, Mission, flies_on_earth, names_parts
+from bisar_budget.mission.model import MISSION, Mission, flies_on_earth, names_files, names_parts
 from bisar_budget.mission.readers import INVALID
 from bisar_budget.mission.tree import MAX_BYTES, UnusableError, file_fault, read_tree
 
@@ -94,11 +94,19 @@ def parse_mission(
     with suppress(UnusableError):
         mission = MISSION.read(tree.root, (), tree.report)
         folder = folder_of(file)
-        if mission is not INVALID and flies_on_earth(mission):
+        if mission is INVALID and names_files(tree.root):
+            from bisar_budget.mission.paths import reader_of, report_files
+
+            report_files(tree.root, beside or reader_of(folder), tree.report)
+        elif mission is not INVALID and flies_on_earth(mission):
             from bisar_budget.mission.paths import reader_of, with_paths
 
             mission = with_paths(mission, beside or reader_of(folder), tree.report)
-        if mission is not INVALID and names_parts(mission):
+        if mission is INVALID and names_files(tree.root):
+            from bisar_budget.mission.parts import finder_of, report_parts
+
+            report_parts(tree.root, folder, find or finder_of(folder), tree.report)
+        elif mission is not INVALID and names_parts(mission):
             from bisar_budget.mission.parts import finder_of, with_parts
 
             mission = with_parts(mission, folder, _noted(find or finder_of(folder), parts), tree.report)

@@ -165,7 +165,11 @@ class Requirements(NamedTuple):
     declare: Annotated[
         tuple[str, ...],
         Key(
-            Words(*DECLARABLE, *_OF_ONE),
+            Words(
+                *DECLARABLE,
+                *_OF_ONE,
+                accepted=f"{', '.join(DECLARABLE)}; of one platform receiver.imu and the like",
+            ),
             "Errors that the file must declare, for both platforms or for one (receiver.imu); what is missing is "
             "not_evaluated. A zero declares; a still platform owes its position only. A covariance declares position "
             "and velocity; timing: any term of timing_error.",
@@ -228,15 +232,18 @@ class AllocationRules(NamedTuple):
     ] = "equal"
     combine: Annotated[
         str,
-        Key(Choice("each", "sum", "rss"), "each: every error alone; sum: worst case; rss: independent errors."),
-    ] = "each"
+        Key(
+            Choice("each", "sum", "rss"),
+            "rss: independent errors together; sum: all at their worst; each: every error alone, as the paper.",
+        ),
+    ] = "rss"
     model: Annotated[
         str,
         Key(
             Choice("published", "full", "strictest"),
-            "The model that gates: the paper's, the full one, or the stricter of both for each row.",
+            "The model that gates: full: exact ranges; published: the paper's; strictest: the stricter for each row.",
         ),
-    ] = "published"
+    ] = "full"
     coverage_factor: Annotated[
         float,
         Key(
@@ -386,6 +393,18 @@ def names_parts(mission: Mission) -> bool:
     return any(
         platform.motion_error.sensor or (platform.oscillator is not None and platform.oscillator.sensor)
         for platform in mission.platforms
+    )
+
+
+def names_files(root: Mapping[str, Any]) -> bool:
+    """Whether what a file says, mission or not, names a part, an orbit or a log."""
+    platforms = root.get("platforms")
+    sections = platforms.values() if isinstance(platforms, dict) else ()
+    return any(
+        key in ("orbit", "trajectory") or (isinstance(item, dict) and "sensor" in item)
+        for section in sections
+        if isinstance(section, dict)
+        for key, item in section.items()
     )
 
 

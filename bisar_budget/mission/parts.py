@@ -15,6 +15,7 @@ from bisar_budget.mission.bounds import COORDINATE, VELOCITY
 from bisar_budget.mission.instruments import (
     FORMS,
     IMU_KINDS,
+    OSCILLATOR,
     AccelerometerBias,
     AllanDeviation,
     AngleRandomWalk,
@@ -30,7 +31,7 @@ from bisar_budget.mission.instruments import (
     VelocityRandomWalk,
 )
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.platforms import MotionError
+from bisar_budget.mission.platforms import MotionError, Platforms
 from bisar_budget.mission.readers import (
     INVALID,
     Choice,
@@ -50,6 +51,7 @@ from bisar_budget.settings import SettingsError, project_settings
 
 Find = Callable[[str], tuple[str, bytes]]  # file and content of a part by its name
 
+MOTION_ERROR = Section(MotionError)
 _NAME = Text()
 _SOURCE = OneOf(lambda value: TextMap() if isinstance(value, dict) else _NAME, (_NAME, TextMap()))
 _SAYS = Key(_NAME, "What its figures are in their source.")
@@ -112,7 +114,11 @@ FIGURES = {"imu": IMU_KINDS, "gnss": ("position", "velocity", "random"), "oscill
 
 
 class PartError(Exception):
-    """A part that cannot be used; the message says why."""
+    """A part that cannot be used; each of its arguments says what is wrong."""
+
+    def __str__(self) -> str:
+        """Say all of it."""
+        return "; ".join(map(str, self.args))
 
 
 def evidence(part: Part, figure: str) -> str:
@@ -178,7 +184,7 @@ def _parsed(file: str, data: bytes) -> _Read:
     try:
         tree = read_tree(data, file)
     except MissionError as error:
-        raise PartError(f"{file}: {error.faults[0]}") from None
+        raise PartError(*(f"{file}: {fault}" for fault in error.faults)) from None
     kind = tree.root.get("kind")
     section = _SECTIONS.get(kind) if isinstance(kind, str) else None
     part: Any = INVALID
@@ -187,8 +193,7 @@ def _parsed(file: str, data: bytes) -> _Read:
     with suppress(UnusableError):
         part = section.read(tree.root, (), tree.report)
     if tree.faults:
-        fault = tree.faults[0]
-        raise PartError(f"{file}:{fault.line}:{fault.column}: {fault}")
+        raise PartError(*(f"{file}:{fault.line}:{fault.column}: {fault}" for fault in tree.faults))
     if not any(_says(getattr(part, figure)) for figure in FIGURES[kind] if figure != "frequency"):
         raise PartError(f"{file}: states no figure; accepted: one of {', '.join(FIGURES[kind])} that is not zero")
     unsourced = [
@@ -292,20 +297,13 @@ def with_parts(mission: Mission, beside: str, find: Find, report: Report) -> Any
     """
     is_valid = True
     platforms = mission.platforms
+    sources = _Sources(beside, find, report)
     for name in platforms._fields:
         platform = getattr(platforms, name)
-        error, path = platform.motion_error, ("platforms", name, "motion_error", "sensor")
-        parts = _parts_of(error.sensor, path, ("imu", "gnss"), beside, find, report)
-        error = INVALID if parts is INVALID else _motion_of(error, parts, path, report)
-        oscillator = platform.oscillator
-        if oscillator is not None and oscillator.sensor is not None:
-            path = ("platforms", name, "oscillator", "sensor")
-            parts = _parts_of(oscillator.sensor, path, ("oscillator",), beside, find, report)
-            oscillator = INVALID if parts is INVALID else _oscillator_of(oscillator, parts[0], path, report)
-            if oscillator is not INVALID and oscillator.needs_frequency and oscillator.frequency is None:
-                problem = f"{shown(parts[0][0].name)} states no frequency, at which the mask or the tones are stated"
-                report(path[:-1], Problem(problem, "accepted: oscillator.frequency", at=("frequency",)))
-                oscillator = INVALID
+        error = _with_sensors(platform.motion_error, ("platforms", name, "motion_error"), sources)
+        oscillator = platform.oscillator and _with_sensor(
+            platform.oscillator, ("platforms", name, "oscillator"), sources
+        )
         if INVALID in (error, oscillator):
             is_valid = False
             continue
@@ -313,15 +311,64 @@ def with_parts(mission: Mission, beside: str, find: Find, report: Report) -> Any
     return mission._replace(platforms=platforms) if is_valid else INVALID
 
 
-def _parts_of(
-    names: str | tuple[str, ...] | None,
-    path: KeyPath,
-    kinds: Sequence[str],
-    beside: str,
-    find: Find,
-    report: Report,
-) -> Any:
+def report_parts(root: Any, beside: str, find: Find, report: Report) -> None:
+    """Say what is wrong with the parts that a file names, which is no mission for other reasons.
+
+    A section whose values are right is held to its parts as that of a mission is; of another one the names are looked
+    at. The parameters are those of `with_parts`, `root` is what the file says.
+    """
+    sources = _Sources(beside, find, report)
+    platforms = root.get("platforms")
+    for name in Platforms._fields:
+        platform = platforms.get(name) if isinstance(platforms, dict) else None
+        if not isinstance(platform, dict):
+            continue
+        path: KeyPath = ("platforms", name)
+        if motion := _stand_in(MOTION_ERROR, platform.get("motion_error")):
+            _with_sensors(MotionError(**motion), (*path, "motion_error"), sources)
+        if oscillator := _stand_in(OSCILLATOR, platform.get("oscillator")):
+            _with_sensor(Oscillator(**oscillator), (*path, "oscillator"), sources)
+
+
+def _stand_in(section: Section, value: Any) -> dict[str, Any]:
+    """What a section says, if all of it is right; else the names of its parts."""
+    values = section.each(value)
+    if INVALID not in values.values():
+        return values
+    return {key: found for key, found in values.items() if key == "sensor" and found is not INVALID}
+
+
+class _Sources(NamedTuple):
+    """The folder of a mission file, what finds its parts, and what takes their faults."""
+
+    beside: str
+    find: Find
+    report: Report
+
+
+def _with_sensors(error: MotionError, path: KeyPath, sources: _Sources) -> Any:
+    """A motion error with the figures of its parts; `INVALID` after a report."""
+    path = (*path, "sensor")
+    parts = _parts_of(error.sensor, path, ("imu", "gnss"), sources)
+    return INVALID if parts is INVALID else _motion_of(error, parts, path, sources.report)
+
+
+def _with_sensor(oscillator: Oscillator, path: KeyPath, sources: _Sources) -> Any:
+    """An oscillator with the figures of its part; `INVALID` after a report."""
+    if oscillator.sensor is None:
+        return oscillator
+    parts = _parts_of(oscillator.sensor, (*path, "sensor"), ("oscillator",), sources)
+    found = INVALID if parts is INVALID else _oscillator_of(oscillator, parts[0], path, sources.report)
+    if found is not INVALID and found.needs_frequency and found.frequency is None:
+        problem = f"{shown(parts[0][0].name)} states no frequency, at which the mask or the tones are stated"
+        sources.report(path, Problem(problem, "accepted: oscillator.frequency", at=("frequency",)))
+        return INVALID
+    return found
+
+
+def _parts_of(names: str | tuple[str, ...] | None, path: KeyPath, kinds: Sequence[str], sources: _Sources) -> Any:
     """Parts, and what the file of each says; `INVALID` after a report."""
+    beside, find, report = sources
     is_list = isinstance(names, tuple)
     found: list[_Read] = []
     is_valid = True
@@ -333,8 +380,8 @@ def _parts_of(
                 raise PartError(f"is an {part.kind}" if part.kind != "gnss" else "is a GNSS receiver")
         except PartError as error:
             accepted = f"accepted: parts of the kind {' or '.join(kinds)}"
-            names_file = str(error).startswith(os.path.join(beside, name))
-            report(here, Problem(str(error), accepted, names_value=names_file))
+            for said in map(str, error.args):
+                report(here, Problem(said, accepted, names_value=said.startswith(os.path.join(beside, name))))
             is_valid = False
             continue
         if any(part.kind == other.kind for other, _ in found):
@@ -364,6 +411,9 @@ def _motion_of(error: MotionError, parts: Sequence[_Read], path: KeyPath, report
             error = error._replace(imu=imu._replace(**taken))
         elif taken and error.frame != "scene":
             report(path, Problem(f"{shown(part.name)} is stated east, north, up", "accepted: frame: scene"))
+            return INVALID
+        elif taken.keys() & {"position", "velocity"} and error.distribution != "normal":
+            report(path, Problem(f"{shown(part.name)} is stated as one sigma", "accepted: distribution: normal"))
             return INVALID
         else:
             error = error._replace(**taken)
@@ -441,7 +491,7 @@ def _oscillator_of(oscillator: Oscillator, read: _Read, path: KeyPath, report: R
         at = _as_written(written["frequency"])
         if own is None and form == "phase_noise":
             problem = f"the phase noise of {shown(part.name)} is stated at its own frequency, {at}"
-            report(path[:-1], Problem(problem, "accepted: no frequency, or phase_noise beside it", at=("frequency",)))
+            report(path, Problem(problem, "accepted: no frequency, or phase_noise beside it", at=("frequency",)))
             return INVALID
         overridden.append(Overridden("frequency", "oscillator.frequency", part.name, at))
     return oscillator._replace(**taken, overridden=tuple(overridden))

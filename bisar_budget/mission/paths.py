@@ -12,7 +12,7 @@ from bisar_budget.geometry import STRAIGHT, PlatformState
 from bisar_budget.mission import routes
 from bisar_budget.mission.instruments import Overridden
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.platforms import FlownPath, MotionError, Platform, without_image
+from bisar_budget.mission.platforms import FlownPath, MotionError, Platform, Platforms, without_image
 from bisar_budget.mission.readers import INVALID, Report
 from bisar_budget.paths import earth
 from bisar_budget.paths.flight import (
@@ -31,6 +31,7 @@ from bisar_budget.units import format_quantity
 
 Beside = Callable[[str], bytes]  # content of a file that a mission names
 
+_FILES = ("tle", "omm", "oem", "file", "accuracy")  # keys of a path that name one
 _MOST_BYTES = 500_000_000
 _LOGS_KEPT = 2  # of a mission that is read again and again, such as by `solve`
 _logs: dict[tuple[object, ...], Log] = {}  # by what they were read from; the bytes themselves are let go
@@ -64,6 +65,35 @@ def reader_of(folder: str) -> Beside:
         return data
 
     return read
+
+
+def report_files(root: Any, read: Beside, report: Report) -> None:
+    """Say which orbits and logs cannot be read, of a file that is no mission for other reasons.
+
+    What they say is looked at where the rest of the mission is there: a path depends on its scene, time and aperture.
+
+    Parameters
+    ----------
+    root : dict
+        What the file says.
+    read : callable
+        Content of a file that the mission names; raises `PathFileError`.
+    report : callable
+        Takes what is wrong, and where.
+    """
+    platforms = root.get("platforms")
+    for name in Platforms._fields:
+        platform = platforms.get(name) if isinstance(platforms, dict) else None
+        for key, section in (("orbit", routes.ORBIT), ("trajectory", routes.TRAJECTORY)):
+            named = section.each(platform.get(key)) if isinstance(platform, dict) else {}
+            for form in _FILES:
+                file = named.get(form)
+                if not isinstance(file, str):
+                    continue
+                try:
+                    read(file)
+                except PathFileError as error:
+                    report(("platforms", name, key, form), _of_file(file, error))
 
 
 def with_paths(mission: Mission, read: Beside, report: Report) -> Any:
@@ -283,6 +313,8 @@ def _by_accuracy(
         )
     except PathFileError as unusable:
         raise _UnusablePathError(key, _of_file(file, unusable)) from None
+    if error.distribution != "normal" and error.covariance is None and None in (error.position, error.velocity):
+        raise _UnusablePathError(key, Problem("states one sigma", "accepted: motion_error.distribution: normal"))
     source = f"accuracy file {file}"
     for kind, unit in (("position", "m"), ("velocity", "m/s")):
         figure = getattr(stated, kind)

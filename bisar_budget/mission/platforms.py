@@ -1,6 +1,6 @@
 """Platforms of a mission file: where they fly, in one of five ways, and how wrong their motion is measured."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
@@ -273,16 +273,18 @@ class Platform(NamedTuple):
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
         """Hold it to one complete geometry, above the ground, off the scene centre."""
-        if not values.keys() >= set(_PATH_KEYS):
-            return  # one of them is wrong by itself
-        platform = Platform(**{key: values[key] for key in _PATH_KEYS})
-        unclear = platform._unclear_geometry()
+        wrong = [key for key in _PATH_KEYS if key not in values]  # by themselves, and given all the same
+        given = [key for key in _PATH_KEYS if key in wrong or values[key] is not None]
+        unclear = _unclear_geometry(given, is_fixed=values.get("speed") == 0, may_be_fixed="speed" in wrong)
         if unclear is not None:
             yield unclear
-        if platform.position is not None and platform.position[2] < 0:
+        position: Vector | None = values.get("position")
+        if position is not None and position[2] < 0:
             yield Problem("puts the platform below the ground, z < 0", at=("position", 2))
-        if unclear is None and not platform.is_of_the_earth:
-            yield from platform.without_image(values.get("motion_error"))
+        if unclear is None and not wrong:
+            platform = Platform(**{key: values[key] for key in _PATH_KEYS})
+            if not platform.is_of_the_earth:
+                yield from platform.without_image(values.get("motion_error"))
 
     def without_image(self, error: MotionError | None) -> Iterator[Problem]:
         """Say what keeps its path from forming an image, and its errors from their frame."""
@@ -295,21 +297,6 @@ class Platform(NamedTuple):
                 state.frame(error.frame)
             except UndefinedFrameError as undefined:
                 yield Problem(str(undefined), "accepted: scene", at=("motion_error", "frame"))
-
-    def _unclear_geometry(self) -> Problem | None:
-        given = [key for key in _PATH_KEYS if getattr(self, key) is not None]
-        ways = [way for way in WAYS if any(key in way.own for key in given)] or WAYS[-1:]
-        known = (*ways[0].keys, *ways[0].optional)
-        strange = [key for key in given if key not in known]
-        if strange:
-            own = next(key for key in given if key in ways[0].own)
-            other = next((key for key in strange if any(key in way.own for way in ways[1:])), strange[0])
-            return Problem(f"mixes {own} with {other}", ACCEPTED_WAYS, at=(other,))
-        is_fixed, direction = self.speed == 0, ways[0].direction
-        if is_fixed and direction in given:
-            return Problem("a platform with speed 0 has none", ACCEPTED_WAYS, at=(direction,))
-        missing = [key for key in ways[0].keys if key not in given and not (is_fixed and key == direction)]
-        return Problem(f"lacks {', '.join(missing)}", ACCEPTED_WAYS) if missing else None
 
     @property
     def way(self) -> str:
@@ -332,6 +319,23 @@ class Platform(NamedTuple):
             return _state_from_vectors(self.position, self.velocity, *curves)
         polar = (self.slant_range, self.azimuth, self.elevation, self.speed, self.motion_azimuth, self.climb)
         return _state_from_angles(*polar, *curves)
+
+
+def _unclear_geometry(given: Sequence[str], *, is_fixed: bool, may_be_fixed: bool) -> Problem | None:
+    """Say what keeps the keys that a file gives from being one complete way."""
+    ways = [way for way in WAYS if any(key in way.own for key in given)] or WAYS[-1:]
+    known = (*ways[0].keys, *ways[0].optional)
+    strange = [key for key in given if key not in known]
+    if strange:
+        own = next(key for key in given if key in ways[0].own)
+        other = next((key for key in strange if any(key in way.own for way in ways[1:])), strange[0])
+        return Problem(f"mixes {own} with {other}", ACCEPTED_WAYS, at=(other,))
+    direction = ways[0].direction
+    if is_fixed and direction in given:
+        return Problem("a platform with speed 0 has none", ACCEPTED_WAYS, at=(direction,))
+    needless = direction if is_fixed or may_be_fixed else ""
+    missing = [key for key in ways[0].keys if key not in given and key != needless]
+    return Problem(f"lacks {', '.join(missing)}", ACCEPTED_WAYS) if missing else None
 
 
 def _bends(jerk: Vector | None, snap: Vector | None) -> tuple[Vector, ...]:

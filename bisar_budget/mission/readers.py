@@ -200,19 +200,23 @@ class Glob(Text):
 
 
 class Choice(Reader):
-    """One of a few words; `refused` maps words that mean something elsewhere to why not here."""
+    """One of a few words; `refused` maps words that mean something elsewhere to why not here.
+
+    `accepted` says which there are; omitted: all of them.
+    """
 
     is_word = True
 
-    def __init__(self, *names: str, refused: Mapping[str, str] | None = None) -> None:
+    def __init__(self, *names: str, refused: Mapping[str, str] | None = None, accepted: str = "") -> None:
         self.names = names
         self.refused = refused or {}
+        self.accepted = accepted or ", ".join(names)
 
     def leaf(self, value: Any) -> str:
         """Refuse other words, with the nearest."""
         if isinstance(value, str) and value in self.names:
             return value
-        accepted = f"accepted: {', '.join(self.names)}"
+        accepted = f"accepted: {self.accepted}"
         if isinstance(value, str) and value in self.refused:
             raise InvalidValueError(self.refused[value], accepted)
         raise InvalidValueError("is not a known choice", accepted, did_you_mean(value, self.names))
@@ -225,13 +229,13 @@ class Choice(Reader):
 class Words(Reader):
     """A list of some of a few words, each once."""
 
-    def __init__(self, *names: str) -> None:
-        self.word = Choice(*names)
+    def __init__(self, *names: str, accepted: str = "") -> None:
+        self.word = Choice(*names, accepted=accepted)
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
         """Read each word at its own place."""
         if not isinstance(value, list):
-            report(path, Problem("must be a list", f"accepted: some of {', '.join(self.word.names)}"))
+            report(path, Problem("must be a list", f"accepted: some of {self.word.accepted}"))
             return INVALID
         words = tuple([_read(self.word, word, (*path, index), report) for index, word in enumerate(value)])
         for index, word in enumerate(words):
@@ -400,6 +404,11 @@ class Section(Reader):
                 is_valid = False
         return self.kind(**values) if is_valid else INVALID
 
+    def each(self, value: Any) -> dict[str, Any]:
+        """Read each known key by itself, and say nothing: `INVALID` stands for what is wrong."""
+        given = value.items() if isinstance(value, dict) else ()
+        return {name: _read(self.keys[name].reader, item, (), _unsaid) for name, item in given if name in self.keys}
+
     def below(self, part: str) -> Reader | None:
         """Give the reader of a key."""
         return self.keys[part].reader if part in self.keys else None
@@ -502,6 +511,10 @@ def is_place(part: str) -> bool:
 
 def _read(reader: Reader, value: Any, path: KeyPath, report: Report) -> Any:
     return INVALID if value is INVALID else reader.read(value, path, report)
+
+
+def _unsaid(path: KeyPath, problem: Problem) -> None:
+    """Take what is said elsewhere."""
 
 
 def did_you_mean(given: object, known: tuple[str, ...]) -> str:

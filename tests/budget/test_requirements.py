@@ -167,6 +167,7 @@ def test_without_its_requirement_the_cubic_is_power_that_islr_holds(coverage: in
 def test_a_cubic_alone_does_not_judge_islr() -> None:
     found = check(requirements={"islr": "-20 dB"}, **SMALL, **{f"{RECEIVER}__imu": {"gyro_bias": "10 deg/h"}})
     assert row(found, "mission.islr").declared is not None
+    assert {one.status for one in found.rows if one.subject.kind == "islr"} == {"not_evaluated", "not_declared"}
     assert requirement(found, "islr").status == "not_evaluated"
     assert code(found) == 1
 

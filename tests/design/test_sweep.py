@@ -694,7 +694,11 @@ class TestWords:
             ("motion_error.sensor=[stim300", r"sensor=\[stim300: is not valid YAML"),
             ("orbit.tle=[a, b],[c, d]", "tle: no value of it makes a mission: .* mixes orbit"),
             ("motion_error.frame=track,ric", "frame=ric: the ric frame needs the scene's latitude"),
-            ("trajectory.file=a.csv,b.csv", "file: no value of it makes a mission: .* mixes trajectory"),
+            (
+                "trajectory.file=tandem_x.yaml,tandem_l.yaml",
+                "file: no value of it makes a mission: .* mixes trajectory",
+            ),
+            ("trajectory.file=a.csv,b.csv", "file=a.csv: a.csv cannot be read"),
         ],
     )
     def test_what_no_number_can_mend_is_said_at_once(self, text: str, said: str) -> None:

@@ -583,6 +583,13 @@ def test_names_of_a_file_stay_in_their_comment(tmp_path) -> None:
     assert read["radar"]["center_frequency"] == "8 GHz"
 
 
+def test_a_header_says_nothing_of_the_model_so_the_full_one_judges(tmp_path) -> None:
+    text = mission_text(import_collection(str(written(tmp_path / "a.cphd", sample(BISTATIC)))))
+    assert "allocation" not in yaml.safe_load(text)
+    rules = parse_mission(text).allocation
+    assert (rules.model, rules.combine) == ("full", "rss")
+
+
 @pytest.mark.parametrize(("off", "exit_code"), [(5.0, 0), (5e7, 2)])
 def test_a_vector_that_is_elsewhere_is_said_or_refused(run, tmp_path, off, exit_code) -> None:
     """By 5 m a warning; by more than a hundredth of the range no mission."""

@@ -159,6 +159,8 @@ def test_a_mask_is_sorted_by_frequency() -> None:
         ("motion_error: {sensor: [stim300, hg1700]}", "hg1700", "sensor[1]: is a second imu"),
         ("motion_error: {sensor: [stim300, stim300]}", "stim300]", "is in the list twice"),
         ("motion_error: {sensor: mosaic-x5-rtk, frame: track}", "mosaic", "is stated east, north, up"),
+        ("motion_error: {sensor: mosaic-x5-rtk, distribution: uniform}", "mosaic", "is stated as one sigma"),
+        ("motion_error: {sensor: mosaic-x5-rtk, velocity: 1 cm/s, distribution: bound}", "mosaic", "one sigma"),
         ("motion_error: {sensor: nowhere/mine.yaml}", "nowhere", "cannot be read: No such file or directory"),
     ],
 )  # fmt: skip
@@ -286,6 +288,15 @@ class TestCatalogue:
         (random,) = (row for row in found.rows if row.id == "receiver.random.multipath")
         assert random.evidence == "Ours: test 7"
         assert random.remarks == ()
+
+    @pytest.mark.parametrize("distribution", ["normal", "uniform", "bound"])
+    def test_a_distribution_is_that_of_the_files_own_figures(self, distribution: str) -> None:
+        """One sigma of a part is no bound; figures of an IMU are one sigma whatever stands beside them."""
+        own = f"position: 1 cm, velocity: 1 cm/s, distribution: {distribution}"
+        error = parse_mission(
+            receiver(f"motion_error: {{sensor: [stim300, mosaic-x5-rtk], {own}}}")
+        ).platforms.receiver
+        assert error.motion_error.distribution == distribution
 
     def test_random_errors_of_the_file_replace_those_of_a_part(self, tmp_path) -> None:
         file = tmp_path / "gnss.yaml"

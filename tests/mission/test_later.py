@@ -27,7 +27,8 @@ OTHER = {"name": "antenna", "quadratic_phase_error": "1 deg"}
 def faults(**changes: object) -> tuple[Fault, ...]:
     with pytest.raises(MissionError) as caught:
         parse_mission(mission_text(**changes), "m.yaml")
-    return caught.value.faults
+    # Logs that these missions name are not there, which is said beside it.
+    return tuple(fault for fault in caught.value.faults if "cannot be read: No such file" not in fault.problem)
 
 
 @pytest.mark.parametrize(

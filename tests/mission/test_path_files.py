@@ -441,6 +441,16 @@ BROKEN: dict[str, tuple[Callable[[], str], dict[str, bytes | str], str]] = {
         {"zeros.out": smrmsg(np.arange(61.0), north=0, east=0, down=0, rates=(0, 0, 0))},
         "no trajectory is without error",
     ),
+    "an accuracy that is no bound": (
+        lambda: aircraft(
+            platforms__receiver={
+                "trajectory": {"file": "sbet.out", "week": 2421, "accuracy": "smrmsg.out"},
+                "motion_error": {"distribution": "uniform", "velocity": "1 cm/s"},
+            }
+        ),
+        {},
+        "states one sigma",
+    ),
     "an accuracy in another frame": (
         lambda: aircraft(
             platforms__receiver={

@@ -4,6 +4,7 @@ Every number is one that the check found or an explanation shows; nothing is com
 """
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from hashlib import sha256
 from typing import TYPE_CHECKING
@@ -132,21 +133,33 @@ def compliance(report: Report, style: Style) -> Compliance:
     )
 
 
-def _verdict(status: str, waived: int) -> str:
+def _verdict(status: str, waived: Counter[str]) -> str:
     """Verdict on rows and requirements, with what it owes to waivers."""
-    waivers = f"{waived} rows or requirements are" if waived > 1 else "1 row or requirement is"
-    return f"{STATUS[status].verdict}; {waivers} waived" if waived else STATUS[status].verdict
+    said = [f"{count} {_plural(what, count)} {'are' if count > 1 else 'is'} waived" for what, count in waived.items()]
+    return "; ".join([STATUS[status].verdict, *said])
 
 
-def _waived(found: MissionFindings) -> int:
+_OVER, _UNJUDGED = "row over its limit", "requirement or row that cannot be judged"
+
+
+def _plural(what: str, count: int) -> str:
+    if count == 1:
+        return what
+    return "rows over their limits" if what == _OVER else "requirements or rows that cannot be judged"
+
+
+def _waived(found: MissionFindings) -> Counter[str]:
     """Number of rows that are waived, and of requirements that are and have no such row."""
-    return found.summary.get("waived", 0) + sum(one.status == "waived" for one in unseen(found))
+    rows = [row for row in found.rows if row.status == "waived"]
+    over = sum((row.utilization or 0.0) > 1 for row in rows)
+    unjudged = len(rows) - over + sum(one.status == "waived" for one in unseen(found))
+    return Counter({what: count for what, count in ((_OVER, over), (_UNJUDGED, unjudged)) if count})
 
 
 def _overall(report: Report, pages: Sequence[MissionPage]) -> str:
     """Verdict on the run: a mission that declares nothing complies with nothing."""
     usable = [mission for mission in report.missions if isinstance(mission, MissionFindings)]
-    said = _verdict(report.status, sum(map(_waived, usable)))
+    said = _verdict(report.status, sum(map(_waived, usable), Counter()))
     empty = sum(page.verdict == _NOTHING for page in pages)
     if empty == len(pages):
         return _NOTHING

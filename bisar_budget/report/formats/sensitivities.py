@@ -141,7 +141,7 @@ def to_limit(found: Sensitivity, slope: Slope) -> str:
         return "-"
     if slope.is_proportional:
         part = change / slope.value
-        return f"{100 * part:+.3g} %" if -0.99 < part < 9 else f"x {1 + part:.3g}"
+        return f"{100 * part:+.3g} %" if -0.99 < part < 9 else f"x {float(f'{1 + part:.3g}'):g}"
     return f"{change:+.3g} dB" if slope.per_text.endswith("dB") else f"{math.degrees(change):+.3g} deg"
 
 

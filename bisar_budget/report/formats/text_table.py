@@ -60,14 +60,18 @@ def _unusable(mission: UnusableMission, style: Style) -> list[str]:
 def _mission(mission: MissionFindings, style: Style) -> list[str]:
     if style.verbosity < 0:
         count = sum(not warning.is_of_options for warning in mission.warnings)
-        said = [_summary(mission), *_alone(mission)]
+        said = [_summary(mission, is_brief=True), *_alone(mission)]
         said += [f"{count} warning{'s' if count != 1 else ''} about the file"] if count else []
         if outside := overrides_words(mission, with_changes=False):
             said.append(f"from outside the file: {outside}")
         return [_lead("; ".join(said), mission.status, style)]
     lines = _verdict(mission, style)
     lines += ["", *_requirements(mission, style)]
-    lines += ["", *(line for key, text in _head(mission) for line in wrapped(f"{key:<12} {text}", " " * 13)), ""]
+    lines += [
+        "",
+        *(line for key, text in _head(mission, style) for line in wrapped(f"{key:<12} {text}", " " * 13)),
+        "",
+    ]
     after = list(_after(mission, style))
     room = max(LINES - len(lines) - len(after), 0)
     return [*lines, *_table(mission, style, room), *after]
@@ -122,10 +126,11 @@ def _right(cells: Sequence[str], widths: Sequence[int]) -> list[str]:
     return [cell.rjust(width) for cell, width in zip(cells, widths, strict=True)]
 
 
-def _head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
-    """The collection, and how many rows stand how; the model is said with the name."""
+def _head(mission: MissionFindings, style: Style) -> Iterator[tuple[str, str]]:
+    """The collection, and with -v how many rows stand how; the model is said with the name."""
     yield from ((key, text) for key, text in head(mission) if key != "Model")
-    yield "Rows", ", ".join(f"{count} {STATUS[status].text}" for status, count in mission.summary.items())
+    if style.verbosity > 0:
+        yield "Rows", ", ".join(f"{count} {STATUS[status].text}" for status, count in mission.summary.items())
 
 
 def _after(mission: MissionFindings, style: Style) -> Iterator[str]:
@@ -157,19 +162,18 @@ def _table(mission: MissionFindings, style: Style, room: int) -> Iterator[str]:
     if is_short and not mission.is_empty:
         hidden = [row for row in rows if not matters(row)]
         rows = [row for row in rows if matters(row)]
-    is_met = [STATUS[row.status].is_met or row.status == "info" for row in rows]
-    while True:
-        lines = [*_lines(rows, mission, style), *wrapped(_table_key(rows, hidden), "  ")]
-        if (
-            not is_short
-            or mission.is_empty
-            or len(lines) <= room
-            or len(rows) <= _FEWEST
-            or not is_met[len(rows) - 1]
-        ):
-            break
-        hidden, rows = [rows[-1], *hidden], rows[:-1]
+    passing = [row for row in rows if STATUS[row.status].is_met or row.status == "info"]
+    passing.sort(key=lambda row: -(row.utilization or 0.0))
+    lines = _table_lines(rows, hidden, mission, style)
+    while is_short and not mission.is_empty and len(lines) > room and passing and len(rows) > _FEWEST:
+        least = passing.pop()
+        hidden, rows = [least, *hidden], [row for row in rows if row is not least]
+        lines = _table_lines(rows, hidden, mission, style)
     yield from lines
+
+
+def _table_lines(rows: Sequence[Row], hidden: Sequence[Row], mission: MissionFindings, style: Style) -> list[str]:
+    return [*_lines(rows, mission, style), *wrapped(_table_key(rows, hidden), "  ")]
 
 
 def _lines(rows: Sequence[Row], mission: MissionFindings, style: Style) -> Iterator[str]:
@@ -291,9 +295,9 @@ def _asides(mission: MissionFindings, style: Style) -> Iterator[str]:
         yield from (f"note: {note}" for note in mission.notes)
 
 
-def _summary(mission: MissionFindings) -> str:
+def _summary(mission: MissionFindings, *, is_brief: bool = False) -> str:
     changed = f" {changes_words(mission.changes)}" if mission.changes else ""
-    return f"{STATUS[mission.status].text} {printable(mission.file)}{changed}: {verdict(mission)}"
+    return f"{STATUS[mission.status].text} {printable(mission.file)}{changed}: {verdict(mission, is_brief=is_brief)}"
 
 
 def _overall(statuses: Sequence[str], style: Style) -> str:

@@ -94,28 +94,33 @@ def requirement_finding(one: JudgedRequirement) -> str:
         text += (
             f", {requirement_size(one.reached, one)} reached, {requirement_size(one.allowed, one, 'down')} allowed"
         )
-    if one.row is not None:
+    if one.row is not None and one.status != "not_evaluated":
         text += f", decided by {one.row}"
     return ". ".join([text, *filter(None, [one.reason]), *(waiver.words for waiver in one.waivers)])
 
 
-def verdict(mission: MissionFindings) -> str:
-    """Say whether every requirement was judged and is met; else how many are not."""
+def verdict(mission: MissionFindings, *, is_brief: bool = False) -> str:
+    """Say whether every requirement was judged and is met; else how many are not. `is_brief` leaves verbs out."""
     if mission.is_empty:
-        return "the file declares no error, so nothing is judged; the allowables follow"
+        return "the file declares no error" + ("" if is_brief else ", so nothing is judged; the allowables follow")
     statuses = [one.status for one in mission.requirements]
-    said = []
-    if failing := statuses.count("fail"):
-        said.append(f"{_counted(failing, 'requirement')} {'is' if failing == 1 else 'are'} not met")
-    if unjudged := statuses.count("not_evaluated"):
-        said.append(f"{_counted(unjudged, 'requirement')} cannot be judged")
-    if effects := len(unjudged_effects(mission)):
-        said.append(f"{_counted(effects, 'effect')} of errors {'is' if effects == 1 else 'are'} judged by none")
+    counts = (
+        (statuses.count("fail"), "requirement", ("is", "are"), "not met"),
+        (statuses.count("not_evaluated"), "requirement", ("cannot", "cannot"), "be judged"),
+        (len(unjudged_effects(mission)), "effect", ("is", "are"), "judged by no requirement"),
+    )
+    said, named = [], ""
+    for count, what, verbs, outcome in counts:
+        if count:
+            subject = str(count) if what == named else f"{count} {what}{'' if count == 1 else 's'}"
+            verb = "" if is_brief and verbs[0] == "is" else f"{verbs[count > 1]} "
+            said.append(f"{subject} {verb}{outcome}")
+            named = what
     if said:
         return ", ".join(said)
     broken = [row for row in mission.rows if row.status in _BREAKS]
     if broken:
-        return f"{_counted(len(broken), 'row')} {'fails' if len(broken) == 1 else 'fail'} or cannot be judged"
+        return f"{len(broken)} row{' fails' if len(broken) == 1 else 's fail'} or cannot be judged"
     if mission.is_unverified:
         return "images were asked for, and none gave a verdict"
     return _met(mission)
@@ -127,10 +132,6 @@ def _met(mission: MissionFindings) -> str:
     if mission.status == "warn":
         return f"{text}, with warnings"
     return f"{text}, with autofocus" if mission.status == "pass_with_autofocus" else text
-
-
-def _counted(count: int, what: str) -> str:
-    return f"{count} {what}{'' if count == 1 else 's'}"
 
 
 class UnjudgedEffect(NamedTuple):
@@ -159,8 +160,9 @@ def _texts(values: object) -> list[str]:
 
 
 def is_said_with_the_table(row: Row) -> bool:
-    """Whether all that decides a row is that no requirement takes its effect."""
-    return row.status == "not_evaluated" and row.reason is not None and row.reason.code == "effect-is-not-judged"
+    """Whether the table of requirements, and what stands below it, says why a row is not evaluated."""
+    codes = ("effect-is-not-judged", *_SHORT)
+    return row.status == "not_evaluated" and row.reason is not None and row.reason.code in codes
 
 
 def unseen(mission: MissionFindings) -> list[JudgedRequirement]:
