@@ -375,7 +375,7 @@ def test_text(run: Callable) -> None:
     said = [line.split() for line in done.stdout.splitlines()]
     assert ["collection.aperture_time", "6", "s", "-70.9", "%", "1", "%", "+23.6"] in said
     assert ["requirements.quadratic_phase_error", "45", "deg", "x", "11.8", "1", "%", "-11.8"] in said
-    assert "Left out: 6 keys (a whole number, 0)." in done.stdout
+    assert "Left out: 8 keys (a whole number, 0, a choice)." in done.stdout
 
 
 def test_json(run: Callable) -> None:
