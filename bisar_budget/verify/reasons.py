@@ -86,6 +86,12 @@ def no_spread_declared() -> str:
 
 
 @phrase
+def no_tone_declared() -> str:
+    """Of the requirement of PSLR."""
+    return "nothing that echoes is declared"
+
+
+@phrase
 def lines_without_amplitude() -> str:
     """Of lines that share a frequency."""
     return "the lines have no amplitude"
