@@ -33,7 +33,7 @@ from bisar_budget.budget.input_doubt import declared_position_error, is_in_doubt
 from bisar_budget.budget.orbit import FASTEST_FLIGHT
 from bisar_budget.budget.random_rows import pslr_row, spur_rows
 from bisar_budget.budget.required import DECLARATIONS, Missing, is_asked_for, missing_declarations
-from bisar_budget.budget.requirements import (
+from bisar_budget.budget.requirement_states import (
     KEYS,
     TAKEN_BY,
     EffectTotal,

@@ -14,7 +14,7 @@ from bisar_budget.analysis.spread import islr_db, mainlobe_energy, noise, spread
 from bisar_budget.analysis.together import Together
 from bisar_budget.analysis.vibration_limits import LARGEST_ECHO, echo_level
 from bisar_budget.budget.input_doubt import InputDoubt
-from bisar_budget.budget.requirements import (
+from bisar_budget.budget.requirement_states import (
     KEYS,
     TAKEN_BY,
     UNITS,

@@ -43,7 +43,7 @@ def _command(name: str) -> click.Command:
 
 
 class _Commands(click.Group):
-    """A group of late imports, whose crashes exit with 3: 1 means a broken requirement and nothing else."""
+    """A group of late imports, whose crashes exit with 3: 1 means a requirement that is broken or not judged."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(_MODULES)

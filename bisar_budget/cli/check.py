@@ -12,7 +12,7 @@ import click
 from click.core import ParameterSource
 
 from bisar_budget import __version__
-from bisar_budget.cli.outside import day, day_origin, origin_of, outside
+from bisar_budget.cli.outside import DAY_OF_RUN, day, day_origin, origin_of, outside
 from bisar_budget.cli.streams import (
     EXIT_BROKEN,
     FILE,
@@ -421,7 +421,9 @@ def _explain(
         found = check_mission(mission, today, outside=from_outside)
         known |= dict.fromkeys(row.id for row in found.rows)
         if any(row.id == row_id for row in found.rows):
-            texts.append(explain(mission, found, row_id) + "".join(f"{line}\n" for line in overrides_lines(found)))
+            given = tuple(one for one in found.overrides if one.origin != DAY_OF_RUN)
+            said = overrides_lines(found._replace(overrides=given))
+            texts.append(explain(mission, found, row_id) + "".join(f"{line}\n" for line in said))
     if not texts:
         hint = did_you_mean(row_id, tuple(known))
         raise click.UsageError(f"--explain {printable(row_id)}: no row has this id. {hint or 'A check lists them.'}")

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from bisar_budget.budget.overrides import Outside
     from bisar_budget.findings.requirement import Override
 
+DAY_OF_RUN = "the day of the run"
 _BEARING = ("model", "strict", "exit_zero")  # on the verdict, besides the day and --set
 
 
@@ -49,7 +50,7 @@ def day_origin(today: datetime | None) -> str:
     """Say where the day of waivers comes from."""
     if today is not None:
         return "command line"
-    return "environment, SOURCE_DATE_EPOCH" if os.environ.get("SOURCE_DATE_EPOCH") else "the day of the run"
+    return "environment, SOURCE_DATE_EPOCH" if os.environ.get("SOURCE_DATE_EPOCH") else DAY_OF_RUN
 
 
 def day(today: datetime | None) -> date:

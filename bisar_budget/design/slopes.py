@@ -16,9 +16,9 @@ class Slope(NamedTuple):
     """What one number of the file does.
 
     `text` is its value as the file has it, `value` the same in `unit`; of a covariance the factor 1 on its sigmas.
-    `per_text` says how much more of it `change` is for, `per` the same in SI, signed like the value, and `measure` the
-    same by one measure for all numbers: a part of the number, of a radian, of a power, of a range. `change` is that of
-    the worst utilization, `row_change` that of the row that was asked for; None where there is none. Both are
+    `per_text` says how much more of it `change` is for, `per` the same in SI, signed like the value, and `measure`
+    the same by one measure for all numbers: a part of the number, of a radian, of a power, of a range. `change` is
+    that of the worst utilization, `row_change` that of the row that was asked for; None where there is none. Both are
     differences over values `step` to either side, or, where there is no mission on one side, over two steps on the
     other (`difference`: central, forward, backward). `row_below` and `row_above` have the worst utilization at the
     smaller and the larger end of the difference, in magnitude; `is_mixed` is whether the row that has it at the value

@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from bisar_budget import __version__
-from tests.conftest import ROOT, mission_text
+from tests.conftest import COMPLIES, ROOT, mission_text
 
 FAILING = {"platforms__transmitter__motion_error__velocity": "5 m/s"}
 
@@ -18,7 +18,7 @@ FAILING = {"platforms__transmitter__motion_error__velocity": "5 m/s"}
 @pytest.fixture
 def good(tmp_path):
     path = tmp_path / "good.yaml"
-    path.write_text(mission_text())
+    path.write_text(mission_text(**COMPLIES))
     return path
 
 
@@ -53,13 +53,14 @@ class TestExitCodes:
         assert run("check", broken, "--exit-zero", "--format", format_name).exit_code == 2
 
 
-def test_strict_fails_on_warnings_and_on_what_was_not_evaluated(run, tmp_path) -> None:
+def test_strict_fails_on_warnings_and_what_is_not_judged_fails_without_it(run, tmp_path) -> None:
     warning = tmp_path / "warning.yaml"
     warning.write_text(mission_text(timing_error__quadratic=6e-13))
     unjudged = tmp_path / "unjudged.yaml"
-    unjudged.write_text(mission_text(platforms__receiver__motion_error={"vibration": {"wideband": {"rms": 1e-6}}}))
-    for path in (warning, unjudged):
-        assert run("check", path).exit_code == 0
+    vibration = {"vibration": {"wideband": {"rms": 5e-4}}}  # 0.1 rad of phase: above negligible, and no ISLR
+    unjudged.write_text(mission_text(platforms__receiver__motion_error=vibration))
+    for path, code in ((warning, 0), (unjudged, 1)):
+        assert run("check", path).exit_code == code
         assert run("check", path, "--strict").exit_code == 1
 
 
@@ -112,7 +113,7 @@ def test_an_unusable_file_stands_in_every_format(run, good, broken) -> None:
 
 
 def test_standard_input(run) -> None:
-    result = run("check", "-", "--format", "json", input=mission_text())
+    result = run("check", "-", "--format", "json", input=mission_text(**COMPLIES))
     assert result.exit_code == 0
     assert json.loads(result.stdout)["missions"][0]["file"] == "-"
 
@@ -143,7 +144,7 @@ def test_output_that_cannot_be_written_is_2(run, good, tmp_path) -> None:
         result = run("check", good, "-o", target)
         assert result.exit_code == 2
         assert "cannot write" in result.stderr
-    assert good.read_text() == mission_text()
+    assert good.read_text() == mission_text(**COMPLIES)
 
 
 def test_reports_by_suffix_beside_the_text(run, failing, tmp_path) -> None:
@@ -257,9 +258,9 @@ class TestInit:
     def test_does_not_replace_without_force(self, run, good) -> None:
         result = run("init", good)
         assert result.exit_code == 2
-        assert good.read_text() == mission_text()
+        assert good.read_text() == mission_text(**COMPLIES)
         assert run("init", good, "--force").exit_code == 0
-        assert good.read_text() != mission_text()
+        assert good.read_text() != mission_text(**COMPLIES)
 
     def test_standard_output(self, run) -> None:
         assert "schema_version: 1" in run("init", "-").stdout
@@ -271,8 +272,14 @@ class TestInit:
         assert count == 22
         path = tmp_path / "m.yaml"
         path.write_text(text)
-        result = run("check", path)
-        assert result.exit_code == 0, result.output
+        result = run("check", path, "--format", "json")
+        assert result.exit_code == 1, result.output  # it asks for more than it declares
+        (mission,) = json.loads(result.stdout)["missions"]
+        stands = {one["key"]: one["status"] for one in mission["requirements"]}
+        assert stands.pop("quadratic_phase_error") == "pass_with_autofocus"
+        assert stands.pop("location_error") == "waived"
+        assert stands.pop("declare") == "not_evaluated"
+        assert set(stands.values()) <= {"pass", "warn"}
 
     def test_the_other_ways_to_state_a_path_are_those_of_a_mission(self, run, tmp_path) -> None:
         """It did not mention orbits, logs and places. Files are asked for: all keys are known."""
@@ -411,7 +418,7 @@ def test_quiet_counts_the_warnings_about_a_file(run, tmp_path) -> None:
     file = tmp_path / "silent.yaml"
     file.write_text(mission_text())
     result = run("check", "-q", file)
-    assert result.exit_code == 0
+    assert result.exit_code == 1
     assert result.stdout.splitlines()[0].endswith("; 1 warning about the file")
 
 

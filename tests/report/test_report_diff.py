@@ -241,7 +241,7 @@ class TestCommand:
         rows = [line for line in text.splitlines() if line.startswith("|")]
         assert len(rows) == 3
         assert {line.count("|") for line in rows} == {8}
-        assert "100 mrad → 200 mrad" in rows[2]
+        assert "0.1 rad → 0.2 rad" in rows[2]
 
     @pytest.mark.parametrize(
         ("arguments", "message"),

@@ -11,9 +11,9 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.report.change.comparison import Change, MissionChange, Moved
 from bisar_budget.report.words.escapes import markdown_text
 from bisar_budget.report.words.layout import table, wrapped
-from bisar_budget.report.words.quantities import row_size
 from bisar_budget.report.words.requirements import overrides_lines, overrides_words
 from bisar_budget.report.words.sentences import percent
+from bisar_budget.report.words.sizes import row_size
 from bisar_budget.units import format_quantity
 
 FORMAT = "bisar-budget/diff/1"

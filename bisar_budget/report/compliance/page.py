@@ -58,7 +58,6 @@ from bisar_budget.report.explain.explanation import chain, collection_chain
 from bisar_budget.report.formats import verification
 from bisar_budget.report.words.escapes import source_path
 from bisar_budget.report.words.missions import doubtful_model, head, multiple_of_pi, narrow_gradients, path_words
-from bisar_budget.report.words.quantities import phase_limit, phase_unit, requirement_size, row_limit, row_size
 from bisar_budget.report.words.requirements import (
     kind_names,
     requirement_lines,
@@ -68,6 +67,7 @@ from bisar_budget.report.words.requirements import (
     verdict,
 )
 from bisar_budget.report.words.sentences import matters, measure, percent
+from bisar_budget.report.words.sizes import phase_limit, phase_unit, requirement_size, row_limit, row_size
 from bisar_budget.units import format_in, format_quantity
 
 if TYPE_CHECKING:

@@ -69,7 +69,7 @@ def _value(axis: Axis, place: int) -> str:
 
 
 def _counts(study: TradeStudy) -> str:
-    failing = study.cases - study.complying - study.missing
+    failing = study.cases - study.complying - study.missing - study.unevaluated
     said = [f"{study.cases} cases", f"{study.complying} comply ({percent(study.complying / study.cases)})"]
     if study.unevaluated:
         said.append(f"{study.unevaluated} not evaluated")

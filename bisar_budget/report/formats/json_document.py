@@ -171,7 +171,8 @@ def verdict_item(verdict: "Verdict") -> dict[str, Any]:
 
 
 def _requirement(one: JudgedRequirement) -> dict[str, Any]:
-    found = {name: value for name, value in one._asdict().items() if name != "waivers"}
+    found: dict[str, Any] = one._asdict()
+    found["waivers"] = [waiver.words for waiver in one.waivers]
     return found | {"reason_code": None if one.reason is None else one.reason.code}
 
 

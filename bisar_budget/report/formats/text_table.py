@@ -12,7 +12,6 @@ from bisar_budget.findings.status import STATUS, worst
 from bisar_budget.report import Piece, Style
 from bisar_budget.report.words.layout import WIDTH, wrapped, wrapped_counts
 from bisar_budget.report.words.missions import document_words, doubtful_model, head, narrow_gradients
-from bisar_budget.report.words.quantities import row_limit, row_size
 from bisar_budget.report.words.requirements import (
     COLUMNS,
     RequirementLine,
@@ -26,6 +25,7 @@ from bisar_budget.report.words.requirements import (
     verdict,
 )
 from bisar_budget.report.words.sentences import binding_words, matters, percent
+from bisar_budget.report.words.sizes import row_limit, row_size
 from bisar_budget.units import format_quantity
 
 LINES = 45  # of a report, where its rows can be fewer

@@ -7,7 +7,7 @@ from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.mission.model import Document
 from bisar_budget.mission.platforms import FlownPath
-from bisar_budget.report.words.quantities import phase_limit
+from bisar_budget.report.words.sizes import phase_limit
 from bisar_budget.units import format_quantity
 
 _MODELS = {

@@ -10,8 +10,8 @@ from bisar_budget.findings.requirement import DeclaredKinds, JudgedRequirement, 
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import RANK, STATUS
 from bisar_budget.report.words.layout import wrapped
-from bisar_budget.report.words.quantities import requirement_size
 from bisar_budget.report.words.sentences import percent
+from bisar_budget.report.words.sizes import requirement_size
 
 COLUMNS = ("requirement", "allowed", "reached", "use", "status", "decided by")
 MODELS = {"published": "published model", "full": "full model", "strictest": "stricter of both models"}
@@ -54,13 +54,15 @@ def requirement_lines(mission: MissionFindings) -> Iterator[RequirementLine]:
     """Write the table of requirements, in the order of the contract."""
     for one in mission.requirements:
         is_open = one.status == "not_evaluated"
-        allowed = one.value if one.allowed is None else one.allowed
+        allowed, reached = one.value if one.allowed is None else one.allowed, one.reached
+        if is_open and one.row != one.id:  # what a share has reached is not what all of it would
+            allowed, reached = one.value, None
         remark = ", ".join(_remarks(one, mission))
         yield RequirementLine(
             requirement=one,
             name=one.name,
             allowed=requirement_size(allowed, one, "down"),
-            reached=requirement_size(one.reached, one),
+            reached=requirement_size(reached, one),
             use="-" if one.utilization is None or one.allowed is None or is_open else percent(one.utilization),
             status=one.status,
             decided_by=(_short(one.reason) if is_open and one.reason else one.row) or ("" if remark else "-"),
@@ -74,7 +76,7 @@ def _short(reason: phrases.Note) -> str:
 
 def _remarks(one: JudgedRequirement, mission: MissionFindings) -> Iterator[str]:
     """Say what is allowed, where that is not the requirement as it stands, and which waivers hold."""
-    if one.allowed is not None and one.value is not None:
+    if one.allowed is not None and one.value is not None and one.status != "not_evaluated":
         gain = mission.allocation.autofocus_gain if one.key == "quadratic_phase_error" else 1.0
         is_share = abs(one.allowed - gain * one.value) > 1e-9 * abs(one.value)
         is_gained = gain > 1 and abs(one.allowed - one.value) > 1e-9 * one.value

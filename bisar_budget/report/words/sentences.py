@@ -4,7 +4,7 @@ import math
 
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import DECLARE, Row
-from bisar_budget.report.words.quantities import row_limit, row_size
+from bisar_budget.report.words.sizes import row_limit, row_size
 
 # What can set an allowable, in words; of a requirement the terminal has room for the first.
 BINDING_WORDS = {
