@@ -60,6 +60,8 @@ def test_each_stands_as_a_check_with_it_says(key: str, file: str) -> None:
         row = next(row for row in checked.rows if row.id == part.standing.row)
         assert part.standing.utilization == pytest.approx(row.utilization, rel=1e-9)
         judged = [row for row in checked.rows if row.status not in ("info", "not_declared", "waived")]
+        if not part.complies:
+            judged = [row for row in judged if row.status in ("fail", "not_evaluated")]
         assert row.utilization == max(row.utilization or 0 for row in judged)
 
 
@@ -130,7 +132,7 @@ def test_text_and_json(run: Callable) -> None:
     done = run("solve", OCXO, "--for", OSCILLATOR, "--set", CLOCK)
     assert done.exit_code == 0
     lines = done.stdout.splitlines()
-    assert lines[0] == f"{OSCILLATOR}: the mission complies with 7 of 17 parts"
+    assert lines[0] == f"{OSCILLATOR}: the mission complies with 6 of 17 parts"
     assert any(line.startswith("ettus-gpsdo-ocxo *") and "FAIL" in line for line in lines)
     (mission,) = json.loads(run("solve", OCXO, "--for", OSCILLATOR, "--set", CLOCK, "--format", "json").stdout)[
         "missions"
@@ -212,7 +214,7 @@ def test_a_factor_and_a_part_are_imaged(run: Callable) -> None:
     assert "transmitter.acceleration.x at factor 0.08488" in " ".join(done.stdout.split())
     assert "confirmed" in done.stdout
     done = run("solve", OCXO, "--for", OSCILLATOR, "--set", CLOCK, "--verify")
-    assert "Imaged: receiver.quadratic_phase_error at thunderbolt-e: " in " ".join(done.stdout.split())
+    assert "Imaged: receiver.islr at wenzel-100mhz: " in " ".join(done.stdout.split())
 
 
 def test_where_nothing_complies_nothing_is_imaged(run: Callable) -> None:
