@@ -13,6 +13,7 @@ from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.spread import (
     CUBIC_POWER,
+    Tone,
     islr_db,
     mainlobe_energy,
     shown_islr_db,
@@ -283,23 +284,17 @@ def pslr_row(mission: Mission, gating: str) -> Iterator[Row]:
     required = mission.requirements.pslr
     if required is None:
         return
-    found = tones(mission)
-    over = NOTHING
-    highest, allowed = 0.0, 10 ** (required / 20)
-    for group in (*((index,) for index in range(len(found))), *near_lines([one.cycles for one in found])):
-        near = [found[index] for index in group]
-        phase = worst_phases([one.phase for one in near], [one.cycles for one in near]).amplitude
-        level = echo_level(phase) if phase <= LARGEST_ECHO else phase / 2
-        if level > max(highest, allowed):
-            largest = max(near, key=lambda one: one.phase)
-            over = phrases.echoes_together_over(_db(level), required, largest.subject.id, len(near))
-        highest = max(highest, level)
+    allowed, over = 10 ** (required / 20), NOTHING
+    highest, near = highest_echo(mission)
+    if highest > allowed:
+        largest = max(near, key=lambda one: one.phase)
+        over = phrases.echoes_together_over(_db(highest), required, largest.subject.id, len(near))
     row = judged(
         mission,
         subject=subject("mission", "pslr"),
         metric="pslr",
         unit="dB",
-        declared=highest if found else None,
+        declared=highest if near else None,
         allowable=allowed,
         path=("requirements", "pslr"),
         equation="first principles",
@@ -307,6 +302,19 @@ def pslr_row(mission: Mission, gating: str) -> Iterator[Row]:
         limits=(allowed, allowed),
     )
     yield in_decibel(row._replace(binding_requirement="pslr", model=gating))
+
+
+def highest_echo(mission: Mission) -> tuple[float, list[Tone]]:
+    """Amplitude of the highest echo over that of the response, and the tones that make it; none, of no tone."""
+    found = tones(mission)
+    highest: tuple[float, list[Tone]] = (0.0, [])
+    for group in (*((index,) for index in range(len(found))), *near_lines([one.cycles for one in found])):
+        near = [found[index] for index in group]
+        phase = worst_phases([one.phase for one in near], [one.cycles for one in near]).amplitude
+        level = echo_level(phase) if phase <= LARGEST_ECHO else phase / 2
+        if level > highest[0] or not highest[1]:
+            highest = (level, near)
+    return highest
 
 
 def _db(amplitude: float) -> float:

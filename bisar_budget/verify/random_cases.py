@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bisar_budget.analysis.spread import islr_db, mainlobe_energy, shown_islr_db, spread_limit, spread_powers, tones
-from bisar_budget.budget.random_rows import ISLR, limits_for, sizes_at
+from bisar_budget.budget.random_rows import ISLR, held_effect, limits_for, sizes_at
 from bisar_budget.effects.clocks import Spur
 from bisar_budget.effects.exact_arrays import aperture_nodes
 from bisar_budget.effects.models import CUBIC
@@ -41,7 +41,8 @@ _ORDER = 3  # up to which a phase moves and defocuses; the rest spreads
 def limits_of(study: Study, error: RandomError) -> dict[str, float]:
     """Size at which each requirement that an error touches is reached, autofocus left out; empty: none limits it."""
     model = _model(study, error)
-    return sizes_at(error.effect(model), limits_for(study.mission, study.allocation, error.owner, model))
+    effect = held_effect(study.mission, error.effect(model))
+    return sizes_at(effect, limits_for(study.mission, study.allocation, error.owner, model))
 
 
 def _model(study: Study, error: RandomError) -> str:
@@ -76,7 +77,8 @@ def verify_random(study: Study, error: RandomError) -> Verdict:
         unit=error.unit,
     )
     if binding == ISLR:
-        return _power(study, blank, [at_limit], error.owner)
+        is_taken = study.mission.requirements.cubic_phase_error is not None
+        return _power(study, blank, [at_limit], error.owner, order=_ORDER if is_taken else _ORDER - 1)
     return _phase(study, blank, at_limit, binding, _stream(study, error.id))
 
 
@@ -201,11 +203,12 @@ def _power(
     white: float = 0.0,
     echoes: Sequence[tuple[float, float]] = (),
     cubic: float = 0.0,
+    order: int = _ORDER,
 ) -> Verdict:
     """ISLR that time series at a limit add to an image, against what an owner may add to it.
 
     Beside the errors of sensors and clocks there may be white noise, tones, each with its cycles per aperture, and a
-    cubic phase; of each the rms over the aperture. [rad]
+    cubic phase; of each the rms over the aperture [rad]. Phases up to an order are taken out of the time series.
     """
     mission, collection = study.mission, study.collection
     rng = _stream(study, blank.id)
@@ -213,7 +216,7 @@ def _power(
     times = cell_centres(collection.aperture_time, MOMENTS)
     place = 2 * times / collection.aperture_time
     legendre = np.polynomial.legendre.legvander(place, _ORDER)
-    fitted = legendre @ np.linalg.pinv(legendre)
+    fitted = legendre[:, : order + 1] @ np.linalg.pinv(legendre[:, : order + 1])
 
     def left(draws: int) -> Floats:
         """Phases without what moves and defocuses the response."""

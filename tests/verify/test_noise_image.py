@@ -5,11 +5,12 @@ import math
 import numpy as np
 import pytest
 
+from bisar_budget.budget.check import check_mission
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.simulate.image_formation import taylor_window
 from bisar_budget.verify.limits import verify_mission
 from bisar_budget.verify.noise_image import Mainlobe, added_islr
-from tests.conftest import mission_text
+from tests.conftest import TODAY, mission_text
 from tests.effects.test_random_errors import MISSION
 from tests.responses import energy_within, shown_db
 
@@ -120,3 +121,15 @@ class TestVerdicts:
             (row,) = verify_mission(mission, "mission.vibration.wideband").rows
             assert row.verdict == "confirmed"
             assert row.measured_db + 20 == pytest.approx(excess, abs=0.01 + 4 * row.measured_db_error)
+
+    @pytest.mark.parametrize("required", ["", "cubic_phase_error: 45 deg, "])
+    def test_an_error_is_verified_with_the_cubic_phase_that_islr_holds(self, required: str) -> None:
+        """Of a velocity random walk the cubic phase has 1.8 times the power of what is beyond: both are at its limit."""
+        allocation = "allocation: {model: full, combine: rss}\n"
+        text = f"{MISSION}requirements: {{quadratic_phase_error: 180 deg, {required}islr: -30 dB}}\n{allocation}"
+        mission = parse_mission(text)
+        (row,) = verify_mission(mission, "receiver.imu.velocity_random_walk").rows
+        (checked,) = [one for one in check_mission(mission, TODAY).rows if one.id == row.id]
+        assert (row.boundary_error, checked.binding_requirement) == (pytest.approx(checked.allowable), "islr")
+        assert row.verdict in ("confirmed", "conservative")
+        assert row.measured_db == pytest.approx(row.requirement_db, abs=1.5)

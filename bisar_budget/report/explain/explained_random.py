@@ -6,7 +6,8 @@ from collections.abc import Iterator, Sequence
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.spread import mainlobe_energy, spread_phase, spread_powers
-from bisar_budget.analysis.vibration_limits import vibration_limits
+from bisar_budget.analysis.vibration_limits import tone_limits
+from bisar_budget.budget.random_rows import held_effect, highest_echo
 from bisar_budget.constants import STANDARD_GRAVITY
 from bisar_budget.effects.clocks import spurs_of
 from bisar_budget.effects.models import CUBIC, QUADRATIC
@@ -261,7 +262,8 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
         values = {"limit": required.cubic_phase_error, "cubic/unit": effect.cubic}
         lines = equation("by_cubic", "limit/(cubic/unit)", values, sizes["by_cubic"], _unit(error))
         yield from step(f"Allowable by requirements.{CUBIC}, without share and gain", *lines)
-    if effect.spread and required.islr is not None:
+    held = held_effect(mission, effect).spread
+    if held and required.islr is not None:
         power, share = 10 ** (required.islr / 10), allocation.islr.of(error.owner)
         energy = mainlobe_energy(mission)
         rule, values = _allowed_variance(model, power, energy)
@@ -270,10 +272,16 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
         yield from step(
             f"Phase that may be left, requirements.islr {required.islr:g} dB, share s of its power", *lines
         )
-        sizes["by_ISLR"] = rms / effect.spread
+        sizes["by_ISLR"] = rms / held
         k = _covered(mission, error)
-        values = {"rms": rms, "left/unit": effect.spread * k, "k": k}
-        formula = "rms/(left/unit)" if k == 1 else "k*rms/(left/unit)"
+        values, formula = {"rms": rms, "left/unit": held * k, "k": k}, "k*rms/(left/unit)"
+        if held != effect.spread:  # no requirement takes the cubic phase
+            values = {"left": effect.spread, "cubic": effect.cubic, "k": mission.allocation.coverage_factor}
+            lines = equation("held/unit", "sqrt(left^2 + 4*(cubic/k)^2/175)", values, held, "rad")
+            yield from step("With the power of the cubic phase, at one sigma, of one unit that is declared", *lines)
+            values, formula = {"rms": rms, "held/unit": held}, "rms/(held/unit)"
+        elif k == 1:
+            formula = "rms/(left/unit)"
         lines = equation("by_ISLR", formula, values, sizes["by_ISLR"], _unit(error))
         yield from step("Allowable by requirements.islr", *lines)
     if row.allowable is None or not sizes:
@@ -345,6 +353,28 @@ def explained_islr(analysis: Analysis, allocation: Allocation, row: Row) -> Iter
         yield from step("Utilization, of amplitudes", *lines)
 
 
+def explained_pslr(mission: Mission, row: Row) -> Iterator[Step]:
+    """The highest echo of all tones, and what is required."""
+    level, near = highest_echo(mission)
+    required = mission.requirements.pslr or 0.0
+    if row.declared is None:
+        yield from step("Nothing that echoes is declared")
+    else:
+        listed = [
+            f"{printable(one.subject.id)}: {number(one.phase)} rad, {number(one.cycles)} cycles" for one in near
+        ]
+        yield from step(
+            "Tones that make the highest echo, in the worst of their phases, from first principles", *listed
+        )
+        lines = equation("declared", "20*log(l)/log(10)", {"l": level}, row.declared, "dB")
+        yield from step("Its level l = J₁(φ)/J₀(φ), φ the phase of all of them", *lines)
+    yield from step("Required", *equation("allowable", "PSLR", {"PSLR": required}, required, "dB"))
+    if row.declared is not None and row.utilization is not None:
+        values = {"declared": row.declared, "allowable": required}
+        lines = equation("utilization", "10^((declared - allowable)/20)", values, row.utilization, "")
+        yield from step("Utilization, of amplitudes", *lines)
+
+
 def explained_spur(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
     """From the tone of an oscillator to its paired echoes, and to what the platform's share of PSLR allows."""
     oscillator = getattr(mission.platforms, row.owner).oscillator
@@ -360,7 +390,7 @@ def explained_spur(mission: Mission, allocation: Allocation, row: Row) -> Iterat
         values, formula = {**values, "left": left}, f"{formula} + 20*log(left)/log(10)"
         title += ", of which the exchanged pulses leave a part"
     yield from step(title, *equation("declared", formula, values, row.declared or 0.0, "dB"))
-    limits = vibration_limits(mission, allocation, "pslr").get(row.owner)
+    limits = tone_limits(mission, allocation)[1].get(row.owner)
     if limits is None or row.allowable is None:
         yield from step("Allowable: no limit", printable(row.reason or "no requirement limits this error"))
         return

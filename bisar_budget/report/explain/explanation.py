@@ -87,6 +87,10 @@ def chain(mission: Mission, found: MissionFindings, row: Row) -> Iterator[Step]:
         from bisar_budget.report.explain.explained_random import explained_spur
 
         yield from explained_spur(mission, found.allocation, row)
+    elif row.subject.kind == "pslr":
+        from bisar_budget.report.explain.explained_random import explained_pslr
+
+        yield from explained_pslr(mission, row)
     elif row.subject.kind == "islr":
         from bisar_budget.report.explain.explained_random import explained_islr
 
@@ -181,7 +185,8 @@ def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]
 def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
     """From the file to the limits of both models, for one line, lines near each other, or noise."""
     platform, entry = row.owner, row.subject.entry or 0
-    is_sinusoid, is_sum = row.metric != "islr", row.subject.axis == "sinusoidal.sum"
+    is_sinusoid, is_sum = row.subject.axis != "wideband", row.subject.axis == "sinusoidal.sum"
+    is_echo = row.metric != "islr"  # which takes the power of a sinusoid where no PSLR is required
     path: KeyPath = ("platforms", platform, "motion_error", "vibration", "sinusoidal" if is_sinusoid else "wideband")
     if row.declared is None:
         yield Step(missing(mission, path))
@@ -208,7 +213,7 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[S
         if row.metric == QUADRATIC:
             yield from _slow_vibration(mission, allocation, row, line.frequency * mission.collection.aperture_time)
             return
-    requirement = mission.requirements.pslr if is_sinusoid else mission.requirements.islr
+    requirement = mission.requirements.pslr if is_echo else mission.requirements.islr
     if requirement is None or row.allowable_published is None or row.allowable_full is None:
         return
     name = row.metric.upper()
@@ -217,13 +222,15 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[S
         f"requirements.{row.metric} as a power ratio",
         *equation(name, "10^(dB/10)", {"dB": requirement}, ratio, ""),
     )
-    split = allocation.pslr if is_sinusoid else allocation.islr
+    split = allocation.pslr if is_echo else allocation.islr
     share = split.of(platform)
     values = {name: ratio, "λ": wavelength, "s": share}
-    lines = equation("published", formulas.VIBRATION[row.metric], values, row.allowable_published, "m")
-    kind = "sinusoidal" if is_sinusoid else "wideband"
+    is_power = is_sinusoid and not is_echo
+    root = "sqrt(2)*" if is_power else ""
+    lines = equation("published", root + formulas.VIBRATION[row.metric], values, row.allowable_published, "m")
+    kind = "sinusoidal" if is_echo else "wideband, a sinusoid of as much power" if is_power else "wideband"
     yield from step(f"Section V, {kind}, s is the {platform}’s share of power", *lines)
-    if is_sinusoid:
+    if is_echo:
         part = amplitude_share(split, platform)
         shares = {"s_t": split.transmitter, "s_r": split.receiver}
         yield from step(
@@ -246,7 +253,7 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[S
         title = "First principles, independent on both platforms; a phase of σ rad has the ISLR (exp(σ²) − 1)/E"
         values = {**values, "E": mainlobe_energy(mission)}
         known = []
-    lines = equation("full", formulas.FULL_VIBRATION[row.metric], values, row.allowable_full, "m")
+    lines = equation("full", root + formulas.FULL_VIBRATION[row.metric], values, row.allowable_full, "m")
     yield from step(title, *known, *lines)
     limits = {"published": row.allowable_published, "full": row.allowable_full}
     model = mission.gating_model
