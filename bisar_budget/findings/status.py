@@ -38,7 +38,7 @@ class Status(NamedTuple):
     @property
     def is_held(self) -> bool:
         """Whether a number was held to a limit and the outcome stands: neither waived nor without a value."""
-        return self.is_judged and self.junit != "skipped"
+        return self.is_judged and not self.junit_words
 
 
 # Worst first, for reading. What is waived breaks its requirement: it stands before all that meets one.

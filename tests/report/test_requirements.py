@@ -15,11 +15,16 @@ from bisar_budget.report.words.requirements import declared_words, kind_names
 from tests.conftest import COMPLIES, ROOT, findings
 from tests.page import read_page
 
-# An ISLR and nothing that spreads: no row fails, and one requirement is not judged.
+# An ISLR and nothing that spreads; the cubic phase has a judge of its own. No row fails, one requirement is not judged.
 UNJUDGED = {
     **COMPLIES,
     "allocation": {"model": "full", "combine": "rss"},
-    "requirements": {"quadratic_phase_error": "45 deg", "islr": "-20 dB", "location_error": "10 m"},
+    "requirements": {
+        "quadratic_phase_error": "45 deg",
+        "cubic_phase_error": "22.5 deg",
+        "islr": "-20 dB",
+        "location_error": "10 m",
+    },
 }
 # Vibration that spreads 0.1 rad, and no ISLR: an effect that no requirement takes.
 UNTAKEN = {
@@ -114,7 +119,7 @@ class TestText:
         assert " ".join(lines[3].split()) == "requirement allowed reached use status decided by"
 
     def test_every_requirement_met(self) -> None:
-        changes = {**UNJUDGED, "requirements": {"location_error": "10 m"}}
+        changes = {**UNJUDGED, "requirements": {"location_error": "10 m", "cubic_phase_error": "22.5 deg"}}
         first = said("text", findings(**changes)).splitlines()[0]
         assert first == "pass mission.yaml: every requirement is judged and met"
         assert "met or waived" in said("text", findings(**WAIVED)).splitlines()[0]
@@ -158,7 +163,7 @@ class TestKinds:
     def test_how_many_are_declared_and_which_are_not(self) -> None:
         found = findings(**UNJUDGED)
         said_of = declared_words(found.kinds)
-        assert said_of.startswith(f"Declared 1 of {found.kinds.count} kinds of error; not declared: ")
+        assert said_of.startswith(f"Declared 1 of {found.kinds.in_all} kinds of error; not declared: ")
         assert "position (both)" in said_of
         assert "velocity (transmitter)" in said_of
         assert said_of.endswith("; without source: 1.")
