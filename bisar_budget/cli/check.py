@@ -198,7 +198,7 @@ class _Draws(ParamType[int]):
     "--explain",
     metavar="ID",
     help="Explain the row ID instead of writing the report: its line of the file, its equations with the numbers put "
-    "in, its verdict. Exits with 0.",
+    "in, its verdict. Or a requirement, such as requirement.islr. Exits with 0.",
 )
 @click.option(
     "--color",
@@ -409,7 +409,7 @@ def _explain(
     changes: "Sequence[SetValue]",
     from_outside: "Outside",
 ) -> None:
-    """Explain a row in every mission that has it."""
+    """Explain a row, or a requirement, in every mission that has it."""
     from bisar_budget.budget.check import check_mission
     from bisar_budget.mission.readers import did_you_mean
     from bisar_budget.report.explain.explanation import explain, explain_requirement

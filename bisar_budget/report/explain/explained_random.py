@@ -390,8 +390,8 @@ def _tones_and_cubic(
         together.cubics_without_coverage(allocation.islr, owner), together.rule_of_all, together.groups
     )
     title = "Cubic phase of the declared errors, without coverage factor"
-    yield from combined(title, together.rule_of_all, parts, cubic, symbol="cubic")
-    lines = equation(cubic_row, "4*cubic^2/175", {"cubic": cubic}, members[cubic_row], "rad²")
+    yield from combined(title, together.rule_of_all, parts, cubic, symbol="φ_3")
+    lines = equation("v_3", "4*φ_3^2/175", {"φ_3": cubic}, members[cubic_row], "rad²")
     yield from step("No requirements.cubic_phase_error: its mean square after the fit of a line spreads", *lines)
 
 
@@ -418,7 +418,7 @@ def explained_pslr(mission: Mission, row: Row) -> Iterator[Step]:
             yield from step("As a level", *lines)
     if row.allowable is None:
         return
-    lines = equation("allowable", "PSLR", {"PSLR": row.allowable}, row.allowable, "dB")
+    lines = equation("allowable", "required", {"required": row.allowable}, row.allowable, "dB")
     yield from step(f"requirements.pslr, all of it, {place(mission, ('requirements', 'pslr'))}", *lines)
     yield from _use_of_amplitudes(row)
 
@@ -466,7 +466,8 @@ def explained_spur(mission: Mission, allocation: Allocation, row: Row) -> Iterat
         return
     values = {"A": limits.by(row.model or "published"), "λ": mission.radar.wavelength}
     lines = equation("φ", "2*π*A/λ", values, 2 * math.pi * values["A"] / values["λ"], "rad")
-    yield from step(f"Phase of a vibration at the limit of {row.owner}.vibration.sinusoidal", *lines)
+    by_power = "" if row.metric == "pslr" else ", √2 times the rms value that ISLR allows"
+    yield from step(f"Phase of a vibration at the limit of {row.owner}.vibration.sinusoidal{by_power}", *lines)
     phase = {"φ": 2 * math.pi * values["A"] / values["λ"]}
     yield from step("Its echoes", *equation("allowable", "20*log(φ/2)/log(10)", phase, row.allowable, "dB"))
     yield from _use_of_amplitudes(row)

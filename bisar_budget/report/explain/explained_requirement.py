@@ -12,7 +12,7 @@ from bisar_budget.effects.correlation import combined_phase, phase_parts
 from bisar_budget.faults import printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import JudgedRequirement
-from bisar_budget.findings.row import Row
+from bisar_budget.findings.row import DECLARE, Row
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import Platform
@@ -28,7 +28,9 @@ _EFFECTS = {"cubic": "Cubic phase", "spread": "Rms phase that spreads", "tone": 
 def finding_of(mission: Mission, found: MissionFindings, one: JudgedRequirement) -> Iterator[Step]:
     """Where a requirement stands in the file, and the rows that judge it."""
     path = ("requirements", one.key)
-    if one.is_default:
+    if one.key == DECLARE:
+        yield from _asked_for(mission)
+    elif one.is_default:
         yield from step("The file does not state it: the default")
     else:
         yield from step(f"Required in {place(mission, path)}", as_written(mission, path))
@@ -44,29 +46,44 @@ def finding_of(mission: Mission, found: MissionFindings, one: JudgedRequirement)
 
 def declarations(mission: Mission) -> Iterator[Step]:
     """What must be declared, and what of it the file lacks."""
-    path = ("requirements", "declare")
-    yield from step(f"Required in {place(mission, path)}", as_written(mission, path))
+    yield from _asked_for(mission)
     missing = [one.key for one in missing_declarations(mission)]
     yield from step("Not in the file", *(missing or ["nothing: all of it is declared"]))
 
 
-def not_judged(analysis: Analysis, row: Row) -> Iterator[Step]:
-    """Numbers behind a row that could not be judged: an effect, a path in doubt, a place that is not known."""
-    mission = analysis.mission
-    code = row.reason.code if isinstance(row.reason, Note) else ""
-    if row.status not in ("not_evaluated", "waived"):
+def _asked_for(mission: Mission) -> Iterator[Step]:
+    asked = ", ".join(mission.requirements.declare)
+    yield from step(f"Required in {place(mission, ('requirements', 'declare'))}", f"requirements.declare: [{asked}]")
+
+
+def not_judged(found: MissionFindings, row: Row) -> Iterator[Step]:
+    """Numbers behind what could not be judged: an effect, a path in doubt, a place that is not known."""
+    analysis = found.analysed()
+    mission, reason = analysis.mission, _reason(found, row)
+    if reason is None:
         return
+    code = reason.code
     if code == "not-declared-as-required":
-        path = ("requirements", "declare")
-        yield from step(f"Must be declared by {place(mission, path)}", as_written(mission, path))
+        yield from _asked_for(mission)
     elif code == "input-in-doubt":
         yield from _path_in_doubt(mission, row)
     elif code == "place-is-not-known":
-        yield from _random_errors(analysis, row)
+        yield from _random_errors(analysis, row, reason)
     else:
         for one in untaken_effects(mission, effect_totals(analysis, gating_models(analysis))):
             if row.id in one.makers and one.makers[row.id][0]:
                 yield from _untaken(analysis, row, one)
+
+
+def _reason(found: MissionFindings, row: Row) -> Note | None:
+    """Why a row is not judged, or the requirement that is the mission's own row of it."""
+    if row.status in ("not_evaluated", "waived"):
+        return row.reason
+    if row.status == "not_declared":
+        for one in found.requirements:
+            if one.id == row.id and one.status in ("not_evaluated", "waived"):
+                return one.reason
+    return None
 
 
 def _untaken(analysis: Analysis, row: Row, one: UntakenEffect) -> Iterator[Step]:
@@ -112,14 +129,15 @@ def _path_in_doubt(mission: Mission, row: Row) -> Iterator[Step]:
         yield from step("Position errors that it declares, without coverage factor: less than the doubt", line)
 
 
-def _random_errors(analysis: Analysis, row: Row) -> Iterator[Step]:
+def _random_errors(analysis: Analysis, row: Row, reason: Note) -> Iterator[Step]:
     """Phases of the errors that move the image by an amount that is not computed."""
     model = row.model or "published"
-    names = row.reason.values[0] if isinstance(row.reason, Note) else ()
-    lines = []
+    names, lines = reason.values[0], []
     for error in analysis.random:
         if isinstance(names, list | tuple) and error.id in names and error.declared is not None:
             effect = error.effect(model)
             quadratic, cubic = effect.quadratic * error.declared, effect.cubic * error.declared
             lines.append(f"{printable(error.id)}: QPE {with_unit(quadratic, 'rad')}, cubic {with_unit(cubic, 'rad')}")
-    yield from step("Random errors, which are not in the displacement: they move the image too", *lines)
+    yield from step(
+        "Not in the displacement, by an amount that is not computed: random errors move the image too", *lines
+    )

@@ -52,21 +52,24 @@ def explain(mission: Mission, found: MissionFindings, row_id: str) -> str:
     row = next(row for row in found.rows if row.id == row_id)
     own_id = f" [{printable(row.requirement_id)}]" if row.requirement_id else ""
     title = f"{STATUS[row.status].text} {printable(row.id)}{own_id}"
-    return _text(mission, title, chain(mission, found, row), _verdict(row))
+    steps = [line for step in _to_utilization(mission, found, row) for line in step.lines]
+    if row.declared is not None and row.allowable is not None and row.utilization is not None:
+        steps.append(f"                = {percent(row.utilization)}")  # under the sum of the last step
+    steps += [line for step in not_judged(found, row) for line in step.lines]
+    return _text(mission, title, [*steps, *_verdict(row)])
 
 
 def explain_requirement(mission: Mission, found: MissionFindings, one: JudgedRequirement) -> str:
     """Write how a requirement of a mission stands, and the rows that judge it."""
     title = f"{STATUS[one.status].text} {requirement_id(one)}"
-    return _text(mission, title, finding_of(mission, found, one), ["", requirement_finding(one)])
+    steps = [line for step in finding_of(mission, found, one) for line in step.lines]
+    return _text(mission, title, [*steps, "", requirement_finding(one)])
 
 
-def _text(mission: Mission, title: str, steps: Iterable[Step], verdict: Iterable[str]) -> str:
+def _text(mission: Mission, title: str, body: Iterable[str]) -> str:
     lines = [f"{title} of {printable(mission.name)}"]
     lines += [f"Not as the file says: {changes_words(mission.changes)}"] if mission.changes else []
-    lines.append("")
-    lines += [line for step in steps for line in step.lines]
-    lines += verdict
+    lines += ["", *body]
     return "\n".join(part for line in lines for part in _fitted(line)) + "\n"
 
 
@@ -83,7 +86,12 @@ def _fitted(line: str) -> list[str]:
 
 
 def chain(mission: Mission, found: MissionFindings, row: Row) -> Iterator[Step]:
-    """Steps from the line of the mission file to how much of the allowable a row uses."""
+    """Steps from the line of the mission file to how much of the allowable a row uses, or why that is not judged."""
+    yield from _to_utilization(mission, found, row)
+    yield from not_judged(found, row)
+
+
+def _to_utilization(mission: Mission, found: MissionFindings, row: Row) -> Iterator[Step]:
     analysis = found.analysed()
     together = Together(analysis, analysis.full if row.model == "full" else analysis.published)
     source = next((source for source in analysis.sources if source.id == row.id), None)
@@ -122,7 +130,6 @@ def chain(mission: Mission, found: MissionFindings, row: Row) -> Iterator[Step]:
     if row.declared is not None and row.allowable is not None and row.utilization is not None and row.unit != "dB":
         values = {"declared": row.declared, "allowable": row.allowable}
         yield from step("Utilization", *equation("utilization", "declared/allowable", values, row.utilization, ""))
-    yield from not_judged(analysis, row)
 
 
 def collection_chain(found: MissionFindings) -> Iterator[Step]:
@@ -410,8 +417,6 @@ def _location_aggregate(mission: Mission, together: Together, found: MissionFind
 
 
 def _verdict(row: Row) -> Iterator[str]:
-    if row.declared is not None and row.allowable is not None and row.utilization is not None:
-        yield f"                = {percent(row.utilization)}"  # under the sum of the last step
     yield ""
     texts = [text for text in (row.reason, *row.notes) if text]
     declared = "" if row.declared is None else f", declared {format_quantity(row.declared, row.unit)}"
