@@ -11,10 +11,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from bisar_budget.analysis.spread import islr_db, mainlobe_energy, shown_islr_db, spread_limit, spread_powers, tones
-from bisar_budget.analysis.vibration_limits import echo_phase
-from bisar_budget.budget.random_rows import ISLR, held_effect, highest_echo, limits_for, sizes_at
+from bisar_budget.analysis.vibration_limits import echo_phase, highest_echo
+from bisar_budget.budget.random_rows import ISLR, held_effect, limits_for, sizes_at
 from bisar_budget.effects.clocks import Spur
-from bisar_budget.effects.echoes import sinc, worst_phases
+from bisar_budget.effects.echoes import sinc
 from bisar_budget.effects.exact_arrays import aperture_nodes
 from bisar_budget.effects.models import CUBIC
 from bisar_budget.effects.random_errors import RandomError
@@ -77,14 +77,13 @@ def verify_pslr(study: Study) -> Verdict:
     required = study.mission.requirements.pslr or 0.0
     row_id = subject("mission", "pslr").id
     blank = Verdict(id=row_id, model=study.model, boundary_error=required, unit="dB", requirement_db=required)
-    _, near = highest_echo(study.mission)
-    if not any(one.phase for one in near):
+    highest = highest_echo(tones(study.mission))
+    if highest is None or not highest.phase:
         return blank._replace(reason=reasons.no_tone_declared())
-    worst = worst_phases([one.phase for one in near], [one.cycles for one in near])
-    scale = echo_phase(10 ** (required / 20)) / worst.amplitude * study.collection.wavelength / (2 * math.pi)
+    scale = echo_phase(10 ** (required / 20)) / highest.phase * study.collection.wavelength / (2 * math.pi)
     sinusoids: dict[str, tuple[PathSinusoid, ...]] = {}
-    for one in near:
-        turned = 0.0 if sinc(worst.cycles - one.cycles) >= 0 else math.pi
+    for one in highest.tones:
+        turned = 0.0 if sinc(highest.cycles - one.cycles) >= 0 else math.pi
         tone = PathSinusoid(scale * one.phase, one.cycles / study.collection.aperture_time, turned)
         sinusoids[one.subject.owner] = (*sinusoids.get(one.subject.owner, ()), tone)
     return echo(study.collection, blank, sinusoids, "the tones together in their worst phases")
