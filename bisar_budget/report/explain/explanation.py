@@ -29,7 +29,7 @@ from bisar_budget.report.explain.explained_full import at_the_allowable, end_of_
 from bisar_budget.report.explain.formulas import Step, Sum, WorkedEquation, equation, number, step, with_unit
 from bisar_budget.report.words.layout import wrapped
 from bisar_budget.report.words.sentences import percent
-from bisar_budget.units import format_quantity
+from bisar_budget.report.words.sizes import row_limit, row_size
 
 _DEEPER = 3  # a broken equation goes on; no symbol has the width that would put its equals sign there
 _LONGEST_UNIT = 16  # letters, of what may follow a number
@@ -54,7 +54,7 @@ def explain(mission: Mission, found: MissionFindings, row_id: str) -> str:
     lines += [f"Not as the file says: {changes_words(mission.changes)}"] if mission.changes else []
     lines.append("")
     lines += [line for step in chain(mission, found, row) for line in step.lines]
-    lines += _verdict(row)
+    lines += _verdict(row, found)
     return "\n".join(part for line in lines for part in _fitted(line)) + "\n"
 
 
@@ -405,12 +405,12 @@ def _listed(members: Sequence[tuple[str, float]], unit: str) -> list[str]:
     return [f"{printable(name):<{width}}  {size:.6g} {unit}" for name, size in members if size] or ["none"]
 
 
-def _verdict(row: Row) -> Iterator[str]:
+def _verdict(row: Row, found: MissionFindings) -> Iterator[str]:
     if row.declared is not None and row.allowable is not None and row.utilization is not None:
         yield f"                = {percent(row.utilization)}"  # under the sum of the last step
     yield ""
     texts = [text for text in (row.reason, *row.notes) if text]
-    declared = "" if row.declared is None else f", declared {format_quantity(row.declared, row.unit)}"
-    allowable = "" if row.allowable is None else f", allowable {format_quantity(row.allowable, row.unit, 3, 'down')}"
+    declared = "" if row.declared is None else f", declared {row_size(row.declared, row, found)}"
+    allowable = "" if row.allowable is None else f", allowable {row_limit(row.allowable, row, found)}"
     yield f"{STATUS[row.status].text}{declared}{allowable}"
     yield from (f"    {printable(text)}" for text in texts)
