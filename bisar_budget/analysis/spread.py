@@ -25,7 +25,7 @@ from bisar_budget.effects.vibration_lines import counted, lines_of
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
 
 CUBIC_POWER = 4 / 175  # of a cubic phase φ₃ at the edge: its Legendre part 2/5·φ₃, whose mean square is (4/25)/7·φ₃²
-SMALLEST_CUBIC_RAD = 1e-6  # of a power of -136 dB; below, exact ranges are rounding
+SMALLEST_CUBIC_RAD = 1e-3  # a power of -76 dB, which no image shows
 NOISE = ("velocity_random_walk", "angle_random_walk")  # figures of an inertial sensor that spread
 
 

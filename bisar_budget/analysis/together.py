@@ -47,6 +47,10 @@ class Together:
 
         Added with `combine: sum`, else by root-sum-square: powers add.
         """
+        return combined_phase(self.cubics_without_coverage(split, owner), self.rule_of_all, self.groups)
+
+    def cubics_without_coverage(self, split: Split, owner: str) -> Phases:
+        """Cubic phase of each error that counts against an owner's share, at the declared sigma, signed. [rad]"""
         factor = self.allocation_rules.coverage_factor
         found = [
             (source.id, self.found[source.id].cubic / (factor if source.is_covered else 1.0))
@@ -58,7 +62,7 @@ class Together:
             for one in self.own
             if owner == "mission" or split.includes(one.owner, owner)
         ]
-        return combined_phase(found, self.rule_of_all, self.groups)
+        return found
 
     @property
     def rule_of_all(self) -> str:

@@ -16,11 +16,13 @@ make none, see `slow_vibration`.
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from bisar_budget import evaluators
 from bisar_budget.analysis.allocation import Allocation, Split
-from bisar_budget.analysis.spread import mainlobe_energy, spread_phase
+from bisar_budget.analysis.spread import Tone, mainlobe_energy, spread_phase
+from bisar_budget.effects.echoes import near_lines, worst_phases
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.models import CUBIC, QUADRATIC
 from bisar_budget.effects.slow_vibration import cubic_part, quadratic_part
@@ -47,12 +49,44 @@ class VibrationLimits(NamedTuple):
 
 def echo_level(phase: float) -> float:
     """Amplitude of a paired echo over that of the response, J₁(φ)/J₀(φ), of a sinusoid of peak φ up to 2 rad."""
+    j0, j1 = bessel(phase)
+    return j1 / j0
+
+
+def bessel(phase: float) -> tuple[float, float]:
+    """J₀(φ) and J₁(φ) of a phase φ up to 2 rad."""
     square, term, j0, j1 = -((phase / 2) ** 2), 1.0, 0.0, 0.0
     for k in range(1, 13):  # the series of both; the last terms are rounding
         j0 += term
         j1 += term / k
         term *= square / (k * k)
-    return phase / 2 * j1 / j0
+    return j0, phase / 2 * j1
+
+
+class Echo(NamedTuple):
+    """Paired echo of a tone, or of tones near each other in the worst of their phases.
+
+    One tone of the peak phase `phase` [rad] has an echo as high; `cycles` is its place, in cells from the response,
+    `level` its amplitude over that of the response.
+    """
+
+    tones: tuple[Tone, ...]
+    phase: float
+    cycles: float
+    level: float
+
+
+def highest_echo(tones: Sequence[Tone]) -> Echo | None:
+    """Highest echo of all tones, each alone and those near each other together; None without any."""
+    groups = (*((index,) for index in range(len(tones))), *near_lines([one.cycles for one in tones]))
+    return max(
+        (_echo([tones[index] for index in group]) for group in groups), key=lambda one: one.level, default=None
+    )
+
+
+def _echo(near: Sequence[Tone]) -> Echo:
+    phase, cycles = worst_phases([one.phase for one in near], [one.cycles for one in near])
+    return Echo(tuple(near), phase, cycles, echo_level(phase) if phase <= LARGEST_ECHO else phase / 2)
 
 
 def echo_phase(level: float) -> float:

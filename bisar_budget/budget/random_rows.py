@@ -13,7 +13,6 @@ from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.spread import (
     CUBIC_POWER,
-    Tone,
     islr_db,
     mainlobe_energy,
     shown_islr_db,
@@ -21,13 +20,12 @@ from bisar_budget.analysis.spread import (
     spread_powers,
     tones,
 )
-from bisar_budget.analysis.vibration_limits import LARGEST_ECHO, echo_level, tone_limits
+from bisar_budget.analysis.vibration_limits import highest_echo, tone_limits
 from bisar_budget.budget.judgement import judged
 from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.budget.vibration_rows import ECHO_CYCLES
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.effects.clocks import spurs_of
-from bisar_budget.effects.echoes import near_lines, worst_phases
 from bisar_budget.effects.effect import override_notes
 from bisar_budget.effects.models import CUBIC, QUADRATIC
 from bisar_budget.effects.random_errors import RandomEffect, RandomError
@@ -284,17 +282,17 @@ def pslr_row(mission: Mission, gating: str) -> Iterator[Row]:
     required = mission.requirements.pslr
     if required is None:
         return
-    allowed, over = 10 ** (required / 20), NOTHING
-    highest, near = highest_echo(mission)
-    if highest > allowed:
-        largest = max(near, key=lambda one: one.phase)
-        over = phrases.echoes_together_over(_db(highest), required, largest.subject.id, len(near))
+    highest, allowed = highest_echo(tones(mission)), 10 ** (required / 20)
+    over = NOTHING
+    if highest is not None and highest.level > allowed:
+        largest = max(highest.tones, key=lambda one: one.phase)
+        over = phrases.echoes_together_over(_db(highest.level), required, largest.subject.id, len(highest.tones))
     row = judged(
         mission,
         subject=subject("mission", "pslr"),
         metric="pslr",
         unit="dB",
-        declared=highest if near else None,
+        declared=None if highest is None else highest.level,
         allowable=allowed,
         path=("requirements", "pslr"),
         equation="first principles",
@@ -302,19 +300,6 @@ def pslr_row(mission: Mission, gating: str) -> Iterator[Row]:
         limits=(allowed, allowed),
     )
     yield in_decibel(row._replace(binding_requirement="pslr", model=gating))
-
-
-def highest_echo(mission: Mission) -> tuple[float, list[Tone]]:
-    """Amplitude of the highest echo over that of the response, and the tones that make it; none, of no tone."""
-    found = tones(mission)
-    highest: tuple[float, list[Tone]] = (0.0, [])
-    for group in (*((index,) for index in range(len(found))), *near_lines([one.cycles for one in found])):
-        near = [found[index] for index in group]
-        phase = worst_phases([one.phase for one in near], [one.cycles for one in near]).amplitude
-        level = echo_level(phase) if phase <= LARGEST_ECHO else phase / 2
-        if level > highest[0] or not highest[1]:
-            highest = (level, near)
-    return highest
 
 
 def _db(amplitude: float) -> float:

@@ -11,7 +11,7 @@ from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis, Model
 from bisar_budget.analysis.spread import islr_db, mainlobe_energy, noise, spread_limit, tones
-from bisar_budget.analysis.together import Together
+from bisar_budget.analysis.together import Phases, Together
 from bisar_budget.analysis.vibration_limits import LARGEST_ECHO, echo_level
 from bisar_budget.budget.input_doubt import InputDoubt
 from bisar_budget.budget.requirement_states import (
@@ -28,8 +28,7 @@ from bisar_budget.budget.requirement_states import (
     untaken_effects,
 )
 from bisar_budget.budget.waivers import Waived, apply_waivers
-from bisar_budget.effects.combine import combine_phases
-from bisar_budget.effects.correlation import combined_phase
+from bisar_budget.effects.correlation import Correlated, combined_phase
 from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.findings.mission import FileWarning
 from bisar_budget.findings.requirement import JudgedRequirement
@@ -70,7 +69,7 @@ def judged_requirements(
         Day on which waivers are judged, UTC.
     """
     mission = analysis.mission
-    gates = _gating_models(analysis)
+    gates = gating_models(analysis)
     untaken = untaken_effects(mission, effect_totals(analysis, gates))
     looked_at = [_looked_at(row, mission, untaken) for row in rows]
     misplacing = _misplacing(analysis)
@@ -108,7 +107,8 @@ def is_broken(row: Row) -> bool:
     return row.status in ("fail", "not_evaluated")
 
 
-def _gating_models(analysis: Analysis) -> list[Model]:
+def gating_models(analysis: Analysis) -> list[Model]:
+    """Models whose limits a mission is held to: one, or both where the stricter decides."""
     gating = analysis.mission.gating_model
     both: tuple[Model, ...] = (analysis.published, analysis.full)
     return [model for model in both if gating in (model.name, "strictest")]
@@ -120,14 +120,8 @@ def effect_totals(analysis: Analysis, models: Sequence[Model]) -> list[EffectTot
     totals = dict.fromkeys(TAKEN_BY, 0.0)
     for model in models:
         together = Together(analysis, model)
-        rule = together.rule_of_all
-        parts = {
-            "cubic": together.all_cubics(),
-            "spread": [(one.row_id, math.sqrt(one.variance)) for one in noise(analysis, model.name)],
-            "tone": [(one.subject.id, one.phase) for one in tones(analysis.mission)],
-        }
-        for kind, of_kind in parts.items():
-            total = combined_phase(of_kind, rule, together.groups) if kind == "cubic" else _combined(of_kind, rule)
+        for kind, of_kind in effect_parts(analysis, together).items():
+            total = combined_phase(of_kind, together.rule_of_all, groups_of(kind, together))
             totals[kind] = max(totals[kind], total)
             for row_id, size in of_kind:
                 found[kind][row_id] = max(found[kind].get(row_id, 0.0), abs(size))
@@ -137,8 +131,18 @@ def effect_totals(analysis: Analysis, models: Sequence[Model]) -> list[EffectTot
     ]
 
 
-def _combined(parts: Sequence[tuple[str, float]], rule: str) -> float:
-    return combine_phases([size for _, size in parts], rule)
+def effect_parts(analysis: Analysis, together: Together) -> dict[str, Phases]:
+    """Cubic phase, rms phase that spreads and peak phase of tones of each declared error by a model. [rad]"""
+    return {
+        "cubic": together.all_cubics(),
+        "spread": [(one.row_id, math.sqrt(one.variance)) for one in noise(analysis, together.model.name)],
+        "tone": [(one.subject.id, one.phase) for one in tones(analysis.mission)],
+    }
+
+
+def groups_of(kind: str, together: Together) -> Sequence[Correlated]:
+    """Covariances that an effect knows: those of the cubic phase."""
+    return together.groups if kind == "cubic" else ()
 
 
 def _looked_at(row: Row, mission: Mission, untaken: Sequence[UntakenEffect]) -> Row:
@@ -146,16 +150,18 @@ def _looked_at(row: Row, mission: Mission, untaken: Sequence[UntakenEffect]) -> 
     if not any(row.id in one.parts for one in untaken):
         return row
     status = _STATUSES[status_of(code(row.status), row.id, row.allowable is not None, untaken)[0]]
-    if status == row.status:
-        return row
     if status == "info":
-        return row._replace(status=status, utilization=None, margin=None)
+        return row if row.status == "info" else row._replace(status=status, utilization=None, margin=None)
     reason = NOTHING
     for one in untaken:
         if row.id in one.makers and one.makers[row.id][0]:
             lines = [f"{key}: {_EXAMPLES[key]}" for key in TAKEN_BY[one.kind]]
             said = phrases.effect_is_not_judged(one.kind, float(one.parts[row.id][0]), float(one.total[0]), lines)
             reason = reason.then(said) if reason else said
+    if not reason:
+        return row
+    if status == "fail":  # it is known to be broken, and more of it is not judged
+        reason = (row.reason or NOTHING).then(reason)
     return row._replace(status=status, reason=reason)
 
 

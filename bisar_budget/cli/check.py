@@ -198,7 +198,7 @@ class _Draws(ParamType[int]):
     "--explain",
     metavar="ID",
     help="Explain the row ID instead of writing the report: its line of the file, its equations with the numbers put "
-    "in, its verdict. Exits with 0.",
+    "in, its verdict. Or a requirement, such as requirement.islr. Exits with 0.",
 )
 @click.option(
     "--color",
@@ -409,21 +409,28 @@ def _explain(
     changes: "Sequence[SetValue]",
     from_outside: "Outside",
 ) -> None:
-    """Explain a row in every mission that has it."""
+    """Explain a row, or a requirement, in every mission that has it."""
     from bisar_budget.budget.check import check_mission
     from bisar_budget.mission.readers import did_you_mean
-    from bisar_budget.report.explain.explanation import explain
-    from bisar_budget.report.words.requirements import overrides_lines
+    from bisar_budget.report.explain.explanation import explain, explain_requirement
+    from bisar_budget.report.words.requirements import overrides_lines, requirement_id
 
     texts: list[str] = []
     known: dict[str, None] = {}
     for mission in load_all(files, model, changes):
         found = check_mission(mission, today, outside=from_outside)
-        known |= dict.fromkeys(row.id for row in found.rows)
+        required = {requirement_id(one): one for one in found.requirements}
+        known |= dict.fromkeys([*(row.id for row in found.rows), *required])
+        required |= {one.id: one for one in found.requirements}
         if any(row.id == row_id for row in found.rows):
-            given = tuple(one for one in found.overrides if one.origin != DAY_OF_RUN)
-            said = overrides_lines(found._replace(overrides=given))
-            texts.append(explain(mission, found, row_id) + "".join(f"{line}\n" for line in said))
+            text = explain(mission, found, row_id)
+        elif row_id in required:
+            text = explain_requirement(mission, found, required[row_id])
+        else:
+            continue
+        given = tuple(one for one in found.overrides if one.origin != DAY_OF_RUN)
+        said = overrides_lines(found._replace(overrides=given))
+        texts.append(text + "".join(f"{line}\n" for line in said))
     if not texts:
         hint = did_you_mean(row_id, tuple(known))
         raise click.UsageError(f"--explain {printable(row_id)}: no row has this id. {hint or 'A check lists them.'}")

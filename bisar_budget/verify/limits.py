@@ -1,10 +1,11 @@
 """Form images with each error set exactly at its limit, and measure whether the limit is true."""
 
+import math
 from collections.abc import Callable, Iterator
 from fnmatch import fnmatchcase
 from functools import partial
 
-from bisar_budget.analysis.vibration_limits import vibration_limits
+from bisar_budget.analysis.vibration_limits import tone_limits
 from bisar_budget.budget.aggregates import aggregate_rows
 from bisar_budget.effects.echoes import SLOWEST
 from bisar_budget.effects.effect import PLATFORMS
@@ -108,20 +109,52 @@ def _order(one: Subject) -> tuple[int, int]:
     return (("sinusoidal", "sinusoidal.sum", "wideband").index(one.axis), one.entry or 0)
 
 
+def _of_tones_by_islr(study: Study) -> Iterator[tuple[Subject, Case]]:
+    """Lines of vibration where ISLR holds their power."""
+    from bisar_budget.verify.random_cases import verify_spread_tone
+
+    metric, limits = tone_limits(study.mission, study.allocation)
+    for name, limit in limits.items() if metric == "islr" else ():
+        T, size = study.collection.aperture_time, limit.by(study.model)
+        cycles = [line.frequency * T for line in lines_of(study.mission, name)] or [vibration.UNDECLARED_CYCLES]
+        for index, turns in enumerate(cycles):
+            if turns >= SLOWEST:
+                one = subject(name, "vibration", "sinusoidal", entry=index)
+                blank = Verdict(id=one.id, model=study.model, boundary_error=size, unit="m")
+                yield one, partial(verify_spread_tone, study, blank, name, size, turns)
+
+
 def _of_instruments(study: Study) -> Iterator[tuple[str, Case]]:
     """Sensors and clocks that have a limit, and what all noise spreads together."""
     from bisar_budget.budget.random_rows import islr_rows
     from bisar_budget.effects.clocks import spurs_of
-    from bisar_budget.verify.random_cases import limits_of, verify_islr, verify_random, verify_spur
+    from bisar_budget.verify.random_cases import (
+        limits_of,
+        verify_islr,
+        verify_pslr,
+        verify_random,
+        verify_spread_tone,
+        verify_spur,
+    )
 
     for error in study.analysis.random:
         if limits_of(study, error):
             yield error.id, partial(verify_random, study, error)
+    metric, limits = tone_limits(study.mission, study.allocation)
     for spur in spurs_of(study.mission):
-        limit = vibration_limits(study.mission, study.allocation, "pslr").get(spur.name)
-        if limit is not None:
-            row_id = subject(spur.name, "oscillator", "spur", entry=spur.entry).id
-            yield row_id, partial(verify_spur, study, spur, row_id, limit.by(study.model))
+        limit = limits.get(spur.name)
+        if limit is None:
+            continue
+        row_id, size = subject(spur.name, "oscillator", "spur", entry=spur.entry).id, limit.by(study.model)
+        if metric == "pslr":
+            yield row_id, partial(verify_spur, study, spur, row_id, size)
+        else:
+            level = 20 * math.log10(math.pi * size / study.collection.wavelength)
+            blank = Verdict(id=row_id, model=study.model, boundary_error=level, unit="dB")
+            cycles = spur.frequency * study.collection.aperture_time
+            yield row_id, partial(verify_spread_tone, study, blank, spur.name, size, cycles)
+    if study.mission.requirements.pslr is not None:
+        yield "mission.pslr", partial(verify_pslr, study)
     for row in islr_rows(study.analysis, study.models[-1].name, study.allocation):
         yield row.id, partial(verify_islr, study, row.subject)
 
@@ -139,7 +172,7 @@ def _cases(study: Study) -> Iterator[tuple[str, Case]]:
             if line.frequency * study.collection.aperture_time < SLOWEST:
                 one = subject(name, "vibration", "sinusoidal", entry=index)
                 slow[one] = partial(phase_cases.slow_vibration, study, one.id, name, line)
-    swaying = slow | dict(vibration.cases(mission, allocation, study.collection))
+    swaying = slow | dict(_of_tones_by_islr(study)) | dict(vibration.cases(mission, allocation, study.collection))
     for owner in (*PLATFORMS, "mission"):
         for one in sorted((one for one in swaying if one.owner == owner), key=_order):
             yield one.id, swaying[one]

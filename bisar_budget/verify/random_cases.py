@@ -11,8 +11,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from bisar_budget.analysis.spread import islr_db, mainlobe_energy, shown_islr_db, spread_limit, spread_powers, tones
+from bisar_budget.analysis.vibration_limits import echo_phase, highest_echo
 from bisar_budget.budget.random_rows import ISLR, held_effect, limits_for, sizes_at
 from bisar_budget.effects.clocks import Spur
+from bisar_budget.effects.echoes import sinc
 from bisar_budget.effects.exact_arrays import aperture_nodes
 from bisar_budget.effects.models import CUBIC
 from bisar_budget.effects.random_errors import RandomError
@@ -62,6 +64,29 @@ def verify_spur(study: Study, spur: Spur, row_id: str, amplitude: float) -> Verd
     )
     sinusoids = {spur.name: (PathSinusoid(amplitude, spur.frequency),)}
     return echo(study.collection, blank, sinusoids, "the tone alone")
+
+
+def verify_spread_tone(study: Study, blank: Verdict, owner: str, amplitude: float, cycles: float) -> Verdict:
+    """A tone where ISLR holds it, at its limit: a motion [m] of so many cycles per aperture."""
+    phase = 2 * math.pi * amplitude / study.collection.wavelength
+    return _power(study, blank, [], owner, echoes=[(phase / math.sqrt(2), cycles)])
+
+
+def verify_pslr(study: Study) -> Verdict:
+    """The tones that make the highest echo, in their worst phases, scaled together to what is required."""
+    required = study.mission.requirements.pslr or 0.0
+    row_id = subject("mission", "pslr").id
+    blank = Verdict(id=row_id, model=study.model, boundary_error=required, unit="dB", requirement_db=required)
+    highest = highest_echo(tones(study.mission))
+    if highest is None or not highest.phase:
+        return blank._replace(reason=reasons.no_tone_declared())
+    scale = echo_phase(10 ** (required / 20)) / highest.phase * study.collection.wavelength / (2 * math.pi)
+    sinusoids: dict[str, tuple[PathSinusoid, ...]] = {}
+    for one in highest.tones:
+        turned = 0.0 if sinc(highest.cycles - one.cycles) >= 0 else math.pi
+        tone = PathSinusoid(scale * one.phase, one.cycles / study.collection.aperture_time, turned)
+        sinusoids[one.subject.owner] = (*sinusoids.get(one.subject.owner, ()), tone)
+    return echo(study.collection, blank, sinusoids, "the tones together in their worst phases")
 
 
 def verify_random(study: Study, error: RandomError) -> Verdict:
@@ -183,7 +208,7 @@ def verify_islr(study: Study, of: Subject) -> Verdict:
     if not total:
         return blank._replace(reason=reasons.no_spread_declared())
     scale = limit / math.sqrt(total)
-    rms = {row_id: scale * math.sqrt(power) for row_id, power in powers}
+    rms = {row_id: scale * math.sqrt(power) for row_id, power in powers if power}  # a direct path cancels some
     members = [
         error._replace(declared=scale * (error.declared or 0.0)) for error in study.analysis.random if error.id in rms
     ]

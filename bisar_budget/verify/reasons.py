@@ -1,5 +1,6 @@
 """Why a limit has the verdict that it has, or none: every sentence of a verdict, in one place, as in `phrases`."""
 
+import math
 from collections.abc import Sequence
 
 from bisar_budget.phrases import phrase
@@ -83,6 +84,12 @@ def images_are_of_the_centre() -> str:
 def no_spread_declared() -> str:
     """Of an ISLR row."""
     return "nothing that spreads is declared"
+
+
+@phrase
+def no_tone_declared() -> str:
+    """Of the requirement of PSLR."""
+    return "nothing that echoes is declared"
 
 
 @phrase
@@ -190,7 +197,8 @@ def sigma_of_time_series(draws: int, factor: float, images: int, is_cubic: bool)
     """Of a random error's limit."""
     times = "" if factor == 1 else f" times the coverage factor {factor:g}"
     bound = ", bound by the cubic phase" if is_cubic else ""
-    return f"one sigma of {draws} time series{times}, {images} of them in images{bound}"
+    known = 196 / math.sqrt(2 * draws)  # of a standard deviation of normal draws
+    return f"one sigma of {draws} time series, ± {known:.2g} % at 95 %{times}, {images} of them in images{bound}"
 
 
 @phrase

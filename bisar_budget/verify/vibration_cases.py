@@ -31,7 +31,7 @@ MOMENTS = 1024  # of an aperture whose spread power is measured; the mask holds 
 _FINE = 8  # interpolation of a cut before its peak is read
 _SEEN_WALK = 0.3  # range cells, from which a smear is said
 _COMMON_RUNS = 32
-_UNDECLARED_CYCLES = 10  # of a vibration per aperture, where the file gives no frequency
+UNDECLARED_CYCLES = 10  # of a vibration per aperture, where the file gives no frequency
 
 Case = Callable[[], Verdict]
 
@@ -96,7 +96,7 @@ def _sinusoidal(
     declared: float | None,
 ) -> Verdict:
     """Measure the paired echo on the difference from the error-free image, which its sidelobes would bury."""
-    frequency = _UNDECLARED_CYCLES / collection.aperture_time if declared is None else declared
+    frequency = UNDECLARED_CYCLES / collection.aperture_time if declared is None else declared
     sinusoids = {name: (PathSinusoid(amplitude=size, frequency=frequency),) for name, size in limits.items()}
     who = "one platform alone" if len(limits) == 1 else "both platforms in phase"
     blank = _blank(row_id, model, limits, requirement_db)

@@ -84,7 +84,9 @@ def assert_as_checked(mission, cases, whole, columns=(), model=None) -> None:
                 assert got[name] == want, (values, name)
             else:
                 want = math.nan if want is None else want
-                assert got[name] == pytest.approx(want, rel=NEAR, nan_ok=True), (values, name)
+                # ISLR holds cubic phases: exact ranges know them to 4e-10 rad, the smallest that counts is 1e-3.
+                near = 1e-6 if ".islr." in name else NEAR
+                assert got[name] == pytest.approx(want, rel=near, nan_ok=True), (values, name)
 
 
 COLUMNS = (

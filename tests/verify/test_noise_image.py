@@ -124,7 +124,7 @@ class TestVerdicts:
 
     @pytest.mark.parametrize("required", ["", "cubic_phase_error: 45 deg, "])
     def test_an_error_is_verified_with_the_cubic_phase_that_islr_holds(self, required: str) -> None:
-        """Of a velocity random walk the cubic phase has 1.8 times the power of what is beyond: both are at its limit."""
+        """The cubic of a velocity random walk has 1.8 times the power of what is beyond: both are at its limit."""
         allocation = "allocation: {model: full, combine: rss}\n"
         text = f"{MISSION}requirements: {{quadratic_phase_error: 180 deg, {required}islr: -30 dB}}\n{allocation}"
         mission = parse_mission(text)

@@ -80,3 +80,26 @@ def test_a_vector_is_in_the_data_as_its_part_along_the_line_of_sight() -> None:
     loss = 20 * math.log10(images[0].response.peak / images[0].clean_response.peak)
     phase = 2 * math.pi * projected / 0.0299792458
     assert loss == pytest.approx(20 * math.log10(1 - phase**2 / 4 + phase**4 / 64), abs=0.05)  # J₀
+
+
+def test_all_tones_together_fill_the_requirement_of_pslr_in_the_image() -> None:
+    """Both platforms' lines, scaled in their declared ratio: J₁(φ)/J₀(φ) of the phase of both is -30 dB."""
+    changes = {f"platforms__{name}__motion_error": lines("3 um", "2 um") for name in ("transmitter", "receiver")}
+    verdict = verdicts("mission.pslr", **changes)["mission.pslr"]
+    assert (verdict.verdict, verdict.requirement_db) == ("confirmed", -30)
+    assert verdict.measured_db == pytest.approx(-30, abs=0.3)
+    assert verdicts("mission.pslr")["mission.pslr"].verdict == "not_evaluated"
+
+
+@pytest.mark.parametrize(("model", "excess"), [("full", 0.0), ("published", 0.45)])
+def test_a_tone_that_islr_holds_adds_its_power_to_the_image(model: str, excess: float) -> None:
+    """Half the power of -20 dB for one platform; a tone leaves J₀² of the response, 1 - φ²/2 to first order."""
+    changes = {
+        "requirements": {"islr": -20},
+        "allocation__model": model,
+        "platforms__receiver__motion_error": lines("1 um"),
+    }
+    verdict = verdicts("receiver.vibration.sinusoidal.0", **changes)["receiver.vibration.sinusoidal.0"]
+    assert verdict.boundary_error == row(findings(**changes), "receiver.vibration.sinusoidal.0").allowable
+    assert verdict.measured_db == pytest.approx(verdict.requirement_db + excess, abs=0.03)
+    assert verdict.verdict == "confirmed"

@@ -1,11 +1,15 @@
 """From the total of the quadratic phase error to what one owner may use of it."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from bisar_budget.analysis.allocation import Allocation
+from bisar_budget.constants import ROUNDING
+from bisar_budget.faults import printable
 from bisar_budget.report.explain import formulas
-from bisar_budget.report.explain.formulas import Step, equation, step
+from bisar_budget.report.explain.formulas import Step, Sum, equation, number, step
+
+RULES = {"each": "the largest", "sum": "the sum", "rss": "the root-sum-square"}
 
 
 def limit_steps(allocation: Allocation, owner: str, limit: float) -> Iterator[Step]:
@@ -33,3 +37,32 @@ def autofocus_gain(allocation: Allocation) -> Iterator[Step]:
     raw = math.pi * allocation.n_pull / allocation.qpe_total
     lines = equation("gain", formulas.AUTOFOCUS_GAIN, values, raw, "")
     yield from step("Autofocus, Section VI" + (", never below 1" if raw < 1 else ""), *lines)
+
+
+def combined(
+    title: str,
+    rule: str,
+    parts: Sequence[tuple[str, float]],
+    total: float | None,
+    *,
+    symbol: str = "combined",
+    unit: str = "rad",
+) -> Iterator[Step]:
+    """What errors add up to by a rule: names and sizes, and the sum written out; `total` None: it has no value."""
+    title = f"{title}, {RULES[rule]}"
+    # What is left of terms that cancel exactly is rounding.
+    largest = max((abs(size) for _, size in parts), default=0.0)
+    members = [(name, abs(size) if abs(size) > ROUNDING * largest else 0.0) for name, size in parts]
+    width = max((len(name) for name, _ in members), default=0)
+    listed = [f"{printable(name):<{width}}  {size:.6g} {unit}" for name, size in members if size] or ["none"]
+    if total is None or not members:
+        yield from step(title, *listed)
+        return
+    sizes = [number(size) for _, size in members if size] or ["0"]
+    if rule == "sum":
+        text = " + ".join(sizes)
+    elif rule == "rss":
+        text = "sqrt(" + " + ".join(f"{size}^2" for size in sizes) + ")"
+    else:
+        text = f"max(0, {', '.join(sizes)})"
+    yield from step(title, *listed, Sum(f"{symbol} = {text} = {total:.6g} {unit}"))

@@ -1,24 +1,28 @@
 """How a sensor or a clock comes to its phases: figures of a data sheet, line of sight, spectra and integrals."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.analysis.spread import mainlobe_energy, spread_phase, spread_powers
-from bisar_budget.analysis.vibration_limits import tone_limits
-from bisar_budget.budget.random_rows import held_effect, highest_echo
+from bisar_budget.analysis.spread import mainlobe_energy, spread_phase, spread_powers, tones
+from bisar_budget.analysis.together import Together
+from bisar_budget.analysis.vibration_limits import LARGEST_ECHO, Echo, bessel, highest_echo, tone_limits
+from bisar_budget.budget.random_rows import held_effect
 from bisar_budget.constants import STANDARD_GRAVITY
 from bisar_budget.effects.clocks import spurs_of
+from bisar_budget.effects.correlation import phase_parts
+from bisar_budget.effects.echoes import sinc
 from bisar_budget.effects.models import CUBIC, QUADRATIC
 from bisar_budget.effects.oscillators import noise_of
-from bisar_budget.effects.random_errors import RandomError
+from bisar_budget.effects.random_errors import RandomEffect, RandomError
 from bisar_budget.effects.spectra import PowerLawPiece, parts, synchronized_parts
+from bisar_budget.effects.subject import subject
 from bisar_budget.effects.tones import gauss_markov
 from bisar_budget.faults import printable
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.model import Mission
-from bisar_budget.report.explain.explained_budget import limit_steps
+from bisar_budget.report.explain.explained_budget import combined, limit_steps
 from bisar_budget.report.explain.explained_error import as_written, missing, place
 from bisar_budget.report.explain.formulas import (
     Step,
@@ -248,6 +252,7 @@ def _covered(mission: Mission, error: RandomError) -> float:
 
 def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row: Row, model: str) -> Iterator[Step]:
     effect = error.effect(model)
+    held = held_effect(mission, effect)
     limit = allocation.qpe_limit(error.owner) * allocation.autofocus_gain
     yield from limit_steps(allocation, error.owner, limit)
     sizes: dict[str, float] = {}
@@ -262,8 +267,11 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
         values = {"limit": required.cubic_phase_error, "cubic/unit": effect.cubic}
         lines = equation("by_cubic", "limit/(cubic/unit)", values, sizes["by_cubic"], _unit(error))
         yield from step(f"Allowable by requirements.{CUBIC}, without share and gain", *lines)
-    held = held_effect(mission, effect).spread
-    if held and required.islr is not None:
+    if held.spread and required.islr is not None:
+        spread = "left/unit"
+        if held.spread != effect.spread:
+            spread = "spread/unit"
+            yield from _with_cubic(mission, error, effect, held)
         power, share = 10 ** (required.islr / 10), allocation.islr.of(error.owner)
         energy = mainlobe_energy(mission)
         rule, values = _allowed_variance(model, power, energy)
@@ -272,16 +280,10 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
         yield from step(
             f"Phase that may be left, requirements.islr {required.islr:g} dB, share s of its power", *lines
         )
-        sizes["by_ISLR"] = rms / held
+        sizes["by_ISLR"] = rms / held.spread
         k = _covered(mission, error)
-        values, formula = {"rms": rms, "left/unit": held * k, "k": k}, "k*rms/(left/unit)"
-        if held != effect.spread:  # no requirement takes the cubic phase
-            values = {"left": effect.spread, "cubic": effect.cubic, "k": mission.allocation.coverage_factor}
-            lines = equation("held/unit", "sqrt(left^2 + 4*(cubic/k)^2/175)", values, held, "rad")
-            yield from step("With the power of the cubic phase, at one sigma, of one unit that is declared", *lines)
-            values, formula = {"rms": rms, "held/unit": held}, "rms/(held/unit)"
-        elif k == 1:
-            formula = "rms/(left/unit)"
+        values = {"rms": rms, spread: held.spread * k, "k": k}
+        formula = f"rms/({spread})" if k == 1 else f"k*rms/({spread})"
         lines = equation("by_ISLR", formula, values, sizes["by_ISLR"], _unit(error))
         yield from step("Allowable by requirements.islr", *lines)
     if row.allowable is None or not sizes:
@@ -299,6 +301,20 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
     lines = equation("allowable", "20*log(factor)/log(10)", {"factor": smallest}, row.allowable, "dB")
     yield from step("As a level, against the noise that is declared: it may rise by that much", *lines)
     yield from step("Utilization", *equation("utilization", "1/factor", {"factor": smallest}, 1 / smallest, ""))
+
+
+def _with_cubic(mission: Mission, error: RandomError, effect: RandomEffect, held: RandomEffect) -> Iterator[Step]:
+    """Add the power of the cubic phase to what is left, where no requirement of its own takes it."""
+    k, factor = _covered(mission, error), mission.allocation.coverage_factor
+    values = {"cubic/unit": effect.cubic, "left/unit": effect.spread * k, "k": factor}
+    # What is left is shown of one sigma, the cubic phase with the factor of what is declared or without it.
+    formula = "4*(cubic/unit)^2/175" if k == factor else "4*(cubic/unit/k)^2/175"
+    formula = f"sqrt((left/unit)^2 + {formula})" if effect.spread else f"sqrt({formula})"
+    lines = equation(
+        "spread/unit", formula, values, held.spread * k, f"rad{f' per {_unit(error)}' * bool(_unit(error))}"
+    )
+    title = "No requirements.cubic_phase_error: ISLR holds the power of the cubic phase too, without coverage factor"
+    yield from step(title, *lines)
 
 
 def _unit(error: RandomError) -> str:
@@ -331,11 +347,12 @@ def explained_islr(analysis: Analysis, allocation: Allocation, row: Row) -> Iter
     if row.declared is None:
         yield from step("Nothing that spreads is declared")
     else:
+        yield from _tones_and_cubic(analysis, allocation, owner, model, dict(members))
         width = max(len(name) for name, _ in members)
         listed = [f"{printable(name):<{width}}  {power:.6g} rad²" for name, power in members]
         terms = " + ".join(number(power) for _, power in members)
-        yield from step("Squares of the rms phases that are left after the cubic: independent, so they add", *listed,
-                        Sum(f"v = {terms} = {with_unit(total, 'rad²')}"))  # fmt: skip
+        title = "Squares of the rms phases that spread: independent, so they add"
+        yield from step(title, *listed, Sum(f"v = {terms} = {with_unit(total, 'rad²')}"))
         lines = equation("declared", _level(model, "v"), {"v": total, **known}, row.declared, "dB")
         yield from step(f"As ISLR: {rule}", *lines)
     if row.allowable is None:
@@ -353,30 +370,83 @@ def explained_islr(analysis: Analysis, allocation: Allocation, row: Row) -> Iter
         yield from step("Utilization, of amplitudes", *lines)
 
 
+def _tones_and_cubic(
+    analysis: Analysis, allocation: Allocation, owner: str, model: str, members: Mapping[str, float]
+) -> Iterator[Step]:
+    """Powers of what is no noise: tones and the cubic phase, where no requirement of their own takes them."""
+    powers = [
+        Sum(f"{one.subject.id} = {number(one.phase)}^2/2 = {with_unit(members[one.subject.id], 'rad²')}")
+        for one in tones(analysis.mission)
+        if one.subject.id in members
+    ]
+    if powers:
+        yield from step("No requirements.pslr: a tone spreads half the square of its peak phase", *powers)
+    cubic_row = subject("mission", CUBIC).id
+    if cubic_row not in members:
+        return
+    together = Together(analysis, analysis.full if model == "full" else analysis.published)
+    cubic = together.cubic_without_coverage(allocation.islr, owner)
+    parts = phase_parts(
+        together.cubics_without_coverage(allocation.islr, owner), together.rule_of_all, together.groups
+    )
+    title = "Cubic phase of the declared errors, without coverage factor"
+    yield from combined(title, together.rule_of_all, parts, cubic, symbol="φ_3")
+    lines = equation("v_3", "4*φ_3^2/175", {"φ_3": cubic}, members[cubic_row], "rad²")
+    yield from step("No requirements.cubic_phase_error: its mean square after the fit of a line spreads", *lines)
+
+
 def explained_pslr(mission: Mission, row: Row) -> Iterator[Step]:
-    """The highest echo of all tones, and what is required."""
-    level, near = highest_echo(mission)
-    required = mission.requirements.pslr or 0.0
-    if row.declared is None:
-        yield from step("Nothing that echoes is declared")
+    """From all tones to the highest echo that they make in the worst of their phases."""
+    found = tones(mission)
+    echo = highest_echo(found)
+    if echo is None:
+        yield from step("No tone is declared: no vibration from one cycle per aperture on, no spur")
     else:
-        listed = [
-            f"{printable(one.subject.id)}: {number(one.phase)} rad, {number(one.cycles)} cycles" for one in near
-        ]
-        yield from step(
-            "Tones that make the highest echo, in the worst of their phases, from first principles", *listed
+        width = max(len(one.subject.id) for one in found)
+        listed = [f"{one.subject.id:<{width}}  {one.phase:.6g} rad, {one.cycles:.6g} cells" for one in found]
+        yield from step("Tones: peak phase, and distance of their echoes from the response", *listed)
+        terms = " + ".join(f"{number(one.phase)}*{number(abs(sinc(echo.cycles - one.cycles)))}" for one in echo.tones)
+        title = (
+            f"Highest echo: at x = {number(echo.cycles)} cells, of {', '.join(one.subject.id for one in echo.tones)}"
         )
-        lines = equation("declared", "20*log(l)/log(10)", {"l": level}, row.declared, "dB")
-        yield from step("Its level l = J₁(φ)/J₀(φ), φ the phase of all of them", *lines)
-    yield from step("Required", *equation("allowable", "PSLR", {"PSLR": required}, required, "dB"))
-    if row.declared is not None and row.utilization is not None:
-        values = {"declared": row.declared, "allowable": required}
-        lines = equation("utilization", "10^((declared - allowable)/20)", values, row.utilization, "")
-        yield from step("Utilization, of amplitudes", *lines)
+        if len(echo.tones) > 1:
+            title += ", each φ·|sinc(x − f·T)| in the worst phases, sinc(x) = sin(πx)/(πx)"
+        yield from step(title, Sum(f"φ = {terms} = {with_unit(echo.phase, 'rad')}"))
+        yield from _echo_level(echo)
+        if row.declared is not None:
+            lines = equation("declared", "20*log(l)/log(10)", {"l": echo.level}, row.declared, "dB")
+            yield from step("As a level", *lines)
+    if row.allowable is None:
+        return
+    lines = equation("allowable", "required", {"required": row.allowable}, row.allowable, "dB")
+    yield from step(f"requirements.pslr, all of it, {place(mission, ('requirements', 'pslr'))}", *lines)
+    yield from _use_of_amplitudes(row)
+
+
+def _echo_level(echo: Echo) -> Iterator[Step]:
+    if echo.phase > LARGEST_ECHO:
+        lines = equation("l", "φ/2", {"φ": echo.phase}, echo.level, "")
+        yield from step(f"Amplitude over that of the response; above {LARGEST_ECHO:g} rad half the phase", *lines)
+        return
+    j0, j1 = bessel(echo.phase)
+    yield from step(
+        "Amplitude over that of the response, J₁(φ)/J₀(φ)",
+        *equation("J_0", "", {}, j0, ""),
+        *equation("J_1", "", {}, j1, ""),
+        *equation("l", "J_1/J_0", {"J_0": j0, "J_1": j1}, echo.level, ""),
+    )
+
+
+def _use_of_amplitudes(row: Row) -> Iterator[Step]:
+    if row.utilization is None or row.declared is None or row.allowable is None:
+        return
+    values = {"declared": row.declared, "allowable": row.allowable}
+    lines = equation("utilization", "10^((declared - allowable)/20)", values, row.utilization, "")
+    yield from step("Utilization, of amplitudes", *lines)
 
 
 def explained_spur(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
-    """From the tone of an oscillator to its paired echoes, and to what the platform's share of PSLR allows."""
+    """From the tone of an oscillator to its paired echoes, and to what the platform's share allows."""
     oscillator = getattr(mission.platforms, row.owner).oscillator
     path = ("platforms", row.owner, "oscillator", "spurs")
     entry = row.subject.entry or 0
@@ -396,10 +466,8 @@ def explained_spur(mission: Mission, allocation: Allocation, row: Row) -> Iterat
         return
     values = {"A": limits.by(row.model or "published"), "λ": mission.radar.wavelength}
     lines = equation("φ", "2*π*A/λ", values, 2 * math.pi * values["A"] / values["λ"], "rad")
-    yield from step(f"Phase of a vibration at the limit of {row.owner}.vibration.sinusoidal", *lines)
+    by_power = "" if row.metric == "pslr" else ", √2 times the rms value that ISLR allows"
+    yield from step(f"Phase of a vibration at the limit of {row.owner}.vibration.sinusoidal{by_power}", *lines)
     phase = {"φ": 2 * math.pi * values["A"] / values["λ"]}
     yield from step("Its echoes", *equation("allowable", "20*log(φ/2)/log(10)", phase, row.allowable, "dB"))
-    if row.utilization is not None:
-        values = {"declared": row.declared or 0.0, "allowable": row.allowable}
-        lines = equation("utilization", "10^((declared - allowable)/20)", values, row.utilization, "")
-        yield from step("Utilization, of amplitudes", *lines)
+    yield from _use_of_amplitudes(row)

@@ -1,7 +1,7 @@
 """How a row comes to its status: from the line of the mission file through the equations to the verdict."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
@@ -9,7 +9,6 @@ from bisar_budget.analysis.scene import ScenePhases, at
 from bisar_budget.analysis.spread import mainlobe_energy
 from bisar_budget.analysis.together import Together
 from bisar_budget.analysis.vibration_limits import amplitude_share, echo_phase, slow_limits
-from bisar_budget.constants import ROUNDING
 from bisar_budget.effects.correlation import displacement_parts, phase_parts
 from bisar_budget.effects.echoes import near_lines, sinc, worst_phases
 from bisar_budget.effects.effect import ErrorSource, image_plane
@@ -18,22 +17,24 @@ from bisar_budget.effects.slow_vibration import cubic_part, quadratic_part
 from bisar_budget.effects.vibration_lines import lines_of, sight_of
 from bisar_budget.faults import KeyPath, changes_words, printable
 from bisar_budget.findings.mission import MissionFindings
-from bisar_budget.findings.row import Row
+from bisar_budget.findings.requirement import JudgedRequirement
+from bisar_budget.findings.row import DECLARE, Row
 from bisar_budget.findings.status import STATUS
 from bisar_budget.geometry import dot, without_rounding
 from bisar_budget.mission.model import Mission
 from bisar_budget.report.explain import formulas
-from bisar_budget.report.explain.explained_budget import limit_steps
+from bisar_budget.report.explain.explained_budget import RULES, combined, limit_steps
 from bisar_budget.report.explain.explained_error import as_written, declaration, effect, missing, place
 from bisar_budget.report.explain.explained_full import at_the_allowable, end_of_the_image
+from bisar_budget.report.explain.explained_requirement import declarations, finding_of, not_judged
 from bisar_budget.report.explain.formulas import Step, Sum, WorkedEquation, equation, number, step, with_unit
 from bisar_budget.report.words.layout import wrapped
+from bisar_budget.report.words.requirements import requirement_finding, requirement_id
 from bisar_budget.report.words.sentences import percent
 from bisar_budget.report.words.sizes import row_limit, row_size
 
 _DEEPER = 3  # a broken equation goes on; no symbol has the width that would put its equals sign there
 _LONGEST_UNIT = 16  # letters, of what may follow a number
-_RULES = {"each": "the largest", "sum": "the sum", "rss": "the root-sum-square"}
 
 
 def explain(mission: Mission, found: MissionFindings, row_id: str) -> str:
@@ -50,11 +51,25 @@ def explain(mission: Mission, found: MissionFindings, row_id: str) -> str:
     """
     row = next(row for row in found.rows if row.id == row_id)
     own_id = f" [{printable(row.requirement_id)}]" if row.requirement_id else ""
-    lines = [f"{STATUS[row.status].text} {printable(row.id)}{own_id} of {printable(mission.name)}"]
+    title = f"{STATUS[row.status].text} {printable(row.id)}{own_id}"
+    steps = [line for step in _to_utilization(mission, found, row) for line in step.lines]
+    if row.declared is not None and row.allowable is not None and row.utilization is not None:
+        steps.append(f"                = {percent(row.utilization)}")  # under the sum of the last step
+    steps += [line for step in not_judged(found, row) for line in step.lines]
+    return _text(mission, title, [*steps, *_verdict(row, found)])
+
+
+def explain_requirement(mission: Mission, found: MissionFindings, one: JudgedRequirement) -> str:
+    """Write how a requirement of a mission stands, and the rows that judge it."""
+    title = f"{STATUS[one.status].text} {requirement_id(one)}"
+    steps = [line for step in finding_of(mission, found, one) for line in step.lines]
+    return _text(mission, title, [*steps, "", requirement_finding(one)])
+
+
+def _text(mission: Mission, title: str, body: Iterable[str]) -> str:
+    lines = [f"{title} of {printable(mission.name)}"]
     lines += [f"Not as the file says: {changes_words(mission.changes)}"] if mission.changes else []
-    lines.append("")
-    lines += [line for step in chain(mission, found, row) for line in step.lines]
-    lines += _verdict(row, found)
+    lines += ["", *body]
     return "\n".join(part for line in lines for part in _fitted(line)) + "\n"
 
 
@@ -71,7 +86,12 @@ def _fitted(line: str) -> list[str]:
 
 
 def chain(mission: Mission, found: MissionFindings, row: Row) -> Iterator[Step]:
-    """Steps from the line of the mission file to how much of the allowable a row uses."""
+    """Steps from the line of the mission file to how much of the allowable a row uses, or why that is not judged."""
+    yield from _to_utilization(mission, found, row)
+    yield from not_judged(found, row)
+
+
+def _to_utilization(mission: Mission, found: MissionFindings, row: Row) -> Iterator[Step]:
     analysis = found.analysed()
     together = Together(analysis, analysis.full if row.model == "full" else analysis.published)
     source = next((source for source in analysis.sources if source.id == row.id), None)
@@ -105,6 +125,8 @@ def chain(mission: Mission, found: MissionFindings, row: Row) -> Iterator[Step]:
         yield from _spatial_variance(analysis, found, row)
     elif row.subject.kind == LOCATION:
         yield from _location_aggregate(mission, together, found, row)
+    elif row.metric == DECLARE:
+        yield from declarations(mission)
     if row.declared is not None and row.allowable is not None and row.utilization is not None and row.unit != "dB":
         values = {"declared": row.declared, "allowable": row.allowable}
         yield from step("Utilization", *equation("utilization", "declared/allowable", values, row.utilization, ""))
@@ -186,7 +208,6 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[S
     """From the file to the limits of both models, for one line, lines near each other, or noise."""
     platform, entry = row.owner, row.subject.entry or 0
     is_sinusoid, is_sum = row.subject.axis != "wideband", row.subject.axis == "sinusoidal.sum"
-    is_echo = row.metric != "islr"  # which takes the power of a sinusoid where no PSLR is required
     path: KeyPath = ("platforms", platform, "motion_error", "vibration", "sinusoidal" if is_sinusoid else "wideband")
     if row.declared is None:
         yield Step(missing(mission, path))
@@ -213,7 +234,8 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[S
         if row.metric == QUADRATIC:
             yield from _slow_vibration(mission, allocation, row, line.frequency * mission.collection.aperture_time)
             return
-    requirement = mission.requirements.pslr if is_echo else mission.requirements.islr
+    by_echoes = row.metric == "pslr"
+    requirement = mission.requirements.pslr if by_echoes else mission.requirements.islr
     if requirement is None or row.allowable_published is None or row.allowable_full is None:
         return
     name = row.metric.upper()
@@ -222,15 +244,17 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[S
         f"requirements.{row.metric} as a power ratio",
         *equation(name, "10^(dB/10)", {"dB": requirement}, ratio, ""),
     )
-    split = allocation.pslr if is_echo else allocation.islr
+    split = allocation.pslr if by_echoes else allocation.islr
     share = split.of(platform)
     values = {name: ratio, "λ": wavelength, "s": share}
-    is_power = is_sinusoid and not is_echo
-    root = "sqrt(2)*" if is_power else ""
-    lines = equation("published", root + formulas.VIBRATION[row.metric], values, row.allowable_published, "m")
-    kind = "sinusoidal" if is_echo else "wideband, a sinusoid of as much power" if is_power else "wideband"
-    yield from step(f"Section V, {kind}, s is the {platform}’s share of power", *lines)
-    if is_echo:
+    is_power = is_sinusoid and not by_echoes
+    published = formulas.VIBRATION[row.metric]
+    kind = "sinusoidal" if by_echoes else "wideband"
+    yield from step(
+        f"Section V, {kind}, s is the {platform}’s share of power",
+        *_limit("published", published, values, row.allowable_published, is_power=is_power),
+    )
+    if by_echoes:
         part = amplitude_share(split, platform)
         shares = {"s_t": split.transmitter, "s_r": split.receiver}
         yield from step(
@@ -253,14 +277,26 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[S
         title = "First principles, independent on both platforms; a phase of σ rad has the ISLR (exp(σ²) − 1)/E"
         values = {**values, "E": mainlobe_energy(mission)}
         known = []
-    lines = equation("full", root + formulas.FULL_VIBRATION[row.metric], values, row.allowable_full, "m")
-    yield from step(title, *known, *lines)
+    full = formulas.FULL_VIBRATION[row.metric]
+    yield from step(title, *known, *_limit("full", full, values, row.allowable_full, is_power=is_power))
     limits = {"published": row.allowable_published, "full": row.allowable_full}
     model = mission.gating_model
     chosen = "min(published, full)" if model == "strictest" else model
     yield from step(
         f"Allowable, allocation.model {model}", *equation("allowable", chosen, limits, row.allowable or 0.0, "m")
     )
+
+
+def _limit(
+    model: str, formula: str, values: Mapping[str, float], result: float, *, is_power: bool
+) -> Iterator[WorkedEquation]:
+    """Limit of a vibration by a model; of a line that ISLR holds by its power, the amplitude of that rms value."""
+    if not is_power:
+        yield from equation(model, formula, values, result, "m")
+        return
+    rms = result / math.sqrt(2)
+    yield from equation(f"σ_{model}", formula, values, rms, "m")
+    yield from equation(model, "sqrt(2)*σ", {"σ": rms}, result, "m")
 
 
 def _slow_vibration(mission: Mission, allocation: Allocation, row: Row, cycles: float) -> Iterator[Step]:
@@ -330,7 +366,7 @@ def _phase_aggregate(together: Together, found: MissionFindings, row: Row) -> It
     rule = "sum" if is_pull_in else found.combine
     phases = together.owed(found.allocation, owner)
     parts = phase_parts(phases, rule, together.groups)
-    yield from _combined("QPE", rule, [(name, abs(size)) for name, size in parts], row)
+    yield from combined("QPE of the declared errors", rule, parts, row.declared)
     if is_pull_in:
         values = {"N_pull": found.allocation.n_pull or 0.0}
         lines = equation("allowable", "π*N_pull", values, row.allowable or 0.0, "rad")
@@ -341,7 +377,7 @@ def _phase_aggregate(together: Together, found: MissionFindings, row: Row) -> It
 
 def _cubic_aggregate(together: Together, found: MissionFindings, row: Row) -> Iterator[Step]:
     parts = phase_parts(together.all_cubics(), found.combine, together.groups)
-    yield from _combined("Cubic phase", found.combine, [(name, abs(size)) for name, size in parts], row)
+    yield from combined("Cubic phase of the declared errors", found.combine, parts, row.declared)
     if row.allowable is not None:
         yield from step("Allowable", f"requirements.cubic_phase_error = {row.allowable:.6g} rad")
 
@@ -353,61 +389,34 @@ def _spatial_variance(analysis: Analysis, found: MissionFindings, row: Row) -> I
         return
     edge = ScenePhases(analysis)
     east, north = at(scene.radius, scene.azimuth)
-    sizes = [(name, abs(phase)) for name, phase in edge.parts(edge.differences(scene.radius, scene.azimuth))]
+    parts = edge.parts(edge.differences(scene.radius, scene.azimuth))
     yield from step(
         f"Full model at the scene’s edge, {east:.6g} m east, {north:.6g} m north of the centre, less at the centre"
     )
-    yield from _combined("Difference of QPE", found.combine, sizes, row)
+    yield from combined("Difference of QPE of the declared errors", found.combine, parts, row.declared)
     yield from step("Budget of what one autofocus correction leaves", f"total = {found.allocation.qpe_total:.6g} rad")
 
 
 def _location_aggregate(mission: Mission, together: Together, found: MissionFindings, row: Row) -> Iterator[Step]:
-    rule = "the longest sum over all signs of the vectors" if found.combine == "sum" else _RULES[found.combine]
+    rule = "the longest sum over all signs of the vectors" if found.combine == "sum" else RULES[found.combine]
     parts = displacement_parts(together.moves(found.combine) or [], found.combine, together.groups)
     title = "(25), (30)" if row.model == "published" else "Full model, each by the sign that moves farther"
     if found.combine == "sum":
         vectors = [
             f"{printable(name)}: {with_unit(x, 'm')} east, {with_unit(y, 'm')} north" for name, (x, y) in parts
         ]
-        combined = [] if row.declared is None else [f"combined = {row.declared:.6g} m"]
-        yield from step(f"{title}: displacements, {rule}", *(vectors or ["none"]), *combined)
+        longest = [] if row.declared is None else [f"combined = {row.declared:.6g} m"]
+        yield from step(f"{title}: displacements, {rule}", *(vectors or ["none"]), *longest)
     else:
-        yield from _combined(
-            f"{title}: displacement", found.combine, [(n, math.hypot(*m)) for n, m in parts], row, "m"
-        )
+        lengths = [(name, math.hypot(*move)) for name, move in parts]
+        title = f"{title}: displacement of the declared errors"
+        yield from combined(title, found.combine, lengths, row.declared, unit="m")
     if row.allowable is not None:
         where = place(mission, ("requirements", "location_error"))
         yield from step("Allowable", f"requirements.location_error = {row.allowable:.6g} m, {where}")
 
 
-def _combined(
-    symbol: str, rule: str, members: Sequence[tuple[str, float]], row: Row, unit: str = "rad"
-) -> Iterator[Step]:
-    title = f"{symbol} of the declared errors, {_RULES[rule]}"
-    # What is left of terms that cancel exactly is rounding.
-    largest = max((size for _, size in members), default=0.0)
-    members = [(name, size if size > ROUNDING * largest else 0.0) for name, size in members]
-    if row.declared is None or not members:
-        yield from step(title, *_listed(members, unit))
-        return
-    sizes = [number(size) for _, size in members if size] or ["0"]
-    if rule == "sum":
-        text = " + ".join(sizes)
-    elif rule == "rss":
-        text = "sqrt(" + " + ".join(f"{size}^2" for size in sizes) + ")"
-    else:
-        text = f"max(0, {', '.join(sizes)})"
-    yield from step(title, *_listed(members, unit), Sum(f"combined = {text} = {row.declared:.6g} {unit}"))
-
-
-def _listed(members: Sequence[tuple[str, float]], unit: str) -> list[str]:
-    width = max((len(name) for name, _ in members), default=0)
-    return [f"{printable(name):<{width}}  {size:.6g} {unit}" for name, size in members if size] or ["none"]
-
-
 def _verdict(row: Row, found: MissionFindings) -> Iterator[str]:
-    if row.declared is not None and row.allowable is not None and row.utilization is not None:
-        yield f"                = {percent(row.utilization)}"  # under the sum of the last step
     yield ""
     texts = [text for text in (row.reason, *row.notes) if text]
     declared = "" if row.declared is None else f", declared {row_size(row.declared, row, found)}"

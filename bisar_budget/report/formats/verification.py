@@ -139,7 +139,7 @@ def limit(row: Verdict) -> str:
 def numbers(row: Verdict) -> tuple[str, str, str, str, str]:
     """Budget, what Table II, the full model and exact ranges predict, what the image shows; phases in rad."""
     if row.requirement_db is not None:
-        return f"{row.requirement_db:g} dB", "-", "-", "-", _decibel(row.measured_db)
+        return f"{row.requirement_db:.4g} dB", "-", "-", "-", _decibel(row.measured_db)
     if row.budget_rad is None and row.measured_displacement_m is not None:  # held to the location
         moves = (row.displacement_m, row.measured_displacement_m)
         exact, image = ("-" if move is None else format_quantity(math.hypot(*move), "m") for move in moves)
