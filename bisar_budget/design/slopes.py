@@ -9,7 +9,7 @@ from bisar_budget.findings.requirement import Override
 
 LITTLE = 1e-4  # of a utilization: less of a change is not shown
 EVEN = 0.01  # part of every number for which effects are compared
-_FAR = 1e6  # times: a number that would have to change by so much decides nothing
+_FURTHEST = math.log(1e6)  # times: a number that would have to change by more decides nothing
 
 
 class Slope(NamedTuple):
@@ -118,15 +118,18 @@ class Sensitivity(NamedTuple):
         """Change of a number, by itself, that uses up the margin: the utilization is 1 there; signed, in its unit.
 
         The utilization goes on as it goes here: with a power of the number, or exponentially with a level or an
-        angle. Exact where it does, as of the aperture time or of an error; None beyond a millionfold or a full turn.
+        angle. Exact where it does, as of the aperture time or of an error; None beyond a millionfold or half a turn.
         """
         if not slope.effect or self.asked <= 0:
             return None
         change = -math.log(self.asked) * self.asked / slope.effect  # in `per`s, of the logarithm of the utilization
         if slope.is_proportional:
             power = EVEN * change
-            return slope.value * math.expm1(power) if abs(power) <= math.log(_FAR) else None
-        return change * slope.per if abs(change * slope.measure) <= 2 * math.pi else None
+            return slope.value * math.expm1(power) if abs(power) <= _FURTHEST else None
+        is_near = (
+            abs(change * slope.per) <= math.pi if slope.unit == "rad" else abs(change * slope.measure) <= _FURTHEST
+        )
+        return change * slope.per if is_near else None
 
     @property
     def shown(self) -> tuple[Slope, ...]:

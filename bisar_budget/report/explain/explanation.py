@@ -31,7 +31,7 @@ from bisar_budget.report.explain.formulas import Step, Sum, WorkedEquation, equa
 from bisar_budget.report.words.layout import wrapped
 from bisar_budget.report.words.requirements import requirement_finding, requirement_id
 from bisar_budget.report.words.sentences import percent
-from bisar_budget.units import format_quantity
+from bisar_budget.report.words.sizes import row_limit, row_size
 
 _DEEPER = 3  # a broken equation goes on; no symbol has the width that would put its equals sign there
 _LONGEST_UNIT = 16  # letters, of what may follow a number
@@ -56,7 +56,7 @@ def explain(mission: Mission, found: MissionFindings, row_id: str) -> str:
     if row.declared is not None and row.allowable is not None and row.utilization is not None:
         steps.append(f"                = {percent(row.utilization)}")  # under the sum of the last step
     steps += [line for step in not_judged(found, row) for line in step.lines]
-    return _text(mission, title, [*steps, *_verdict(row)])
+    return _text(mission, title, [*steps, *_verdict(row, found)])
 
 
 def explain_requirement(mission: Mission, found: MissionFindings, one: JudgedRequirement) -> str:
@@ -416,10 +416,10 @@ def _location_aggregate(mission: Mission, together: Together, found: MissionFind
         yield from step("Allowable", f"requirements.location_error = {row.allowable:.6g} m, {where}")
 
 
-def _verdict(row: Row) -> Iterator[str]:
+def _verdict(row: Row, found: MissionFindings) -> Iterator[str]:
     yield ""
     texts = [text for text in (row.reason, *row.notes) if text]
-    declared = "" if row.declared is None else f", declared {format_quantity(row.declared, row.unit)}"
-    allowable = "" if row.allowable is None else f", allowable {format_quantity(row.allowable, row.unit, 3, 'down')}"
+    declared = "" if row.declared is None else f", declared {row_size(row.declared, row, found)}"
+    allowable = "" if row.allowable is None else f", allowable {row_limit(row.allowable, row, found)}"
     yield f"{STATUS[row.status].text}{declared}{allowable}"
     yield from (f"    {printable(text)}" for text in texts)
