@@ -14,6 +14,7 @@ __all__ = [
     "random_rows",
     "required",
     "requirement_states",
+    "requirement_table",
     "verdicts",
     "vibration_rows",
     "waivers",

@@ -15,7 +15,7 @@ from bisar_budget.report.words.requirements import declared_words, kind_names
 from tests.conftest import COMPLIES, ROOT, findings
 from tests.page import read_page
 
-# An ISLR and nothing that spreads; the cubic phase has a judge of its own. No row fails, and ISLR is not judged.
+# An ISLR and nothing that spreads; the cubic phase has its own judge. One requirement is not judged, no row fails.
 UNJUDGED = {
     **COMPLIES,
     "allocation": {"model": "full", "combine": "rss"},

@@ -7,6 +7,7 @@ from typing import Any
 from bisar_budget.design.compared import Comparison, PartState
 from bisar_budget.design.solution import Crossing, Imaged, Solution, State
 from bisar_budget.faults import changes_words, printable
+from bisar_budget.findings.requirement import NAMES
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report.formats.json_document import verdict_item
@@ -158,7 +159,7 @@ def _table_of(found: Comparison, style: Style) -> Iterator[str]:
     for part in found.parts:
         stands = part.standing
         use = "-" if stands.utilization is None else percent(stands.utilization)
-        row = printable(part.reason) if part.reason else stands.row or "no row decides"
+        row = printable(part.reason) if part.reason else stands.row or _undecided(stands.requirement)
         marks = f"{' *' if part.is_given else ''}{' -' if part.silent_on else ''}"
         kind = [part.kind] if is_mixed else []
         rows.append([f"{part.id}{marks}", *kind, STATUS[stands.status].text, use, row])
@@ -223,7 +224,7 @@ def _facts(solution: Solution) -> Iterator[tuple[str, str]]:
         given = solution.given
         yield "Mission", f"{_said(solution, given.value)}: {_stands(given)}"
     what = f"row {printable(solution.row)}" if solution.row else "the mission"
-    strict = "does neither fail nor warn" if solution.target == "warn" else "does not fail"
+    strict = "complies without a warning" if solution.target == "warn" else "complies"
     low, high = (_said(solution, value) for value in (solution.low, solution.high))
     yield "Searched", f"{low} to {high}, for where {what} {strict}; {solution.model} model"
     if len(solution.crossings) > 2 or (len(solution.crossings) == 2 and not solution.crossings[1].is_upper):
@@ -270,13 +271,18 @@ def _shown(found: Imaged) -> str:
     return f"{said}: {', '.join(words)}"
 
 
+def _undecided(requirement: str | None) -> str:
+    """Say what is wrong where no row decides: a requirement that cannot be judged."""
+    return "no row decides" if requirement is None else f"{NAMES[requirement]} cannot be judged"
+
+
 def _stands(state: State) -> str:
     """Say how the mission stands at a value."""
     word = STATUS[state.status].text
     if state.reason:
         return f"{word}, {printable(state.reason)}"
     if state.row is None:
-        return f"{word}, no row decides"
+        return f"{word}, {_undecided(state.requirement)}"
     use = "" if state.utilization is None else f" uses {percent(state.utilization)}"
     requirement = (state.requirement or "").replace("_", " ")
     return f"{word}, {printable(state.row)}{use} ({requirement})"
