@@ -307,6 +307,25 @@ def test_the_terms_of_the_clock_stand_for_what_oscillators_do_to_the_place() -> 
         assert requirement(found, "location_error").status == "not_evaluated"
 
 
+@pytest.mark.parametrize(("frequency", "status"), [("0.16 Hz", "not_evaluated"), ("0.17 Hz", "pass")])
+@pytest.mark.parametrize("combine", ["each", "rss", "sum"])
+def test_a_location_beside_a_slow_vibration_is_not_judged(combine: str, frequency: str, status: str) -> None:
+    """Below a cycle per aperture, 1/6 Hz, it moves the image like a velocity: 10 m in 1000 s passed a 20 cm location."""
+    tone = {"sinusoidal": [{"amplitude": um(0.01), "frequency": frequency}]}
+    needs = {key: value for key, value in LOCATED.items() if key != "islr"}
+    needs |= {"pslr": "-10 dB"} if status == "pass" else {}  # a slow one makes no echoes
+    allocation = {"model": "full", "combine": combine}
+    velocity = {"velocity": "1 um/s", "vibration": tone}
+    found = check(requirements=needs, allocation=allocation, **{RECEIVER: velocity})
+    place = requirement(found, "location_error")
+    assert (place.status, row(found, "mission.location_error").status) == (status, status)
+    if status != "pass":
+        assert place.reason == (
+            "receiver.vibration.sinusoidal.0: slow vibration moves the image too, and this version does not compute "
+            "by how much"
+        )
+
+
 def test_an_error_that_breaks_the_location_fails_beside_a_random_one() -> None:
     found = check(requirements=LOCATED, **{f"{RECEIVER}__position": "100 m"}, **RANDOM["GNSS"])
     assert requirement(found, "location_error").status == "fail"
