@@ -105,8 +105,10 @@ def _untaken(analysis: Analysis, row: Row, one: UntakenEffect) -> Iterator[Step]
         "Below a tenth of requirements.quadratic_phase_error and below 0.08 rad it would be negligible", *lines
     )
     largest, own = max(float(size[0]) for size in one.parts.values()), float(one.parts[row.id][0])
-    lines = equation("least", f"{MAKES_UP:g}*largest", {"largest": largest}, MAKES_UP * largest, "rad")
-    title = "Parts of at least a tenth of the largest make it up"
+    count = sum(float(size[0]) > 0 for size in one.parts.values())
+    values = {"largest": largest, "negligible": level}
+    lines = equation("least", f"min({MAKES_UP:g}*largest, negligible/{count})", values, float(one.least[0]), "rad")
+    title = "Parts of at least a tenth of the largest make it up, and smaller ones that would not be negligible together"
     yield from step(f"{title}; this row’s is {with_unit(own, 'rad')}", *lines)
 
 
