@@ -150,9 +150,9 @@ def nothing_judges(key: str) -> str:
 
 
 @phrase
-def place_is_not_known(row_ids: Sequence[str]) -> str:
-    """Of the location, beside errors that vary at random."""
-    return f"{', '.join(row_ids)}: random errors move the image too, and this version does not compute by how much"
+def place_is_not_known(row_ids: Sequence[str], cause: str) -> str:
+    """Of the location, beside errors that vary at random, or slowly."""
+    return f"{', '.join(row_ids)}: {cause} the image too, and this version does not compute by how much"
 
 
 @phrase

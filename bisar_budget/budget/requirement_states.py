@@ -26,7 +26,7 @@ Truths = NDArray[np.bool_]
 KEYS = (QUADRATIC, CUBIC, LOCATION, "pslr", "islr", "declare")
 UNITS = {QUADRATIC: "rad", CUBIC: "rad", LOCATION: "m", "pslr": "dB", "islr": "dB", "declare": ""}
 TENTH, SMALL_RAD = 0.1, 0.08  # of the quadratic requirement; and of any image
-MAKES_UP = 0.1  # of the largest part: a row with less does not make an effect up
+MAKES_UP = 0.1  # of the largest part: a row with less does not make an effect up, if all that have less are negligible
 
 # Requirements that take an effect, in the order in which one is suggested.
 TAKEN_BY = {"cubic": (CUBIC, "islr"), "spread": ("islr",), "tone": ("pslr", "islr")}
@@ -59,13 +59,17 @@ class EffectTotal(NamedTuple):
 
 
 class UntakenEffect(NamedTuple):
-    """An effect that no requirement takes: where it is negligible, and where not, with the rows that make it up."""
+    """An effect that no requirement takes: where it is negligible, and where not, with the rows that make it up.
+
+    `least` is the smallest part of a row that makes it up. [rad]
+    """
 
     kind: str
     total: Floats
     is_negligible: Truths
     is_above: Truths
     makers: Mapping[str, Truths]
+    least: Floats
     parts: Mapping[str, Floats]
 
 
@@ -106,8 +110,10 @@ def untaken_effects(mission: Mission, effects: Sequence[EffectTotal]) -> list[Un
             continue
         largest = np.max(list(parts.values()), axis=0)
         is_above = (total >= level) & (largest > 0)
-        makers = {row_id: is_above & (size >= MAKES_UP * largest) & (size > 0) for row_id, size in parts.items()}
-        found.append(UntakenEffect(effect.kind, total, (total > 0) & ~is_above, is_above, makers, parts))
+        count = np.sum([size > 0 for size in parts.values()], axis=0)
+        least = np.minimum(MAKES_UP * largest, level / np.maximum(count, 1))
+        makers = {row_id: is_above & (size >= least) & (size > 0) for row_id, size in parts.items()}
+        found.append(UntakenEffect(effect.kind, total, (total > 0) & ~is_above, is_above, makers, least, parts))
     return found
 
 

@@ -72,8 +72,7 @@ def judged_requirements(
     gates = gating_models(analysis)
     untaken = untaken_effects(mission, effect_totals(analysis, gates))
     looked_at = [_looked_at(row, mission, untaken) for row in rows]
-    misplacing = _misplacing(analysis)
-    unknown_place = phrases.place_is_not_known(misplacing) if misplacing else doubts[0].note if doubts else NOTHING
+    unknown_place = _unknown_place(analysis) or (doubts[0].note if doubts else NOTHING)
     if unknown_place and mission.requirements.location_error is not None:
         looked_at = [_misplaced(row, unknown_place) for row in looked_at]
     has_noise = any(noise(analysis, model.name) for model in gates) or (
@@ -172,8 +171,19 @@ def _of_a_cubic_alone(row: Row) -> Row:
     return row._replace(status="not_evaluated", reason=phrases.nothing_judges("islr"))
 
 
+def _unknown_place(analysis: Analysis) -> Note:
+    """Say which errors displace the image by an amount that no row holds: what varies at random, or slowly."""
+    slow = [one.row_id for one in analysis.slow if one.qpe_rad]
+    at_random = _misplacing(analysis)
+    if not slow and not at_random:
+        return NOTHING
+    causes = [*(["random errors"] if at_random else []), *(["slow vibration"] if slow else [])]
+    cause = f"{' and '.join(causes)} {'move' if at_random else 'moves'}"
+    return phrases.place_is_not_known([*at_random, *slow], cause)
+
+
 def _misplacing(analysis: Analysis) -> list[str]:
-    """Rows of the errors that displace the image by an amount that no row holds: what varies at random.
+    """Rows of the errors that displace the image by a random amount.
 
     Both terms of the clock, where the file declares them, stand for what oscillators and a link do to the place.
     """

@@ -56,8 +56,8 @@ class _Part(ParamType[float]):
     "tolerated",
     type=_Part(),
     metavar="PERCENT",
-    help="Exit with 1 if a row newly fails, or if the change uses up more than this part of what was left of "
-    "its limit.",
+    help="Exit with 1 if a row or a requirement newly fails or is not evaluated any more, or if the change uses up "
+    "more than this part of what was left of a row's limit.",
 )
 @click.option(
     "--format",
@@ -126,5 +126,5 @@ def diff(
         write = difference.as_text if format_name == "text" else difference.as_markdown
         text = write(compared, tolerated, all_rows)
     deliver(text, output, format_name)
-    is_refused = tolerated is not None and any(change.broken(tolerated) for change in compared)
+    is_refused = tolerated is not None and any(change.is_refused(tolerated) for change in compared)
     sys.exit(EXIT_BROKEN if is_refused else 0)

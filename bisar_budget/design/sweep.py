@@ -525,8 +525,9 @@ class Engine:
             found[column.name][place] = number
         stands = standing(checked, self.question.row, breaking(self.question.target))
         found["status"][place] = stands.status
+        found["binding_requirement"][place] = stands.requirement or ""
         if stands.row is not None:
-            found["worst_row"][place], found["binding_requirement"][place] = stands.row, stands.requirement
+            found["worst_row"][place] = stands.row
             found["utilization"][place] = math.nan if stands.utilization is None else stands.utilization
         rows = {row.id: row for row in checked.rows}
         for one in self.asked:

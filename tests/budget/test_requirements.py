@@ -211,6 +211,17 @@ def test_what_adds_little_to_an_effect_is_not_blamed_for_it() -> None:
     assert row(found, "transmitter.vibration.wideband").status == "info"
 
 
+@pytest.mark.parametrize(("size", "status"), [(0.041, "not_evaluated"), (0.038, "info")])
+def test_a_waiver_of_the_largest_part_leaves_no_other_unjudged(size: float, status: str) -> None:
+    """0.4 rad were below a tenth of 5 rad, and a waiver of those passed them; of two parts each may have half a level."""
+    stated, other = {"wideband": {"rms": um(5)}}, {"wideband": {"rms": um(size)}}
+    changes = {VIBRATION: stated, "platforms__transmitter__motion_error__vibration": other, **SMALL}
+    found = check(waivers=[waiver("receiver.vibration.wideband")], **changes)
+    assert row(found, "receiver.vibration.wideband").status == "waived"
+    assert row(found, "transmitter.vibration.wideband").status == status
+    assert code(found) == (1 if status == "not_evaluated" else 0)
+
+
 def test_an_oscillator_of_10_rad_of_noise_needs_a_requirement() -> None:
     oscillator = {"frequency": "10 MHz", "phase_noise": {"1 kHz": "-60 dBc/Hz", "1 MHz": "-60 dBc/Hz"}}
     found = check(platforms__receiver__oscillator=oscillator, **SMALL)
@@ -305,6 +316,25 @@ def test_the_terms_of_the_clock_stand_for_what_oscillators_do_to_the_place() -> 
         half = {term: value for term, value in clock.items() if term != missing}
         found = check(requirements=LOCATED, timing_error=half, **SMALL, **RANDOM["oscillator"])
         assert requirement(found, "location_error").status == "not_evaluated"
+
+
+@pytest.mark.parametrize(("frequency", "status"), [("0.16 Hz", "not_evaluated"), ("0.17 Hz", "pass")])
+@pytest.mark.parametrize("combine", ["each", "rss", "sum"])
+def test_a_location_beside_a_slow_vibration_is_not_judged(combine: str, frequency: str, status: str) -> None:
+    """Below a cycle per aperture, 1/6 Hz, it moves the image like a velocity: 10 m in 1000 s passed a 20 cm location."""
+    tone = {"sinusoidal": [{"amplitude": um(0.01), "frequency": frequency}]}
+    needs = {key: value for key, value in LOCATED.items() if key != "islr"}
+    needs |= {"pslr": "-10 dB"} if status == "pass" else {}  # a slow one makes no echoes
+    allocation = {"model": "full", "combine": combine}
+    velocity = {"velocity": "1 um/s", "vibration": tone}
+    found = check(requirements=needs, allocation=allocation, **{RECEIVER: velocity})
+    place = requirement(found, "location_error")
+    assert (place.status, row(found, "mission.location_error").status) == (status, status)
+    if status != "pass":
+        assert place.reason == (
+            "receiver.vibration.sinusoidal.0: slow vibration moves the image too, and this version does not compute "
+            "by how much"
+        )
 
 
 def test_an_error_that_breaks_the_location_fails_beside_a_random_one() -> None:

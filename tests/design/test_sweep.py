@@ -268,9 +268,10 @@ def test_edges_of_scenes_are_held(rule, model) -> None:
 
 
 @pytest.mark.parametrize("rule", ["each", "sum", "rss"])
-def test_vibrations_may_be_slow(rule) -> None:
-    """Below one cycle per aperture a vibration is a phase that counts with the others."""
-    text = mission_text(timing_error__quadratic="1e-12 /s").replace(
+@pytest.mark.parametrize("needs", [{}, {"requirements": {"location_error": "10 km"}}])
+def test_vibrations_may_be_slow(needs, rule) -> None:
+    """Below one cycle per aperture a vibration is a phase that counts with the others, and moves the image."""
+    text = mission_text(timing_error__quadratic="1e-12 /s", **needs).replace(
         "  receiver:",
         "  receiver:\n    motion_error: {vibration: {sinusoidal: [{amplitude: 20 um, frequency: 2 Hz}]}}",
         1,
@@ -297,12 +298,15 @@ def test_the_end_of_the_image_binds() -> None:
 
 
 def test_what_arrays_do_not_hold_is_checked_one_by_one() -> None:
-    """A path that the Earth decides is found anew for every aperture."""
+    """A path that the Earth decides is found anew for every aperture; where no row decides, a requirement breaks."""
     mission = load_mission(str(MISSIONS / "sentinel1_elements_besancon.yaml"))
     cases = grid(mission, collection__aperture_time=[1.0, 1.5])
-    whole, by_case = swept(mission, cases)
-    assert by_case == 2
-    assert_as_checked(mission, cases, whole)
+    for needs in ((), (SetValue("requirements.pslr", "-30 dB"),)):
+        unmet = load_mission(mission.file, changes=needs)
+        whole, by_case = swept(unmet, cases)
+        assert by_case == 2
+        assert_as_checked(unmet, cases, whole)
+    assert list(whole["binding_requirement"]) == ["pslr"] * 2
 
 
 _LINK = "{error: 1 deg, interval: 0.3 s}"

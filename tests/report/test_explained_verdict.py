@@ -196,7 +196,8 @@ class TestNotJudged:
         found = {symbol: (numbers, value) for symbol, numbers, value in reversed(sums(last))}
         assert found["total"][1] == pytest.approx(math.hypot(*parts.values()), rel=1e-5)
         assert found["negligible"][1] == 0.08  # the smaller one of 9 deg and 0.08 rad
-        assert found["least"][1] == pytest.approx(max(parts.values()) / 10, rel=1e-5)
+        # All parts that are smaller are negligible together.
+        assert found["least"][1] == pytest.approx(min(max(parts.values()) / 10, 0.08 / len(parts)), rel=1e-5)
         assert parts[row_id] >= found["least"][1]
         assert f"this row’s is {parts[row_id]:.6g} rad" in last
 

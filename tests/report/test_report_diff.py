@@ -14,6 +14,7 @@ from bisar_budget.report.change.comparison import Change, compare
 from tests.conftest import findings, mission_text, row
 
 LIMIT = findings().allocation.qpe_limit("mission")
+RMS = "platforms__receiver__motion_error__vibration__wideband__rms"
 BASE = {"timing_error__quadratic": 3e-13, "other_errors": [{"name": "a", "quadratic_phase_error": 0.1}]}
 
 
@@ -86,6 +87,20 @@ class TestCompare:
         assert result.changes[0].is_newly_failing
         assert {c.id for c in result.changes} == {"timing.quadratic", "timing.constant", "mission.location_error"}
         assert result.unchanged + len(result.changes) == len(after.rows)
+
+    def test_what_nothing_judges_any_more_is_newly_failing(self) -> None:
+        """A requirement that lost what judges it, and a row that is not evaluated any more, passed every gate."""
+        needs = {"requirements": {"islr": "-20 dB"}}
+        noise = {"platforms__receiver__motion_error__vibration": {"wideband": {"rms": "1 um"}}}
+        result = compare(findings(**BASE, **needs, **noise), findings(**BASE, **needs))
+        (lost,) = [one for one in result.requirements if one.key == "islr"]
+        assert (lost.before, lost.after, lost.is_newly_failing) == ("pass", "not_evaluated", True)
+        assert result.is_refused(1.0)
+        back = compare(result.after, result.before)
+        assert not any(one.is_newly_failing for one in back.requirements)
+        assert not back.is_refused(1.0)
+        unasked = compare(findings(**BASE, **needs, **noise), findings(**BASE, **{RMS: "1 mm"}))
+        assert [c.id for c in unasked.changes if c.is_newly_failing] == ["receiver.vibration.wideband"]
 
     def test_a_moved_line_is_no_change(self) -> None:
         from bisar_budget.budget.check import check_mission

@@ -52,8 +52,8 @@ class Change(NamedTuple):
 
     @property
     def is_newly_failing(self) -> bool:
-        """Whether it fails now and did not."""
-        return _status(self.after) == "fail" != _status(self.before)
+        """Whether it fails, or is not evaluated, now and was not."""
+        return _is_newly_broken(_status(self.before), _status(self.after))
 
     @property
     def is_change(self) -> bool:
@@ -74,8 +74,25 @@ class Change(NamedTuple):
         return self.is_newly_failing or (is_judged and self.erosion > tolerated + UTILIZATION_TOLERANCE)
 
 
+class RequirementMove(NamedTuple):
+    """How a requirement stood and stands: its statuses; None where the mission has no such requirement."""
+
+    key: str
+    name: str
+    before: str | None
+    after: str | None
+
+    @property
+    def is_newly_failing(self) -> bool:
+        """Whether it is not met, or not evaluated, now and was not."""
+        return _is_newly_broken(self.before, self.after)
+
+
 class MissionChange(NamedTuple):
-    """A mission before and after; changes have the largest erosion first. `inputs` are keys of the mission file."""
+    """A mission before and after; changes have the largest erosion first. `inputs` are keys of the mission file.
+
+    `requirements` are those that stand otherwise now.
+    """
 
     before: MissionFindings
     after: MissionFindings
@@ -83,6 +100,11 @@ class MissionChange(NamedTuple):
     unchanged: int
     inputs: tuple[Moved, ...] = ()
     geometry: tuple[Moved, ...] = ()
+    requirements: tuple[RequirementMove, ...] = ()
+
+    def is_refused(self, tolerated: float) -> bool:
+        """Whether a gate refuses it: a row, or a requirement, which no row may judge any more."""
+        return bool(self.broken(tolerated)) or any(one.is_newly_failing for one in self.requirements)
 
     def broken(self, tolerated: float) -> list[Change]:
         """List the changes that a gate refuses."""
@@ -102,7 +124,22 @@ def compare(before: MissionFindings, after: MissionFindings) -> MissionChange:
         len(changes) - len(changed),
         inputs=tuple(_inputs(before.mission, after.mission)),
         geometry=tuple(_geometry(before, after)),
+        requirements=tuple(_requirements(before, after)),
     )
+
+
+def _requirements(before: MissionFindings, after: MissionFindings) -> Iterator[RequirementMove]:
+    """Requirements that stand otherwise now."""
+    old, new = ({one.key: one for one in found.requirements} for found in (before, after))
+    for key, one in {**old, **new}.items():
+        statuses = [found[key].status if key in found else None for found in (old, new)]
+        if statuses[0] != statuses[1]:
+            yield RequirementMove(key, one.name, *statuses)
+
+
+def _is_newly_broken(before: str | None, after: str | None) -> bool:
+    """Whether what was held is so no more; what could not be judged and fails now is worse too."""
+    return (after == "fail" != before) or (after == "not_evaluated" and before not in ("fail", "not_evaluated"))
 
 
 def _inputs(before: Mission | None, after: Mission | None) -> Iterator[Moved]:

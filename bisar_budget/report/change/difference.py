@@ -8,7 +8,7 @@ from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
-from bisar_budget.report.change.comparison import Change, MissionChange, Moved
+from bisar_budget.report.change.comparison import Change, MissionChange, Moved, RequirementMove
 from bisar_budget.report.words.escapes import markdown_text
 from bisar_budget.report.words.layout import table, wrapped
 from bisar_budget.report.words.requirements import overrides_lines, overrides_words
@@ -33,6 +33,9 @@ def _text(mission: MissionChange, tolerated: float | None, all_rows: bool) -> li
                 printable(f"  {move.name}: {_said(move.before, move)} -> {_said(move.after, move)}") for move in moves
             ]
             lines += [title, *(line for text in texts for line in wrapped(text, "    ")), ""]
+    if mission.requirements:
+        texts = [f"  {one.name}: {_standings(one)}" for one in mission.requirements]
+        lines += ["Requirements", *texts, ""]
     if changes := _shown(mission, tolerated, all_rows):
         rows = [
             (printable(change.id), _use(change.before), _use(change.after), _erosion(change), _statuses(change))
@@ -75,12 +78,19 @@ def _statuses(change: Change) -> str:
     return after if before == after else f"{before} -> {after}"
 
 
+def _standings(one: RequirementMove) -> str:
+    before, after = ("none" if status is None else STATUS[status].text for status in (one.before, one.after))
+    return f"{before} -> {after}"
+
+
 def _summary(mission: MissionChange, tolerated: float | None, all_rows: bool) -> str:
     newly = sum(change.is_newly_failing for change in mission.changes)
     hidden = len(mission.changes) - len(_shown(mission, tolerated, all_rows))
     small = f" ({hidden} by less than 1 %, not shown without --all)" if hidden else ""
     count = len(mission.changes)
     text = f"{count} row{'s' if count != 1 else ''} changed{small}, {mission.unchanged} not, {newly} newly failing"
+    if unmet := sum(one.is_newly_failing for one in mission.requirements):
+        text += f"; {unmet} requirement{'s' if unmet != 1 else ''} newly failing"
     if tolerated is not None:
         refused = len(mission.broken(tolerated))
         text += f"; {refused} refused (newly failing, or erosion above {percent(tolerated)})"
@@ -101,7 +111,9 @@ def as_markdown(missions: Sequence[MissionChange], tolerated: float | None, all_
                     markdown_text(_said(move.after, move)),
                 )
                 lines.append(f"- {title} {' → '.join(said)}")
-        lines += [""] if mission.inputs or mission.geometry else []
+        for one in mission.requirements:
+            lines.append(f"- requirement {markdown_text(one.name)}: {_standings(one).replace('->', '→')}")
+        lines += [""] if mission.inputs or mission.geometry or mission.requirements else []
         changes = _shown(mission, tolerated, all_rows)
         if changes:
             lines.append("| row | declared | allowable | use before | use after | erosion | status |")
@@ -150,6 +162,9 @@ def as_json(version: str, missions: Sequence[MissionChange], tolerated: float | 
                 "unchanged": mission.unchanged,
                 "inputs": [{"key": move.name, "before": move.before, "after": move.after} for move in mission.inputs],
                 "geometry": [move._asdict() for move in mission.geometry],
+                "requirements": [
+                    {**one._asdict(), "is_newly_failing": one.is_newly_failing} for one in mission.requirements
+                ],
                 "rows": [_document(change, tolerated) for change in mission.changes],
             }
             for mission in missions

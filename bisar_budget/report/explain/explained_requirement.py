@@ -68,7 +68,7 @@ def not_judged(found: MissionFindings, row: Row) -> Iterator[Step]:
     elif code == "input-in-doubt":
         yield from _path_in_doubt(mission, row)
     elif code == "place-is-not-known":
-        yield from _random_errors(analysis, row, reason)
+        yield from _displacing(analysis, row, reason)
     else:
         for one in untaken_effects(mission, effect_totals(analysis, gating_models(analysis))):
             if row.id in one.makers and one.makers[row.id][0]:
@@ -105,8 +105,10 @@ def _untaken(analysis: Analysis, row: Row, one: UntakenEffect) -> Iterator[Step]
         "Below a tenth of requirements.quadratic_phase_error and below 0.08 rad it would be negligible", *lines
     )
     largest, own = max(float(size[0]) for size in one.parts.values()), float(one.parts[row.id][0])
-    lines = equation("least", f"{MAKES_UP:g}*largest", {"largest": largest}, MAKES_UP * largest, "rad")
-    title = "Parts of at least a tenth of the largest make it up"
+    count = sum(float(size[0]) > 0 for size in one.parts.values())
+    values = {"largest": largest, "negligible": level}
+    lines = equation("least", f"min({MAKES_UP:g}*largest, negligible/{count})", values, float(one.least[0]), "rad")
+    title = "Parts of at least a tenth of the largest make it up, and smaller ones that would not be negligible together"
     yield from step(f"{title}; this row’s is {with_unit(own, 'rad')}", *lines)
 
 
@@ -129,15 +131,14 @@ def _path_in_doubt(mission: Mission, row: Row) -> Iterator[Step]:
         yield from step("Position errors that it declares, without coverage factor: less than the doubt", line)
 
 
-def _random_errors(analysis: Analysis, row: Row, reason: Note) -> Iterator[Step]:
+def _displacing(analysis: Analysis, row: Row, reason: Note) -> Iterator[Step]:
     """Phases of the errors that move the image by an amount that is not computed."""
     model = row.model or "published"
     names, lines = reason.values[0], []
-    for error in analysis.random:
-        if isinstance(names, list | tuple) and error.id in names and error.declared is not None:
-            effect = error.effect(model)
-            quadratic, cubic = effect.quadratic * error.declared, effect.cubic * error.declared
-            lines.append(f"{printable(error.id)}: QPE {with_unit(quadratic, 'rad')}, cubic {with_unit(cubic, 'rad')}")
+    for one in analysis.own_phases(model):
+        if isinstance(names, list | tuple) and one.row_id in names:
+            phases = f"QPE {with_unit(one.qpe_rad, 'rad')}, cubic {with_unit(one.cubic_rad, 'rad')}"
+            lines.append(f"{printable(one.row_id)}: {phases}")
     yield from step(
-        "Not in the displacement, by an amount that is not computed: random errors move the image too", *lines
+        f"Not in the displacement, by an amount that is not computed: {reason.values[1]} the image too", *lines
     )

@@ -17,7 +17,7 @@ COLUMNS = ("requirement", "allowed", "reached", "use", "status", "decided by")
 MODELS = {"published": "published model", "full": "full model", "strictest": "stricter of both models"}
 RULES = {"each": "each error alone", "sum": "worst-case sum", "rss": "root-sum-square"}
 _BREAKS = ("fail", "not_evaluated")
-_SHORT = {"place-is-not-known": "random errors move the image too"}  # of reasons that rows say at length
+_UNKNOWN_PLACE = "place-is-not-known"  # a reason that rows say at length
 
 
 class HasOverrides(Protocol):
@@ -71,7 +71,8 @@ def requirement_lines(mission: MissionFindings) -> Iterator[RequirementLine]:
 
 
 def _short(reason: phrases.Note) -> str:
-    return _SHORT.get(reason.code, reason)
+    """A reason that rows say at length, without the ids of the rows."""
+    return f"{reason.values[1]} the image too" if reason.code == _UNKNOWN_PLACE else reason
 
 
 def _remarks(one: JudgedRequirement, mission: MissionFindings) -> Iterator[str]:
@@ -163,7 +164,7 @@ def _texts(values: object) -> list[str]:
 
 def is_said_with_the_table(row: Row) -> bool:
     """Whether the table of requirements, and what stands below it, says why a row is not evaluated."""
-    codes = ("effect-is-not-judged", *_SHORT)
+    codes = ("effect-is-not-judged", _UNKNOWN_PLACE)
     return row.status == "not_evaluated" and row.reason is not None and row.reason.code in codes
 
 
