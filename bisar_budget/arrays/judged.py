@@ -119,7 +119,7 @@ class _Check:
         self.stated_random = [error for error in self.random if error.declared is not None]
 
     def _own(self, model: str) -> list[ManyOwnPhases]:
-        """Phases of what has no displacement of its own: slow vibrations, and the declared errors of sensors and clocks."""
+        """Phases of what has no displacement of its own: slow vibrations, declared errors of sensors and clocks."""
         found, factor = list(self.slow), self.mission.allocation.coverage_factor
         for error in self.stated_random:
             quadratic, cubic, _ = (self.array(part * error.declared) for part in error.effect(model))
@@ -239,7 +239,7 @@ class _Check:
         """Whether errors that vary at random, or slowly, displace the image; as `requirement_table` has it."""
         timing = self.mission.timing_error
         is_clock_stated = timing.constant is not None and timing.linear is not None
-        found = np.any([np.zeros(self.cases, dtype=bool), *(one.qpe > 0 for one in self.slow)], axis=0)
+        found: NDArray[np.bool_] = np.any([np.zeros(self.cases, bool), *(one.qpe > 0 for one in self.slow)], axis=0)
         for error in self.stated_random:
             if error.subject.kind in ("oscillator", "synchronization") and is_clock_stated:
                 continue

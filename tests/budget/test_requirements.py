@@ -213,7 +213,7 @@ def test_what_adds_little_to_an_effect_is_not_blamed_for_it() -> None:
 
 @pytest.mark.parametrize(("size", "status"), [(0.041, "not_evaluated"), (0.038, "info")])
 def test_a_waiver_of_the_largest_part_leaves_no_other_unjudged(size: float, status: str) -> None:
-    """0.4 rad were below a tenth of 5 rad, and a waiver of those passed them; of two parts each may have half a level."""
+    """0.4 rad were below a tenth of 5 rad, and a waiver of those passed them; two parts may have half a level each."""
     stated, other = {"wideband": {"rms": um(5)}}, {"wideband": {"rms": um(size)}}
     changes = {VIBRATION: stated, "platforms__transmitter__motion_error__vibration": other, **SMALL}
     found = check(waivers=[waiver("receiver.vibration.wideband")], **changes)
@@ -321,7 +321,7 @@ def test_the_terms_of_the_clock_stand_for_what_oscillators_do_to_the_place() -> 
 @pytest.mark.parametrize(("frequency", "status"), [("0.16 Hz", "not_evaluated"), ("0.17 Hz", "pass")])
 @pytest.mark.parametrize("combine", ["each", "rss", "sum"])
 def test_a_location_beside_a_slow_vibration_is_not_judged(combine: str, frequency: str, status: str) -> None:
-    """Below a cycle per aperture, 1/6 Hz, it moves the image like a velocity: 10 m in 1000 s passed a 20 cm location."""
+    """Below a cycle per aperture, 1/6 Hz, it moves the image like a velocity: 10 m in 1000 s passed 20 cm."""
     tone = {"sinusoidal": [{"amplitude": um(0.01), "frequency": frequency}]}
     needs = {key: value for key, value in LOCATED.items() if key != "islr"}
     needs |= {"pslr": "-10 dB"} if status == "pass" else {}  # a slow one makes no echoes

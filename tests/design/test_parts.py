@@ -133,9 +133,7 @@ def test_text_and_json(run: Callable) -> None:
     lines = done.stdout.splitlines()
     assert lines[0] == f"{OSCILLATOR}: the mission complies with 6 of 17 parts"
     assert any(line.startswith("ettus-gpsdo-ocxo *") and "FAIL" in line for line in lines)
-    (mission,) = json.loads(run("solve", OCXO, "--for", OSCILLATOR, "--format", "json").stdout)[
-        "missions"
-    ]
+    (mission,) = json.loads(run("solve", OCXO, "--for", OSCILLATOR, "--format", "json").stdout)["missions"]
     assert (mission["status"], mission["value"], mission["crossings"]) == ("some", None, [])
     first = mission["parts"][0]
     assert mission["text"] == first["id"]
