@@ -213,7 +213,7 @@ def test_what_adds_little_to_an_effect_is_not_blamed_for_it() -> None:
 
 @pytest.mark.parametrize(("size", "status"), [(0.041, "not_evaluated"), (0.038, "info")])
 def test_a_waiver_of_the_largest_part_leaves_no_other_unjudged(size: float, status: str) -> None:
-    """0.4 rad were below a tenth of 5 rad, and a waiver of those passed them; two parts may have half a level each."""
+    """0.4 rad were below a tenth of 5 rad, and a waiver of those passed them; two parts may have half each."""
     stated, other = {"wideband": {"rms": um(5)}}, {"wideband": {"rms": um(size)}}
     changes = {VIBRATION: stated, "platforms__transmitter__motion_error__vibration": other, **SMALL}
     found = check(waivers=[waiver("receiver.vibration.wideband")], **changes)
