@@ -26,7 +26,9 @@ Truths = NDArray[np.bool_]
 KEYS = (QUADRATIC, CUBIC, LOCATION, "pslr", "islr", "declare")
 UNITS = {QUADRATIC: "rad", CUBIC: "rad", LOCATION: "m", "pslr": "dB", "islr": "dB", "declare": ""}
 TENTH, SMALL_RAD = 0.1, 0.08  # of the quadratic requirement; and of any image
-MAKES_UP = 0.1  # of the largest part: a row with less does not make an effect up, if all that have less are negligible
+MAKES_UP = (
+    0.1  # of the largest part: a row with less does not make an effect up, if all that have less are negligible
+)
 
 # Requirements that take an effect, in the order in which one is suggested.
 TAKEN_BY = {"cubic": (CUBIC, "islr"), "spread": ("islr",), "tone": ("pslr", "islr")}

@@ -108,7 +108,9 @@ def _untaken(analysis: Analysis, row: Row, one: UntakenEffect) -> Iterator[Step]
     count = sum(float(size[0]) > 0 for size in one.parts.values())
     values = {"largest": largest, "negligible": level}
     lines = equation("least", f"min({MAKES_UP:g}*largest, negligible/{count})", values, float(one.least[0]), "rad")
-    title = "Parts of at least a tenth of the largest make it up, and smaller ones that would not be negligible together"
+    title = (
+        "Parts of at least a tenth of the largest make it up, and smaller ones that would not be negligible together"
+    )
     yield from step(f"{title}; this row’s is {with_unit(own, 'rad')}", *lines)
 
 
