@@ -214,7 +214,7 @@ def test_what_adds_little_to_an_effect_is_not_blamed_for_it() -> None:
 
 @pytest.mark.parametrize(("size", "status"), [(0.041, "not_evaluated"), (0.038, "info")])
 def test_a_waiver_of_the_largest_part_leaves_no_other_unjudged(size: float, status: str) -> None:
-    """0.4 rad were below a tenth of 5 rad, and a waiver of those passed them; of two parts each may have half a level."""
+    """0.4 rad were below a tenth of 5 rad, and a waiver of those passed them; each of two may have half a level."""
     stated, other = {"wideband": {"rms": um(5)}}, {"wideband": {"rms": um(size)}}
     changes = {VIBRATION: stated, "platforms__transmitter__motion_error__vibration": other, **SMALL}
     found = check(waivers=[waiver("receiver.vibration.wideband")], **changes)
@@ -321,9 +321,7 @@ def test_the_terms_of_the_clock_stand_for_what_oscillators_do_to_the_place() -> 
 
 @pytest.mark.parametrize("factor", [0.999, 1.001])
 @pytest.mark.parametrize("combine", ["each", "rss", "sum"])
-def test_a_location_beside_a_slow_vibration_is_judged_while_it_could_not_break_it(
-    combine: str, factor: float
-) -> None:
+def test_a_location_beside_a_slow_vibration_that_could_break_it_is_not_judged(combine: str, factor: float) -> None:
     """10 m in 1000 s passed a location of 20 cm. Nearly all of it is a position error along the line of sight."""
     size, allowed = 10.0, 50.0
     tone = {"sinusoidal": [{"amplitude": f"{size} m", "frequency": "0.001 Hz"}]}
