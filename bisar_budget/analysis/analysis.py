@@ -70,7 +70,7 @@ class Analysis:
         return slow_phases(self.mission)
 
     def own_phases(self, model: str) -> list[OwnPhase]:
-        """Phases of what displaces nothing by itself: slow vibrations, and the declared errors of sensors and clocks."""
+        """Phases of what has no displacement of its own: slow vibrations, declared errors of sensors and clocks."""
         found = list(self.slow)
         factor = self.mission.allocation.coverage_factor
         for error in self.random:

@@ -119,7 +119,7 @@ class _Check:
         self.stated_random = [error for error in self.random if error.declared is not None]
 
     def _own(self, model: str) -> list[ManyOwnPhases]:
-        """Phases of what displaces nothing by itself: slow vibrations, and the declared errors of sensors and clocks."""
+        """Phases of what has no displacement of its own: slow vibrations, declared errors of sensors and clocks."""
         found, factor = list(self.slow), self.mission.allocation.coverage_factor
         for error in self.stated_random:
             quadratic, cubic, _ = (self.array(part * error.declared) for part in error.effect(model))
