@@ -177,7 +177,7 @@ class _Check:
         """Rows with what they could not be judged by, after waivers, and how each requirement stands."""
         mission = self.mission
         untaken = untaken_effects(mission, self._effect_totals(gates))
-        is_misplaced = np.any([self._is_misplaced(), *self._in_doubt.values()], axis=0)
+        is_misplaced = np.any([self._is_misplaced(rows), *self._in_doubt.values()], axis=0)
         noise = [one.variance for model in gates for one in self.random_rows.noise(model)]
         noise += list(self.tones.values()) if mission.requirements.pslr is None else []
         has_noise = np.any([np.zeros(self.cases, bool), *(~np.isnan(one) for one in noise)], axis=0)
@@ -235,11 +235,17 @@ class _Check:
                     found[kind][row_id] = np.fmax(found[kind].get(row_id, 0.0), np.abs(self.array(size)))
         return [EffectTotal(kind, totals[kind], list(of_kind.items())) for kind, of_kind in found.items()]
 
-    def _is_misplaced(self) -> NDArray[np.bool_]:
+    def _is_misplaced(self, rows: Sequence[Judged]) -> NDArray[np.bool_]:
         """Whether errors that vary at random, or slowly, displace the image; as `requirement_table` has it."""
         timing = self.mission.timing_error
         is_clock_stated = timing.constant is not None and timing.linear is not None
-        found: NDArray[np.bool_] = np.any([np.zeros(self.cases, bool), *(one.qpe > 0 for one in self.slow)], axis=0)
+        found = np.zeros(self.cases, dtype=bool)
+        needed = self.mission.requirements.location_error
+        if needed is not None and self.slow:
+            (place,) = (np.nan_to_num(row.declared) for row in rows if row.subject.id == f"mission.{LOCATION}")
+            moves = [place, *(one.moves for one in self.slow)]
+            most = combined_phase([("", size) for size in moves], self.combine, ())
+            found = (most > self.array(needed) * BOUND) & np.any([one.moves > 0 for one in self.slow], axis=0)
         for error in self.stated_random:
             if error.subject.kind in ("oscillator", "synchronization") and is_clock_stated:
                 continue

@@ -15,7 +15,7 @@ Moves = Mapping[str, tuple[Floats, Floats]]  # by row id, east and north [m]
 
 
 class ManyOwnPhases(NamedTuple):
-    """What has no displacement, but phases that count in sums, (cases,); as `OwnPhase`. [rad]
+    """What has no displacement of its own, but phases that count in sums, (cases,); as `OwnPhase`. [rad]
 
     A vibration is there, and its phases are not 0, only in the cases in which it is slow.
     """
@@ -26,6 +26,7 @@ class ManyOwnPhases(NamedTuple):
     cubic: Floats
     is_there: NDArray[np.bool_]
     coverage: Any = 1.0  # the factor that both phases have in them
+    moves: Any = 0.0  # the most by which it displaces the image [m]
 
 
 class ManyCorrelated(NamedTuple):

@@ -28,8 +28,9 @@ def many_slow_phases(count: int, one: Callable[[int], Mission]) -> list[ManyOwnP
         for phase in slow_phases(one(place)):
             if phase.row_id not in found:
                 nothing = (np.zeros(count), np.zeros(count), np.zeros(count, dtype=bool))
-                found[phase.row_id] = ManyOwnPhases(phase.row_id, phase.owner, *nothing)
+                found[phase.row_id] = ManyOwnPhases(phase.row_id, phase.owner, *nothing, moves=np.zeros(count))
             of_row = found[phase.row_id]
+            of_row.moves[place] = phase.moves
             of_row.qpe[place], of_row.cubic[place], of_row.is_there[place] = phase.qpe_rad, phase.cubic_rad, True
     return list(found.values())
 

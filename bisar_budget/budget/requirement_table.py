@@ -28,6 +28,8 @@ from bisar_budget.budget.requirement_states import (
     untaken_effects,
 )
 from bisar_budget.budget.waivers import Waived, apply_waivers
+from bisar_budget.constants import UTILIZATION_TOLERANCE
+from bisar_budget.effects.combine import combine_phases
 from bisar_budget.effects.correlation import Correlated, combined_phase
 from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.findings.mission import FileWarning
@@ -72,7 +74,7 @@ def judged_requirements(
     gates = gating_models(analysis)
     untaken = untaken_effects(mission, effect_totals(analysis, gates))
     looked_at = [_looked_at(row, mission, untaken) for row in rows]
-    unknown_place = _unknown_place(analysis) or (doubts[0].note if doubts else NOTHING)
+    unknown_place = _unknown_place(analysis, rows) or (doubts[0].note if doubts else NOTHING)
     if unknown_place and mission.requirements.location_error is not None:
         looked_at = [_misplaced(row, unknown_place) for row in looked_at]
     has_noise = any(noise(analysis, model.name) for model in gates) or (
@@ -171,15 +173,23 @@ def _of_a_cubic_alone(row: Row) -> Row:
     return row._replace(status="not_evaluated", reason=phrases.nothing_judges("islr"))
 
 
-def _unknown_place(analysis: Analysis) -> Note:
-    """Say which errors displace the image by an amount that no row holds: what varies at random, or slowly."""
-    slow = [one.row_id for one in analysis.slow if one.qpe_rad]
+def _unknown_place(analysis: Analysis, rows: Sequence[Row]) -> Note:
+    """Say which errors displace the image by an amount that no row holds: what varies at random, or slowly.
+
+    A slow vibration is no doubt where the location is met with the most that it could add.
+    """
+    mission, slow = analysis.mission, [one for one in analysis.slow if one.moves]
+    needed = mission.requirements.location_error
+    if slow and needed is not None:
+        reached = [row.declared or 0.0 for row in rows if row.id == f"mission.{LOCATION}"]
+        most = combine_phases([*reached, *(one.moves for one in slow)], mission.allocation.combine)
+        slow = slow if most > needed * (1 + UTILIZATION_TOLERANCE) else []
     at_random = _misplacing(analysis)
     if not slow and not at_random:
         return NOTHING
     causes = [*(["random errors"] if at_random else []), *(["slow vibration"] if slow else [])]
     cause = f"{' and '.join(causes)} {'move' if at_random else 'moves'}"
-    return phrases.place_is_not_known([*at_random, *slow], cause)
+    return phrases.place_is_not_known([*at_random, *(one.row_id for one in slow)], cause)
 
 
 def _misplacing(analysis: Analysis) -> list[str]:

@@ -11,8 +11,9 @@ from typing import NamedTuple
 from bisar_budget.effects.echoes import SLOWEST
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.subject import subject
-from bisar_budget.effects.tones import tone
-from bisar_budget.effects.vibration_lines import lines_of
+from bisar_budget.effects.tones import SLOW, tone
+from bisar_budget.effects.vibration_lines import Line, lines_of
+from bisar_budget.geometry import norm
 from bisar_budget.mission.model import Mission
 
 
@@ -30,9 +31,10 @@ def cubic_part(cycles: float) -> float:
 
 
 class OwnPhase(NamedTuple):
-    """What has no displacement, but phases that count in sums: row id, owner, QPE and cubic phase. [rad]
+    """What has no displacement of its own, but phases that count in sums: row id, owner, QPE and cubic phase. [rad]
 
-    `coverage` is the coverage factor that both phases have in them.
+    `coverage` is the coverage factor that both phases have in them; `moves` the most by which a slow vibration
+    displaces the image. [m]
     """
 
     row_id: str
@@ -40,6 +42,7 @@ class OwnPhase(NamedTuple):
     qpe_rad: float
     cubic_rad: float
     coverage: float = 1.0
+    moves: float = 0.0
 
 
 def slow_phases(mission: Mission) -> list[OwnPhase]:
@@ -52,5 +55,32 @@ def slow_phases(mission: Mission) -> list[OwnPhase]:
             if cycles < SLOWEST:
                 phase = 2 * math.pi * line.amplitude / mission.radar.wavelength
                 row_id = subject(name, "vibration", "sinusoidal", entry=index).id
-                found.append(OwnPhase(row_id, name, phase * quadratic_part(cycles), phase * cubic_part(cycles)))
+                qpe, cubic = phase * quadratic_part(cycles), phase * cubic_part(cycles)
+                moves = _largest_displacement(mission, name, index, line)
+                found.append(OwnPhase(row_id, name, qpe, cubic, moves=moves))
     return found
+
+
+def _largest_displacement(mission: Mission, name: str, index: int, line: Line) -> float:
+    """Upper bound of what a slow vibration displaces the image by, in any phase, to first order. [m]
+
+    Its mean A·j₀(x) and its slope (2/T)·3A·j₁(x), x = πfT, are those of a range error, which lie a quarter of a cycle
+    apart; a line of sight that turns sees what moves across it as well. Along the gradients s and ṡ a metre of the
+    one is 1/(|s| sin γ) on the ground and a metre per second of the other 1/(|ṡ| sin γ).
+    """
+    platform, geometry = getattr(mission.platforms, name), mission.geometry
+    T, stated = mission.collection.aperture_time, platform.motion_error.vibration.sinusoidal[index].amplitude
+    x = math.pi * line.frequency * T
+    mean = math.sin(x) / x
+    slope = 3 * (math.sin(x) / x - math.cos(x)) / x if x > SLOW else x  # 3·j₁(x), which is below x
+    rate = 2 / T * line.amplitude * slope
+    if isinstance(stated, tuple):
+        rate += math.hypot(*stated) * norm(platform.state.look_rate)
+    if mission.has_direct_path:
+        whole = math.hypot(*stated) if isinstance(stated, tuple) else stated
+        rate += whole * norm(geometry.apart.look_rate)
+    sine = math.sin(geometry.gradient_angle)
+    return math.hypot(
+        line.amplitude * mean / (math.hypot(*geometry.range_gradient) * sine),
+        rate / (math.hypot(*geometry.doppler_gradient) * sine),
+    )

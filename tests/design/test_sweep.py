@@ -268,7 +268,7 @@ def test_edges_of_scenes_are_held(rule, model) -> None:
 
 
 @pytest.mark.parametrize("rule", ["each", "sum", "rss"])
-@pytest.mark.parametrize("needs", [{}, {"requirements": {"location_error": "10 km"}}])
+@pytest.mark.parametrize("needs", [{}, {"requirements": {"location_error": "5 mm"}}])
 def test_vibrations_may_be_slow(needs, rule) -> None:
     """Below one cycle per aperture a vibration is a phase that counts with the others, and moves the image."""
     text = mission_text(timing_error__quadratic="1e-12 /s", **needs).replace(

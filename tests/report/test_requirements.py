@@ -89,7 +89,7 @@ class TestMachines:
         (command,) = said("github", found).splitlines()
         assert command.startswith("::error file=mission.yaml,line=")
         assert f"line={found.requirements[-1].line}," in command
-        assert "title=NOT EVAL requirement.islr::ISLR of -20 dB: not evaluated" in command
+        assert "title=NOT EVAL requirement.islr::ISLR of -20 dB: not evaluated; nothing declared that" in command
 
     def test_what_a_row_shows_is_no_second_finding(self) -> None:
         """A requirement that a failing row breaks is one annotation, of ten that a step shows."""

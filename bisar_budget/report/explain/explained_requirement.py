@@ -109,7 +109,7 @@ def _untaken(analysis: Analysis, row: Row, one: UntakenEffect) -> Iterator[Step]
     values = {"largest": largest, "negligible": level}
     lines = equation("least", f"min({MAKES_UP:g}*largest, negligible/{count})", values, float(one.least[0]), "rad")
     title = (
-        "Parts of at least a tenth of the largest make it up, and smaller ones that would not be negligible together"
+        "Parts of at least a tenth of the largest make it up, and smaller ones that together would not be negligible"
     )
     yield from step(f"{title}; this row’s is {with_unit(own, 'rad')}", *lines)
 

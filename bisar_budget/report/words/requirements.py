@@ -99,7 +99,7 @@ def requirement_finding(one: JudgedRequirement) -> str:
         )
     if one.row is not None and one.status != "not_evaluated":
         text += f", decided by {one.row}"
-    return ". ".join([text, *filter(None, [one.reason]), *(waiver.words for waiver in one.waivers)])
+    return "; ".join([text, *filter(None, [one.reason]), *(waiver.words for waiver in one.waivers)])
 
 
 def verdict(mission: MissionFindings, *, is_brief: bool = False) -> str:
