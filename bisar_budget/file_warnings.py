@@ -86,7 +86,7 @@ def walks_over_range_cells(n_pull: float, cells: float, cap: str) -> str:
     """Of a pull-in range that range walk does not leave; `cap` is the `n_pull` of half a cell, rounded down."""
     return (
         f"autofocus.n_pull: {n_pull:g} counts as {cap}, f0/B, where an error walks half a range cell; one of "
-        f"{n_pull:g}π rad walks over {cells:.3g}, which correction along one dimension does not take out"
+        f"{n_pull:g}π rad walks {cells:.3g} cells, which correction along one dimension does not take out"
     )
 
 

@@ -253,6 +253,16 @@ def test_rows_that_limit_nothing_are_a_count_and_all_shows_them(run) -> None:
     assert [row_id in long for row_id in hidden] == [True] * 3
 
 
+def test_one_row_that_is_not_shown_is_said_of_one() -> None:
+    """It read "1 that limit nothing"."""
+    found = findings(**FULL)
+    declared = [row for row in found.rows if row.declared]
+    silent = declared[0]._replace(status="info", utilization=None, allowable=None, metric="islr", declared=0.0)
+    text = render("text", Report("1", (found._replace(rows=(*declared[1:], silent)),)), Style())
+    said = re.findall(r"\d+ that (?:limits? nothing|uses? less)", " ".join(text.split()))
+    assert "1 that limits nothing" in said
+
+
 def test_an_oscillator_as_declared_is_0_db_and_stands_in_the_table(run) -> None:
     """The largest error of a mission was counted among those that limit nothing: declared is 0, of a level."""
     text = run("check", "specs/missions/ocxo_free_running.yaml", "--all").stdout

@@ -201,11 +201,11 @@ def _table_key(rows: Sequence[Row], hidden: Sequence[Row]) -> str:
         key += "; by: what sets the allowable; a table, an equation or a model stands for QPE"
     left = [row for row in hidden if row.status != "not_declared"]
     counts = [
-        (len(hidden) - len(left), "not declared"),
-        (sum(not matters(row) for row in left), "that limit nothing"),
-        (sum(matters(row) for row in left), "that use less"),
+        (len(hidden) - len(left), "not declared", "not declared"),
+        (sum(not matters(row) for row in left), "that limits nothing", "that limit nothing"),
+        (sum(matters(row) for row in left), "that uses less", "that use less"),
     ]
-    others = ", ".join(f"{count} {what}" for count, what in counts if count)
+    others = ", ".join(f"{count} {one if count == 1 else many}" for count, one, many in counts if count)
     return f"{key}. Not shown (--all): {others}." if others else f"{key}."
 
 
