@@ -243,3 +243,14 @@ def test_a_path_of_an_orbit_keeps_its_letters() -> None:
     assert "paths/astra1n_2026282.tle" in text
     assert "Paths/" not in text
     assert Path(file).exists()
+
+
+def test_the_index_of_a_report_names_the_requirement_that_decides() -> None:
+    """Beside `not evaluated` stood the row that uses most of its limit, which passes."""
+    unjudged, met = findings(**UNJUDGED), findings(**COMPLIES)
+    text = render("markdown", Report(version="", missions=(unjudged, met)), Style())
+    lines = [line for line in text.splitlines() if line.startswith("| base | mission.yaml")]
+    assert [line.split(" | ")[2:4] for line in lines] == [
+        ["not evaluated", "requirement.islr"],
+        ["pass", "receiver.velocity.x"],
+    ]

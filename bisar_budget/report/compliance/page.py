@@ -60,6 +60,7 @@ from bisar_budget.report.words.escapes import source_path
 from bisar_budget.report.words.missions import doubtful_model, head, multiple_of_pi, narrow_gradients, path_words
 from bisar_budget.report.words.requirements import (
     kind_names,
+    requirement_id,
     requirement_lines,
     rule_words,
     unjudged_effects,
@@ -247,8 +248,8 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
         overrides=found.overrides,
         name=found.name,
         counts=", ".join(f"{count} {STATUS[status].words}" for status, count in found.summary.items()),
-        worst=judged[0].id if judged else "",
-        worst_use=_use(judged[0]) if judged else "",
+        worst=_worst(found, judged),
+        worst_use=_use(judged[0]) if judged and _worst(found, judged) == judged[0].id else "",
         head=tuple(head(found)),
         tone="warn" if STATUS[found.status].is_met and waived else found.status,
         drivers=drivers,
@@ -392,6 +393,14 @@ def _quantity(value: float | None, unit: str) -> str:
 def _limit(value: float, unit: str) -> str:
     """Round down, everywhere alike: no limit is larger than it is, and none has two sizes on a page."""
     return format_quantity(value, unit, 3, "down")
+
+
+def _worst(found: MissionFindings, judged: Sequence[Row]) -> str:
+    """Name of what decides a mission in the index: its worst row, or a requirement that is worse than any row."""
+    if judged and judged[0].status == found.status:
+        return judged[0].id
+    decides = [requirement_id(one) for one in found.requirements if one.status == found.status]
+    return decides[0] if decides else judged[0].id if judged else ""
 
 
 def _allowable(row: Row, found: MissionFindings) -> str:
