@@ -57,6 +57,17 @@ def declared_kinds(mission: Mission) -> DeclaredKinds:
     if not mission.has_direct_path:
         has_clock = any(term is not None for term in mission.timing_error)
         (declared if has_clock else missing).append("timing")
+    common, link, others = mission.common_motion_error, mission.synchronization, mission.other_errors
+    if mission.scene.height_error is not None:
+        declared.append("terrain")
+    for kind, is_declared, has_source in (  # nobody owes these
+        ("common", common is not None, common is not None and common.source),
+        ("synchronization", link is not None, link is not None and link.source),
+        ("other", bool(others), all(one.source for one in others)),
+    ):
+        if is_declared:
+            declared.append(kind)
+            without_source += [] if has_source else [kind]
     return DeclaredKinds(tuple(declared), tuple(missing), tuple(without_source))
 
 

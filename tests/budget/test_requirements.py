@@ -128,6 +128,24 @@ def test_autofocus_is_not_said_to_correct_another_requirement() -> None:
     assert {requirement(found, key).status for key in needs} == {"pass"}
 
 
+@pytest.mark.parametrize(
+    ("kind", "changes", "has_source"),
+    [
+        ("terrain", {"scene__height_error": "1 m"}, True),
+        ("common", {"common_motion_error": {"position": "1 m"}}, False),
+        ("common", {"common_motion_error": {"position": "1 m", "source": "GNSS"}}, True),
+        ("other", {"other_errors": [{"name": "air", "quadratic_phase_error": "1 deg"}]}, False),
+        ("synchronization", {"synchronization": {"interval": "1 s", "error": "1 deg", "source": "link"}}, True),
+    ],
+)
+def test_what_nobody_owes_counts_where_it_is_declared(kind: str, changes: dict[str, Any], has_source: bool) -> None:
+    """ "Declared 0 of 15 kinds" stood beside "every requirement is judged and met"."""
+    before, found = check().kinds, check(**changes).kinds
+    assert found.declared == (*before.declared, kind)
+    assert (found.missing, found.in_all) == (before.missing, before.in_all + 1)
+    assert found.without_source == (() if has_source else (kind,))
+
+
 # ---------------------------------------------------------------------- the cubic
 GYRO = {f"{RECEIVER}__imu": {"gyro_bias": "100000 deg/h"}}
 
