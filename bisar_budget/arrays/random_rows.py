@@ -37,7 +37,7 @@ class Limits(NamedTuple):
 
 
 class Spreads(NamedTuple):
-    """What spreads: row id, owner and phase variance; NaN where it is not declared. [rad²]"""
+    """A part that spreads: row id, owner and phase variance; NaN where it is not declared. [rad²]"""
 
     row_id: str
     owner: str
@@ -142,7 +142,7 @@ class RandomRows:
 
     # ---------------------------------------------------------------- powers together
     def islr_rows(self, gating: str, cubic: Callable[[str], Floats]) -> Iterator[Judged]:
-        """What spreads: of the mission where ISLR is required, and of each owner unless only wideband vibration does.
+        """Rows of what spreads in sum: for the mission, and for each owner unless only wideband vibration spreads.
 
         `cubic` gives the cubic phase of an owner at one sigma, which ISLR holds where nothing else does. [rad]
         """
@@ -188,7 +188,7 @@ class RandomRows:
         return row._replace(declared=declared, allowable=allowable, binding=binding, metric="islr")
 
     def noise(self, model: str) -> list[Spreads]:
-        """What spreads beyond the cubic; as `noise` of `analysis.spread`."""
+        """Parts that spread beyond the cubic; as `noise` of `analysis.spread`."""
         return [*self._of_vibration(), *self._of_errors(model)]
 
     def _of_errors(self, model: str) -> Iterator[Spreads]:

@@ -15,7 +15,7 @@ Moves = Mapping[str, tuple[Floats, Floats]]  # by row id, east and north [m]
 
 
 class ManyOwnPhases(NamedTuple):
-    """What has no displacement of its own, but phases that count in sums, (cases,); as `OwnPhase`. [rad]
+    """Phases that count in sums and displace nothing by themselves, (cases,); as `OwnPhase`. [rad]
 
     A vibration is there, and its phases are not 0, only in the cases in which it is slow.
     """

@@ -1,4 +1,4 @@
-"""What from outside a mission file bears on its verdict: options, settings, the environment, parts of a project."""
+"""Influences from outside a mission file on its verdict: options, settings, the environment, parts of a project."""
 
 import os
 from collections.abc import Iterator

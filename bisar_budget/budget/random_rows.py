@@ -234,7 +234,7 @@ def _echo(phase: float) -> float:
 
 # ---------------------------------------------------------------------- powers together
 def islr_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterator[Row]:
-    """What spreads: of the mission where ISLR is required, and of each owner unless only wideband vibration does."""
+    """Rows of what spreads in sum: for the mission, and for each owner unless only wideband vibration spreads."""
     mission = analysis.mission
     if mission.requirements.islr is None:
         return
