@@ -110,12 +110,18 @@ def solve(
 
 
 def _nearest(states: Sequence[State]) -> State:
-    """Of places that all comply the first with the least left, of others the first that lacks the least."""
+    """Of places that all comply the first with the least left, of others the first that lacks the least.
+
+    Where something is not evaluated nothing is broken: no limit is nearer.
+    """
     if all(state.complies for state in states):
         uses = [state.utilization or 0.0 for state in states]
         decides = max(uses)
     else:
-        uses = [math.inf if state.utilization is None else state.utilization for state in states]
+        uses = [
+            -1.0 if state.status == "not_evaluated" else math.inf if state.utilization is None else state.utilization
+            for state in states
+        ]
         decides = min(uses)
     return next(state for state, use in zip(states, uses, strict=True) if _is_alike(use, decides))
 

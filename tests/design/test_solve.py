@@ -291,6 +291,18 @@ def test_nothing_complies(run: Callable) -> None:
     assert "Nearest      3 s: FAIL, transmitter.acceleration.x uses 295 %" in done.stdout
 
 
+@pytest.mark.parametrize(("velocity", "is_broken"), [("1 um/s", False), ("20 mm/s", False), ("10 m/s", True)])
+def test_what_cannot_be_judged_is_no_near_miss(run: Callable, tmp_path, velocity: str, is_broken: bool) -> None:
+    """A mission that no aperture time makes judged was said to be near where it fails by the least."""
+    file = tmp_path / "m.yaml"
+    error = {"velocity": velocity, "vibration": {"wideband": {"rms": "1 mm"}}}
+    file.write_text(mission_text(platforms__receiver__motion_error=error), encoding="utf-8")
+    done = run("solve", file, "--for", "collection.aperture_time", "--between", "1..9 s")
+    assert done.exit_code == 1
+    assert ("Nearest " in done.stdout) == is_broken
+    assert ("Not judged" in done.stdout) == (not is_broken)
+
+
 def test_everything_complies(run: Callable) -> None:
     done = run("solve", SECTION_V, "--for", "collection.aperture_time", "--between", "1 s..1.2 s")
     assert done.exit_code == 0

@@ -250,6 +250,9 @@ def _facts(solution: Solution) -> Iterator[tuple[str, str]]:
     if not solution.crossings:
         is_miss = solution.status == "none"
         nearest = solution.nearest
+        if is_miss and nearest.status == "not_evaluated":
+            yield "Not judged", f"where nothing fails, such as {_said(solution, nearest.value)}: {_stands(nearest)}"
+            return
         yield "Nearest" if is_miss else "Least left", f"{_said(solution, nearest.value)}: {_stands(nearest)}"
 
 
