@@ -15,6 +15,7 @@ from bisar_budget.cli.keeping import Keeping, keeping
 from bisar_budget.cli.outside import day, outside
 from bisar_budget.cli.streams import (
     DATE,
+    EXIT_BROKEN,
     FILE,
     MODEL,
     SET,
@@ -124,8 +125,8 @@ def sweep(
 
     It has what varied, resolutions, angles, the status, the worst row, its utilization, and the requirement that
     binds. Cases for which there is no mission, such as a platform below the ground, have the status error and a
-    reason. CSV goes to standard output without -o and --plot. Statuses do not change the exit code: 0, or 2 for
-    wrong usage or an unusable mission file.
+    reason. CSV goes to standard output without -o and --plot. Statuses do not change the exit code, as long as some
+    case is judged: 0; 1 if none is; 2 for wrong usage or an unusable mission file.
     """
     _usable(output, plot, plot_column, is_polar)
     if (cases_file is None) == (not varied):
@@ -152,6 +153,7 @@ def sweep(
             run = _Run(loaded, cases, columns, model, judged_on, jobs or cores(), kept, said)
             run.foresee(force)
             run.write(output, plot, plot_column, is_polar)
+        sys.exit(EXIT_BROKEN if run.is_unjudged else 0)
     except TableError as error:
         for line in error.lines:
             complain(line)
@@ -332,6 +334,11 @@ class _Run:
             uses = {row: found[name] for name, row in names.items()}
         kind = os.path.splitext(plot)[1][1:].lower()
         write_file(plot, trade_plot.drawn(trade, uses, self.mission, kind, is_polar=is_polar))
+
+    @property
+    def is_unjudged(self) -> bool:
+        """Whether no case that is a mission could be judged."""
+        return 0 < self.unevaluated == self.done - self.missing
 
     def _summary(self) -> str:
         """One line: how many cases, how many comply, how they were checked."""

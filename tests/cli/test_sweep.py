@@ -19,7 +19,7 @@ import pytest
 from bisar_budget.cli import sweep as command
 from bisar_budget.design import sweep as engine
 from bisar_budget.design.swept import Part, Swept
-from tests.conftest import ROOT, heed_signals
+from tests.conftest import ROOT, heed_signals, mission_text
 
 SECTION_V = str(ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml")
 SPOTLIGHT = str(ROOT / "specs" / "missions" / "one_stationary_spotlight.yaml")
@@ -298,3 +298,11 @@ def test_the_day_decides_about_waivers(run, tmp_path: Path) -> None:
     ]
     assert found[0] != ["fail"]
     assert found[1] == ["fail"]
+
+
+@pytest.mark.parametrize(("islr", "code"), [("", 0), ("requirements: { islr: -20 dB }", 1)])
+def test_a_sweep_of_which_no_case_is_judged_exits_with_1(run, tmp_path, islr: str, code: int) -> None:
+    file = tmp_path / "m.yaml"
+    text = mission_text(platforms__receiver__motion_error__velocity="1 um/s")
+    file.write_text(f"{text}{islr}", encoding="utf-8")
+    assert run("sweep", file, "--vary", f"{TIME}=1,2s").exit_code == code
