@@ -157,18 +157,18 @@ class RandomRows:
         for one in spreads:
             if not one.row_id.endswith("vibration.wideband"):
                 is_vibration_alone &= np.isnan(one.variance)
-        has_cubic = needs.cubic_phase_error is None
-        if has_cubic:
-            is_vibration_alone &= ~(cubic("mission") > SMALLEST_CUBIC_RAD)
+
+        def counted(owner: str) -> Floats:
+            """Cubic phase that ISLR holds: none too small to show, and none of an error without an image. [rad]"""
+            phase = cubic(owner) if needs.cubic_phase_error is None else array(0.0)
+            return np.where((phase > SMALLEST_CUBIC_RAD) & np.isfinite(phase), phase, 0.0)
+
+        is_vibration_alone &= counted("mission") == 0
         for owner in ("transmitter", "receiver", *(["clock"] if self.islr.clock is not None else []), "mission"):
             members = [one.variance for one in spreads if owner == "mission" or self.islr.includes(one.owner, owner)]
-            is_declared = np.any([array(False) > 0, *(~np.isnan(one) for one in members)], axis=0)
-            variance = array(sum(np.nan_to_num(one) for one in members))
-            if has_cubic:
-                phase = cubic(owner)
-                counts = (phase > SMALLEST_CUBIC_RAD) & np.isfinite(phase)
-                is_declared = is_declared | counts
-                variance = variance + CUBIC_POWER * np.where(counts, phase, 0.0) ** 2
+            phase = counted(owner)
+            is_declared = np.any([phase > 0, *(~np.isnan(one) for one in members)], axis=0)
+            variance = array(sum(np.nan_to_num(one) for one in members)) + CUBIC_POWER * phase**2
             limit, by_other = (array(self._spread_limit(owner, model)) for model in (gating, other))
             rms, what = np.sqrt(variance), subject(owner, "islr")
             judged = self.judging.row(what, rms, limit, doubt=rms > by_other * BOUND)
