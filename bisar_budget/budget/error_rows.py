@@ -197,23 +197,13 @@ def _doubt(analysis: Analysis, other: Model, source: ErrorSource, theirs: Declar
 
 def _unseen(analysis: Analysis, model: Model, source: ErrorSource, declared: float | None) -> Row:
     """Row of an error that a terminal counts and does not show."""
-    return Row(
-        subject=source.subject,
-        metric=QUADRATIC,
-        unit=source.unit,
+    return Row.without_numbers(
+        source.subject,
+        QUADRATIC,
+        source.unit,
+        "not_declared" if declared is None else "info",
         declared=declared,
-        allowable=None,
-        allowable_published=None,
-        allowable_full=None,
-        qpe_published_rad=None,
-        qpe_full_rad=None,
-        displacement_m=None,
-        utilization=None,
-        margin=None,
-        status="not_declared" if declared is None else "info",
         line=analysis.mission.line(source.path),
-        reason=None,
-        remarks=(),
         equation=model.equation(source),
         requirement_id=analysis.mission.requirement_ids.get(source.id),
         evidence=source.evidence,

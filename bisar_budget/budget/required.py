@@ -136,27 +136,15 @@ def with_required(rows: Sequence[Row], mission: Mission) -> list[Row]:
 
 def _declarations(mission: Mission, missing: Sequence[Missing]) -> Row:
     """The row that says whether all is there: of kinds, too, that have no row where nothing is declared."""
-    return Row(
-        subject=DECLARATIONS,
-        metric=DECLARE,
-        unit="",
-        declared=None,
-        allowable=None,
-        allowable_published=None,
-        allowable_full=None,
-        qpe_published_rad=None,
-        qpe_full_rad=None,
-        displacement_m=None,
-        utilization=None,
-        margin=None,
-        status="not_evaluated" if missing else "pass",
+    return Row.without_numbers(
+        DECLARATIONS,
+        DECLARE,
+        "",
+        "not_evaluated" if missing else "pass",
         line=mission.line(("requirements", "declare")),
         reason=phrases.declarations_are_missing([one.key for one in missing]) if missing else None,
-        remarks=(),
         equation="requirements.declare",
         requirement_id=mission.requirement_ids.get(DECLARATIONS.id),
-        evidence=None,
-        is_independent=True,
         model=mission.gating_model,
     )
 

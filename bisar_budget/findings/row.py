@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from datetime import date
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from bisar_budget import phrases
 from bisar_budget.effects.subject import Subject
@@ -25,6 +25,18 @@ class AppliedWaiver(NamedTuple):
     def words(self) -> Note:
         """The waiver in a sentence."""
         return phrases.waived(*self)
+
+
+_NUMBERS = (
+    "allowable",
+    "allowable_published",
+    "allowable_full",
+    "qpe_published_rad",
+    "qpe_full_rad",
+    "displacement_m",
+    "utilization",
+    "margin",
+)
 
 
 class Row(NamedTuple):
@@ -67,6 +79,15 @@ class Row(NamedTuple):
     model: str | None = None
     waivers: tuple[AppliedWaiver, ...] = ()
     refuted: tuple[Note, ...] = ()
+
+    @classmethod
+    def without_numbers(
+        cls, subject: Subject, metric: str, unit: str, status: str, *, declared: float | None = None, **others: Any
+    ) -> "Row":
+        """A row of which no allowable and no phase is known, or asked; `others` are its other fields."""
+        numbers: dict[str, Any] = dict.fromkeys(_NUMBERS)
+        words: dict[str, Any] = {"reason": None, "remarks": (), "evidence": None, "is_independent": True}
+        return cls(subject, metric, unit, declared, status=status, **(numbers | words | others))
 
     @property
     def id(self) -> str:
