@@ -29,11 +29,17 @@ def pattern(window: str, cells: Any) -> Any:
 
 
 def energy_within(window: str) -> float:
-    """Share of the response's energy within its first nulls: a sum over fine steps, and by Parseval over cells."""
+    """Share of the response's energy within its first nulls, to 1e-9: a sum over fine steps, by Parseval over cells.
+
+    Beyond the last cell the nulls of both are those of the sinc, and its tail falls as the square of the place.
+    """
     null, step = first_null(window), 1e-5
     inside = np.arange(-null + step / 2, null, step)
-    cells = np.arange(-200_000, 200_000) + 0.37  # any places a cell apart; what is beyond is below 1e-6
-    return float((pattern(window, inside) ** 2).sum() * step / (pattern(window, cells) ** 2).sum())
+    last = 200_000
+    cells = np.arange(-last, last) + 0.5  # any places a cell apart
+    of_cells = pattern(window, cells) ** 2
+    tail = 2 * of_cells[-1] * cells[-1] ** 2 / last
+    return float((pattern(window, inside) ** 2).sum() * step / (of_cells.sum() + tail))
 
 
 def shown_db(variance: float, window: str = "uniform") -> float:

@@ -324,7 +324,7 @@ class TestPowers:
 
     def test_a_limit_of_powers_on_both_sides(self) -> None:
         limit = math.sqrt(math.log1p(0.01 * energy_within("uniform")) / 2) * math.sqrt(6930) / (K * T**1.5)
-        for factor, status in ((1 - 3e-6, "warn"), (1 + 3e-6, "fail")):  # the energy is known to 2e-6
+        for factor, status in ((1 - 1e-6, "warn"), (1 + 1e-6, "fail")):
             walk = {"imu": {"velocity_random_walk": f"{limit * factor!r} m/s/sqrt(s)"}}
             found = with_error(walk, allocation={"model": "full"}, requirements={"quadratic_phase_error": "360 deg"})
             assert row(found, "receiver.islr").status == status

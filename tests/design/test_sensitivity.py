@@ -130,11 +130,9 @@ def test_exact_ranges_leave_no_noise_in_a_slope(name: str, is_small: bool) -> No
     found = ask(file=str(MISSIONS / f"{name}.yaml"))
     by_key = slopes(found)
     held = by_key[f"requirements.{found.requirement}"]
-    # A level counts per decibel, and what it allows noise goes with its amplitude but for the square of a level.
-    is_level = found.requirement == "islr"
-    tolerance = 0.02 if is_level or name == "sentinel1_elements_besancon" else 1e-3
-    per = math.log(10) / 20 if is_level else 0.01
-    assert held.change == pytest.approx(-per * found.utilization, rel=tolerance)
+    assert held.change == pytest.approx(
+        -0.01 * found.utilization, rel=1e-3 if name != "sentinel1_elements_besancon" else 0.02
+    )
     if "allocation.coverage_factor" in by_key:
         assert by_key["allocation.coverage_factor"].change == pytest.approx(0.01 * found.utilization, rel=1e-3)
 
