@@ -52,7 +52,7 @@ class Place(int):
 
     @property
     def text(self) -> str:
-        """What stands there, as the file has it; empty for a mapping or a list."""
+        """The text that stands there, as the file has it; empty for a mapping or a list."""
         return self._text
 
 

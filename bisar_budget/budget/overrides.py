@@ -12,7 +12,7 @@ from bisar_budget.resources import resource
 
 
 class Outside(NamedTuple):
-    """What bears on all missions of a run: options that somebody gave, and where the day of waivers comes from."""
+    """Influences on all missions of a run: options that somebody gave, and where the day of waivers comes from."""
 
     options: tuple[Override, ...] = ()
     day_origin: str = "the caller"

@@ -274,7 +274,7 @@ def _why_not_judged(key: str, unknown_place: Note) -> Note:
 
 
 def _sizes(row: Row, key: str, mission: Mission, allocation: Allocation) -> tuple[float | None, float | None]:
-    """What a row is allowed and what it reaches, in the unit of a requirement that it judges."""
+    """Size that a row is allowed, and size that it reaches, in the unit of a requirement that it judges."""
     if row.declared is None and row.metric != key:
         return None, None
     if row.unit == UNITS[key] and (

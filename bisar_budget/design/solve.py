@@ -110,7 +110,7 @@ def solve(
 
 
 def _nearest(states: Sequence[State]) -> State:
-    """Of places that all comply the first with the least left, of others the first that lacks the least.
+    """The first place with the least left where all comply, else the first that lacks the least.
 
     Where something is not evaluated nothing is broken: no limit is nearer.
     """

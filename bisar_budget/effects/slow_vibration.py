@@ -31,7 +31,7 @@ def cubic_part(cycles: float) -> float:
 
 
 class OwnPhase(NamedTuple):
-    """What has no displacement of its own, but phases that count in sums: row id, owner, QPE and cubic phase. [rad]
+    """Phases that count in sums and have no row of a displacement: row id, owner, QPE and cubic phase. [rad]
 
     `coverage` is the coverage factor that both phases have in them; `moves` the most by which a slow vibration
     displaces the image. [m]
