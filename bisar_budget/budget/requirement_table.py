@@ -153,17 +153,13 @@ def _looked_at(row: Row, mission: Mission, untaken: Sequence[UntakenEffect]) -> 
     status = _STATUSES[status_of(code(row.status), row.id, row.allowable is not None, untaken)[0]]
     if status == "info":
         return row if row.status == "info" else row._replace(status=status, utilization=None, margin=None)
-    reason = NOTHING
+    said = [row.reason] if status == "fail" and row.reason else []  # known to be broken, and more of it is not judged
     for one in untaken:
         if row.id in one.makers and one.makers[row.id][0]:
             lines = [f"{key}: {_EXAMPLES[key]}" for key in TAKEN_BY[one.kind]]
-            said = phrases.effect_is_not_judged(one.kind, float(one.parts[row.id][0]), float(one.total[0]), lines)
-            reason = reason.then(said) if reason else said
-    if not reason:
-        return row
-    if status == "fail":  # it is known to be broken, and more of it is not judged
-        reason = (row.reason or NOTHING).then(reason)
-    return row._replace(status=status, reason=reason)
+            parts = float(one.parts[row.id][0]), float(one.total[0])
+            said.append(phrases.effect_is_not_judged(one.kind, *parts, lines))
+    return row._replace(status=status, reason=said[0].then(*said[1:]) if said else row.reason)
 
 
 def _of_a_cubic_alone(row: Row) -> Row:

@@ -13,6 +13,7 @@ from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.status import exit_code
 from bisar_budget.mission.load import parse_mission
+from bisar_budget.report.words.requirements import unjudged_effects
 from tests import reference
 from tests.conftest import findings, mission_text, row
 
@@ -247,6 +248,21 @@ def test_an_oscillator_of_10_rad_of_noise_needs_a_requirement() -> None:
     assert row(found, "receiver.oscillator").status == "not_evaluated"
     assert "add `islr: -20 dB`" in str(row(found, "receiver.oscillator").reason)
     assert code(found) == 1
+
+
+@pytest.mark.parametrize("combine", ["each", "rss"])
+def test_a_row_that_fails_says_each_effect_that_nothing_judges(combine: str) -> None:
+    """The table listed an effect only where no row that makes it up fails."""
+    oscillator = {"frequency": "10 MHz", "phase_noise": {"1 Hz": "-50 dBc/Hz", "1 kHz": "-50 dBc/Hz"}}
+    allocation = {"combine": combine, "model": "full"}
+    found = check(platforms__receiver__oscillator=oscillator, allocation=allocation)
+    noisy = row(found, "receiver.oscillator")
+    assert noisy.status == ("fail" if combine == "each" else "not_evaluated")
+    assert ("QPE" in str(noisy.reason)) == (combine == "each")
+    cubic, spread = (one.text for one in unjudged_effects(found))
+    assert cubic.startswith("cubic phase of ")
+    assert "rad rms of phase that spreads" in spread
+    assert requirement(found, "quadratic_phase_error").status == "fail"
 
 
 # ---------------------------------------------------------------------- tones

@@ -8,7 +8,7 @@ from bisar_budget.faults import printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import DeclaredKinds, JudgedRequirement, Override
 from bisar_budget.findings.row import Row
-from bisar_budget.findings.status import RANK, STATUS
+from bisar_budget.findings.status import STATUS
 from bisar_budget.report.words.layout import wrapped
 from bisar_budget.report.words.sentences import percent
 from bisar_budget.report.words.sizes import requirement_size
@@ -148,7 +148,7 @@ def unjudged_effects(mission: MissionFindings) -> list[UnjudgedEffect]:
     """List the effects of declared errors that no requirement takes, above what is negligible."""
     found: dict[str, tuple[str, list[Row]]] = {}
     for row in mission.rows:
-        if row.status != "not_evaluated" or row.reason is None:
+        if row.status not in _BREAKS or row.reason is None:
             continue
         for note in (row.reason, *(value for value in row.reason.values if isinstance(value, phrases.Note))):
             if note.code == "effect-is-not-judged":
@@ -176,11 +176,6 @@ def unseen(mission: MissionFindings) -> list[JudgedRequirement]:
         for one in mission.requirements
         if one.status in (*_BREAKS, "waived") and not any(statuses.get(row) == one.status for row in one.rows)
     ]
-
-
-def worst_requirements_first(requirements: Sequence[JudgedRequirement]) -> list[JudgedRequirement]:
-    """Sort by status; equals keep their order."""
-    return sorted(requirements, key=lambda one: RANK[one.status])
 
 
 def declared_words(kinds: DeclaredKinds) -> str:
