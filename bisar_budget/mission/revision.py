@@ -79,8 +79,10 @@ def mission_at(path: str, revision: str) -> Mission:
 
 
 def _git(folder: str, *arguments: str, given: bytes = b"") -> tuple[bool, bytes]:
+    # A folder can have the files of a bare repository among those that are committed: its revisions, its settings.
+    command = ["git", "-c", "safe.bareRepository=explicit", "-C", folder, *arguments]
     try:
-        done = run(["git", "-C", folder, *arguments], input=given, stdout=PIPE, stderr=DEVNULL, check=False)
+        done = run(command, input=given, stdout=PIPE, stderr=DEVNULL, check=False)
     except OSError:
         raise RevisionError("git cannot be run; --base needs it") from None
     except ValueError:  # a NUL in the name
