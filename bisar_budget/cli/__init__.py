@@ -131,9 +131,8 @@ def main() -> None:
     What a library warns of nobody who runs this command can mend, and PYTHONWARNINGS can make it an error.
     """
     warnings.simplefilter("ignore")
-    os.environ["PYTHONSAFEPATH"] = (
-        "1"  # for workers: they begin with `python -c`, which imports from the current folder
-    )
+    # Workers begin with `python -c`, which imports from the current folder, where no installed command does.
+    os.environ["PYTHONSAFEPATH"] = "1"
     if len(sys.argv) > 1:  # a shell that completes gives none; else a check would write a completion, and exit with 0
         os.environ.pop("_BISAR_BUDGET_COMPLETE", None)
     for name in ("SIGTERM", "SIGHUP"):

@@ -17,6 +17,7 @@ from tests.conftest import ROOT
 
 EXAMPLE = ROOT / "examples" / "design-repo"
 ACTION = yaml.safe_load((ROOT / "action.yml").read_text(encoding="utf-8"))
+PACKAGES = list(dict.fromkeys(sysconfig.get_path(name) for name in ("purelib", "platlib")))
 BASH = shutil.which("bash")
 EROSION = {"fail-on-erosion": "50%"}
 
@@ -146,9 +147,8 @@ def python(tmp_path_factory: pytest.TempPathFactory) -> str:
     for made in (design, tool, folder / "temp"):
         made.mkdir()
     variables = set_traps(design)
-    at_hand = dict.fromkeys([str(ROOT), *(sysconfig.get_path(name) for name in ("purelib", "platlib"))])
     (tool / "pyproject.toml").write_text(PROJECT, encoding="utf-8")
-    (tool / "backend.py").write_text(BACKEND % "\n".join(at_hand), encoding="utf-8")
+    (tool / "backend.py").write_text(BACKEND % "\n".join([str(ROOT), *PACKAGES]), encoding="utf-8")
     variables |= {"RUNNER_OS": "Linux", "RUNNER_TEMP": str(folder / "temp"), "GITHUB_ACTION_PATH": str(tool)}
     variables |= {"GITHUB_OUTPUT": str(folder / "output"), "PIP_NO_INDEX": "1"}
     done = run_step(
@@ -276,6 +276,7 @@ class TestAction:
         git(other, "add", "-A")
         git(other, "commit", "-q", "-m", "as loose as now")
         git(design, "branch", "-M", "main")
+        git(other, "config", "core.worktree", ".")
         shutil.copytree(other / ".git", mission.parent, dirs_exist_ok=True)
         done = self.run(design, "Compare with the base", missions="missions/survey.yaml", base="main", **EROSION)
         assert done.returncode == 2
@@ -367,17 +368,12 @@ class TestExample:
         assert (design / job["artifacts"]["reports"]["junit"]).exists()
 
 
-AT_HAND = """import os, sys
-sys.path += [path for path in os.environ["AT_HAND"].split(os.pathsep) if path not in sys.path]
-"""
-
-
 class TestPreCommit:
     """The hook as pre-commit runs it: the tool cloned, built and installed, then both missions.
 
-    What the tool imports is not installed anew: it is found behind the packages of the hook's own environment, where
-    this run has it, and so is what builds it: no package is fetched. CI builds the wheel in an environment of its
-    own, and installs it with all that it asks for, outside the checkout.
+    What the tool imports is not installed anew: a list in its wheel leads to where this run has it, behind the
+    packages of the hook's own environment. PYTHONPATH leads to what builds it, and no package is fetched. CI builds
+    the wheel in an environment of its own, and installs it with all that it asks for, outside the checkout.
     """
 
     @pytest.fixture
@@ -402,7 +398,10 @@ class TestPreCommit:
         project = (folder / "pyproject.toml").read_text(encoding="utf-8")
         alone, found = re.subn(r"(?ms)^dependencies = \[.*?^\]$", "dependencies = []", project)
         assert found == 1
+        table = "[tool.hatch.build.targets.wheel.force-include]\n"
+        alone = alone.replace(table, f'{table}"at_hand.pth" = "at_hand.pth"\n')
         (folder / "pyproject.toml").write_text(alone, encoding="utf-8")
+        (folder / "at_hand.pth").write_text("\n".join(PACKAGES), encoding="utf-8")
         git(folder, "init", "-q")
         git(folder, "add", "-A")
         git(folder, "commit", "-q", "-m", "tool")
@@ -418,22 +417,18 @@ class TestPreCommit:
         config = re.sub("https://github.com/OWNER/bisar-budget", str(tool), config)
         (design / ".pre-commit-config.yaml").write_text(config, encoding="utf-8")
         git(design, "add", ".pre-commit-config.yaml")
-        (tmp_path / "start").mkdir()
-        (tmp_path / "start" / "sitecustomize.py").write_text(AT_HAND, encoding="utf-8")
-        here = [sysconfig.get_path(name) for name in ("purelib", "platlib")]
-        at_hand = {
+        variables = {
             "PRE_COMMIT_HOME": str(tmp_path / "cache"),
-            "PYTHONPATH": str(tmp_path / "start"),
-            "AT_HAND": os.pathsep.join(dict.fromkeys(here)),
+            "PYTHONPATH": os.pathsep.join(PACKAGES),
             "PIP_NO_BUILD_ISOLATION": "0",  # pip's word for no isolation
             "PIP_NO_COMPILE": "1",
         }
 
         def hook(*files: str) -> subprocess.CompletedProcess[str]:
             return subprocess.run(
-                [sys.executable, "-m", "pre_commit", "run", "bisar-budget", "--files", *files],
+                [sys.executable, "-I", "-m", "pre_commit", "run", "bisar-budget", "--files", *files],
                 cwd=design,
-                env=environment(**at_hand),
+                env=environment(**variables),
                 capture_output=True,
                 text=True,
                 check=False,
@@ -449,3 +444,9 @@ class TestPreCommit:
         assert good.returncode == 0, good.stdout + good.stderr
         assert "Passed" in good.stdout
         assert "Skipped" in hook("pyproject.toml").stdout
+
+        variables["PYTHONPATH"] = set_traps(design)["PYTHONPATH"]
+        trapped = hook("missions/fine_survey.yaml")
+        assert trapped.returncode == 1, trapped.stdout + trapped.stderr
+        assert "FAIL missions/fine_survey.yaml" in trapped.stdout
+        assert caught(design) == []
