@@ -362,8 +362,9 @@ class TestExample:
         job = yaml.safe_load((design / ".gitlab-ci.yml").read_text(encoding="utf-8"))["budget"]
         (script,) = job["script"]
         monkeypatch.chdir(design)
-        program, *arguments = script.replace('"', "").split()
-        assert program == "bisar-budget"
+        program = "python -I -m bisar_budget "
+        assert script.startswith(program)
+        arguments = script.removeprefix(program).replace('"', "").split()
         assert run(*arguments).exit_code == 1
         assert (design / job["artifacts"]["reports"]["junit"]).exists()
 
