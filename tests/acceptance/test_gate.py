@@ -216,7 +216,7 @@ class TestAction:
             capture_output=True,
             text=True,
         )
-        assert (done.returncode, done.stderr, caught(design)) == (1, "", [])
+        assert (done.returncode, caught(design)) == (1, []), done.stderr
 
     @pytest.mark.parametrize(
         ("strict", "code"),
@@ -346,6 +346,13 @@ class TestAction:
         for name in ACTION["inputs"]:
             assert f"inputs.{name} " in text
         assert not any("${{" in step.get("run", "") for step in ACTION["runs"]["steps"])
+
+    def test_a_step_uses_outputs_of_steps_before_it(self) -> None:
+        known: list[str] = []
+        for step in ACTION["runs"]["steps"]:
+            assert set(re.findall(r"steps\.([\w-]+)\.", str(step))) <= set(known)
+            known += [step["id"]] if "id" in step else []
+        assert known == ["setup", "install"]
 
 
 class TestExample:
