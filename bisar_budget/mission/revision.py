@@ -24,7 +24,9 @@ class RevisionError(Exception):
 class Revision:
     """The files of a git repository as committed in a branch, tag or commit.
 
-    Links are followed within the revision, submodules are read at the commit that it names. A file outside of the
+    The repository is that of the current folder where the path is in it, else its own: a folder that became a submodule
+    since does not answer for itself. Links are followed within the revision, submodules are read at the commit that it
+    names. A file outside of the
     repository has one version, that on the disk; `outside` lists those that were read.
 
     Parameters
@@ -43,16 +45,16 @@ class Revision:
     def __init__(self, near: str, name: str) -> None:
         self.name = name
         self.outside: list[str] = []
-        folder, _ = _existing(near)
-        is_found, top, said = _git(folder, "rev-parse", "--show-toplevel")
-        if not is_found:
+        self.top, said = _top(os.curdir)
+        if not self.top or self._inside(near) is None:
+            self.top, said = _top(_existing(near)[0])
+        if not self.top:
             raise RevisionError(f"{near} {said or 'is not in a git repository'}")
-        self.top = os.fsdecode(top).rstrip("\r\n")
         # What starts with a dash would be an option to git.
         is_known, commit, _ = (
             (False, b"", "")
             if name.startswith("-")
-            else _git(folder, "rev-parse", "--verify", "--quiet", f"{name}^{{commit}}")
+            else _git(self.top, "rev-parse", "--verify", "--quiet", f"{name}^{{commit}}")
         )
         if not is_known:
             raise RevisionError(f"the repository of {near} has no revision {printable(name)}")
@@ -135,6 +137,12 @@ def _matches(parts: Sequence[str], pattern: Sequence[str]) -> bool:
     return is_name and _matches(parts[1:], pattern[1:])
 
 
+def _top(folder: str) -> tuple[str, str]:
+    """Top of the repository of a folder, empty where there is none, and what git says of it."""
+    is_found, top, said = _git(folder, "rev-parse", "--show-toplevel")
+    return (os.fsdecode(top).rstrip("\r\n") if is_found else ""), said
+
+
 class _Object(NamedTuple):
     """An object of git: its kind, its content, its hash, and the folder of its repository."""
 
@@ -207,8 +215,10 @@ def mission_at(path: str, revision: Revision, model: str | None = None) -> Missi
 
 def _git(folder: str, *arguments: str, given: bytes = b"") -> tuple[bool, bytes, str]:
     """Whether git did it, what it wrote, and what it refuses that has nothing to do with what was asked."""
+    # A folder can have the files of a bare repository among those that are committed: its revisions, its settings.
+    command = ["git", "-c", "safe.bareRepository=explicit", "-C", folder, *arguments]
     try:
-        done = run(["git", "-C", folder, *arguments], input=given, capture_output=True, check=False)
+        done = run(command, input=given, capture_output=True, check=False)
     except OSError:
         raise RevisionError("git cannot be run; --base needs it") from None
     except ValueError:  # a NUL in the name
