@@ -24,10 +24,10 @@ class RevisionError(Exception):
 class Revision:
     """The files of a git repository as committed in a branch, tag or commit.
 
-    The repository is that of the current folder where the path is in it, else its own: a folder that became a submodule
-    since does not answer for itself. Links are followed within the revision, submodules are read at the commit that it
-    names. A file outside of the
-    repository has one version, that on the disk; `outside` lists those that were read.
+    The repository is that of the current folder where the path is in it, else its own: a folder that became a
+    submodule since does not answer for itself. Links are followed within the revision, submodules are read at the
+    commit that it names. A file outside of the repository has one version, that on the disk; `outside` lists those
+    that were read.
 
     Parameters
     ----------

@@ -85,3 +85,11 @@ def test_a_repository_of_another_owner_is_said(repository: Path, monkeypatch: py
     monkeypatch.setenv("GIT_TEST_ASSUME_DIFFERENT_OWNER", "1")
     with pytest.raises(RevisionError, match=r"safe\.directory"):
         Revision("a.yaml", "HEAD")
+
+
+def test_a_folder_that_became_a_repository_does_not_answer_for_itself(repository: Path) -> None:
+    """One with a revision of the same name, in which the file was as it is now."""
+    (repository / "m" / "a.yaml").write_text("looser")
+    git(repository / "m", "init", "-q")
+    commit(repository / "m")
+    assert Revision("m/a.yaml", "HEAD").content("m/a.yaml", 100) == b"m/a.yaml"
