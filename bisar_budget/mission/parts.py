@@ -43,7 +43,6 @@ from bisar_budget.mission.readers import (
     Reference,
     Report,
     Section,
-    Text,
     TextMap,
     Triple,
     did_you_mean,
@@ -55,9 +54,9 @@ from bisar_budget.settings import SettingsError, project_settings
 Find = Callable[[str], tuple[str, bytes]]  # file and content of a part by its name
 
 MOTION_ERROR = Section(MotionError)
-_TEXT, _BY_FIGURE = Text(), TextMap("figure")
+_TEXT, _BY_FIGURE = Label(), TextMap("figure")
 _SOURCE = OneOf(lambda value: _BY_FIGURE if isinstance(value, dict) else _TEXT, (_TEXT, _BY_FIGURE))
-_NAME = Key(Label(), "Maker, type, and revision or mode; reports show it.")
+_NAME = Key(_TEXT, "Maker, type, and revision or mode; reports show it.")
 _SAYS = Key(_TEXT, "What its figures are in their source: which statistic, typical or largest, in which conditions.")
 _SOURCES = Key(_SOURCE, "Document, revision and table of every figure, or of each by its key.")
 _KIND = "Which kind of part it is, and which figures it has."

@@ -181,7 +181,7 @@ class Reference(Text):
 
 
 class Label(Text):
-    """Text that may look like a number, such as the issue of a document."""
+    """Text that may look like a number to an editor, such as the issue of a document."""
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Text or a number, of which the digits are kept as they stand."""
@@ -348,7 +348,7 @@ class TextMap(Reader):
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Object."""
-        return {"type": "object", "additionalProperties": Text().schema(definitions), "maxProperties": _MAX_IDS}
+        return {"type": "object", "additionalProperties": Label().schema(definitions), "maxProperties": _MAX_IDS}
 
 
 class Section(Reader):

@@ -15,6 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bisar_budget.faults import MissionError
+from bisar_budget.mission.instruments import FORMS
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.parts import FIGURES, SECTIONS, PartError, catalogue, folders, read_entry, read_part
 from bisar_budget.mission.schema import part_schema
@@ -133,6 +134,44 @@ SCHEMA_SEES = {
 ALL_BROKEN = BROKEN | SCHEMA_SEES
 
 
+# Values of each figure that are right, and those that may stand in the place of any value.
+RIGHT = {
+    "accelerometer_bias": ["1 mg", "[1 ug, 0, 2 ug]"],
+    "attitude": ["0.1 deg", "[1 mrad, 1 mrad, 0]"],
+    "gyro_bias": ["1 deg/h"],
+    "velocity_random_walk": ["0.1 m/s/sqrt(h)", "50 ug/sqrt(Hz)"],
+    "angle_random_walk": ["0.1 deg/sqrt(h)"],
+    "position": ["1", "[1 cm, 1 cm, 2 cm]"],
+    "velocity": ["3 cm/s"],
+    "random": ["[{name: a, sigma: 1 m, correlation_time: 1 s}]"],
+    "frequency": ["10 MHz", "1e7"],
+    "phase_noise": ["{1 Hz: -80 dBc/Hz, 10 Hz: -100 dBc/Hz}"],
+    "allan_deviation": ["{1 s: 1e-11}"],
+    "power_law": ["{h0: 1e-22}", "{h-1: 1e-22, h2: 0}"],
+}
+ANY = [value for values in RIGHT.values() for value in values]
+ANY += ["0", "-1", "0.1", "x", "' '", "~", "[]", "{}", "[1 m]", "[0, 0, 0]", "{h0: 0}", "{gyro_bias: y, position: z}"]
+ANY += ["imu", "oscillator", "[{name: a, sigma: 0, correlation_time: 1 s}]", "{1 Hz: 0 dBc/Hz, 10 Hz: 60 dBc/Hz}"]
+
+
+@st.composite
+def files(draw: st.DrawFn, *, changed: bool = True) -> str:
+    """Text of a part's file that is right, with one key changed, added or removed if `changed`."""
+    kind = draw(st.sampled_from(list(SECTIONS)))
+    figures = draw(st.sets(st.sampled_from(FIGURES[kind]), min_size=1))
+    if kind == "oscillator":
+        figures = {"frequency", draw(st.sampled_from(FORMS))}
+    each = f"{{{', '.join(f'{figure}: y' for figure in sorted(figures))}}}"
+    file = {"kind": kind, "name": "x", "source": draw(st.sampled_from(["y", each]))}
+    file |= {figure: draw(st.sampled_from(RIGHT[figure])) for figure in sorted(figures)}
+    if changed:
+        key = draw(st.sampled_from([*file, *RIGHT, "says", "extra"]))
+        file[key] = draw(st.sampled_from(ANY))
+        if draw(st.booleans()):
+            del file[key]
+    return "".join(f"{key}: {value}\n" for key, value in file.items())
+
+
 def schema_takes(text: str) -> bool:
     return not list(VALIDATOR.iter_errors(yaml.load(text, Loader=_Core)))
 
@@ -245,28 +284,8 @@ class TestBothSides:
             ["5:9", "source"], ["6:1", "source"], ["7:20", "angle_random_walk"],
         ]  # fmt: skip
 
-    # Values that are right, wrong and at the border for any figure, and keys of every kind.
-    _VALUES = st.sampled_from(
-        ["0", "1 deg/h", "1 mg", "1 m", "-1 m", "1 m/s", "0.1", "[1 m, 0, 1 m]", "[1 m]", "[]", "{}", "~", "10 MHz",
-         "{1 s: 1e-11}", "{h0: 1e-22}", "{h0: 0}", "{1 Hz: -80 dBc/Hz, 10 Hz: -100 dBc/Hz}", "1 deg/sqrt(h)",
-         "[{name: a, sigma: 1 m, correlation_time: 1 s}]", "[{name: a, sigma: 0, correlation_time: 1 s}]"]
-    )  # fmt: skip
-    _KEYS = st.sampled_from(
-        sorted({figure for figures in FIGURES.values() for figure in figures} | {"says", "extra"})
-    )
-    _HEADS = st.fixed_dictionaries(
-        {
-            "kind": st.sampled_from([*SECTIONS, *SECTIONS, *SECTIONS, "gyro"]),
-            "name": st.sampled_from(["x", "x", "x", "' '", "12"]),
-            "source": st.sampled_from(["y", "y", "y", "{gyro_bias: y, position: z}", "{}"]),
-        }
-    )
-
-    @given(_HEADS, st.dictionaries(_KEYS, _VALUES, min_size=1, max_size=3))
-    def test_any_file(
-        self, tmp_path_factory: pytest.TempPathFactory, head: dict[str, str], more: dict[str, str]
-    ) -> None:
-        text = "".join(f"{key}: {value}\n" for key, value in {**head, **more}.items())
+    @given(files())
+    def test_any_file(self, tmp_path_factory: pytest.TempPathFactory, text: str) -> None:
         file = written(tmp_path_factory.mktemp("part"), text)
         try:
             read_entry(str(file))
@@ -275,6 +294,13 @@ class TestBothSides:
             said = mission_says(file)
             assert all(line in said for line in error.args)
             return
+        assert mission_says(file) == ""
+        assert schema_takes(text), text
+
+    @given(files(changed=False))
+    def test_any_file_that_is_right(self, tmp_path_factory: pytest.TempPathFactory, text: str) -> None:
+        file = written(tmp_path_factory.mktemp("part"), text)
+        assert read_entry(str(file)).figures
         assert mission_says(file) == ""
         assert schema_takes(text), text
 
