@@ -44,7 +44,7 @@ def overrides(mission: Mission, outside: Outside, today: date) -> tuple[Override
 def _own_parts(mission: Mission) -> Iterator[Override]:
     """Parts of the project that stand in for those of the catalogue with the same name."""
     catalogue = str(resource("specs", "sensors")) if mission.parts else ""
-    for name, file in mission.parts:
+    for name, file, _ in mission.parts:
         if name.endswith((".yaml", ".yml")) or os.path.dirname(file) == catalogue:
             continue
         if any(os.path.exists(os.path.join(catalogue, name + suffix)) for suffix in (".yaml", ".yml")):

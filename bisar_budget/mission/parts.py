@@ -48,7 +48,7 @@ from bisar_budget.mission.readers import (
     did_you_mean,
 )
 from bisar_budget.mission.tree import MAX_BYTES, Tree, UnusableError, read_tree
-from bisar_budget.resources import UnreadableError, content, resource, standard_input
+from bisar_budget.resources import DISK, Files, UnreadableError, resource, standard_input
 from bisar_budget.settings import SettingsError, project_settings
 
 Find = Callable[[str], tuple[str, bytes]]  # file and content of a part by its name
@@ -183,15 +183,16 @@ def entries(places: Sequence[str]) -> Iterator[Entry]:
 
 def _entry(name: str, file: str, read: _Read) -> Entry:
     part, written = read
-    figures = {key: _as_written(written[key]) for key in FIGURES[part.kind] if key in written}
+    figures = {key: figure_text(written[key]) for key in FIGURES[part.kind] if key in written}
     return Entry(name, file, part, figures)
 
 
-def _as_written(value: Any) -> str:
+def figure_text(value: Any) -> str:
+    """A figure as the file of its part has it, in one line."""
     if isinstance(value, dict):
-        return ", ".join(f"{key}: {_as_written(item)}" for key, item in value.items())
+        return ", ".join(f"{key}: {figure_text(item)}" for key, item in value.items())
     if isinstance(value, list):
-        return f"[{', '.join(map(_as_written, value))}]"
+        return f"[{', '.join(map(figure_text, value))}]"
     return str(value)
 
 
@@ -214,7 +215,7 @@ def read_entry(file: str) -> Entry:
     PartError
         No mission can use it; carries every fault.
     """
-    data = _standard_input() if file == "-" else _content(file)
+    data = _standard_input() if file == "-" else _content(file, DISK)
     faults = () if file == "-" else tuple(_name_faults(file))
     try:
         read = _parsed(file, data)
@@ -237,12 +238,12 @@ def _name_faults(file: str) -> Iterator[Fault]:
 
 
 def _read(file: str) -> _Read:
-    return _parsed(file, _content(file))
+    return _parsed(file, _content(file, DISK))
 
 
-def _content(file: str) -> bytes:
+def _content(file: str, files: Files) -> bytes:
     try:
-        return content(file, MAX_BYTES)
+        return files.content(file, MAX_BYTES)
     except UnreadableError as error:
         said = str(error)
         raise PartError(said, faults=[file_fault(said.removeprefix(f"{file} "))]) from None
@@ -327,7 +328,7 @@ def _says(figure: Any) -> bool:
     return isinstance(figure, float) and figure != 0
 
 
-def folders(beside: str) -> list[str]:
+def folders(beside: str, files: Files = DISK) -> list[str]:
     """Where parts are looked for: the project's own folders, then the catalogue of this package.
 
     Raises
@@ -336,7 +337,7 @@ def folders(beside: str) -> list[str]:
         The project's settings cannot be read.
     """
     try:
-        settings = project_settings(beside or os.getcwd())
+        settings = project_settings(beside or os.getcwd(), files)
     except SettingsError as error:
         raise PartError(str(error)) from None
     except OSError:  # somebody removed the current folder
@@ -345,34 +346,34 @@ def folders(beside: str) -> list[str]:
     return [*own, str(resource("specs", "sensors"))]
 
 
-def catalogue(places: Sequence[str]) -> dict[str, str]:
+def catalogue(places: Sequence[str], files: Files = DISK) -> dict[str, str]:
     """File of each part by its name; a project's own stand before the catalogue's."""
     found: dict[str, str] = {}
     for folder in places:
-        for file in part_files(folder)[:_MOST]:
+        for file in part_files(folder, files)[:_MOST]:
             found.setdefault(os.path.splitext(os.path.basename(file))[0], file)
     return found
 
 
-def part_files(folder: str) -> list[str]:
+def part_files(folder: str, files: Files = DISK) -> list[str]:
     """Files of a folder that are parts by their names; raises `PartError` where it cannot be listed."""
     try:
-        names = sorted(os.listdir(folder))
+        names = files.names(folder)
     except OSError as error:
         problem = f"cannot be listed: {error.strerror}"
         raise PartError(f"{folder}: cannot be listed", faults=[file_fault(problem)]) from None
     return [os.path.join(folder, name) for name in names if os.path.splitext(name)[1] in _SUFFIXES]
 
 
-def finder_of(folder: str) -> Find:
+def finder_of(folder: str, files: Files = DISK) -> Find:
     """What finds the parts that a mission file in a folder names.
 
     It raises `PartError` where there is none of a name, or its file cannot be read.
     """
 
     def find(name: str) -> tuple[str, bytes]:
-        file = _file_of(name, folder)
-        return file, _content(file)
+        file = _file_of(name, folder, files)
+        return file, _content(file, files)
 
     return find
 
@@ -388,16 +389,17 @@ def find_part(name: str, beside: str) -> Part:
     return _parsed(*finder_of(beside)(name))[0]
 
 
-def _file_of(name: str, beside: str) -> str:
+def _file_of(name: str, beside: str, files: Files) -> str:
     if name.endswith(_SUFFIXES):
         return os.path.join(beside, name)
-    places = folders(beside)
+    places = folders(beside, files)
     for folder in places:
-        for suffix in _SUFFIXES:
-            file = os.path.join(folder, name + suffix)
-            if os.sep not in name and os.path.exists(file):
-                return file
-    near = did_you_mean(name.lower(), tuple(catalogue(places)))
+        with suppress(OSError):  # said where the part is in no other folder
+            there = files.names(folder)
+            for file in (name + suffix for suffix in _SUFFIXES):
+                if file in there:
+                    return os.path.join(folder, file)
+    near = did_you_mean(name.lower(), tuple(catalogue(places, files)))
     raise PartError(f"is no part of the catalogue; `bisar-budget sensors` lists them{'. ' if near else ''}{near}")
 
 
@@ -522,7 +524,7 @@ def _motion_of(error: MotionError, parts: Sequence[_Read], path: KeyPath, report
                 continue
             key = _own_key(error, own, figure)
             if key:
-                overridden.append(Overridden(figure, key, part.name, _as_written(written[figure])))
+                overridden.append(Overridden(figure, key, part.name, figure_text(written[figure])))
             else:
                 taken[figure] = getattr(part, figure)
         if isinstance(part, ImuPart):
@@ -559,27 +561,23 @@ class TakenFigure(NamedTuple):
     part: str
 
 
-def taken_figures(mission: Mission, find: Find) -> Iterator[TakenFigure]:
-    """Figures that a mission takes from parts, which `find` finds; it is the same mission if its file states them.
+def taken_figures(mission: Mission) -> Iterator[TakenFigure]:
+    """Figures that a mission takes from parts; it is the same mission if its file states them.
 
     Values are text, or mappings and lists of text, as the file of the part has them.
-
-    Raises
-    ------
-    PartError
-        A part cannot be read any more.
     """
+    read = {one.name: _parsed(one.file, one.data) for one in mission.parts}
     for name, platform in zip(mission.platforms._fields, mission.platforms, strict=True):
         error, oscillator = platform.motion_error, platform.oscillator
         names = error.sensor if isinstance(error.sensor, tuple) else (error.sensor,) if error.sensor else ()
         for each in names:
-            part, written = _parsed(*find(each))
+            part, written = read[each]
             inner = "imu." if part.kind == "imu" else ""
             for figure in FIGURES[part.kind]:
                 if figure in written and dict(error.of_parts).get(figure) == evidence(part, figure):
                     yield TakenFigure(f"platforms.{name}.motion_error.{inner}{figure}", written[figure], each)
         if oscillator is not None and oscillator.sensor:
-            part, written = _parsed(*find(oscillator.sensor))
+            part, written = read[oscillator.sensor]
             path = ("platforms", name, "oscillator", "frequency")
             is_own = {"frequency": path in mission.places}
             is_own |= {form: oscillator.source != evidence(part, form) for form in FORMS}
@@ -602,11 +600,11 @@ def _oscillator_of(oscillator: Oscillator, read: _Read, path: KeyPath, report: R
     if own is None:
         taken = {form: getattr(part, form), "source": evidence(part, form)}
     else:
-        overridden.append(Overridden(own, f"oscillator.{own}", part.name, f"{form} {_as_written(written[form])}"))
+        overridden.append(Overridden(own, f"oscillator.{own}", part.name, f"{form} {figure_text(written[form])}"))
     if oscillator.frequency is None:
         taken["frequency"] = stated
     elif stated is not None and oscillator.frequency != stated:
-        at = _as_written(written["frequency"])
+        at = figure_text(written["frequency"])
         if own is None and form == "phase_noise":
             problem = f"the phase noise of {shown(part.name)} is stated at its own frequency, {at}"
             report(path, Problem(problem, "accepted: no frequency, or phase_noise beside it", at=("frequency",)))
