@@ -3,7 +3,7 @@
 import os
 import stat
 import sys
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, BinaryIO, Protocol
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -60,6 +60,13 @@ def content(file: str, most: int, called: str | None = None) -> bytes:
         raise UnreadableError(f"{called} cannot be read: {error.strerror}", is_missing=is_missing) from None
     except ValueError:  # a NUL in the name
         raise UnreadableError("is no name of a file") from None
+
+
+def standard_input() -> BinaryIO:
+    """Bytes of standard input; raises `ValueError` where there is none."""
+    if sys.stdin is None:
+        raise ValueError("standard input is closed")
+    return sys.stdin.buffer
 
 
 class Files(Protocol):

@@ -4,15 +4,15 @@ A text gives a `Mission` or a `MissionError`, nothing else.
 """
 
 import os
-import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import BinaryIO, cast
 
-from bisar_budget.faults import Fault, MissionError, SetValue, changes_words
+from bisar_budget.faults import Fault, MissionError, SetValue, changes_words, file_fault
 from bisar_budget.mission.model import MISSION, Mission, PartFile, flies_on_earth, names_files, names_parts
 from bisar_budget.mission.readers import INVALID
-from bisar_budget.mission.tree import MAX_BYTES, UnusableError, file_fault, read_tree
+from bisar_budget.mission.tree import MAX_BYTES, UnusableError, read_tree
+from bisar_budget.resources import standard_input
 
 _Find = Callable[[str], tuple[str, bytes]]
 
@@ -29,9 +29,7 @@ def load_mission(path: str, model: str | None = None, changes: Sequence[SetValue
     """
     try:
         if path == "-":
-            if sys.stdin is None:
-                raise ValueError("standard input is closed")
-            data = _bounded(sys.stdin.buffer)
+            data = _bounded(standard_input())
         else:
             with open(path, "rb") as file:
                 data = _bounded(file)
@@ -107,16 +105,16 @@ def parse_mission(
         if mission is INVALID and names_files(tree.root):
             from bisar_budget.mission.parts import finder_of, report_parts
 
-            report_parts(tree.root, folder, find or finder_of(folder), tree.report)
+            report_parts(tree.root, find or finder_of(folder), tree.report)
         elif mission is not INVALID and names_parts(mission):
             from bisar_budget.mission.parts import finder_of, with_parts
 
-            mission = with_parts(mission, folder, _noted(find or finder_of(folder), parts), tree.report)
+            mission = with_parts(mission, _noted(find or finder_of(folder), parts), tree.report)
     if tree.faults:
-        ordered = sorted(dict.fromkeys(tree.faults), key=lambda fault: (fault.line or 0, fault.column or 0))
+        ordered = tree.in_order()
         if changes:
-            ordered = [_with_changes(fault, changes) for fault in ordered]
-        raise MissionError(file, tuple(ordered))
+            ordered = tuple([_with_changes(fault, changes) for fault in ordered])
+        raise MissionError(file, ordered)
     as_bytes = data.encode("utf-8", "surrogatepass") if isinstance(data, str) else data
     read = cast(Mission, mission._replace(file=file, places=tree.values, data=as_bytes, changes=tuple(changes)))
     read = read._replace(parts=tuple(parts.values()))
