@@ -48,7 +48,9 @@ def _own_parts(mission: Mission) -> Iterator[Override]:
         if name.endswith((".yaml", ".yml")) or os.path.dirname(file) == catalogue:
             continue
         if any(os.path.exists(os.path.join(catalogue, name + suffix)) for suffix in (".yaml", ".yml")):
-            yield Override(f"part {printable(name)}", _shown(file, mission.file), "the project's, in place of the catalogue's")
+            yield Override(
+                f"part {printable(name)}", _shown(file, mission.file), "the project's, in place of the catalogue's"
+            )
 
 
 def _shown(file: str, mission_file: str) -> str:

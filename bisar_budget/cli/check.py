@@ -3,7 +3,6 @@
 import os
 import sys
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import suppress
 from datetime import date, datetime
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -452,10 +451,12 @@ def _format_of(name: str) -> str:
 
 def _root() -> tuple[str, bool]:
     """Folder that reports name files of no repository from, and whether it is GitHub's checkout."""
+    try:
+        here = os.getcwd()
+    except OSError:  # somebody removed it under us
+        return "", False
     checkout = os.environ.get("GITHUB_WORKSPACE")
-    with suppress(OSError):  # somebody removed the current folder under us
-        return os.path.realpath(checkout or os.getcwd()), bool(checkout)
-    return "", False
+    return os.path.realpath(checkout or here), bool(checkout)
 
 
 def _step_summary(format_name: str) -> str | None:

@@ -14,7 +14,7 @@ import pytest
 from bisar_budget.faults import Fault
 from bisar_budget.findings.mission import Report, UnusableMission
 from bisar_budget.report import Style, render
-from tests.conftest import findings, mission_text
+from tests.conftest import ROOT, findings, mission_text
 
 # A row fails, one has an id of the project's own, an id of the project's own names no row.
 MISSION = {
@@ -157,6 +157,20 @@ class TestAMissionOfARepository:
 
 @pytest.mark.parametrize("format_name", NAMED)
 class TestStandardInput:
+    @pytest.mark.skipif(not os.path.exists("/dev/fd"), reason="no pipes with a name")
+    def test_of_a_pipe_with_a_name_is_named_alike_every_time(self, format_name: str, tmp_path) -> None:
+        """`check <(generate)`: the system calls the pipe by another number in every run."""
+        command = [sys.executable, "-m", "bisar_budget", "check", "/dev/fd/0", "--format", format_name]
+        environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+        runs = [
+            subprocess.run(
+                command, input=mission_text(**MISSION).encode(), capture_output=True, cwd=tmp_path, env=environment
+            )
+            for _ in range(2)
+        ]
+        assert runs[0].returncode == 1, runs[0].stderr
+        assert runs[0].stdout == runs[1].stdout
+
     def test_is_named_alike_everywhere(self, repo, written, format_name, monkeypatch, tmp_path) -> None:
         text = mission_text(**MISSION)
         expected = written(format_name, "-", input=text)
@@ -265,10 +279,29 @@ class TestTwoMissions:
             write(repo / "a.yaml", document=number, requirement_ids={"nobody": "X"}), repo / "missions" / "m.yaml"
         )
 
+    def test_with_the_other_s_path_for_a_document_number(self, distinct, repo) -> None:
+        distinct(write(repo / "a.yaml", document={"number": "missions/m.yaml"}), repo / "missions" / "m.yaml")
+
     def test_whose_names_are_spelled_alike(self, distinct, repo) -> None:
         distinct(write(repo / "a-b.c" / "m.yaml"), write(repo / "a_b_c" / "m.yaml"))
         distinct(write(repo / "m.yaml"), write(repo / "m.yml"))
         distinct(write(repo / "漢.yaml"), write(repo / "字.yaml"))
+
+
+@pytest.mark.parametrize("format_name", NAMED)
+def test_a_folder_removed_under_the_command_leaves_names_as_given(
+    repo, written, format_name, monkeypatch, tmp_path
+) -> None:
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    monkeypatch.chdir(gone)
+    gone.rmdir()
+    written(format_name, repo / "missions" / "m.yaml", "m.yaml", env={"GITHUB_WORKSPACE": str(repo)})
+
+
+@pytest.mark.parametrize("format_name", (*NAMED, "github", "html"))
+def test_a_name_that_no_file_can_have_is_an_error_of_the_file(run, format_name) -> None:
+    assert run("check", "a\0b.yaml", "--format", format_name).exit_code == 2
 
 
 def test_one_file_named_twice_has_one_name(repo, written) -> None:

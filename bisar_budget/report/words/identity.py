@@ -44,15 +44,15 @@ def identities(missions: Sequence[MissionFindings | UnusableMission], style: Sty
     """
     places = [_place(mission.file, style) for mission in missions]
     files = [place.file for place in places]
-    names = _told_apart({place.file: place.portable_path for place in places})
-    numbers = [mission.document.number if isinstance(mission, MissionFindings) else None for mission in missions]
-    uses = Counter(number for number, _ in set(zip(numbers, files, strict=True)))
-    own = [
-        names[file] if number is None else number if uses[number] == 1 else f"{number}/{names[file]}"
-        for number, file in zip(numbers, files, strict=True)
-    ]
-    shared = _shared_requirements(missions, files, own)
-    return [Identity(name, place.portable_path, shared) for name, place in zip(own, places, strict=True)]
+    paths = _told_apart({place.file: place.portable_path for place in places})
+    names = dict(paths)
+    for mission, file in zip(missions, files, strict=True):
+        if isinstance(mission, MissionFindings) and mission.document.number:
+            names[file] = mission.document.number
+    while alike := _alike(names):
+        names |= {file: f"{names[file]}/{paths[file]}" for file in alike}
+    shared = _shared_requirements(missions, files, names)
+    return [Identity(names[place.file], place.portable_path, shared) for place in places]
 
 
 def digest(*parts: str) -> str:
@@ -82,7 +82,7 @@ def source_path(file: str, style: Style) -> str:
     if not style.root or file == "-":
         return file.replace(os.sep, "/")
     place = _place(file, style)
-    if place.root:
+    if place.is_in_repository:
         return place.portable_path
     for name in (os.path.abspath(file), place.file):
         if path := _below(name, style.root):
@@ -91,37 +91,36 @@ def source_path(file: str, style: Style) -> str:
 
 
 class _FilePlace(NamedTuple):
-    """Absolute path of a file, links followed, and of the root of its repository, empty where it is in none."""
+    """Absolute path of a file, links followed, and the path that is the same on every machine, with forward slashes.
+
+    That is within the repository, else the name of the file alone.
+    """
 
     file: str
-    root: str
-
-    @property
-    def portable_path(self) -> str:
-        """Path that is the same on every machine, with forward slashes: within the repository, else the name."""
-        if not os.path.isabs(self.file):  # standard input, or named as given
-            return self.file.replace(os.sep, "/")
-        path = _below(self.file, self.root) if self.root else os.path.basename(self.file)
-        return path.replace(os.sep, "/")
+    portable_path: str
+    is_in_repository: bool = False
 
 
 def _place(file: str, style: Style) -> _FilePlace:
     """Find a file and the Git work tree that holds it.
 
     A link is followed. Where that leads out of every work tree, to a store of large files such as git-annex has in
-    `.git`, the link itself is the file of the repository.
+    `.git`, the link itself is the file of the repository. One that leads to no file is that of a pipe.
     """
     if file == "-":
-        return _FilePlace(_STANDARD_INPUT, "")
-    if not style.root:
-        return _FilePlace(file, "")
-    target = os.path.realpath(file)
+        return _FilePlace(_STANDARD_INPUT, _STANDARD_INPUT)
+    if not style.root or "\0" in file:  # which no file has in its name
+        return _FilePlace(file, file.replace(os.sep, "/"))
     link = os.path.join(os.path.realpath(os.path.dirname(file)), os.path.basename(file))
+    target = os.path.realpath(file)
+    if not os.path.exists(target):
+        target = link
     for path in dict.fromkeys((target, link)):
         root = _work_tree(os.path.dirname(path), style)
-        if root and not _below(path, root).startswith(f".git{os.sep}"):
-            return _FilePlace(path, root)
-    return _FilePlace(target, "")
+        below = _below(path, root) if root else ""
+        if below and not below.startswith(f".git{os.sep}"):
+            return _FilePlace(path, below.replace(os.sep, "/"), is_in_repository=True)
+    return _FilePlace(target, os.path.basename(target))
 
 
 def _work_tree(folder: str, style: Style) -> str:
@@ -140,26 +139,30 @@ def _below(file: str, folder: str) -> str:
     return file[len(start) :] if file.startswith(start) else ""
 
 
+def _alike(names: Mapping[str, str]) -> list[str]:
+    """Files that have not a name of their own."""
+    uses = Counter(names.values())
+    return [file for file, name in names.items() if uses[name] > 1]
+
+
 def _told_apart(paths: Mapping[str, str]) -> dict[str, str]:
-    """Put folders before the paths that several files have, until no two files have one."""
+    """Put folders before the paths that several files have, until no two files have one; whole paths differ."""
     names, added = dict(paths), 0
-    while True:
-        counts = Counter(names.values())
+    while alike := _alike(names):
         added += 1
-        longer = {file: _with_folders(file, paths[file], added) for file, name in names.items() if counts[name] > 1}
-        if all(names[file] == name for file, name in longer.items()):
-            return names
-        names |= longer
+        names |= {file: _with_folders(file, paths[file], added) for file in alike}
+    return names
 
 
 def _with_folders(file: str, path: str, count: int) -> str:
     """Path of a file with so many of the folders that stand before it."""
-    parts = file.replace(os.sep, "/").strip("/").split("/")
-    return "/".join(parts[-(path.count("/") + 1 + count) :])
+    whole = file.replace(os.sep, "/")
+    parts, length = whole.strip("/").split("/"), path.count("/") + 1 + count
+    return "/".join(parts[-length:]) if length <= len(parts) else whole
 
 
 def _shared_requirements(
-    missions: Sequence[MissionFindings | UnusableMission], files: Sequence[str], names: Sequence[str]
+    missions: Sequence[MissionFindings | UnusableMission], files: Sequence[str], names: Mapping[str, str]
 ) -> frozenset[tuple[str, str]]:
     """Requirement ids with their row that stand in several files, or that are the name of a mission too."""
     used = {
@@ -170,5 +173,5 @@ def _shared_requirements(
         if row.requirement_id is not None
     }
     uses = Counter((requirement_id, row_id) for requirement_id, row_id, _ in used)
-    taken = set(names)
+    taken = set(names.values())
     return frozenset(pair for pair, count in uses.items() if count > 1 or pair[0] in taken)
