@@ -299,7 +299,7 @@ def test_a_folder_removed_under_the_command_leaves_names_as_given(
     written(format_name, repo / "missions" / "m.yaml", "m.yaml", env={"GITHUB_WORKSPACE": str(repo)})
 
 
-@pytest.mark.parametrize("format_name", (*NAMED, "github", "html"))
+@pytest.mark.parametrize("format_name", [*NAMED, "github", "html"])
 def test_a_name_that_no_file_can_have_is_an_error_of_the_file(run, format_name) -> None:
     assert run("check", "a\0b.yaml", "--format", format_name).exit_code == 2
 
