@@ -75,10 +75,19 @@ class _Gate(click.Command):
                     option.type.convert(item, option, None)
                     if key == "report":
                         _format_of(item)
+                        _hold_below(os.path.dirname(settings.file), item)  # type: ignore[union-attr]
             except click.UsageError as error:
                 raise click.UsageError(f"{settings.file}: {TABLE}.{key}: {error.message}") from None  # type: ignore[union-attr]
             defaults[str(option.name)] = value
         return defaults
+
+
+def _hold_below(folder: str, report: str) -> None:
+    """Hold a report that a repository asks for to its own folder: a check of somebody's missions writes nowhere else."""
+    inside = os.path.join(os.path.realpath(folder), "")
+    if not os.path.realpath(report).startswith(inside):
+        shown = printable(os.path.relpath(report, folder))
+        raise click.UsageError(f"{shown} leads out of the folder of this file; `--report` takes any place.")
 
 
 class _Draws(ParamType[int]):

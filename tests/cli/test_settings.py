@@ -146,3 +146,18 @@ def test_tomllib_is_loaded_only_where_the_tool_is_named(tmp_path, monkeypatch) -
     (tmp_path / "pyproject.toml").write_text(table("strict = true"))
     assert "tomllib" in loaded_after(code)
     assert (ROOT / "pyproject.toml").exists()
+
+
+@pytest.mark.parametrize("name", ["../a.xml", "/tmp/a.xml", "out/../../a.xml", "link.xml", "folder/a.xml"])
+def test_a_report_of_the_settings_leads_nowhere_else(run, project, tmp_path, name: str) -> None:
+    """The settings of a repository that somebody else wrote would put a report over any file."""
+    project(table(f'report = ["{name}"]'))
+    outside = tmp_path.parent / f"{tmp_path.name}-elsewhere"
+    outside.mkdir()
+    (tmp_path / "link.xml").symlink_to(outside / "a.xml")
+    (tmp_path / "folder").symlink_to(outside)
+    done = run("check", "m.yaml")
+    assert done.exit_code == 2
+    assert "tool.bisar-budget.report: " in done.stderr
+    assert "leads out of the folder of this file" in done.stderr
+    assert not list(outside.iterdir())
