@@ -83,8 +83,13 @@ def sentences(*texts: str) -> str:
     """Join texts by full stops, but for those that end with a question mark; the last is left as it is."""
     joined = ""
     for text in filter(None, texts):
-        joined += f"{'' if joined.endswith(('.', '?')) else '.'} {text}" if joined else text
+        joined = f"{closed(joined)} {text}" if joined else text
     return joined
+
+
+def closed(text: str) -> str:
+    """The text with a full stop at its end, if it has neither that nor a question mark."""
+    return text if text.endswith((".", "?")) else f"{text}."
 
 
 class SetValue(NamedTuple):

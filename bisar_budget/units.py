@@ -246,7 +246,7 @@ def _parse_closely(value: object, dimension: Dimension) -> float:
         raise _invalid("must be a finite number" if is_nan_or_inf else f"must be {dimension.name}", dimension)
     digits = match[0].lstrip("+-")
     if digits[0] == "0" and digits[1:2].isdigit():
-        raise InvalidValueError("has a leading zero, which some YAML readers take for octal", "write it without")
+        raise InvalidValueError("has a leading zero, which some YAML readers take for octal", "write it without the zero")
     number, unit = float(match[0]), text[match.end() :].lstrip()
     scale = dimension.scales.get(unit)
     if not unit:

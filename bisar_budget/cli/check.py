@@ -28,7 +28,7 @@ from bisar_budget.cli.streams import (
     write_file,
 )
 from bisar_budget.constants import MAX_DRAWS, MAX_DRAWS_HERE
-from bisar_budget.faults import fault_words, printable
+from bisar_budget.faults import closed, fault_words, printable
 from bisar_budget.report import FORMATS
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ class _Gate(click.Command):
 
                 near = did_you_mean(name, tuple(known))
                 problem = fault_words("is not a known variable", "", f"accepted: {', '.join(known)}", near)
-                raise click.UsageError(f"{printable(name)}: {problem}")
+                raise click.UsageError(f"{printable(name)}: {closed(problem)}")
         try:
             settings = project_settings(os.getcwd())
         except SettingsError as error:
@@ -436,9 +436,8 @@ def _explain(
         said = overrides_lines(found._replace(overrides=given))
         texts.append(text + "".join(f"{line}\n" for line in said))
     if not texts:
-        raise click.UsageError(
-            f"--explain {printable(row_id)}: {unknown_id(row_id, known, files[0], 'row or requirement')}"
-        )
+        problem = closed(unknown_id(row_id, known, files[0], "row or requirement"))
+        raise click.UsageError(f"--explain {printable(row_id)}: {problem}")
     deliver("\n".join(texts), output)
 
 
@@ -473,7 +472,7 @@ def _append_step_summary(path: str, report: "Report", style: "Style") -> None:
             file.write(step_summary(report, style))
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
-        complain(f"Warning: cannot write the step summary {printable(path)}: {reason}")
+        complain(f"warning: cannot write the step summary {printable(path)}: {reason}")
 
 
 def _say_faults(missions: "Iterable[MissionFindings | UnusableMission | None]") -> None:

@@ -107,10 +107,9 @@ def number_of(tree: dict[str, Any], key: str, of_all: str = "") -> Number:
     if isinstance(reader, Section):
         raise QuestionError(f"{key}: is a section; accepted: one of its keys, {', '.join(reader.keys)}")
     if not isinstance(reader, Quantity):
-        hint = ". sweep --vary compares what it can be" if reader.is_word else ""
-        raise QuestionError(
-            f"{key}: is no number with a unit; accepted: one that is, such as collection.aperture_time{hint}"
-        )
+        accepted = "accepted: one that is, such as collection.aperture_time"
+        hint = "`bisar-budget sweep --vary` compares what it can be" if reader.is_word else ""
+        raise QuestionError(f"{key}: {fault_words('is no number with a unit', '', accepted, hint)}")
     return as_number(key, reader, value)
 
 
@@ -182,7 +181,7 @@ def _found(tree: dict[str, Any], key: str) -> tuple[Reader, Any]:
         if isinstance(reader, ListOf | TextList | Triple):
             listed = value if isinstance(value, list) else []
             if int(part) >= len(listed):
-                raise QuestionError(f"{key}: the list has {len(listed)} entries, and none has the number {part}")
+                raise QuestionError(f"{key}: the list has {len(listed)} entr{'y' if len(listed) == 1 else 'ies'}, and none has the number {part}")
             value = listed[int(part)]
         else:
             value = value.get(part) if isinstance(value, dict) else None

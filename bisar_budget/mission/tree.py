@@ -116,7 +116,7 @@ class Tree:
         self.root = self.node(next_event, next_event(), ())
         while type(event := next_event()) is not yaml.StreamEndEvent:
             if type(event) is yaml.DocumentStartEvent:
-                self.fault(event.start_mark, (), "has a second YAML document", accepted="one mission to a file")
+                self.fault(event.start_mark, (), "has a second YAML document", accepted="accepted: one mission in a file")
                 raise UnusableError
 
     def node(self, next_event: Callable[[], Any], event: Any, path: KeyPath) -> Any:
@@ -150,7 +150,7 @@ class Tree:
             if event.flow_style:
                 self._decimal_commas(items, path)
         if event.tag is not None and event.tag != "!":
-            self.fault(mark, path, "carries a YAML tag", given=shown(event.tag), accepted="plain values")
+            self.fault(mark, path, "carries a YAML tag", given=shown(event.tag), accepted="accepted: plain values")
             return INVALID
         return value
 
@@ -172,7 +172,7 @@ class Tree:
                 given = shown(f"{before.value},{item.value}")
                 problem, accepted = (
                     "may be half of a number with a decimal comma",
-                    "a point, or a blank behind commas",
+                    "accepted: a point, or a blank behind commas",
                 )
                 self.fault(item.start_mark, (*path, index), problem, given=given, accepted=accepted)
 
@@ -188,7 +188,7 @@ class Tree:
             if key in mapping:
                 first = self.keys[here].start_mark.line + 1
                 problem = f"is a duplicate key; the first is in line {first}"
-                self.fault(mark, here, problem, accepted="each key once")
+                self.fault(mark, here, problem, accepted="accepted: each key once")
                 self.node(next_event, next_event(), (*path, f"{key} (again)"))
                 continue
             self.keys[here] = event
