@@ -76,7 +76,8 @@ SPEED = Dimension(
 ACCELERATION = Dimension(
     "an acceleration",
     "m/s^2",
-    {f"{unit}/s^2": factor for unit, factor in _LENGTHS.items()} | {"g": _G, "mg": 1e-3 * _G, "ug": 1e-6 * _G}
+    {f"{unit}/s^2": factor for unit, factor in _LENGTHS.items()}
+    | {"g": _G, "mg": 1e-3 * _G, "ug": 1e-6 * _G}
     | {"Gal": 1e-2, "mGal": 1e-5, "uGal": 1e-8},
 )
 JERK = Dimension("a jerk", "m/s^3", {f"{unit}/s^3": factor for unit, factor in _LENGTHS.items()})
@@ -246,7 +247,9 @@ def _parse_closely(value: object, dimension: Dimension) -> float:
         raise _invalid("must be a finite number" if is_nan_or_inf else f"must be {dimension.name}", dimension)
     digits = match[0].lstrip("+-")
     if digits[0] == "0" and digits[1:2].isdigit():
-        raise InvalidValueError("has a leading zero, which some YAML readers take for octal", "write it without the zero")
+        raise InvalidValueError(
+            "has a leading zero, which some YAML readers take for octal", "write it without the zero"
+        )
     number, unit = float(match[0]), text[match.end() :].lstrip()
     scale = dimension.scales.get(unit)
     if not unit:

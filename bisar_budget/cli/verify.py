@@ -94,7 +94,9 @@ def verify_all(missions: "Sequence[Mission]", only: str, jobs: int | None) -> "l
     total = sum(len(rows_to_verify(mission, only)) for mission in missions)
     if not total and only != "*":
         listed = where_ids_are(missions[0].file)
-        raise click.UsageError(f"--only {printable(only)}: no row with a limit matches, nothing was verified; {listed}.")
+        raise click.UsageError(
+            f"--only {printable(only)}: no row with a limit matches, nothing was verified; {listed}."
+        )
     jobs = jobs or (1 if is_compiled() else cores())
     seconds = sum(seconds_to_verify(mission, only, jobs) for mission in missions)
     foretell(seconds, f"Forming the images of {total} rows", "--only looks at some of them" + faster(jobs))

@@ -181,7 +181,8 @@ def _found(tree: dict[str, Any], key: str) -> tuple[Reader, Any]:
         if isinstance(reader, ListOf | TextList | Triple):
             listed = value if isinstance(value, list) else []
             if int(part) >= len(listed):
-                raise QuestionError(f"{key}: the list has {len(listed)} entr{'y' if len(listed) == 1 else 'ies'}, and none has the number {part}")
+                entries = f"{len(listed)} entr{'y' if len(listed) == 1 else 'ies'}"
+                raise QuestionError(f"{key}: the list has {entries}, and none has the number {part}")
             value = listed[int(part)]
         else:
             value = value.get(part) if isinstance(value, dict) else None

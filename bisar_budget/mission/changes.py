@@ -133,7 +133,7 @@ def _value(tree: Tree, change: SetValue, path: KeyPath) -> Any:
                 tree.fault(None, path, "has a second YAML document", accepted="accepted: one value")
                 raise UnusableError
     except yaml.MarkedYAMLError as error:
-        said = " ".join(filter(None, (error.context, error.problem)))
+        said = ", ".join(filter(None, (error.context, error.problem)))
         tree.fault(None, path, f"is not valid YAML: {said}", given=shown(change.text))
         return INVALID
     except yaml.reader.ReaderError as error:

@@ -61,8 +61,8 @@ def nearest_keys(path: str) -> str:
 def section_hint(path: str, near: str) -> str:
     """Hint at the sections that have the unknown key at the end of a path; `near` is the hint at one spelt alike.
 
-    A key that is nearly one of its own section, or stands nowhere, has the hint `near`. Of several sections those that
-    share most of the path are named, of too many none.
+    A key that is nearly one of its own section, or stands nowhere, has the hint `near`. Of several sections those
+    that share most of the path are named, of too many none.
     """
     *above, name = _names(path[:_FARTHEST]) or [""]
     found = [known.split(".")[:-1] for known in all_keys() if known.rpartition(".")[2] == name]

@@ -155,6 +155,6 @@ def _with_hint(fault: Fault) -> Fault:
 
 def _with_changes(fault: Fault, changes: Sequence[SetValue]) -> Fault:
     """Say with what options a fault of the file was found: without them there may be none."""
-    return fault if fault.option else fault._replace(
-        hint=sentences(fault.hint, f"Read with {changes_words(changes)}")
+    return (
+        fault if fault.option else fault._replace(hint=sentences(fault.hint, f"Read with {changes_words(changes)}"))
     )

@@ -370,7 +370,7 @@ class Section(Reader):
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
         """Read every key, report every fault."""
         if not isinstance(value, dict):
-            report(path, Problem("must be a mapping of keys to values"))
+            report(path, Problem("must be a mapping of keys to values", f"accepted: {', '.join(self.keys)}"))
             return INVALID
         is_valid = True
         values = {}

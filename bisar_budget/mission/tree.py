@@ -116,7 +116,9 @@ class Tree:
         self.root = self.node(next_event, next_event(), ())
         while type(event := next_event()) is not yaml.StreamEndEvent:
             if type(event) is yaml.DocumentStartEvent:
-                self.fault(event.start_mark, (), "has a second YAML document", accepted="accepted: one mission in a file")
+                self.fault(
+                    event.start_mark, (), "has a second YAML document", accepted="accepted: one mission in a file"
+                )
                 raise UnusableError
 
     def node(self, next_event: Callable[[], Any], event: Any, path: KeyPath) -> Any:
@@ -219,7 +221,7 @@ def read_tree(data: bytes | str, file: str) -> Tree:
             tree.faults.append(file_fault(problem, "`bisar-budget init` writes a mission file to start from"))
     except yaml.MarkedYAMLError as error:
         place = error.problem_mark or error.context_mark
-        problem = f"is not valid YAML: {' '.join(filter(None, (error.context, error.problem)))}"
+        problem = f"is not valid YAML: {', '.join(filter(None, (error.context, error.problem)))}"
         tree.fault(place, (), problem)
         raise MissionError(file, tuple(tree.faults)) from None
     except yaml.reader.ReaderError as error:

@@ -49,25 +49,46 @@ def test_faults_of_files_are_sentences(run, path) -> None:
         assert not malformed(message), message
 
 
+LISTED = f"`bisar-budget check {SECTION_V} --all` lists them"
+BARE = "'0' must be greater than 0 Hz. A bare number is in Hz\n"
 USAGES = (
-    (("check", "-", "--explain", "foo"), "--explain foo: no row or requirement has this id; `bisar-budget check - --all` lists them.\n"),
+    (
+        ("check", "-", "--explain", "foo"),
+        "--explain foo: no row or requirement has this id; `bisar-budget check - --all` lists them.\n",
+    ),
     (("check", "-", "--explain", "receiver.velocty.x"), "lists them. Did you mean 'receiver.velocity.x'?\n"),
-    (("check", "-", "--set", "radar.bandwith=3 MHz"), "accepted: center_frequency, bandwidth. Did you mean 'radar.bandwidth'?"),
-    (("check", "-", "--set", "radar.bandwidth=3 MHz", "--set", "radar.x=3"), "--set radar.x: is not a known key; accepted: center_frequency, bandwidth\n"),
-    (("check", "-", "--set", "radar.bandwidth"), "is not KEY=VALUE; accepted: KEY=VALUE, such as radar.bandwidth=150MHz.\n"),
-    (("check", "-", "--set", "other_errors.3.name=x"), "--set other_errors.3.name: "),
-    (("check", "-", "--set", "radar.bandwidth=010 MHz"), "write it without the zero"),
-    (("check", "-", "--set", "radar.bandwidth=!!str 3"), "(got tag:yaml.org,2002:str); accepted: plain values"),
-    (("verify", SECTION_V, "--only", "foo"), f"no row with a limit matches, nothing was verified; `bisar-budget check {SECTION_V} --all` lists them.\n"),
-    (("solve", SECTION_V, "--for", "radar.bandwidth", "--between", "0..3"), "'0' must be greater than 0 Hz. A bare number is in Hz\n"),
-    (("solve", SECTION_V, "--for", "radar.bandwidth", "--row", "foo"), f"--row foo: no row has this id; `bisar-budget check {SECTION_V} --all` lists them\n"),
-    (("solve", SECTION_V, "--for", "platforms.receiver.azimuth", "--between", "0..180"), "only zero needs no unit. Did you mean '180 deg' or '180 rad'?\n"),
-    (("solve", SECTION_V, "--for", "platforms.transmitter.latitude", "--between", "1deg..2deg"), "no value of the range makes a mission: platforms.transmitter.latitude: mixes"),
-    (("solve", SECTION_V, "--for", "allocation.model"), "such as collection.aperture_time. `bisar-budget sweep --vary` compares what it can be\n"),
-    (("sweep", SECTION_V, "--vary", "radar.bandwidth=0:3:3"), "'0' must be greater than 0 Hz. A bare number is in Hz\n"),
+    (("check", "-", "--set", "radar.bandwith=3 MHz"), "bandwidth. Did you mean 'radar.bandwidth'?\n"),
+    (
+        ("check", "-", "--set", "radar.x=3"),
+        "--set radar.x: is not a known key; accepted: center_frequency, bandwidth\n",
+    ),
+    (("check", "-", "--set", "radar.bandwidth"), "accepted: KEY=VALUE, such as radar.bandwidth=150MHz.\n"),
+    (("check", "-", "--set", "radar.bandwidth=010 MHz"), "write it without the zero\n"),
+    (("check", "-", "--set", "radar.bandwidth=!!str 3"), "(got tag:yaml.org,2002:str); accepted: plain values\n"),
+    (("check", "-", "--set", "radar.bandwidth=[3"), "while parsing a flow sequence, "),
+    (("check", "-", "--set", "radar=3"), "(got 3); accepted: center_frequency, bandwidth\n"),
+    (("verify", SECTION_V, "--only", "foo"), f"no row with a limit matches, nothing was verified; {LISTED}.\n"),
+    (("solve", SECTION_V, "--for", "radar.bandwidth", "--between", "0..3"), BARE),
+    (("solve", SECTION_V, "--for", "radar.bandwidth", "--row", "foo"), f"--row foo: no row has this id; {LISTED}\n"),
+    (
+        ("solve", SECTION_V, "--for", "platforms.receiver.azimuth", "--between", "0..180"),
+        "only zero needs no unit. Did you mean '180 deg' or '180 rad'?\n",
+    ),
+    (
+        ("solve", SECTION_V, "--for", "platforms.transmitter.latitude", "--between", "1deg..2deg"),
+        "no value of the range makes a mission: platforms.transmitter.latitude: mixes",
+    ),
+    (
+        ("solve", SECTION_V, "--for", "allocation.model"),
+        "such as collection.aperture_time. `bisar-budget sweep --vary` compares what it can be\n",
+    ),
+    (("sweep", SECTION_V, "--vary", "radar.bandwidth=0:3:3"), BARE),
     (("sweep", SECTION_V, "--vary", "radar.bandwith=1:3MHz:3"), "Did you mean 'radar.bandwidth'?\n"),
-    (("sweep", SECTION_V, "--vary", "radar.bandwidth=1:3MHz:3", "--column", "foo.margin"), f"--column foo.margin: no row has this id; `bisar-budget check {SECTION_V} --all` lists them\n"),
-)  # fmt: skip
+    (
+        ("sweep", SECTION_V, "--vary", "radar.bandwidth=1:3MHz:3", "--column", "foo.margin"),
+        f"--column foo.margin: no row has this id; {LISTED}\n",
+    ),
+)
 
 
 @pytest.mark.parametrize(("arguments", "said"), USAGES, ids=range(len(USAGES)))

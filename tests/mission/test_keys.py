@@ -18,7 +18,10 @@ NEAR = "Did you mean 'near'?"
         ("platforms.receiver.motion_error.speed", "'speed' is a key of 'platforms.receiver'"),
         ("platforms.receiver.imu", "'imu' is a key of 'platforms.receiver.motion_error'"),
         ("platforms.transmitter.bandwidth", "'bandwidth' is a key of 'platforms.transmitter.oscillator'"),
-        ("platforms.transmitter.motion_error.vibration.sinusoidal[0].speed", "'speed' is a key of 'platforms.transmitter'"),
+        (
+            "platforms.transmitter.motion_error.vibration.sinusoidal[0].speed",
+            "'speed' is a key of 'platforms.transmitter'",
+        ),
         ("speed", "'speed' is a key of 'platforms.transmitter' and 'platforms.receiver'"),
         ("radar.schema_version", "'schema_version' is a key of the file itself"),
         ("position", ""),  # seven sections have it, and nothing of the first level is meant
