@@ -1,6 +1,8 @@
 """Sentences for users, as they are written: what the bad missions and wrong options provoke, read for form."""
 
+import ast
 import re
+from collections.abc import Iterator
 
 import pytest
 
@@ -47,6 +49,29 @@ def test_faults_of_files_are_sentences(run, path) -> None:
     for line in run("check", path, "-q").stderr.splitlines():
         message = line.removeprefix(str(path))
         assert not malformed(message), message
+
+
+def texts_of_the_package() -> Iterator[tuple[str, str]]:
+    """Every text of the source but docstrings, with # for what is put in, and where it stands."""
+    for file in sorted((ROOT / "bisar_budget").rglob("*.py")):
+        tree = ast.parse(file.read_text(encoding="utf-8"))
+        docstrings = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+        joined = [node for node in ast.walk(tree) if isinstance(node, ast.JoinedStr)]
+        skipped = docstrings | {id(part) for text in joined for part in text.values}
+        for node in ast.walk(tree):
+            where = f"{file.relative_to(ROOT)}:{getattr(node, 'lineno', 0)}"
+            if isinstance(node, ast.JoinedStr):
+                yield where, "".join(str(p.value) if isinstance(p, ast.Constant) else "#" for p in node.values)
+            elif (
+                isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in docstrings | pieces
+            ):
+                yield where, node.value
+
+
+def test_no_text_of_the_package_has_a_capital_within_a_sentence() -> None:
+    capital = MALFORMED["a capital within a sentence"]
+    found = [(where, text) for where, text in texts_of_the_package() if capital.search(_CITED.sub("#", text))]
+    assert found == []
 
 
 LISTED = f"`bisar-budget check {SECTION_V} --all` lists them"
