@@ -62,9 +62,7 @@ def texts_of_the_package() -> Iterator[tuple[str, str]]:
             where = f"{file.relative_to(ROOT)}:{getattr(node, 'lineno', 0)}"
             if isinstance(node, ast.JoinedStr):
                 yield where, "".join(str(p.value) if isinstance(p, ast.Constant) else "#" for p in node.values)
-            elif (
-                isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in docstrings | pieces
-            ):
+            elif isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in skipped:
                 yield where, node.value
 
 
