@@ -183,12 +183,14 @@ _MEANT = {
     "as": "arcsec",
     "asec": "arcsec",
     "degree": "deg",
-    "foot": "ft",
-    "feet": "ft",
     "dph": "deg/h",
+    "feet": "ft",
+    "foot": "ft",
     "knot": "kn",
     "meter": "m",
     "metre": "m",
+    "micro-g": "ug",
+    "milli-g": "mg",
     "percent": "%",
     "radian": "rad",
     "sec": "s",
@@ -422,4 +424,5 @@ def _nearest_unit(unit: str, dimension: Dimension) -> str:
         if (meant := _MEANT.get(spelling, "")) in dimension.units:
             return meant
     folded = {known.lower(): known for known in dimension.units if known}
-    return folded.get(word) or next(iter(get_close_matches(unit, dimension.units, 1, 0.6)), "")
+    spelt = normal_unit(word.replace("hz", "Hz")).lower()  # in capitals, as in `DEG/HR`
+    return folded.get(word) or folded.get(spelt) or next(iter(get_close_matches(unit, dimension.units, 1, 0.6)), "")
