@@ -172,6 +172,11 @@ class Fault(NamedTuple):
         return text + fault_words(self.problem, self.given, self.accepted, self.hint)
 
 
+def file_fault(problem: str, hint: str = "") -> Fault:
+    """A fault of the file as a whole."""
+    return Fault(line=None, column=None, key="", problem=problem, hint=hint)
+
+
 class WorkerLostError(Exception):
     """A worker process ended before its work did."""
 

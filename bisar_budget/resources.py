@@ -3,7 +3,7 @@
 import os
 import stat
 import sys
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO, Protocol
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -60,6 +60,40 @@ def content(file: str, most: int, called: str | None = None) -> bytes:
         raise UnreadableError(f"{called} cannot be read: {error.strerror}", is_missing=is_missing) from None
     except ValueError:  # a NUL in the name
         raise UnreadableError("is no name of a file") from None
+
+
+def standard_input() -> BinaryIO:
+    """Bytes of standard input; raises `ValueError` where there is none."""
+    if sys.stdin is None:
+        raise ValueError("standard input is closed")
+    return sys.stdin.buffer
+
+
+class Files(Protocol):
+    """Where the files of a project are read: on the disk, or in a git revision (`mission.revision`)."""
+
+    def content(self, file: str, most: int, called: str | None = None) -> bytes:
+        """Content of a file; see `content`."""
+
+    def names(self, folder: str) -> list[str]:
+        """Names of the files in a folder, sorted; raises `OSError` where it cannot be listed."""
+
+
+class Disk:
+    """The files as they stand."""
+
+    @staticmethod
+    def content(file: str, most: int, called: str | None = None) -> bytes:
+        """Content of a file; see `content`."""
+        return content(file, most, called)
+
+    @staticmethod
+    def names(folder: str) -> list[str]:
+        """Names of the files in a folder, sorted; raises `OSError` where it cannot be listed."""
+        return sorted(os.listdir(folder))
+
+
+DISK = Disk()
 
 
 def cores() -> int:

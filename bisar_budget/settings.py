@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from bisar_budget.faults import fault_words, shown
-from bisar_budget.resources import UnreadableError, content
+from bisar_budget.resources import DISK, Files, UnreadableError
 
 TABLE = "tool.bisar-budget"
 KEYS = {
@@ -38,8 +38,8 @@ class Settings(NamedTuple):
     values: Mapping[str, Any]
 
 
-def project_settings(folder: str) -> Settings | None:
-    """Read the table for a folder; None if no `pyproject.toml` in it or above has one.
+def project_settings(folder: str, files: Files = DISK) -> Settings | None:
+    """Read the table for a folder from `files`; None if no `pyproject.toml` in it or above has one.
 
     Names of reports and folders of sensors are relative to the file that says them.
 
@@ -50,15 +50,15 @@ def project_settings(folder: str) -> Settings | None:
     """
     folder = os.path.abspath(folder)
     while True:
-        settings = _read(os.path.join(folder, "pyproject.toml"))
+        settings = _read(os.path.join(folder, "pyproject.toml"), files)
         above = os.path.dirname(folder)
         if settings is not None or above == folder:
             return settings
         folder = above
 
 
-def _read(file: str) -> Settings | None:
-    data = _bytes_of(file)
+def _read(file: str, files: Files) -> Settings | None:
+    data = _bytes_of(file, files)
     if data is None:
         return None
     try:
@@ -92,10 +92,10 @@ def _read(file: str) -> Settings | None:
     return Settings(file, values)
 
 
-def _bytes_of(file: str) -> bytes | None:
+def _bytes_of(file: str, files: Files) -> bytes | None:
     """Content of a file, None where there is none."""
     try:
-        data = content(file, _LARGEST, f"{file}:")
+        data = files.content(file, _LARGEST, f"{file}:")
     except UnreadableError as error:
         if error.is_missing:
             return None

@@ -44,17 +44,19 @@ def overrides(mission: Mission, outside: Outside, today: date) -> tuple[Override
 def _own_parts(mission: Mission) -> Iterator[Override]:
     """Parts of the project that stand in for those of the catalogue with the same name."""
     catalogue = str(resource("specs", "sensors")) if mission.parts else ""
-    for name, file in mission.parts:
+    for name, file, _ in mission.parts:
         if name.endswith((".yaml", ".yml")) or os.path.dirname(file) == catalogue:
             continue
         if any(os.path.exists(os.path.join(catalogue, name + suffix)) for suffix in (".yaml", ".yml")):
-            yield Override(f"part {printable(name)}", _shown(file), "the project's, in place of the catalogue's")
+            yield Override(
+                f"part {printable(name)}", _shown(file, mission.file), "the project's, in place of the catalogue's"
+            )
 
 
-def _shown(file: str) -> str:
-    """Path of a file from the current folder, if it is below."""
+def _shown(file: str, mission_file: str) -> str:
+    """Path of a file from the folder of the mission file, the same wherever the command runs."""
     try:
-        below = os.path.relpath(file)
-    except (OSError, ValueError):  # the folder is gone; another drive
-        return printable(file)
-    return printable(file if below.startswith(os.pardir) else below)
+        path = os.path.relpath(file, os.path.dirname(mission_file) or os.curdir)
+    except (OSError, ValueError):  # the current folder is gone; another drive
+        path = file
+    return printable(path.replace(os.sep, "/"))

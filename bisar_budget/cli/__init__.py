@@ -131,6 +131,10 @@ def main() -> None:
     What a library warns of nobody who runs this command can mend, and PYTHONWARNINGS can make it an error.
     """
     warnings.simplefilter("ignore")
+    # Workers begin with `python -c`, which imports from the current folder, where no installed command does.
+    os.environ["PYTHONSAFEPATH"] = "1"
+    if len(sys.argv) > 1:  # a shell that completes gives none; else a check would write a completion, and exit with 0
+        os.environ.pop("_BISAR_BUDGET_COMPLETE", None)
     for name in ("SIGTERM", "SIGHUP"):
         asked = getattr(signal, name, None)
         if asked is not None and signal.getsignal(asked) is signal.SIG_DFL:

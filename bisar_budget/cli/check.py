@@ -3,7 +3,6 @@
 import os
 import sys
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import suppress
 from datetime import date, datetime
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -273,7 +272,10 @@ def check(
     judged_on, from_outside = day(today), outside(today)
     use_color = color == "always" or (color == "auto" and output is None and wants_color())
     verbosity = -1 if quiet else 1 if verbose else 0
-    style = Style(color=use_color, verbosity=verbosity, root=_repository(), all_rows=all_rows, detail=detail)
+    root, is_checkout = _root()
+    style = Style(
+        color=use_color, verbosity=verbosity, root=root, is_checkout=is_checkout, all_rows=all_rows, detail=detail
+    )
     says_faults = format_name != "text" or output is not None or quiet or not is_terminal()
     if FORMATS[format_name].is_piecewise and not (written or verifying or draws):
         from bisar_budget.budget.fleet import check_files
@@ -451,11 +453,14 @@ def _format_of(name: str) -> str:
     return format_name
 
 
-def _repository() -> str:
-    """Folder that reports name files from: GitHub's checkout, else the current folder."""
-    with suppress(OSError):  # somebody removed it under us
-        return os.path.abspath(os.environ.get("GITHUB_WORKSPACE") or os.getcwd())
-    return ""
+def _root() -> tuple[str, bool]:
+    """Folder that reports name files of no repository from, and whether it is GitHub's checkout."""
+    try:
+        here = os.getcwd()
+    except OSError:  # somebody removed it under us
+        return "", False
+    checkout = os.environ.get("GITHUB_WORKSPACE")
+    return os.path.realpath(checkout or here), bool(checkout)
 
 
 def _step_summary(format_name: str) -> str | None:

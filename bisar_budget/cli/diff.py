@@ -1,8 +1,10 @@
 """`bisar-budget diff`: what a change to a mission does to every margin."""
 
+import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -27,6 +29,11 @@ from bisar_budget.faults import printable
 
 if TYPE_CHECKING:
     from bisar_budget.faults import SetValue
+    from bisar_budget.mission.model import Mission
+    from bisar_budget.report.change.comparison import ChangeSet, MissionChange
+    from bisar_budget.resources import Files
+
+_Read = Callable[[], "Mission"]
 
 
 class _Part(ParamType[float]):
@@ -56,8 +63,16 @@ class _Part(ParamType[float]):
     "tolerated",
     type=_Part(),
     metavar="PERCENT",
-    help="Exit with 1 if a row or a requirement newly fails or is not evaluated any more, or if the change uses up "
-    "more than this part of what was left of a row's limit.",
+    help="Exit with 1 if the change loosens anything, if a row or a requirement newly fails or is not evaluated any "
+    "more, or if the change uses up more than this part of what was left of a row's limit.",
+)
+@click.option(
+    "--allow",
+    "allowed",
+    multiple=True,
+    metavar="ID",
+    help="With --fail-on-erosion: let this through. ID is as the comparison names it, or a pattern; FILE:ID is that "
+    "of one mission. Repeatable.",
 )
 @click.option(
     "--format",
@@ -75,56 +90,141 @@ def diff(
     base: str | None,
     changes: "tuple[SetValue, ...]",
     tolerated: float | None,
+    allowed: tuple[str, ...],
     format_name: str,
     all_rows: bool,
     output: str | None,
     today: datetime | None,
 ) -> None:
-    """Show what a change to a mission does to every margin.
+    """Show what a change to a mission does to every margin, and what it loosens.
 
     Compares two mission files, each with itself in a git revision, or each with itself with other values (--set).
-    What changed in the file and in the geometry stands first, then the rows.
+    What changed in the file and in the geometry stands first, then the rows. With --base the parts, settings, orbits
+    and logs are those of the revision too, and a pattern names the missions of both.
 
     Rows are sorted by erosion. Erosion is the part of what was left of a limit that the change uses up:
     (u2 - u1)/(1 - u1), u1 and u2 being declared over allowable before and after. A row that had nothing left has
-    u2/u1 - 1. Exit code: 0; 1 with --fail-on-erosion; 2 for wrong usage, an unusable file or an unknown revision.
+    u2/u1 - 1.
+
+    Numbers do not show what is loosened: a mission file, a requirement, an error, its source or a word of
+    requirements.declare that is gone, a larger requirement, a waiver that is new or lasts longer, a row that is newly
+    waived, more autofocus, and less coverage, reserve, model or combination.
+
+    Exit code: 0; 1 with --fail-on-erosion; 2 for wrong usage, an unusable file or an unknown revision.
     """
-    from bisar_budget.budget.check import check_mission
-    from bisar_budget.faults import MissionError
-    from bisar_budget.mission.load import load_mission
-    from bisar_budget.mission.revision import RevisionError, mission_at
     from bisar_budget.report.change import difference
-    from bisar_budget.report.change.comparison import compare
+    from bisar_budget.report.change.comparison import Gate
 
     if base is not None and changes:
         raise click.UsageError("--base and --set each say what a mission is compared with; give one of them.")
-    is_with_itself = base is not None or bool(changes)
-    if not is_with_itself and len(files) != 2:
+    if allowed and tolerated is None:
+        raise click.UsageError("--allow is for --fail-on-erosion, which refuses; give both, or neither.")
+    if base is None and not changes and len(files) != 2:
         raise click.UsageError(
             "give two mission files, OLD and NEW, or mission files and --base REV or --set KEY=VALUE."
         )
-    files = expand(files) if is_with_itself else files
+    if base is not None:
+        comparison = _with_revision(files, base, output, today)
+    else:
+        comparison = _with_files(files, changes, output, today)
+    gate = None if tolerated is None else Gate(tolerated, allowed)
+    if format_name == "json":
+        text = difference.as_json(__version__, comparison, gate)
+    else:
+        write = difference.as_text if format_name == "text" else difference.as_markdown
+        text = write(comparison, gate, all_rows)
+    deliver(text, output, format_name)
+    sys.exit(EXIT_BROKEN if gate is not None and comparison.is_refused(gate) else 0)
+
+
+def _with_files(
+    files: Sequence[str], changes: "tuple[SetValue, ...]", output: str | None, today: datetime | None
+) -> "ChangeSet":
+    """Compare two files, or each with itself with other values."""
+    from bisar_budget.mission.load import load_mission
+    from bisar_budget.report.change.comparison import ChangeSet
+
+    files = expand(files) if changes else files
     spare(files, [output])
-    judged_on, from_outside = day(today), outside(today)
-    pairs = [(file, file) for file in files] if is_with_itself else [(files[0], files[1])]
-    compared = []
-    for before, after in pairs:
+    model = _settings().get("model")
+    old, new = (files, files) if changes else (files[:1], files[1:])
+    before = [partial(load_mission, file, model) for file in old]
+    after = [partial(load_mission, file, model, changes) for file in new]
+    return ChangeSet(_compared(before, after, today))
+
+
+def _with_revision(patterns: Sequence[str], base: str, output: str | None, today: datetime | None) -> "ChangeSet":
+    """Compare missions with themselves in a revision; patterns name those of now and of then."""
+    from bisar_budget.mission.load import load_mission
+    from bisar_budget.mission.revision import Revision, RevisionError, mission_at
+    from bisar_budget.report.change.comparison import ChangeSet
+    from bisar_budget.report.change.loosened import loosened_settings
+    from bisar_budget.resources import resource
+
+    if "-" in patterns:
+        raise click.UsageError("--base needs files: standard input is in no revision.")
+    spare(expand(patterns), [output])
+    settings = _settings()
+    gone, new, before, after = list[str](), list[str](), list[_Read](), list[_Read]()
+    revisions: dict[str, Revision] = {}
+    try:
+        for pattern in patterns:
+            revision = Revision(pattern, base)
+            revision = revisions.setdefault(revision.top, revision)
+            then = _settings(revision)
+            now = [file for file in expand([pattern]) if os.path.lexists(file)]
+            was = revision.matching(pattern)
+            gone += [revision.path_of(file) for file in was if not os.path.lexists(file)]
+            for file in now or ([] if was else [pattern]):
+                if now and not revision.has(file):
+                    new.append(revision.path_of(file))
+                    continue
+                before.append(partial(mission_at, file, revision, then.get("model")))
+                after.append(partial(load_mission, file, settings.get("model")))
+        changes = _compared(before, after, today)
+    except RevisionError as error:
+        fail(str(error))
+    loosened = [one for revision in revisions.values() for one in loosened_settings(_settings(revision), settings)]
+    bundled = str(resource("specs"))
+    outside = [one for revision in revisions.values() for one in revision.outside if not one.startswith(bundled)]
+    return ChangeSet(
+        changes,
+        gone=tuple(dict.fromkeys(gone)),
+        new=tuple(dict.fromkeys(new)),
+        settings=tuple(dict.fromkeys(loosened)),
+        outside=tuple(dict.fromkeys(outside)),
+    )
+
+
+def _compared(before: Sequence[_Read], after: Sequence[_Read], today: datetime | None) -> "tuple[MissionChange, ...]":
+    """Compare each mission with the other of its place; where one cannot be used, say every fault of all and exit."""
+    from bisar_budget.budget.check import check_mission
+    from bisar_budget.faults import MissionError
+    from bisar_budget.report.change.comparison import compare
+
+    missions: list[Mission] = []
+    for read in (pair for both in zip(before, after, strict=True) for pair in both):
         try:
-            old = load_mission(before) if base is None else mission_at(before, base)
-            new = load_mission(after, changes=changes)
-        except RevisionError as error:
-            fail(str(error))
+            missions.append(read())
         except MissionError as error:
             for line in error.lines():
                 complain(line)
-            sys.exit(EXIT_USAGE)
-        judged = [check_mission(mission, judged_on, outside=from_outside) for mission in (old, new)]
-        compared.append(compare(*judged))
-    if format_name == "json":
-        text = difference.as_json(__version__, compared, tolerated)
-    else:
-        write = difference.as_text if format_name == "text" else difference.as_markdown
-        text = write(compared, tolerated, all_rows)
-    deliver(text, output, format_name)
-    is_refused = tolerated is not None and any(change.is_refused(tolerated) for change in compared)
-    sys.exit(EXIT_BROKEN if is_refused else 0)
+    if len(missions) < len(before) + len(after):
+        sys.exit(EXIT_USAGE)
+    judged_on, from_outside = day(today), outside(today)
+    found = [check_mission(mission, judged_on, outside=from_outside) for mission in missions]
+    return tuple(compare(*pair) for pair in zip(found[::2], found[1::2], strict=True))
+
+
+def _settings(files: "Files | None" = None) -> Mapping[str, Any]:
+    """Settings of the project for the current folder: those that `check` takes here, now or in a revision."""
+    from bisar_budget.resources import DISK
+    from bisar_budget.settings import SettingsError, project_settings
+
+    try:
+        found = project_settings(os.getcwd(), files or DISK)
+    except SettingsError as error:
+        raise click.UsageError(printable(str(error))) from None
+    except OSError:  # somebody removed the current folder
+        found = None
+    return found.values if found else {}

@@ -42,12 +42,16 @@ def init(file: str, name: str, force: bool) -> None:
 
 
 @click.command()
+@click.option("--part", "is_of_part", is_flag=True, help="Of the file of a part: a sensor, or an oscillator.")
 @OUTPUT
-def schema(output: str | None) -> None:
-    """Print the JSON Schema of the mission file, for editors."""
+def schema(is_of_part: bool, output: str | None) -> None:
+    """Print the JSON Schema of the mission file, for editors.
+
+    The first line of a file names its schema: # yaml-language-server: $schema=mission.schema.json
+    """
     import json
 
-    from bisar_budget.mission.schema import mission_schema
+    from bisar_budget.mission.schema import mission_schema, part_schema
 
-    text = json.dumps(mission_schema(), indent=2) + "\n"
+    text = json.dumps(part_schema() if is_of_part else mission_schema(), indent=2) + "\n"
     deliver(text, output, "json")

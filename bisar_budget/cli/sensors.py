@@ -1,34 +1,55 @@
 """`bisar-budget sensors`: parts whose figures a mission can take."""
 
+import os
 import sys
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from bisar_budget.cli.streams import EXIT_USAGE, TEXT_OR_JSON, complain, deliver
-from bisar_budget.faults import printable
+from bisar_budget.cli.streams import EXIT_USAGE, FILE, TEXT_OR_JSON, complain, deliver, expand, spare
+from bisar_budget.faults import MissionError, file_fault, printable, sentences
 
 if TYPE_CHECKING:
-    from bisar_budget.mission.parts import Entry
+    from bisar_budget.mission.parts import Entry, PartError
 
 _TITLES = {
     "imu": "Inertial sensors (motion_error.sensor), 1 sigma, each axis",
     "gnss": "GNSS receivers, each in one mode (motion_error.sensor), 1 sigma east, north, up",
     "oscillator": "Oscillators (oscillator.sensor)",
 }
+_KINDS = {"imu": "inertial sensor", "gnss": "GNSS receiver", "oscillator": "oscillator"}
+_IN_A_FOLDER = "accepted: a folder with files that end in .yaml or .yml"
 
 
 @click.command()
-@click.argument("pattern", default="*")
+@click.argument("patterns", nargs=-1, type=FILE, metavar="[PATTERN|FILE]...")
 @click.option("--kind", type=click.Choice(list(_TITLES)), help="Only parts of this kind.")
+@click.option("--check", "checking", is_flag=True, help="Check files of parts of your own, instead of a list.")
 @TEXT_OR_JSON
-def sensors(pattern: str, kind: str | None, format_name: str) -> None:
+def sensors(patterns: Sequence[str], kind: str | None, checking: bool, format_name: str) -> None:
     """List parts of the catalogue, their figures and where these stand.
 
     PATTERN is a name, or a glob of names. A mission takes a part's figures by its name: `motion_error: {sensor:
     stim300}`, `oscillator: {sensor: sit5358}`. Parts of your own are YAML files of the same form: name the file, or
     folders of files in `[tool.bisar-budget] sensors` of pyproject.toml.
+
+    With --check, FILE is the YAML file of a part, a folder of them, a glob pattern, or - for standard input. Each is
+    read as a mission reads it, and every fault is said. Exit code: 0 missions can use all of them, 2 one they cannot.
     """
+    if checking:
+        if kind is not None:
+            raise click.UsageError("--kind is for the list of parts; it cannot be combined with --check.")
+        if not patterns:
+            raise click.UsageError("--check needs FILE: files of parts, folders of them, or - for standard input.")
+        _check(patterns, format_name)
+        return
+    chosen = _listed(patterns or ("*",), kind)
+    deliver(_as_json(chosen) if format_name == "json" else _as_text(chosen), None, format_name)
+
+
+def _listed(patterns: Sequence[str], kind: str | None) -> "list[Entry]":
+    """Parts of the catalogue; ends the command where a pattern matches none."""
     from fnmatch import fnmatchcase
 
     from bisar_budget.mission.parts import PartError, entries, folders
@@ -36,16 +57,83 @@ def sensors(pattern: str, kind: str | None, format_name: str) -> None:
     try:
         known = list(entries(folders("")))
     except PartError as error:
-        complain(f"error: {printable(str(error))}")
+        for said in error.args:
+            complain(f"error: {printable(said)}")
         sys.exit(EXIT_USAGE)
-    chosen = [one for one in known if fnmatchcase(one.id, pattern) and kind in (None, one.part.kind)]
-    if not chosen:
-        from bisar_budget.mission.readers import did_you_mean
+    matching = {
+        pattern: [one for one in known if fnmatchcase(one.id, pattern) and kind in (None, one.part.kind)]
+        for pattern in patterns
+    }
+    for pattern, found in matching.items():
+        if not found:
+            from bisar_budget.mission.readers import did_you_mean
 
-        hint = did_you_mean(pattern, tuple(one.id for one in known))
-        complain(f"error: no part of the catalogue matches {printable(pattern)}. {hint}".rstrip())
+            hint = did_you_mean(pattern, tuple(one.id for one in known))
+            if os.path.exists(pattern):
+                hint = "It is a file: --check checks it"
+            listed = "`bisar-budget sensors` lists them"
+            complain(f"error: {sentences(f'no part of the catalogue matches {printable(pattern)}; {listed}', hint)}")
+    if not all(matching.values()):
         sys.exit(EXIT_USAGE)
-    deliver(_as_json(chosen) if format_name == "json" else _as_text(chosen), None, format_name)
+    return [one for one in known if any(one in found for found in matching.values())]
+
+
+def _check(names: Sequence[str], format_name: str) -> None:
+    """Say of each file whether it is a part that missions can use; ends the command with 2 if one is not."""
+    from bisar_budget.mission.parts import PartError, part_files, read_entry
+
+    files: list[str] = []
+    checked: dict[str, Entry | PartError] = {}
+    for name in expand(names):
+        try:
+            inside = part_files(name) if os.path.isdir(name) else [name]
+            if not inside:
+                raise PartError.of(name, [file_fault("has no file of a part")._replace(accepted=_IN_A_FOLDER)])
+            if any(char in name for char in "*?[") and not os.path.exists(name):
+                raise PartError.of(name, [file_fault("not found, and no file matches the pattern")])
+            files += inside
+        except PartError as error:
+            checked[name] = error
+    spare(files, [])
+    for file in files:
+        try:
+            checked[file] = read_entry(file)
+        except PartError as error:
+            checked[file] = error
+    lines = []
+    for file, found in checked.items():
+        if isinstance(found, PartError):
+            for line in MissionError(file, found.faults).lines():
+                complain(line)
+        else:
+            lines.append(f"{_fine(file, found)}\n")
+    deliver(_checked_as_json(checked) if format_name == "json" else "".join(lines), None, format_name)
+    if len(lines) < len(checked):
+        sys.exit(EXIT_USAGE)
+
+
+def _fine(file: str, entry: "Entry") -> str:
+    count = len(entry.figures)
+    figures = f"{count} figures, each with a source" if count > 1 else "1 figure, with a source"
+    return f"{printable(file)}: fine: {printable(entry.part.name)}, {_KINDS[entry.part.kind]}, {figures}"
+
+
+def _checked_as_json(checked: "Mapping[str, Entry | PartError]") -> str:
+    import json
+
+    from bisar_budget.mission.parts import PartError
+    from bisar_budget.report.formats.json_document import fault_item
+
+    parts = []
+    for file, found in checked.items():
+        if isinstance(found, PartError):
+            faults = [fault_item(fault) for fault in found.faults]
+            parts.append({"file": file, "status": "error", "errors": faults})
+        else:
+            parts.append({"file": file, "status": "pass", "errors": []} | _item(found))
+    status = "error" if any(part["status"] == "error" for part in parts) else "pass"
+    document = {"format": "bisar-budget/sensors-check/1", "status": status, "parts": parts}
+    return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
 
 
 def _as_text(chosen: "list[Entry]") -> str:
@@ -74,20 +162,21 @@ def _as_text(chosen: "list[Entry]") -> str:
 def _as_json(chosen: "list[Entry]") -> str:
     import json
 
+    document = {"format": "bisar-budget/sensors/1", "parts": [_item(one) for one in chosen]}
+    return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
+
+
+def _item(one: "Entry") -> dict[str, Any]:
     from bisar_budget.mission.parts import evidence
 
-    parts = [
-        {
-            "id": one.id,
-            "kind": one.part.kind,
-            "name": one.part.name,
-            "figures": {
-                figure: {"value": written, "source": evidence(one.part, figure).removeprefix(f"{one.part.name}: ")}
-                for figure, written in one.figures.items()
-            },
-            "says": one.part.says,
-            "file": one.file,
-        }
-        for one in chosen
-    ]
-    return json.dumps({"format": "bisar-budget/sensors/1", "parts": parts}, indent=2, ensure_ascii=False) + "\n"
+    return {
+        "id": one.id,
+        "kind": one.part.kind,
+        "name": one.part.name,
+        "figures": {
+            figure: {"value": written, "source": evidence(one.part, figure).removeprefix(f"{one.part.name}: ")}
+            for figure, written in one.figures.items()
+        },
+        "says": one.part.says,
+        "file": one.file,
+    }

@@ -105,15 +105,19 @@ DATE = click.option(
 
 
 def expand(patterns: Iterable[str]) -> list[str]:
-    """Expand the glob patterns that the shell left; a pattern without a match stays and fails to load."""
+    """Expand the glob patterns that the shell left; a pattern without a match stays and fails to load.
+
+    A file that has the name of a pattern is one of many: else a file named `*.yaml` would take the place of all.
+    """
     files: list[str] = []
     for pattern in patterns:
         if not pattern:
             raise click.UsageError("the name of a file is empty.")
-        if pattern != "-" and any(char in pattern for char in "*?[") and not os.path.exists(pattern):
+        if any(char in pattern for char in "*?["):
             from glob import glob
 
-            files += sorted(glob(pattern, recursive=True)) or [pattern]
+            named = [pattern] if os.path.exists(pattern) else []
+            files += sorted({*glob(pattern, recursive=True), *named}) or [pattern]
         else:
             files.append(pattern)
     return list(dict.fromkeys(files))

@@ -15,9 +15,8 @@ from bisar_budget.design.stated import Skipped, Stated, stated_numbers
 from bisar_budget.design.variation import Variation, deciding_row, hold_to_decisions
 from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.findings.row import Row
-from bisar_budget.mission.load import folder_of
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.parts import PartError, finder_of, taken_figures
+from bisar_budget.mission.parts import taken_figures
 
 _BREAKS = ("fail",)
 _NOTHING = 1e-9  # of a utilization: what rounding leaves of a check
@@ -108,10 +107,7 @@ def sensitivity(
 def _stating_its_parts(variation: Variation) -> tuple[Variation, Mapping[str, str]]:
     """The same mission as if its file stated the figures that it takes from parts; the part by the key of each."""
     mission = variation.read()
-    try:
-        taken = list(taken_figures(mission, finder_of(folder_of(mission.file))))
-    except PartError as error:
-        raise QuestionError(str(error)) from None
+    taken = list(taken_figures(mission))
     if not taken:
         return variation, {}
     stated = variation.read([SetValue(one.key, json.dumps(one.value)) for one in taken])

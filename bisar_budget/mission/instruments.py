@@ -168,13 +168,15 @@ class _PowerLawReader(Reader):
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Object of coefficients."""
         one = _COEFFICIENT.schema(definitions)
-        return {"type": "object", "properties": dict.fromkeys(_POWERS, one), "additionalProperties": False}
+        properties = dict.fromkeys(_POWERS, one)
+        return {"type": "object", "properties": properties, "additionalProperties": False, "minProperties": 1}
 
 
 Points = tuple[tuple[float, float], ...]
 FORMS = ("phase_noise", "allan_deviation", "power_law")
 STEEPEST = 60.0  # dB a decade; noise of an oscillator falls by 40 at most
 RISE = 20.0  # dB a decade; a mask that rises by more is a tone, or a slip
+_OR_SENSOR = ", or sensor: a part of the catalogue"
 
 
 Frequency = Annotated[float | None, Key(Quantity(units.FREQUENCY, gt=0, ge=1, le=1e15), "At which a mask is stated.")]
@@ -248,15 +250,15 @@ class Oscillator(NamedTuple):
         return self.phase_noise is not None or bool(self.spurs)
 
     @staticmethod
-    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
-        """Hold it to one form, and a mask to slopes that an oscillator can have."""
+    def problems(values: Mapping[str, Any], or_else: str = _OR_SENSOR) -> Iterator[Problem]:
+        """Hold it to one form, and a mask to slopes that an oscillator can have; `or_else` is accepted instead."""
         forms = [form for form in FORMS if values.get(form) is not None]
         ways = f"accepted: one of {', '.join(FORMS)}"
-        if len(forms) > 1:
-            yield Problem(f"stands beside {forms[0]}", ways, at=(forms[1],))
+        for form in forms[1:]:
+            yield Problem(f"stands beside {forms[0]}", ways, at=(form,))
         if values.get("sensor") is None and values.keys() >= set(FORMS):
             if not forms:
-                yield Problem("says nothing of its noise", f"{ways}, or sensor: a part of the catalogue")
+                yield Problem("says nothing of its noise", f"{ways}{or_else}")
             if values["phase_noise"] is not None and values.get("frequency", 0.0) is None:
                 yield Problem("is missing", "accepted: the frequency at which the mask is stated", at=("frequency",))
         if values.get("spurs") and values.get("sensor") is None and values.get("frequency", 0.0) is None:

@@ -4,15 +4,17 @@ A text gives a `Mission` or a `MissionError`, nothing else.
 """
 
 import os
-import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import BinaryIO, cast
 
-from bisar_budget.faults import Fault, MissionError, SetValue, changes_words, sentences
-from bisar_budget.mission.model import MISSION, Mission, flies_on_earth, names_files, names_parts
+from bisar_budget.faults import Fault, MissionError, SetValue, changes_words, file_fault, sentences
+from bisar_budget.mission.model import MISSION, Mission, PartFile, flies_on_earth, names_files, names_parts
 from bisar_budget.mission.readers import INVALID
-from bisar_budget.mission.tree import MAX_BYTES, UnusableError, file_fault, read_tree
+from bisar_budget.mission.tree import MAX_BYTES, UnusableError, read_tree
+from bisar_budget.resources import standard_input
+
+_Find = Callable[[str], tuple[str, bytes]]
 
 
 def load_mission(path: str, model: str | None = None, changes: Sequence[SetValue] = ()) -> Mission:
@@ -27,9 +29,7 @@ def load_mission(path: str, model: str | None = None, changes: Sequence[SetValue
     """
     try:
         if path == "-":
-            if sys.stdin is None:
-                raise ValueError("standard input is closed")
-            data = _bounded(sys.stdin.buffer)
+            data = _bounded(standard_input())
         else:
             with open(path, "rb") as file:
                 data = _bounded(file)
@@ -57,7 +57,7 @@ def parse_mission(
     model: str | None = None,
     beside: Callable[[str], bytes] | None = None,
     changes: Sequence[SetValue] = (),
-    find: Callable[[str], tuple[str, bytes]] | None = None,
+    find: _Find | None = None,
 ) -> Mission:
     """Turn the content of a mission file into a `Mission`.
 
@@ -90,7 +90,7 @@ def parse_mission(
     if model is not None and isinstance(tree.root.get("allocation"), dict):
         tree.root["allocation"]["model"] = model
     mission = INVALID
-    parts: dict[str, str] = {}
+    parts: dict[str, PartFile] = {}
     with suppress(UnusableError):
         mission = MISSION.read(tree.root, (), tree.report)
         folder = folder_of(file)
@@ -105,29 +105,28 @@ def parse_mission(
         if mission is INVALID and names_files(tree.root):
             from bisar_budget.mission.parts import finder_of, report_parts
 
-            report_parts(tree.root, folder, find or finder_of(folder), tree.report)
+            report_parts(tree.root, find or finder_of(folder), tree.report)
         elif mission is not INVALID and names_parts(mission):
             from bisar_budget.mission.parts import finder_of, with_parts
 
-            mission = with_parts(mission, folder, _noted(find or finder_of(folder), parts), tree.report)
+            mission = with_parts(mission, _noted(find or finder_of(folder), parts), tree.report)
     if tree.faults:
-        ordered = sorted(dict.fromkeys(tree.faults), key=lambda fault: (fault.line or 0, fault.column or 0))
-        ordered = [_with_hint(fault) for fault in ordered]
+        ordered = tuple([_with_hint(fault) for fault in tree.in_order()])
         if changes:
-            ordered = [_with_changes(fault, changes) for fault in ordered]
-        raise MissionError(file, tuple(ordered))
+            ordered = tuple([_with_changes(fault, changes) for fault in ordered])
+        raise MissionError(file, ordered)
     as_bytes = data.encode("utf-8", "surrogatepass") if isinstance(data, str) else data
     read = cast(Mission, mission._replace(file=file, places=tree.values, data=as_bytes, changes=tuple(changes)))
-    read = read._replace(parts=tuple(parts.items()))
+    read = read._replace(parts=tuple(parts.values()))
     return read if model is None else read._replace(allocation=read.allocation._replace(model=model))
 
 
-def _noted(find: Callable[[str], tuple[str, bytes]], files: dict[str, str]) -> Callable[[str], tuple[str, bytes]]:
+def _noted(find: _Find, parts: dict[str, PartFile]) -> _Find:
     """The same, and the file of each part is noted by its name."""
 
     def found(name: str) -> tuple[str, bytes]:
         file, content = find(name)
-        files[name] = file
+        parts[name] = PartFile(name, file, content)
         return file, content
 
     return found

@@ -286,12 +286,20 @@ class Waiver(NamedTuple):
     reason: Annotated[str, Key(Text())]
 
 
+class PartFile(NamedTuple):
+    """The file of a part that a mission takes figures from: the name that the mission says, and the file as read."""
+
+    name: str
+    file: str
+    data: bytes
+
+
 class Mission(NamedTuple):
     """A mission file that can be used.
 
     `file` and `places` say where it stands: the path of each value to the parser's event. `data` is the file as
-    read, byte for byte. `changes` are the values that options put in place of the file's, `parts` name and file of
-    each part that it takes figures from.
+    read, byte for byte. `changes` are the values that options put in place of the file's, `parts` the files of
+    parts that it takes figures from.
     """
 
     schema_version: Annotated[int, Key(Version())]
@@ -320,7 +328,7 @@ class Mission(NamedTuple):
     places: Mapping[KeyPath, Any] = {}
     data: bytes = b""
     changes: tuple[SetValue, ...] = ()
-    parts: tuple[tuple[str, str], ...] = ()
+    parts: tuple[PartFile, ...] = ()
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:

@@ -2,6 +2,7 @@
 
 One YAML file for each part, in `specs/sensors/`, in the folders that a project names, or anywhere by its path. A
 mission names parts, and what the mission says itself overrides single figures.
+`_parsed` reads every part, whoever asks for it.
 """
 
 import os
@@ -9,7 +10,16 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from typing import Annotated, Any, NamedTuple
 
-from bisar_budget.faults import KeyPath, MissionError, Problem, sentences, shown
+from bisar_budget.faults import (
+    Fault,
+    InvalidValueError,
+    KeyPath,
+    MissionError,
+    Problem,
+    file_fault,
+    sentences,
+    shown,
+)
 from bisar_budget.geometry import Vector
 from bisar_budget.mission.bounds import COORDINATE, VELOCITY
 from bisar_budget.mission.instruments import (
@@ -36,34 +46,41 @@ from bisar_budget.mission.readers import (
     INVALID,
     Choice,
     Key,
+    Label,
     ListOf,
     OneOf,
+    Reference,
     Report,
     Section,
-    Text,
     TextMap,
     Triple,
     did_you_mean,
 )
-from bisar_budget.mission.tree import MAX_BYTES, UnusableError, read_tree
-from bisar_budget.resources import UnreadableError, content, resource
+from bisar_budget.mission.tree import MAX_BYTES, Tree, UnusableError, read_tree
+from bisar_budget.resources import DISK, Files, UnreadableError, resource, standard_input
 from bisar_budget.settings import SettingsError, project_settings
 
 Find = Callable[[str], tuple[str, bytes]]  # file and content of a part by its name
 
 MOTION_ERROR = Section(MotionError)
-_NAME = Text()
-_SOURCE = OneOf(lambda value: TextMap() if isinstance(value, dict) else _NAME, (_NAME, TextMap()))
-_SAYS = Key(_NAME, "What its figures are in their source.")
+_TEXT, _BY_FIGURE = Label(), TextMap("figure")
+_SOURCE = OneOf(lambda value: _BY_FIGURE if isinstance(value, dict) else _TEXT, (_TEXT, _BY_FIGURE))
+_NAME = Key(_TEXT, "Maker, type, and revision or mode; reports show it.")
+_SAYS = Key(_TEXT, "What its figures are in their source: which statistic, typical or largest, in which conditions.")
 _SOURCES = Key(_SOURCE, "Document, revision and table of every figure, or of each by its key.")
+_KIND = "Which kind of part it is, and which figures it has."
+_POSITION = "1 sigma east, north, up; a single value stands for each."
+_NOISE = "Position errors that change within an aperture: what is left of its noise."
+_GNSS_KINDS = ("position", "velocity", "random")
+_SUFFIXES = (".yaml", ".yml")
 _MOST = 1000  # parts of a folder
 
 
 class ImuPart(NamedTuple):
-    """An inertial sensor."""
+    """An inertial sensor, 1 sigma; a single value stands for each axis."""
 
-    kind: Annotated[str, Key(Choice("imu"))]
-    name: Annotated[str, Key(_NAME)]
+    kind: Annotated[str, Key(Choice("imu"), _KIND)]
+    name: Annotated[str, _NAME]
     source: Annotated[str | Mapping[str, str], _SOURCES]
     accelerometer_bias: AccelerometerBias = None
     attitude: Attitude = None
@@ -72,24 +89,35 @@ class ImuPart(NamedTuple):
     angle_random_walk: AngleRandomWalk = None
     says: Annotated[str | None, _SAYS] = None
 
+    @staticmethod
+    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+        """Hold it to a figure that is not zero."""
+        yield from _without_figure(values, IMU_KINDS)
+
 
 class GnssPart(NamedTuple):
     """A GNSS receiver in one of its modes: what its position and velocity are wrong by, 1 sigma, east, north, up."""
 
-    kind: Annotated[str, Key(Choice("gnss"))]
-    name: Annotated[str, Key(_NAME)]
+    kind: Annotated[str, Key(Choice("gnss"), _KIND)]
+    name: Annotated[str, _NAME]
     source: Annotated[str | Mapping[str, str], _SOURCES]
-    position: Annotated[Vector | None, Key(Triple(COORDINATE, or_scalar=True))] = None
-    velocity: Annotated[Vector | None, Key(Triple(VELOCITY, or_scalar=True))] = None
-    random: Annotated[tuple[GaussMarkov, ...], Key(ListOf(GaussMarkov))] = ()
+    position: Annotated[Vector | None, Key(Triple(COORDINATE, or_scalar=True), _POSITION)] = None
+    velocity: Annotated[Vector | None, Key(Triple(VELOCITY, or_scalar=True), _POSITION)] = None
+    random: Annotated[tuple[GaussMarkov, ...], Key(ListOf(GaussMarkov), _NOISE)] = ()
     says: Annotated[str | None, _SAYS] = None
+
+    @staticmethod
+    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+        """Hold it to a figure that is not zero, and its noise to what that of a mission is held to."""
+        yield from MotionError.problems({"random": values.get("random", ())})
+        yield from _without_figure(values, _GNSS_KINDS)
 
 
 class OscillatorPart(NamedTuple):
-    """An oscillator."""
+    """An oscillator, with its noise in one of three forms."""
 
-    kind: Annotated[str, Key(Choice("oscillator"))]
-    name: Annotated[str, Key(_NAME)]
+    kind: Annotated[str, Key(Choice("oscillator"), _KIND)]
+    name: Annotated[str, _NAME]
     source: Annotated[str | Mapping[str, str], _SOURCES]
     frequency: Frequency = None
     phase_noise: PhaseNoise = None
@@ -99,22 +127,36 @@ class OscillatorPart(NamedTuple):
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
-        """Hold it to what an oscillator of a mission is held to."""
-        yield from Oscillator.problems({**values, "sensor": None})
+        """Hold it to what an oscillator of a mission is held to, and to noise that is not zero."""
+        yield from Oscillator.problems({**values, "sensor": None}, or_else="")
+        if any(values.get(form) is not None for form in FORMS):
+            yield from _without_figure(values, FORMS)
 
 
 Part = ImuPart | GnssPart | OscillatorPart
 _Read = tuple[Part, Mapping[str, Any]]  # a part, and what its file says as text
-_SECTIONS: dict[str, Section] = {
+SECTIONS: dict[str, Section] = {
     "imu": Section(ImuPart),
     "gnss": Section(GnssPart),
     "oscillator": Section(OscillatorPart),
 }
-FIGURES = {"imu": IMU_KINDS, "gnss": ("position", "velocity", "random"), "oscillator": ("frequency", *FORMS)}
+FIGURES = {"imu": IMU_KINDS, "gnss": _GNSS_KINDS, "oscillator": ("frequency", *FORMS)}
 
 
 class PartError(Exception):
-    """A part that cannot be used; each of its arguments says what is wrong."""
+    """A part that cannot be used; each of its arguments says what is wrong.
+
+    `faults` are those of its file, with their places; empty where there is none to read.
+    """
+
+    def __init__(self, *said: str, faults: Sequence[Fault] = ()) -> None:
+        super().__init__(*said)
+        self.faults = tuple(faults)
+
+    @classmethod
+    def of(cls, file: str, faults: Sequence[Fault]) -> "PartError":
+        """What is wrong with a file, a line for each fault."""
+        return cls(*MissionError(file, tuple(faults)).lines(), faults=faults)
 
     def __str__(self) -> str:
         """Say all of it."""
@@ -152,17 +194,22 @@ def entries(places: Sequence[str]) -> Iterator[Entry]:
     PartError
         One of them is no part.
     """
-    found = [(name, file, *_read(file)) for name, file in catalogue(places).items()]
-    for name, file, part, written in sorted(found, key=lambda one: (list(_SECTIONS).index(one[2].kind), one[0])):
-        figures = {key: _as_written(written[key]) for key in FIGURES[part.kind] if key in written}
-        yield Entry(name, file, part, figures)
+    found = [_entry(name, file, _read(file)) for name, file in catalogue(places).items()]
+    yield from sorted(found, key=lambda one: (list(SECTIONS).index(one.part.kind), one.id))
 
 
-def _as_written(value: Any) -> str:
+def _entry(name: str, file: str, read: _Read) -> Entry:
+    part, written = read
+    figures = {key: figure_text(written[key]) for key in FIGURES[part.kind] if key in written}
+    return Entry(name, file, part, figures)
+
+
+def figure_text(value: Any) -> str:
+    """A figure as the file of its part has it, in one line."""
     if isinstance(value, dict):
-        return ", ".join(f"{key}: {_as_written(item)}" for key, item in value.items())
+        return ", ".join(f"{key}: {figure_text(item)}" for key, item in value.items())
     if isinstance(value, list):
-        return f"[{', '.join(map(_as_written, value))}]"
+        return f"[{', '.join(map(figure_text, value))}]"
     return str(value)
 
 
@@ -177,49 +224,128 @@ def read_part(file: str) -> Part:
     return _read(file)[0]
 
 
-def _read(file: str) -> _Read:
-    return _parsed(file, _content(file))
+def read_entry(file: str) -> Entry:
+    """Read a file, `-` for standard input, as a mission does that names it; hold its name to what one can name.
 
-
-def _content(file: str) -> bytes:
+    Raises
+    ------
+    PartError
+        No mission can use it; carries every fault.
+    """
+    data = _standard_input() if file == "-" else _content(file, DISK)
+    faults = () if file == "-" else tuple(_name_faults(file))
     try:
-        return content(file, MAX_BYTES)
+        read = _parsed(file, data)
+    except PartError as error:
+        raise PartError.of(file, (*faults, *error.faults)) from None
+    if faults:
+        raise PartError.of(file, faults)
+    return _entry(os.path.splitext(os.path.basename(file))[0], file, read)
+
+
+def _name_faults(file: str) -> Iterator[Fault]:
+    name = os.path.basename(file)
+    if not name.endswith(_SUFFIXES):
+        accepted = f"accepted: one that ends in {' or '.join(_SUFFIXES)}"
+        yield file_fault("has a name by which no mission finds a part")._replace(accepted=accepted)
+    try:
+        Reference().leaf(name)
+    except InvalidValueError as error:
+        yield file_fault(f"has a name that no mission can say: it {error}")
+
+
+def _read(file: str) -> _Read:
+    return _parsed(file, _content(file, DISK))
+
+
+def _content(file: str, files: Files) -> bytes:
+    try:
+        return files.content(file, MAX_BYTES)
     except UnreadableError as error:
-        raise PartError(str(error)) from None
+        said = str(error)
+        raise PartError(said, faults=[file_fault(said.removeprefix(f"{file} "))]) from None
+
+
+def _standard_input() -> bytes:
+    try:
+        return standard_input().read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise PartError.of("-", [file_fault(f"cannot be read: {reason}")]) from None
 
 
 def _parsed(file: str, data: bytes) -> _Read:
-    try:
-        tree = read_tree(data, file)
-    except MissionError as error:
-        raise PartError(*(f"{file}: {fault}" for fault in error.faults)) from None
-    kind = tree.root.get("kind")
-    section = _SECTIONS.get(kind) if isinstance(kind, str) else None
     part: Any = INVALID
-    if section is None:
-        raise PartError(f"{file}: kind: must be one of {', '.join(_SECTIONS)}")
+    try:
+        tree = read_tree(data, file, "part")
+    except MissionError as error:
+        raise PartError.of(file, error.faults) from None
     with suppress(UnusableError):
-        part = section.read(tree.root, (), tree.report)
+        part = _part_of(tree)
     if tree.faults:
-        raise PartError(*(f"{file}:{fault.line}:{fault.column}: {fault}" for fault in tree.faults))
-    if not any(_says(getattr(part, figure)) for figure in FIGURES[kind] if figure != "frequency"):
-        raise PartError(f"{file}: states no figure; accepted: one of {', '.join(FIGURES[kind])} that is not zero")
-    unsourced = [
-        figure for figure in FIGURES[kind] if getattr(part, figure) and evidence(part, figure).endswith(": ")
-    ]
-    if unsourced:
-        raise PartError(f"{file}: source: says nothing of {', '.join(unsourced)}")
+        raise PartError.of(file, tree.in_order())
     return part, tree.root
+
+
+def _part_of(tree: Tree) -> Any:
+    """The part that a file states; `INVALID` after a report.
+
+    A file that does not say its kind is read as what its figures are, so that all that is wrong is said at once.
+    """
+    root = tree.root
+    kind = root.get("kind")
+    if not (isinstance(kind, str) and kind in SECTIONS):
+        kind = max(SECTIONS, key=lambda one: len(root.keys() & set(FIGURES[one])))
+        is_likely = not root.keys().isdisjoint(FIGURES[kind])
+        if root.get("kind") is not INVALID:  # that was reported
+            tree.report(("kind",), _no_kind(root, kind if is_likely else ""))
+        if not is_likely:
+            return INVALID
+    part = SECTIONS[kind].read({**root, "kind": kind}, (), tree.report)
+    for problem in _without_source(root, FIGURES[kind]):
+        tree.report((), problem)
+    return part
+
+
+def _no_kind(root: Mapping[str, Any], likely: str) -> Problem:
+    """What is wrong with the kind that a file states, or does not; `likely` is that of its figures."""
+    hint = did_you_mean(root.get("kind", ""), tuple(SECTIONS))
+    if likely:
+        hint = f"Its figures are those of kind: {likely}"
+    elif "platforms" in root:
+        hint = "This seems to be a mission file, which `bisar-budget check` reads"
+    missing = "" if "kind" in root else ", and is missing"
+    return Problem(f"must be one of {', '.join(SECTIONS)}{missing}", hint=hint)
+
+
+def _without_figure(values: Mapping[str, Any], figures: Sequence[str]) -> Iterator[Problem]:
+    """Say so if no figure is there, or zeros alone; a figure that is wrong in itself is no key of `values`."""
+    if values.keys() >= set(figures) and not any(_says(values[figure]) for figure in figures):
+        yield Problem("states no figure", f"accepted: one of {', '.join(figures)} that is not zero")
+
+
+def _without_source(root: Mapping[str, Any], figures: Sequence[str]) -> Iterator[Problem]:
+    """Say which figures that a file states, right or wrong, have no source, where each has its own."""
+    source = root.get("source")
+    if not isinstance(source, dict):
+        return
+    silent = tuple([figure for figure in figures if root.get(figure) and figure not in source])
+    if silent:
+        others = [did_you_mean(key, silent) for key in source if key not in figures]
+        hint = next(filter(None, others), "")
+        yield Problem(f"says nothing of {', '.join(silent)}", "accepted: one for every figure", hint, at=("source",))
 
 
 def _says(figure: Any) -> bool:
     """Whether a figure is there, and is not zero: no sensor is without error."""
+    if isinstance(figure, GaussMarkov):
+        return _says(figure.sigma)
     if isinstance(figure, tuple | list):
         return any(_says(item) for item in figure)
     return isinstance(figure, float) and figure != 0
 
 
-def folders(beside: str) -> list[str]:
+def folders(beside: str, files: Files = DISK) -> list[str]:
     """Where parts are looked for: the project's own folders, then the catalogue of this package.
 
     Raises
@@ -228,7 +354,7 @@ def folders(beside: str) -> list[str]:
         The project's settings cannot be read.
     """
     try:
-        settings = project_settings(beside or os.getcwd())
+        settings = project_settings(beside or os.getcwd(), files)
     except SettingsError as error:
         raise PartError(str(error)) from None
     except OSError:  # somebody removed the current folder
@@ -237,30 +363,34 @@ def folders(beside: str) -> list[str]:
     return [*own, str(resource("specs", "sensors"))]
 
 
-def catalogue(places: Sequence[str]) -> dict[str, str]:
+def catalogue(places: Sequence[str], files: Files = DISK) -> dict[str, str]:
     """File of each part by its name; a project's own stand before the catalogue's."""
     found: dict[str, str] = {}
     for folder in places:
-        try:
-            names = sorted(os.listdir(folder))
-        except OSError:
-            raise PartError(f"{folder}: cannot be listed") from None
-        for name in names[:_MOST]:
-            stem, suffix = os.path.splitext(name)
-            if suffix in (".yaml", ".yml"):
-                found.setdefault(stem, os.path.join(folder, name))
+        for file in part_files(folder, files)[:_MOST]:
+            found.setdefault(os.path.splitext(os.path.basename(file))[0], file)
     return found
 
 
-def finder_of(folder: str) -> Find:
+def part_files(folder: str, files: Files = DISK) -> list[str]:
+    """Files of a folder that are parts by their names; raises `PartError` where it cannot be listed."""
+    try:
+        names = files.names(folder)
+    except OSError as error:
+        problem = f"cannot be listed: {error.strerror}"
+        raise PartError(f"{folder}: cannot be listed", faults=[file_fault(problem)]) from None
+    return [os.path.join(folder, name) for name in names if os.path.splitext(name)[1] in _SUFFIXES]
+
+
+def finder_of(folder: str, files: Files = DISK) -> Find:
     """What finds the parts that a mission file in a folder names.
 
     It raises `PartError` where there is none of a name, or its file cannot be read.
     """
 
     def find(name: str) -> tuple[str, bytes]:
-        file = _file_of(name, folder)
-        return file, _content(file)
+        file = _file_of(name, folder, files)
+        return file, _content(file, files)
 
     return find
 
@@ -276,28 +406,27 @@ def find_part(name: str, beside: str) -> Part:
     return _parsed(*finder_of(beside)(name))[0]
 
 
-def _file_of(name: str, beside: str) -> str:
-    if name.endswith((".yaml", ".yml")):
+def _file_of(name: str, beside: str, files: Files) -> str:
+    if name.endswith(_SUFFIXES):
         return os.path.join(beside, name)
-    places = folders(beside)
+    places = folders(beside, files)
     for folder in places:
-        for suffix in (".yaml", ".yml"):
-            file = os.path.join(folder, name + suffix)
-            if os.sep not in name and os.path.exists(file):
-                return file
-    near = did_you_mean(name.lower(), tuple(catalogue(places)))
+        with suppress(OSError):  # said where the part is in no other folder
+            there = files.names(folder)
+            for file in (name + suffix for suffix in _SUFFIXES):
+                if file in there:
+                    return os.path.join(folder, file)
+    near = did_you_mean(name.lower(), tuple(catalogue(places, files)))
     raise UnknownPartError(sentences("`bisar-budget sensors` lists them", near))
 
 
-def with_parts(mission: Mission, beside: str, find: Find, report: Report) -> Any:
+def with_parts(mission: Mission, find: Find, report: Report) -> Any:
     """Put in the figures of the parts that a mission names; `INVALID` after a report.
 
     Parameters
     ----------
     mission : Mission
         As read.
-    beside : str
-        Folder of the mission file.
     find : callable
         File and content of a part by its name; raises `PartError`.
     report : callable
@@ -305,7 +434,7 @@ def with_parts(mission: Mission, beside: str, find: Find, report: Report) -> Any
     """
     is_valid = True
     platforms = mission.platforms
-    sources = _Sources(beside, find, report)
+    sources = _Sources(find, report)
     for name in platforms._fields:
         platform = getattr(platforms, name)
         error = _with_sensors(platform.motion_error, ("platforms", name, "motion_error"), sources)
@@ -319,13 +448,13 @@ def with_parts(mission: Mission, beside: str, find: Find, report: Report) -> Any
     return mission._replace(platforms=platforms) if is_valid else INVALID
 
 
-def report_parts(root: Any, beside: str, find: Find, report: Report) -> None:
+def report_parts(root: Any, find: Find, report: Report) -> None:
     """Say what is wrong with the parts that a file names, which is no mission for other reasons.
 
     A section whose values are right is held to its parts as that of a mission is; of another one the names are looked
     at. The parameters are those of `with_parts`, `root` is what the file says.
     """
-    sources = _Sources(beside, find, report)
+    sources = _Sources(find, report)
     platforms = root.get("platforms")
     for name in Platforms._fields:
         platform = platforms.get(name) if isinstance(platforms, dict) else None
@@ -347,9 +476,8 @@ def _stand_in(section: Section, value: Any) -> dict[str, Any]:
 
 
 class _Sources(NamedTuple):
-    """The folder of a mission file, what finds its parts, and what takes their faults."""
+    """What finds the parts of a mission, and what takes their faults."""
 
-    beside: str
     find: Find
     report: Report
 
@@ -376,7 +504,7 @@ def _with_sensor(oscillator: Oscillator, path: KeyPath, sources: _Sources) -> An
 
 def _parts_of(names: str | tuple[str, ...] | None, path: KeyPath, kinds: Sequence[str], sources: _Sources) -> Any:
     """Parts, and what the file of each says; `INVALID` after a report."""
-    beside, find, report = sources
+    find, report = sources
     is_list = isinstance(names, tuple)
     found: list[_Read] = []
     is_valid = True
@@ -391,9 +519,10 @@ def _parts_of(names: str | tuple[str, ...] | None, path: KeyPath, kinds: Sequenc
             is_valid = False
             continue
         except PartError as error:
-            accepted = f"accepted: parts of the kind {' or '.join(kinds)}"
+            # What is wrong with its file says what is accepted there, and names the file.
+            accepted = "" if error.faults else f"accepted: parts of the kind {' or '.join(kinds)}"
             for said in map(str, error.args):
-                report(here, Problem(said, accepted, names_value=said.startswith(os.path.join(beside, name))))
+                report(here, Problem(said, accepted, names_value=bool(error.faults)))
             is_valid = False
             continue
         if any(part.kind == other.kind for other, _ in found):
@@ -416,7 +545,7 @@ def _motion_of(error: MotionError, parts: Sequence[_Read], path: KeyPath, report
                 continue
             key = _own_key(error, own, figure)
             if key:
-                overridden.append(Overridden(figure, key, part.name, _as_written(written[figure])))
+                overridden.append(Overridden(figure, key, part.name, figure_text(written[figure])))
             else:
                 taken[figure] = getattr(part, figure)
         if isinstance(part, ImuPart):
@@ -453,27 +582,23 @@ class TakenFigure(NamedTuple):
     part: str
 
 
-def taken_figures(mission: Mission, find: Find) -> Iterator[TakenFigure]:
-    """Figures that a mission takes from parts, which `find` finds; it is the same mission if its file states them.
+def taken_figures(mission: Mission) -> Iterator[TakenFigure]:
+    """Figures that a mission takes from parts; it is the same mission if its file states them.
 
     Values are text, or mappings and lists of text, as the file of the part has them.
-
-    Raises
-    ------
-    PartError
-        A part cannot be read any more.
     """
+    read = {one.name: _parsed(one.file, one.data) for one in mission.parts}
     for name, platform in zip(mission.platforms._fields, mission.platforms, strict=True):
         error, oscillator = platform.motion_error, platform.oscillator
         names = error.sensor if isinstance(error.sensor, tuple) else (error.sensor,) if error.sensor else ()
         for each in names:
-            part, written = _parsed(*find(each))
+            part, written = read[each]
             inner = "imu." if part.kind == "imu" else ""
             for figure in FIGURES[part.kind]:
                 if figure in written and dict(error.of_parts).get(figure) == evidence(part, figure):
                     yield TakenFigure(f"platforms.{name}.motion_error.{inner}{figure}", written[figure], each)
         if oscillator is not None and oscillator.sensor:
-            part, written = _parsed(*find(oscillator.sensor))
+            part, written = read[oscillator.sensor]
             path = ("platforms", name, "oscillator", "frequency")
             is_own = {"frequency": path in mission.places}
             is_own |= {form: oscillator.source != evidence(part, form) for form in FORMS}
@@ -496,11 +621,11 @@ def _oscillator_of(oscillator: Oscillator, read: _Read, path: KeyPath, report: R
     if own is None:
         taken = {form: getattr(part, form), "source": evidence(part, form)}
     else:
-        overridden.append(Overridden(own, f"oscillator.{own}", part.name, f"{form} {_as_written(written[form])}"))
+        overridden.append(Overridden(own, f"oscillator.{own}", part.name, f"{form} {figure_text(written[form])}"))
     if oscillator.frequency is None:
         taken["frequency"] = stated
     elif stated is not None and oscillator.frequency != stated:
-        at = _as_written(written["frequency"])
+        at = figure_text(written["frequency"])
         if own is None and form == "phase_noise":
             problem = f"the phase noise of {shown(part.name)} is stated at its own frequency, {at}"
             report(path, Problem(problem, "accepted: no frequency, or phase_noise beside it", at=("frequency",)))

@@ -26,7 +26,7 @@ from bisar_budget.paths.flight import (
     smoothed,
 )
 from bisar_budget.paths.instant import Instant
-from bisar_budget.resources import UnreadableError, content
+from bisar_budget.resources import DISK, Files, UnreadableError
 from bisar_budget.units import format_quantity
 
 Beside = Callable[[str], bytes]  # content of a file that a mission names
@@ -49,7 +49,7 @@ class _UnusablePathError(Exception):
         self.key, self.problem = key, problem
 
 
-def reader_of(folder: str) -> Beside:
+def reader_of(folder: str, files: Files = DISK) -> Beside:
     """What reads files beside a mission file in a folder.
 
     It raises `PathFileError` where a file cannot be read, is no regular file, or is larger than 500 MB.
@@ -57,7 +57,7 @@ def reader_of(folder: str) -> Beside:
 
     def read(name: str) -> bytes:
         try:
-            data = content(os.path.join(folder, name), _MOST_BYTES, name)
+            data = files.content(os.path.join(folder, name), _MOST_BYTES, name)
         except UnreadableError as error:
             raise PathFileError(str(error)) from None
         if len(data) > _MOST_BYTES:

@@ -171,7 +171,7 @@ class Text(Reader):
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Text that is not empty."""
-        return {"type": "string", "minLength": 1}
+        return {"type": "string", "minLength": 1, "maxLength": _MAX_TEXT}
 
 
 class Reference(Text):
@@ -181,11 +181,11 @@ class Reference(Text):
 
 
 class Label(Text):
-    """Text that may look like a number, such as the issue of a document."""
+    """Text that may look like a number to an editor, such as the issue of a document."""
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Text or a number, of which the digits are kept as they stand."""
-        return {"type": ["string", "number"], "minLength": 1}
+        return {"type": ["string", "number"], "minLength": 1, "maxLength": _MAX_TEXT}
 
 
 class Glob(Text):
@@ -330,7 +330,10 @@ class Day(Reader):
 
 
 class TextMap(Reader):
-    """A mapping of any key to text."""
+    """A mapping of any key to text; `of` says what the keys are."""
+
+    def __init__(self, of: str = "row id") -> None:
+        self.of = of
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
         """Read each value at its own place."""
@@ -345,7 +348,7 @@ class TextMap(Reader):
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Object."""
-        return {"type": "object", "additionalProperties": Text().schema(definitions), "maxProperties": _MAX_IDS}
+        return {"type": "object", "additionalProperties": Label().schema(definitions), "maxProperties": _MAX_IDS}
 
 
 class Section(Reader):

@@ -1,88 +1,228 @@
-"""A mission file as it stood in a git revision."""
+"""A mission file as it stood in a git revision, with all that it names: parts, settings, orbits, logs."""
 
 import os
-from subprocess import DEVNULL, PIPE, run
+from collections.abc import Sequence
+from fnmatch import fnmatchcase
+from subprocess import run
+from typing import NamedTuple
 
 from bisar_budget.faults import printable
-from bisar_budget.mission.load import parse_mission
+from bisar_budget.mission.load import folder_of, parse_mission
 from bisar_budget.mission.model import Mission
-from bisar_budget.paths.flight import PathFileError
+from bisar_budget.mission.parts import finder_of
+from bisar_budget.mission.paths import reader_of
+from bisar_budget.mission.tree import MAX_BYTES
+from bisar_budget.resources import DISK, UnreadableError
+
+_SUBMODULE = b"160000"  # mode of an entry that is a commit of another repository
 
 
 class RevisionError(Exception):
-    """No such file in no such revision, or no repository; the message says which."""
+    """No repository, no such revision, or no such file in it; the message says which."""
 
 
-def file_at(path: str, revision: str) -> bytes:
-    """Content of a file as committed in `revision`: a branch, tag or commit. Links are followed within that revision.
+class Revision:
+    """The files of a git repository as committed in a branch, tag or commit.
+
+    The repository is that of the current folder where the path is in it, else its own: a folder that became a
+    submodule since does not answer for itself. Links are followed within the revision, submodules are read at the
+    commit that it names. A file outside of the repository has one version, that on the disk; `outside` lists those
+    that were read.
+
+    Parameters
+    ----------
+    near : str
+        A path within the repository; it need not exist any more.
+    name : str
+        The revision.
 
     Raises
     ------
     RevisionError
-        Git is not there, the file is in no repository, the revision is unknown or has no such file, or has a link
-        that leads nowhere or out of the repository.
+        Git is not there, the path is in no repository, or the revision is unknown.
     """
-    folder, name = os.path.split(os.path.abspath(path))
-    if not os.path.isdir(folder):
-        raise RevisionError(f"{path}: there is no folder {folder}")
-    if not _git(folder, "rev-parse", "--git-dir")[0]:
-        raise RevisionError(f"{path} is not in a git repository")
-    # What starts with a dash would be an option to git.
-    is_known, commit = (
-        (False, b"")
-        if revision.startswith("-")
-        else _git(folder, "rev-parse", "--verify", "--quiet", f"{revision}^{{commit}}")
-    )
-    if not is_known:
-        raise RevisionError(f"the repository of {path} has no revision {printable(revision)}")
-    asked = os.fsencode(f"{commit.decode().strip()}:./{name}")
-    is_read, answer = (
-        (False, b"")  # git reads one name from each line
-        if b"\n" in asked
-        else _git(folder, "cat-file", "--batch", "--follow-symlinks", given=asked + b"\n")
-    )
+
+    def __init__(self, near: str, name: str) -> None:
+        self.name = name
+        self.outside: list[str] = []
+        self.top, said = _top(os.curdir)
+        if not self.top or self._inside(near) is None:
+            self.top, said = _top(_existing(near)[0])
+        if not self.top:
+            raise RevisionError(f"{near} {said or 'is not in a git repository'}")
+        # What starts with a dash would be an option to git.
+        is_known, commit, _ = (
+            (False, b"", "")
+            if name.startswith("-")
+            else _git(self.top, "rev-parse", "--verify", "--quiet", f"{name}^{{commit}}")
+        )
+        if not is_known:
+            raise RevisionError(f"the repository of {near} has no revision {printable(name)}")
+        self._commit = commit.decode().strip()
+
+    def content(self, file: str, most: int, called: str | None = None) -> bytes:
+        """Content of a file then; arguments and `UnreadableError` are those of `resources.content`."""
+        called = file if called is None else called
+        inside = self._inside(file)
+        if inside is None:
+            data = DISK.content(file, most, called)
+            self.outside.append(file)
+            return data
+        found = self._object(inside)
+        if found.kind == b"blob":
+            return found.content[: most + 1]
+        raise UnreadableError(f"{called} {_why_not(found)} revision {printable(self.name)}", is_missing=True)
+
+    def names(self, folder: str) -> list[str]:
+        """Names of the files in a folder then, sorted; `OSError` where there was none."""
+        inside = self._inside(folder)
+        if inside is None:
+            return DISK.names(folder)
+        found = self._object(inside)
+        if found.kind != b"tree":
+            raise FileNotFoundError(folder)
+        _, names, _ = _git(found.top, "ls-tree", "-z", "--name-only", found.hash)
+        return sorted(os.fsdecode(name) for name in names.split(b"\0") if name)
+
+    def has(self, file: str) -> bool:
+        """Whether there was such a file."""
+        inside = self._inside(file)
+        return inside is not None and self._object(inside).kind == b"blob"
+
+    def matching(self, pattern: str) -> list[str]:
+        """Files of the revision that a name or a glob pattern names from the current folder, sorted."""
+        inside = self._inside(pattern)
+        if inside is None:
+            return []
+        _, names, _ = _git(self.top, "ls-tree", "-r", "-z", "--name-only", self._commit)
+        wanted = inside.split("/")
+        write = str if os.path.isabs(pattern) else os.path.relpath
+        files = [os.fsdecode(name) for name in names.split(b"\0") if name]
+        return sorted(write(os.path.join(self.top, file)) for file in files if _matches(file.split("/"), wanted))
+
+    def path_of(self, file: str) -> str:
+        """Path of a file from the top of the repository, with forward slashes; of one outside as given."""
+        return self._inside(file) or file
+
+    def _inside(self, path: str) -> str | None:
+        """Path from the top of the repository, with forward slashes; None for what is outside.
+
+        Links below the top are left to the revision, which may have others.
+        """
+        real = os.path.join(os.path.realpath(_existing(path)[0]), _existing(path)[1])
+        for whole in (os.path.abspath(path), real):
+            above, below = whole, os.curdir
+            while True:
+                if os.path.isdir(above) and os.path.samefile(above, self.top):
+                    return below.replace(os.sep, "/")
+                above, name = os.path.split(above)
+                if not name:
+                    break
+                below = name if below == os.curdir else os.path.join(name, below)
+        return None
+
+    def _object(self, inside: str) -> "_Object":
+        """Find what stands at a path; of nothing what git says instead."""
+        return _object(self.top, self._commit, inside)
+
+
+def _matches(parts: Sequence[str], pattern: Sequence[str]) -> bool:
+    """Whether the parts of a path are those of a pattern, as `glob.glob` has it: `**` is any folders."""
+    if not pattern:
+        return not parts
+    is_open = bool(parts) and (not parts[0].startswith(".") or pattern[0].startswith("."))
+    if pattern[0] == "**":
+        return _matches(parts, pattern[1:]) or (is_open and _matches(parts[1:], pattern))
+    is_name = bool(parts) and (parts[0] == pattern[0] or (is_open and fnmatchcase(parts[0], pattern[0])))
+    return is_name and _matches(parts[1:], pattern[1:])
+
+
+def _top(folder: str) -> tuple[str, str]:
+    """Top of the repository of a folder, empty where there is none, and what git says of it."""
+    is_found, top, said = _git(folder, "rev-parse", "--show-toplevel")
+    return (os.fsdecode(top).rstrip("\r\n") if is_found else ""), said
+
+
+class _Object(NamedTuple):
+    """An object of git: its kind, its content, its hash, and the folder of its repository."""
+
+    kind: bytes
+    content: bytes = b""
+    hash: str = ""
+    top: str = ""
+
+
+def _object(top: str, commit: str, inside: str) -> _Object:
+    """Find what stands at a path of a commit, in submodules too."""
+    if "\n" in inside:  # git reads one name from each line
+        return _Object(b"missing")
+    asked = os.fsencode(f"{commit}:{'' if inside == os.curdir else inside}")
+    is_read, answer, _ = _git(top, "cat-file", "--batch", "--follow-symlinks", given=asked + b"\n")
     head, _, rest = answer.partition(b"\n")
     words = head.split()
-    if is_read and words[1:2] == [b"blob"]:
-        return rest[: int(words[2])]
-    raise RevisionError(f"{path} {_why_not(words, rest)} revision {printable(revision)}")
-
-
-def _why_not(words: list[bytes], rest: bytes) -> str:
-    """What git says instead of a file: `symlink` with the way out of the tree, or why a link has no end."""
+    if is_read and words[1:2] in ([b"blob"], [b"tree"]):
+        return _Object(words[1], rest[: int(words[2])], words[0].decode(), top)
     if words[:1] == [b"symlink"]:
-        outside = printable(os.fsdecode(rest.removesuffix(b"\n")))
-        return f"is a link out of the repository, to {outside}, in"
-    if words[:1] in ([b"dangling"], [b"loop"], [b"notdir"]):
+        return _Object(words[0], rest.removesuffix(b"\n"))
+    parts = inside.split("/")
+    for length in range(1, len(parts) + 1):
+        module = "/".join(parts[:length])
+        _, entry, _ = _git(top, "ls-tree", "-z", commit, "--", module)
+        if entry.startswith(_SUBMODULE):
+            below = "/".join(parts[length:]) or os.curdir
+            return _object(os.path.join(top, module), entry.split()[2].decode(), below)
+    return _Object(words[0] if words else b"missing")
+
+
+def _existing(path: str) -> tuple[str, str]:
+    """The nearest folder of a path that exists, and the rest of it."""
+    folder, rest = os.path.split(os.path.abspath(path))
+    while not os.path.isdir(folder) and folder != os.path.dirname(folder):
+        folder, name = os.path.split(folder)
+        rest = os.path.join(name, rest)
+    return folder, rest
+
+
+def _why_not(found: _Object) -> str:
+    """What git says instead of a file: `symlink` with the way out of the tree, or why a link has no end."""
+    if found.kind == b"symlink":
+        return f"is a link out of the repository, to {printable(os.fsdecode(found.content))}, in"
+    if found.kind in (b"dangling", b"loop", b"notdir"):
         return "is a link that leads nowhere in"
-    return "is not in"
+    return "is a folder in" if found.kind == b"tree" else "is not in"
 
 
-def mission_at(path: str, revision: str) -> Mission:
-    """Read a mission file as committed in `revision`, and the orbits and logs that it names as committed there.
+def mission_at(path: str, revision: Revision, model: str | None = None) -> Mission:
+    """Read a mission file as committed in `revision`, with the parts, settings, orbits and logs of then.
+
+    `model` stands in for the file's own.
 
     Raises
     ------
     RevisionError
-        As `file_at`.
+        It is not there.
     MissionError
         Not a usable mission then.
     """
-
-    def beside(name: str) -> bytes:
-        try:
-            return file_at(os.path.join(os.path.dirname(path), name), revision)
-        except RevisionError as error:
-            raise PathFileError(str(error)) from None
-
-    return parse_mission(file_at(path, revision), f"{revision}:{path}", beside=beside)
-
-
-def _git(folder: str, *arguments: str, given: bytes = b"") -> tuple[bool, bytes]:
     try:
-        done = run(["git", "-C", folder, *arguments], input=given, stdout=PIPE, stderr=DEVNULL, check=False)
+        data = revision.content(path, MAX_BYTES)
+    except UnreadableError as error:
+        raise RevisionError(str(error)) from None
+    folder = folder_of(path)
+    beside, find = reader_of(folder, revision), finder_of(folder, revision)
+    return parse_mission(data, f"{revision.name}:{path}", model, beside, find=find)
+
+
+def _git(folder: str, *arguments: str, given: bytes = b"") -> tuple[bool, bytes, str]:
+    """Whether git did it, what it wrote, and what it refuses that has nothing to do with what was asked."""
+    # A folder can have the files of a bare repository among those that are committed: its revisions, its settings.
+    command = ["git", "-c", "safe.bareRepository=explicit", "-C", folder, *arguments]
+    try:
+        done = run(command, input=given, capture_output=True, check=False)
     except OSError:
         raise RevisionError("git cannot be run; --base needs it") from None
     except ValueError:  # a NUL in the name
-        return False, b""
-    return done.returncode == 0, done.stdout
+        return False, b"", ""
+    is_distrusted = b"dubious ownership" in done.stderr
+    words = "is in a repository of another owner, which git does not read; `git config safe.directory` lets it"
+    return done.returncode == 0, done.stdout, words if is_distrusted else ""

@@ -12,7 +12,7 @@ from typing import Any
 import yaml
 from yaml import AliasEvent, MappingEndEvent, ScalarEvent
 
-from bisar_budget.faults import Fault, KeyPath, MissionError, Problem, SetValue, printable, shown
+from bisar_budget.faults import Fault, KeyPath, MissionError, Problem, SetValue, file_fault, printable, shown
 from bisar_budget.mission.readers import INVALID
 
 MAX_BYTES = 1 << 20  # a mission file has a few kilobytes
@@ -24,20 +24,15 @@ _PARSER = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
 _NULLS = ("", "~", "null", "Null", "NULL")
 
 
-def file_fault(problem: str, hint: str = "") -> Fault:
-    """A fault of the file as a whole."""
-    return Fault(line=None, column=None, key="", problem=problem, hint=hint)
-
-
 def events(text: str) -> Callable[[], Any]:
     """Give the parser's events of a text, one at each call; raises `yaml.YAMLError`."""
     next_event: Callable[[], Any] = _PARSER(text).get_event
     return next_event
 
 
-def _decoded(data: bytes | str, file: str) -> str:
+def _decoded(data: bytes | str, file: str, what: str) -> str:
     if len(data) > MAX_BYTES:
-        raise MissionError(file, (file_fault(f"is larger than {MAX_BYTES // 1024} KiB, so no mission file"),))
+        raise MissionError(file, (file_fault(f"is larger than {MAX_BYTES // 1024} KiB, so no {what} file"),))
     if isinstance(data, str):
         return data
     try:
@@ -58,10 +53,11 @@ class Tree:
     """What the file says: nested dict, list and str, with the parser's event of every key and value.
 
     What cannot be read is reported and stands in the tree as `INVALID`. `changes` are the options that put values
-    into it, each at the highest path that it changed.
+    into it, each at the highest path that it changed. `what` the file is to be is said of one that is too much.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, what: str = "mission") -> None:
+        self.what = what
         self.root: Any = INVALID
         self.keys: dict[KeyPath, Any] = {}
         self.values: dict[KeyPath, Any] = {}  # events, which hold the marks of start and end
@@ -87,6 +83,10 @@ class Tree:
             return None
         above = (self.changes.get(path[:length]) for length in range(len(path), 0, -1))
         return next(filter(None, above), None)
+
+    def in_order(self) -> tuple[Fault, ...]:
+        """Faults in the order of the file, each once."""
+        return tuple(sorted(dict.fromkeys(self.faults), key=lambda fault: (fault.line or 0, fault.column or 0)))
 
     def report(self, path: KeyPath, problem: Problem) -> None:
         """Note what a reader found wrong, at the value's place, else at the nearest key's above it."""
@@ -116,16 +116,15 @@ class Tree:
         self.root = self.node(next_event, next_event(), ())
         while type(event := next_event()) is not yaml.StreamEndEvent:
             if type(event) is yaml.DocumentStartEvent:
-                self.fault(
-                    event.start_mark, (), "has a second YAML document", accepted="accepted: one mission in a file"
-                )
+                one = f"accepted: one {self.what} in a file"
+                self.fault(event.start_mark, (), "has a second YAML document", accepted=one)
                 raise UnusableError
 
     def node(self, next_event: Callable[[], Any], event: Any, path: KeyPath) -> Any:
         """Read one value; the depth of the recursion is bounded by `MAX_DEPTH`."""
         self.values[path] = event
         if len(self.values) > MAX_VALUES:
-            self.faults.append(file_fault(f"has more than {MAX_VALUES} values, so no mission file"))
+            self.faults.append(file_fault(f"has more than {MAX_VALUES} values, so no {self.what} file"))
             raise UnusableError
         mark = event.start_mark
         kind = type(event)
@@ -203,22 +202,28 @@ class Tree:
         return mapping
 
 
-def read_tree(data: bytes | str, file: str) -> Tree:
-    """Read the one document of a file; bytes are UTF-8.
+_STARTS = {
+    "mission": "`bisar-budget init` writes a mission file to start from",
+    "part": "A part begins with kind: imu, kind: gnss or kind: oscillator",
+}
+
+
+def read_tree(data: bytes | str, file: str, what: str = "mission") -> Tree:
+    """Read the one document of a file; bytes are UTF-8, `what` is "mission" or "part".
 
     Raises
     ------
     MissionError
         It is no mapping in YAML, or too large; carries every fault.
     """
-    text = _decoded(data, file)
-    tree = Tree()
+    text = _decoded(data, file, what)
+    tree = Tree(what)
     try:
         next_event = events(text)
         tree.read_document(next_event)
         if not isinstance(tree.root, dict) and not tree.faults:
             problem = "is empty" if tree.root is INVALID else "is not a mapping of keys to values"
-            tree.faults.append(file_fault(problem, "`bisar-budget init` writes a mission file to start from"))
+            tree.faults.append(file_fault(problem, _STARTS[what]))
     except yaml.MarkedYAMLError as error:
         place = error.problem_mark or error.context_mark
         problem = f"is not valid YAML: {', '.join(filter(None, (error.context, error.problem)))}"

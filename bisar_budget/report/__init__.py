@@ -57,14 +57,16 @@ def format_of(name: str) -> str | None:
 
 
 class Style(NamedTuple):
-    """How much to say, and whether in colour; formats for machines ignore both and name files below `root`.
+    """How much to say, and whether in colour; formats for machines ignore both.
 
+    They name files from the root of the repository that each lies in (`report.words.identity`), else from `root`.
     Pictures lie in the folder `assets` beside the report; empty: nowhere, and the text has none.
     """
 
     color: bool = False
     verbosity: int = 0  # -1: verdicts only; 0: the table; 1: every row's reason, source and displacement
-    root: str = ""  # absolute path of the repository; empty: files are named as given
+    root: str = ""  # absolute path of the current folder, or GitHub's checkout; empty: files are named as given
+    is_checkout: bool = False  # whether `root` is GitHub's checkout, which needs no `.git` to be a repository
     assets: str = ""
     all_rows: bool = False  # of the text: what is neither declared nor limits anything too
     detail: str = "summary"  # of a compliance report; full: formulas and undeclared rows too

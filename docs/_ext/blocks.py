@@ -2,8 +2,9 @@
 
 A console block has commands behind `$ ` and under each the output that it must print; `...` stands for lines that are
 left out. A command with nothing under it may print anything. One that does not exit with 0 is followed by
-`$ echo $?`, so that the page says with what. A YAML block is a mission file, or a part of one, and has to load.
-Python runs. The blocks of a page share a folder, in which `specs` is the project's, and a Python namespace.
+`$ echo $?`, so that the page says with what. A YAML block is a mission file, or a section of one, and has to load;
+one with a `kind` is the file of a sensor or an oscillator. Python runs. The blocks of a page share a folder, in
+which `specs` is the project's, and a Python namespace.
 """
 
 import difflib
@@ -108,8 +109,14 @@ class Page:
         return done.stdout
 
     def _mission(self, text: str) -> None:
-        """Check a mission file; what has no `schema_version` is put into one."""
+        """Check a mission file; what has no `schema_version` is put into one. What has a `kind` is no mission."""
         part = yaml.load(text, yaml.BaseLoader)
+        if "kind" in part:
+            told = self._shell("bisar-budget sensors --check -", text)
+            exit_code, self.exit_code = self.exit_code, 0
+            if exit_code:
+                raise ExampleError(f"{told}{text}")
+            return
         if "schema_version" not in part:
             whole = _merged(yaml.load(_WHOLE, yaml.BaseLoader), part)
             for platform in whole["platforms"].values():

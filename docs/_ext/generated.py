@@ -27,6 +27,7 @@ from bisar_budget.catalogue import SYMBOLS
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission import readers
 from bisar_budget.mission.model import MISSION
+from bisar_budget.mission.parts import SECTIONS
 from bisar_budget.phrases import CODES
 from bisar_budget.report import FORMATS
 from bisar_budget.units import DIMENSIONS
@@ -176,7 +177,17 @@ def mission_keys(_: Generated) -> str:
     return _sections(_all_sections())
 
 
-def _all_sections() -> dict[str, readers.Section]:
+def part_keys(_: Generated) -> str:
+    """Every key of the file of a part, a kind after the other."""
+    found: dict[str, readers.Section] = {}
+    for kind, section in SECTIONS.items():
+        found[f"kind: {kind}"] = section
+        # A section within it has its own file's place: `random[]`.
+        found |= {path: inner for path, inner in _all_sections(section).items() if path}
+    return _sections(found)
+
+
+def _all_sections(root: readers.Section = MISSION) -> dict[str, readers.Section]:
     """Sections by the place where the file first has them, in the order of the file."""
     found: dict[str, readers.Section] = {}
 
@@ -191,7 +202,7 @@ def _all_sections() -> dict[str, readers.Section]:
                     mark = "[]" if isinstance(reader, readers.ListOf) else ""
                     walk(f"{path}.{name}{mark}".lstrip("."), inner)
 
-    walk("", MISSION)
+    walk("", root)
     return found
 
 
@@ -262,12 +273,13 @@ def _form(reader: readers.Reader) -> str:
     words = {
         readers.Section: "section",
         readers.TextList: "list of texts",
-        readers.TextMap: "row id: text",
         readers.Version: "`1`",
         readers.Day: "date, such as `2027-03-31`",
         readers.Label: "text or number",
         readers.Text: "text",
     }
+    if isinstance(reader, readers.TextMap):
+        return f"{reader.of}: text"
     for kind, word in words.items():
         if isinstance(reader, kind):
             return word
@@ -440,6 +452,7 @@ DIRECTIVES = {
     "json-keys": json_keys,
     "note-codes": note_codes,
     "mission-keys": mission_keys,
+    "part-keys": part_keys,
     "units": units,
     "finding": finding,
     "sources": sources,

@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 import sysconfig
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
@@ -16,7 +17,9 @@ from tests.conftest import ROOT
 
 EXAMPLE = ROOT / "examples" / "design-repo"
 ACTION = yaml.safe_load((ROOT / "action.yml").read_text(encoding="utf-8"))
+PACKAGES = list(dict.fromkeys(sysconfig.get_path(name) for name in ("purelib", "platlib")))
 BASH = shutil.which("bash")
+EROSION = {"fail-on-erosion": "50%"}
 
 
 def environment(**changes: str) -> dict[str, str]:
@@ -43,27 +46,249 @@ def design(tmp_path: Path) -> Path:
     return folder
 
 
+# What a repository may have in its root, or a workflow on PYTHONPATH, by the name of what the gate imports, of what
+# starts the workers, and of what installs it.
+TRAPS = (
+    *("bisar_budget", "click", "yaml", "numpy", "jinja2", "json", "pip", "venv", "ensurepip", "sitecustomize"),
+    *("multiprocessing", "pickle", "socket", "signal", "distributed"),
+)
+ON_WORKERS = ("--monte-carlo", "10", "--scheduler", "local:1")
+
+
+def set_trap(folder: Path, name: str) -> None:
+    """Put a package in a folder that makes whoever imports it exit with 0, and leaves its name in `caught`."""
+    (folder / name).mkdir()
+    lines = [
+        "import os",
+        f"with open({str(folder.parent / 'caught')!r}, 'a') as file:",
+        f"    print({name!r}, file=file)",
+    ]
+    (folder / name / "__init__.py").write_text("\n".join([*lines, "os._exit(0)"]), encoding="utf-8")
+    (folder / name / "__main__.py").write_text("", encoding="utf-8")
+
+
+def caught(folder: Path) -> list[str]:
+    """Names of the traps that somebody imported."""
+    file = folder.parent / "caught"
+    return file.read_text(encoding="utf-8").split() if file.exists() else []
+
+
+def set_traps(folder: Path) -> dict[str, str]:
+    """Put all traps in a folder; gives the variables that lead there."""
+    for name in (*TRAPS, "usercustomize"):  # no environment of its own imports that one
+        set_trap(folder, name)
+    (folder / "pip.conf").write_text("[global]\ntarget = vendor\n", encoding="utf-8")
+    (folder / "setup.cfg").write_text("[install]\nprefix = vendor\n", encoding="utf-8")
+    (folder / "constraints.txt").write_text("bisar-budget == 9\n", encoding="utf-8")
+    (folder / ".python-version").write_text("2.7\n", encoding="utf-8")
+    here = str(folder)
+    python = {"PYTHONPATH": here, "PYTHONHOME": here, "PYTHONUSERBASE": here, "PYTHONSTARTUP": "click/__init__.py"}
+    pip = {
+        "PIP_CONFIG_FILE": "pip.conf",
+        "PIP_CONSTRAINT": "constraints.txt",
+        "PIP_TARGET": "vendor",
+        "PIP_USER": "1",
+    }
+    return python | pip | {"_BISAR_BUDGET_COMPLETE": "bash_source"}
+
+
+# Builds a wheel of nothing but the folders where this run has the package and what it imports; asks for no package.
+BACKEND = """import zipfile
+
+def build_wheel(folder, settings=None, metadata=None):
+    about = "bisar_budget-0.dist-info/"
+    files = {
+        "at_hand.pth": %r,
+        about + "METADATA": "Metadata-Version: 2.1\\nName: bisar-budget\\nVersion: 0\\n",
+        about + "WHEEL": "Wheel-Version: 1.0\\nGenerator: t\\nRoot-Is-Purelib: true\\nTag: py3-none-any\\n",
+        about + "entry_points.txt": "[console_scripts]\\nbisar-budget = bisar_budget.cli:main\\n",
+    }
+    name = "bisar_budget-0-py3-none-any.whl"
+    with zipfile.ZipFile(f"{folder}/{name}", "w") as wheel:
+        for path, text in files.items():
+            wheel.writestr(path, text)
+        wheel.writestr(about + "RECORD", "".join(f"{path},,\\n" for path in [*files, about + "RECORD"]))
+    return name
+"""
+PROJECT = '[build-system]\nrequires = []\nbuild-backend = "backend"\nbackend-path = ["."]\n'
+
+
+def run_step(
+    folder: Path, step_name: str, inputs: Mapping[str, str], outputs: Mapping[str, str], **variables: str
+) -> subprocess.CompletedProcess[str]:
+    """Run a step of the action as a runner of GitHub: the script in a file, `bash -eo pipefail`, inputs as variables.
+
+    `outputs` are those of the steps before it, by the names that the action calls them.
+    """
+    (step,) = [step for step in ACTION["runs"]["steps"] if step.get("name") == step_name]
+    given = {f"inputs.{name}": spec.get("default", "") for name, spec in ACTION["inputs"].items()}
+    given |= {f"inputs.{name}": text for name, text in inputs.items()} | outputs
+    for name, value in step["env"].items():
+        (used,) = re.fullmatch(r"\$\{\{ ([\w.-]+) \}\}", value).groups()
+        variables[name] = given[used]
+    script = folder.parent / "step.sh"
+    script.write_text(step["run"], encoding="utf-8")
+    variables |= {"GITHUB_WORKSPACE": str(folder), "GITHUB_STEP_SUMMARY": str(folder.parent / "summary.md")}
+    return subprocess.run(
+        [BASH, "--noprofile", "--norc", "-eo", "pipefail", str(script)],
+        cwd=folder,
+        env=environment(**variables),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+@pytest.fixture(scope="module")
+def python(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Python with the tool, as the action's own step installs it, in a repository full of traps."""
+    folder = tmp_path_factory.mktemp("install")
+    design, tool = folder / "design", folder / "tool"
+    for made in (design, tool, folder / "temp"):
+        made.mkdir()
+    variables = set_traps(design)
+    (tool / "pyproject.toml").write_text(PROJECT, encoding="utf-8")
+    (tool / "backend.py").write_text(BACKEND % "\n".join([str(ROOT), *PACKAGES]), encoding="utf-8")
+    variables |= {"RUNNER_OS": "Linux", "RUNNER_TEMP": str(folder / "temp"), "GITHUB_ACTION_PATH": str(tool)}
+    variables |= {"GITHUB_OUTPUT": str(folder / "output"), "PIP_NO_INDEX": "1"}
+    done = run_step(
+        design, "Install bisar-budget", {}, {"steps.setup.outputs.python-path": sys.executable}, **variables
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert caught(design) == []
+    assert f"bisar-budget, version {__version__}" in done.stdout
+    assert not (design / "vendor").exists()
+    (line,) = (folder / "output").read_text(encoding="utf-8").splitlines()
+    name, _, path = line.partition("=")
+    assert name == "python"
+    assert Path(path).is_relative_to(folder / "temp")
+    return path
+
+
 @pytest.mark.skipif(BASH is None, reason="the action's scripts are for bash")
 class TestAction:
-    def run(self, design: Path, step_name: str, **inputs: str) -> subprocess.CompletedProcess[str]:
-        """Run a step as GitHub's runner does: the script in a file, `bash -eo pipefail`, inputs as variables."""
-        (step,) = [step for step in ACTION["runs"]["steps"] if step.get("name") == step_name]
-        given = {name: spec.get("default", "") for name, spec in ACTION["inputs"].items()} | inputs
-        variables = {}
-        for name, value in step["env"].items():
-            (used,) = re.fullmatch(r"\$\{\{ inputs\.([\w-]+) \}\}", value).groups()
-            variables[name] = given[used]
-        script = design.parent / "step.sh"
-        script.write_text(step["run"])
-        variables |= {"GITHUB_WORKSPACE": str(design), "GITHUB_STEP_SUMMARY": str(design.parent / "summary.md")}
-        return subprocess.run(
-            [BASH, "--noprofile", "--norc", "-eo", "pipefail", str(script)],
+    @pytest.fixture(autouse=True)
+    def tool(self, python: str) -> None:
+        self.outputs = {"steps.install.outputs.python": python}
+
+    def run(
+        self, design: Path, step_name: str, variables: Mapping[str, str] = {}, **inputs: str
+    ) -> subprocess.CompletedProcess[str]:
+        return run_step(design, step_name, inputs, self.outputs, **variables)
+
+    @pytest.mark.parametrize("name", TRAPS)
+    def test_a_trap_catches_who_is_not_isolated(self, design: Path, python: str, name: str) -> None:
+        """Else the tests below would show nothing: each of the traps lets a Python pass that is not isolated."""
+        if name == "distributed":
+            pytest.importorskip("distributed", reason="not installed (extra `cluster`)")
+        set_trap(design, name)
+        program = name if name in ("pip", "venv", "ensurepip") else "bisar_budget"
+        command = [python, "-m", program, "check", "missions/fine_survey.yaml", "--report", "b.html", *ON_WORKERS]
+        done = subprocess.run(command, cwd=design, env=environment(PYTHONPATH=str(design)), capture_output=True)
+        assert (done.returncode, caught(design)) == (0, [name])
+
+    def test_no_file_and_no_variable_takes_the_place_of_the_tool(self, design: Path) -> None:
+        mission = design / "missions" / "survey.yaml"
+        mission.write_text(mission.read_text().replace("300 ug", "700 ug"))
+        variables = set_traps(design)
+        inputs = {"missions": "missions/*.yaml", "base": "HEAD", "junit": "b.xml", "sarif": "b.sarif"} | EROSION
+        check = self.run(design, "Check the budgets", variables, **inputs)
+        assert (check.returncode, check.stderr) == (1, "")
+        assert len(re.findall("(?m)^::error .*title=FAIL ", check.stdout)) >= 4
+        diff = self.run(design, "Compare with the base", variables, **inputs)
+        assert (diff.returncode, diff.stderr) == (1, "")
+        assert "receiver.acceleration.x" in (design.parent / "summary.md").read_text()
+        assert caught(design) == []
+
+    @pytest.mark.parametrize("is_script", [True, False])
+    def test_no_file_takes_the_place_of_a_module_in_a_worker(
+        self, design: Path, python: str, is_script: bool
+    ) -> None:
+        """A worker is an interpreter of its own, that of a command too that is not isolated."""
+        pytest.importorskip("distributed", reason="not installed (extra `cluster`)")
+        variables = {} if is_script else {"PYTHONPATH": str(design)}
+        set_traps(design)
+        program = [str(Path(python).with_name("bisar-budget"))] if is_script else [python, "-I", "-m", "bisar_budget"]
+        done = subprocess.run(
+            [*program, "check", "-q", "missions/fine_survey.yaml", *ON_WORKERS],
             cwd=design,
             env=environment(**variables),
             capture_output=True,
             text=True,
-            check=False,
         )
+        assert (done.returncode, caught(design)) == (1, []), done.stderr
+
+    @pytest.mark.parametrize(
+        ("strict", "code"),
+        [
+            *((word, 1) for word in ("true", "True", "TRUE", "yes", "on", "1", " true\n")),
+            *((word, 0) for word in ("false", "False", "FALSE", "no", "off", "0", "", " ", "false\n")),
+            *(
+                (word, 2)
+                for word in ("yes?", "2", "t rue", "strict", "true false", "*", "--", "x\n::notice::y", "50%0A")
+            ),
+        ],
+    )
+    def test_strict_is_read_or_refused(self, design: Path, strict: str, code: int) -> None:
+        (design / "pyproject.toml").unlink()  # says strict
+        mission = design / "missions" / "survey.yaml"
+        mission.write_text(mission.read_text().replace("combine: each", "combine: each\n  warn_above: 0.1"))
+        done = self.run(design, "Check the budgets", missions="missions/survey.yaml", strict=strict)
+        assert done.returncode == code, done.stdout + done.stderr
+        if code == 2:
+            (line,) = done.stdout.splitlines()
+            assert line.startswith("::error title=bisar-budget::input strict: must be true or false (got ")
+            assert "%0A" not in line
+
+    @pytest.mark.parametrize("name", ["*.yaml", "[a-z]*.yaml", "?*.yaml"])
+    def test_a_file_named_like_the_pattern_is_one_of_many(self, design: Path, name: str) -> None:
+        (design / "missions" / name).write_text((design / "missions" / "survey.yaml").read_text())
+        done = self.run(design, "Check the budgets", missions=f"missions/{name}")
+        assert done.returncode == 1
+        assert "missions/fine_survey.yaml" in done.stdout
+
+    def test_a_file_named_like_an_option_is_a_mission(self, design: Path) -> None:
+        shutil.copy(design / "missions" / "fine_survey.yaml", design / "--exit-zero.yaml")
+        shutil.copy(design / "missions" / "fine_survey.yaml", design / "--exit-zero")
+        for pattern in ("*.yaml", "--exit-zero", "-*"):
+            done = self.run(design, "Check the budgets", missions=pattern)
+            assert (done.returncode, "FAIL transmitter" in done.stdout) == (1, True)
+
+    @pytest.mark.parametrize("command", ["tag", "branch"])
+    def test_the_branch_of_the_remote_is_the_base(self, design: Path, command: str) -> None:
+        """Whoever may push could make a tag of the same name, which Git would take, at the change itself."""
+        git(design, "update-ref", "refs/remotes/origin/main", "HEAD")
+        mission = design / "missions" / "survey.yaml"
+        mission.write_text(mission.read_text().replace("300 ug", "700 ug"))
+        git(design, "commit", "-qam", "looser")
+        git(design, command, "origin/main")
+        inputs = {"missions": "missions/survey.yaml", "base": "origin/main"}
+        assert self.run(design, "Compare with the base", **inputs, **EROSION).returncode == 1
+
+    def test_a_bare_repository_among_the_missions_is_not_asked(self, design: Path) -> None:
+        """One with a revision of the same name, in which the mission was as loose as it is now."""
+        mission = design / "missions" / "survey.yaml"
+        mission.write_text(mission.read_text().replace("300 ug", "700 ug"))
+        other = design.parent / "other"
+        other.mkdir()
+        git(other, "init", "-q", "-b", "main")
+        shutil.copy(mission, other)
+        git(other, "add", "-A")
+        git(other, "commit", "-q", "-m", "as loose as now")
+        git(design, "branch", "-M", "main")
+        git(other, "config", "core.worktree", ".")
+        shutil.copytree(other / ".git", mission.parent, dirs_exist_ok=True)
+        done = self.run(design, "Compare with the base", missions="missions/survey.yaml", base="main", **EROSION)
+        assert done.returncode == 1
+        assert "**refused** receiver.acceleration.x: uses up" in done.stdout
+
+    def test_a_windows_runner_is_refused(self, design: Path) -> None:
+        outputs = {"steps.setup.outputs.python-path": sys.executable}
+        done = run_step(
+            design, "Install bisar-budget", {}, outputs, RUNNER_OS="Windows", RUNNER_TEMP=str(design.parent)
+        )
+        assert done.returncode == 2
+        assert done.stdout.startswith("::error title=bisar-budget::")
 
     def test_the_good_mission_passes(self, design: Path) -> None:
         done = self.run(design, "Check the budgets", missions="missions/survey.yaml")
@@ -105,11 +330,11 @@ class TestAction:
         (design / "missions" / "new.yaml").write_text(mission.read_text())  # nothing to compare with
         inputs = {"missions": "missions/*.yaml", "base": "HEAD"}
         assert self.run(design, "Compare with the base", **inputs).returncode == 0
-        done = self.run(design, "Compare with the base", **inputs, **{"fail-on-erosion": "50%"})
+        done = self.run(design, "Compare with the base", **inputs, **EROSION)
         assert done.returncode == 1
         summary = (design.parent / "summary.md").read_text()
         assert "receiver.acceleration.x" in summary
-        assert "new.yaml" not in summary
+        assert "missions/new.yaml: new, there is nothing to compare it with" in summary
 
     def test_an_unknown_base_is_said(self, design: Path) -> None:
         done = self.run(design, "Compare with the base", missions="missions/*.yaml", base="origin/none")
@@ -121,6 +346,13 @@ class TestAction:
         for name in ACTION["inputs"]:
             assert f"inputs.{name} " in text
         assert not any("${{" in step.get("run", "") for step in ACTION["runs"]["steps"])
+
+    def test_a_step_uses_outputs_of_steps_before_it(self) -> None:
+        known: list[str] = []
+        for step in ACTION["runs"]["steps"]:
+            assert set(re.findall(r"steps\.([\w-]+)\.", str(step))) <= set(known)
+            known += [step["id"]] if "id" in step else []
+        assert known == ["setup", "install"]
 
 
 class TestExample:
@@ -137,23 +369,19 @@ class TestExample:
         job = yaml.safe_load((design / ".gitlab-ci.yml").read_text(encoding="utf-8"))["budget"]
         (script,) = job["script"]
         monkeypatch.chdir(design)
-        program, *arguments = script.replace('"', "").split()
-        assert program == "bisar-budget"
+        program = "python -I -m bisar_budget "
+        assert script.startswith(program)
+        arguments = script.removeprefix(program).replace('"', "").split()
         assert run(*arguments).exit_code == 1
         assert (design / job["artifacts"]["reports"]["junit"]).exists()
-
-
-AT_HAND = """import os, sys
-sys.path += [path for path in os.environ["AT_HAND"].split(os.pathsep) if path not in sys.path]
-"""
 
 
 class TestPreCommit:
     """The hook as pre-commit runs it: the tool cloned, built and installed, then both missions.
 
-    What the tool imports is not installed anew: it is found behind the packages of the hook's own environment, where
-    this run has it, and so is what builds it: no package is fetched. CI builds the wheel in an environment of its
-    own, and installs it with all that it asks for, outside the checkout.
+    What the tool imports is not installed anew: a list in its wheel leads to where this run has it, behind the
+    packages of the hook's own environment. PYTHONPATH leads to what builds it, and no package is fetched. CI builds
+    the wheel in an environment of its own, and installs it with all that it asks for, outside the checkout.
     """
 
     @pytest.fixture
@@ -178,7 +406,10 @@ class TestPreCommit:
         project = (folder / "pyproject.toml").read_text(encoding="utf-8")
         alone, found = re.subn(r"(?ms)^dependencies = \[.*?^\]$", "dependencies = []", project)
         assert found == 1
+        table = "[tool.hatch.build.targets.wheel.force-include]\n"
+        alone = alone.replace(table, f'{table}"at_hand.pth" = "at_hand.pth"\n')
         (folder / "pyproject.toml").write_text(alone, encoding="utf-8")
+        (folder / "at_hand.pth").write_text("\n".join(PACKAGES), encoding="utf-8")
         git(folder, "init", "-q")
         git(folder, "add", "-A")
         git(folder, "commit", "-q", "-m", "tool")
@@ -194,22 +425,18 @@ class TestPreCommit:
         config = re.sub("https://github.com/OWNER/bisar-budget", str(tool), config)
         (design / ".pre-commit-config.yaml").write_text(config, encoding="utf-8")
         git(design, "add", ".pre-commit-config.yaml")
-        (tmp_path / "start").mkdir()
-        (tmp_path / "start" / "sitecustomize.py").write_text(AT_HAND, encoding="utf-8")
-        here = [sysconfig.get_path(name) for name in ("purelib", "platlib")]
-        at_hand = {
+        variables = {
             "PRE_COMMIT_HOME": str(tmp_path / "cache"),
-            "PYTHONPATH": str(tmp_path / "start"),
-            "AT_HAND": os.pathsep.join(dict.fromkeys(here)),
+            "PYTHONPATH": os.pathsep.join(PACKAGES),
             "PIP_NO_BUILD_ISOLATION": "0",  # pip's word for no isolation
             "PIP_NO_COMPILE": "1",
         }
 
         def hook(*files: str) -> subprocess.CompletedProcess[str]:
             return subprocess.run(
-                [sys.executable, "-m", "pre_commit", "run", "bisar-budget", "--files", *files],
+                [sys.executable, "-I", "-m", "pre_commit", "run", "bisar-budget", "--files", *files],
                 cwd=design,
-                env=environment(**at_hand),
+                env=environment(**variables),
                 capture_output=True,
                 text=True,
                 check=False,
@@ -225,3 +452,9 @@ class TestPreCommit:
         assert good.returncode == 0, good.stdout + good.stderr
         assert "Passed" in good.stdout
         assert "Skipped" in hook("pyproject.toml").stdout
+
+        variables["PYTHONPATH"] = set_traps(design)["PYTHONPATH"]
+        trapped = hook("missions/fine_survey.yaml")
+        assert trapped.returncode == 1, trapped.stdout + trapped.stderr
+        assert "FAIL missions/fine_survey.yaml" in trapped.stdout
+        assert caught(design) == []

@@ -125,7 +125,7 @@ class TestDiff:
         assert done.exit_code == 1
         said = " ".join(done.stdout.split())
         assert said.count("--set collection.aperture_time=7s") == 2
-        assert "refused (newly failing, or erosion above 10 %)" in said
+        assert "Refused timing.quadratic_phase_error: fails now" in said
         text = run("diff", MISSION, "--set", SET, "--format", "markdown").stdout.replace("\\", "")
         assert f"{MISSION} --set {SET}" in text.replace("&#45;", "-")
 

@@ -59,6 +59,13 @@ class TestExamples:
         with pytest.raises(ExampleError, match="cannot be used"):
             page.run("yaml", text)
 
+    def test_the_file_of_a_part(self, page: Page) -> None:
+        text = "kind: imu\nname: x\nsource: y\ngyro_bias: 1 deg/h\n"
+        page.run("yaml", text)
+        with pytest.raises(ExampleError, match="-:4:12: gyro_bias: must be an angular rate"):
+            page.run("yaml", text.replace("deg/h", "mg"))
+        assert page.exit_code == 0
+
     def test_a_part_of_a_mission_file(self, page: Page) -> None:
         page.run("yaml", "platforms: { receiver: { motion_error: { velocity: 5 mm/s } } }\n", "part.yaml")
         assert page.run("console", "$ cat part.yaml\n").endswith("5 mm/s } } }")

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bisar_budget.findings.row import Row
-from bisar_budget.report.change.comparison import Change, compare
+from bisar_budget.report.change.comparison import Change, Gate, compare
 from tests.conftest import findings, mission_text, row
 
 LIMIT = findings().allocation.qpe_limit("mission")
@@ -95,10 +95,10 @@ class TestCompare:
         result = compare(findings(**BASE, **needs, **noise), findings(**BASE, **needs))
         (lost,) = [one for one in result.requirements if one.key == "islr"]
         assert (lost.before, lost.after, lost.is_newly_failing) == ("pass", "not_evaluated", True)
-        assert result.is_refused(1.0)
+        assert "mission.islr" in [one.id for one in result.refusals(Gate(1.0)) if not one.is_allowed]
         back = compare(result.after, result.before)
         assert not any(one.is_newly_failing for one in back.requirements)
-        assert not back.is_refused(1.0)
+        assert not back.refusals(Gate(1.0))
         unasked = compare(findings(**BASE, **needs, **noise), findings(**BASE, **{RMS: "1 mm"}))
         assert [c.id for c in unasked.changes if c.is_newly_failing] == ["receiver.vibration.wideband"]
 
@@ -276,12 +276,12 @@ class TestCommand:
         assert message in result.stderr
         assert result.stdout == ""
 
-    def test_a_file_that_the_revision_does_not_have(self, run, repository) -> None:
+    def test_a_file_that_the_revision_does_not_have_is_new(self, run, repository) -> None:
         new = repository.with_name("new.yaml")
         new.write_text(mission_text())
-        result = run("diff", new, "--base", "HEAD")
-        assert result.exit_code == 2
-        assert "new.yaml is not in revision HEAD" in result.stderr
+        result = run("diff", new, "--base", "HEAD", "--fail-on-erosion", "0")
+        assert result.exit_code == 0
+        assert "missions/new.yaml: new, there is nothing to compare it with" in " ".join(result.stdout.split())
 
     def test_no_repository(self, run, tmp_path) -> None:
         (tmp_path / "m.yaml").write_text(mission_text())

@@ -1,28 +1,18 @@
-"""What a change of a mission does: the keys and the geometry that changed, and how much of each limit it erodes."""
+"""What a change does to missions: how much of each limit it erodes, what it loosens, what a gate refuses of it."""
 
-import math
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Sequence
+from fnmatch import fnmatchcase
+from typing import NamedTuple
 
 from bisar_budget.constants import UTILIZATION_TOLERANCE
-from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.faults import Changed, KeyPath
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
-from bisar_budget.mission.changes import parts_of
-from bisar_budget.mission.model import Mission
+from bisar_budget.report.change.inputs import Moved, moved_geometry, moved_inputs
+from bisar_budget.report.change.loosened import Loosened, loosenings
+from bisar_budget.report.words.sentences import percent
 
 SMALL = 0.01  # a row that moves by less than this part tells a reader nothing
-
-
-class Moved(NamedTuple):
-    """A value before and after: of a key as the files write it, or of the geometry; None where there is none."""
-
-    name: str
-    unit: str  # of a number; empty: text
-    before: str | float | None
-    after: str | float | None
 
 
 class Change(NamedTuple):
@@ -56,6 +46,13 @@ class Change(NamedTuple):
         return _is_newly_broken(_status(self.before), _status(self.after))
 
     @property
+    def words(self) -> str:
+        """What it does to the limit, for a gate that refuses it."""
+        if self.is_newly_failing:
+            return _worse(_status(self.after))
+        return f"uses up {percent(self.erosion)} of what was left of its limit"
+
+    @property
     def is_change(self) -> bool:
         """Whether anything that is reported differs; that it moved to another line does not count."""
         return _reported(self.before) != _reported(self.after)
@@ -83,15 +80,46 @@ class RequirementMove(NamedTuple):
     after: str | None
 
     @property
+    def id(self) -> str:
+        """Its name in waivers and reports."""
+        return f"mission.{self.key}"
+
+    @property
     def is_newly_failing(self) -> bool:
         """Whether it is not met, or not evaluated, now and was not."""
         return _is_newly_broken(self.before, self.after)
 
 
+class Refusal(NamedTuple):
+    """One thing that a gate refuses: its id, what it does, and whether `--allow` lets it through."""
+
+    id: str
+    words: str
+    is_allowed: bool
+
+
+class Gate(NamedTuple):
+    """A gate: the part of what was left of a limit that a change may use up, and the ids that it lets through."""
+
+    tolerated: float
+    allowed: tuple[str, ...] = ()
+
+    def only(self, allowed: str) -> "Gate":
+        """The same with one id let through."""
+        return self._replace(allowed=(allowed,))
+
+    def refusal(self, id: str, words: str, file: str) -> Refusal:
+        """Refuse, or let through: the id, or the id behind the file and a colon, may be named or match a pattern."""
+        names = (id, f"{file}:{id}")
+        return Refusal(
+            id, words, any(name == one or fnmatchcase(name, one) for one in self.allowed for name in names)
+        )
+
+
 class MissionChange(NamedTuple):
     """A mission before and after; changes have the largest erosion first. `inputs` are keys of the mission file.
 
-    `requirements` are those that stand otherwise now.
+    `requirements` are those that stand otherwise now, `loosened` what holds the mission less than before.
     """
 
     before: MissionFindings
@@ -101,14 +129,55 @@ class MissionChange(NamedTuple):
     inputs: tuple[Moved, ...] = ()
     geometry: tuple[Moved, ...] = ()
     requirements: tuple[RequirementMove, ...] = ()
-
-    def is_refused(self, tolerated: float) -> bool:
-        """Whether a gate refuses it: a row, or a requirement, which no row may judge any more."""
-        return bool(self.broken(tolerated)) or any(one.is_newly_failing for one in self.requirements)
+    loosened: tuple[Loosened, ...] = ()
 
     def broken(self, tolerated: float) -> list[Change]:
-        """List the changes that a gate refuses."""
+        """List the rows that a gate refuses."""
         return [change for change in self.changes if change.breaks(tolerated)]
+
+    def refusals(self, gate: Gate) -> list[Refusal]:
+        """List what a gate refuses, and what of it is let through: rows, requirements, and what is loosened."""
+        return [gate.refusal(id, words, self.after.file) for id, words in self._refused(gate.tolerated)]
+
+    def _refused(self, tolerated: float) -> Iterator[tuple[str, str]]:
+        broken = self.broken(tolerated)
+        for change in broken:
+            yield change.id, change.words
+        for one in self.requirements:
+            if one.is_newly_failing and one.id not in [change.id for change in broken]:
+                yield one.id, _worse(one.after)
+        for loosened in self.loosened:
+            yield loosened.id, loosened.words
+
+
+class ChangeSet(NamedTuple):
+    """What a change does to all missions of a run.
+
+    `gone` are mission files that the change removes, `new` those that it adds, `settings` what of the project's
+    settings holds less than before, and `outside` files outside of the repository, which have one version.
+    """
+
+    missions: tuple[MissionChange, ...]
+    gone: tuple[str, ...] = ()
+    new: tuple[str, ...] = ()
+    settings: tuple[Loosened, ...] = ()
+    outside: tuple[str, ...] = ()
+
+    def refusals(self, gate: Gate) -> list[Refusal]:
+        """List what a gate refuses that is of no one mission."""
+        gone = [gate.refusal(file, "the mission file is gone", file) for file in self.gone]
+        return gone + [gate.refusal(one.id, one.words, "pyproject.toml") for one in self.settings]
+
+    def is_refused(self, gate: Gate) -> bool:
+        """Whether a gate refuses anything that is not let through."""
+        return not all(one.is_allowed for one in self._all(gate))
+
+    def unused(self, gate: Gate) -> list[str]:
+        """List what `--allow` names and nothing needs."""
+        return [one for one in gate.allowed if not any(found.is_allowed for found in self._all(gate.only(one)))]
+
+    def _all(self, gate: Gate) -> list[Refusal]:
+        return self.refusals(gate) + [one for mission in self.missions for one in mission.refusals(gate)]
 
 
 def compare(before: MissionFindings, after: MissionFindings) -> MissionChange:
@@ -117,14 +186,16 @@ def compare(before: MissionFindings, after: MissionFindings) -> MissionChange:
     changes = [Change(row_id, old.get(row_id), new.get(row_id)) for row_id in {**old, **new}]
     changed = [change for change in changes if change.is_change]
     changed.sort(key=lambda change: (not change.is_newly_failing, -change.erosion))
+    missions = (before.mission, after.mission) if before.mission and after.mission else ()
     return MissionChange(
         before,
         after,
         tuple(changed),
         len(changes) - len(changed),
-        inputs=tuple(_inputs(before.mission, after.mission)),
-        geometry=tuple(_geometry(before, after)),
+        inputs=tuple(moved_inputs(*missions)) if missions else (),
+        geometry=tuple(moved_geometry(before, after)),
         requirements=tuple(_requirements(before, after)),
+        loosened=tuple(loosenings(before, after)) if missions else (),
     )
 
 
@@ -142,89 +213,8 @@ def _is_newly_broken(before: str | None, after: str | None) -> bool:
     return (after == "fail" != before) or (after == "not_evaluated" and before not in ("fail", "not_evaluated"))
 
 
-def _inputs(before: Mission | None, after: Mission | None) -> Iterator[Moved]:
-    """Keys that the files write differently and mean differently: `31 km` is 31000 m."""
-    if before is None or after is None:
-        return
-    old, new = _written(before), _written(after)
-    for path in {**old, **new}:
-        if old.get(path) == new.get(path):
-            continue
-        meant = [_value(mission, path) for mission in (before, after)]
-        if path in old and path in new and meant[0] is not None and meant[0] == meant[1]:
-            continue
-        yield Moved(_dotted(path), "", old.get(path), new.get(path))
-    for name in PLATFORMS:
-        files = [getattr(mission.platforms, name).path for mission in (before, after)]
-        if None not in files and files[0].file == files[1].file and files[0].sha256 != files[1].sha256:
-            contents = [file.sha256 and file.sha256[:12] for file in files]
-            yield Moved(f"platforms.{name}: content of {files[1].file}", "", *contents)
-        stated = [file.accuracy for file in files if file is not None and file.accuracy is not None]
-        if len(stated) == 2 and stated[0][0] == stated[1][0] and stated[0][1] != stated[1][1]:
-            contents = [digest[:12] for _, digest in stated]
-            yield Moved(f"platforms.{name}: content of {stated[1][0]}", "", *contents)
-
-
-def _written(mission: Mission) -> dict[KeyPath, str]:
-    """Values as the file writes them, by path; a list of plain values is one."""
-    texts = {path: event.value for path, event in mission.places.items() if isinstance(_text(event), str)}
-    texts |= dict(_set_values(mission))
-    lists: dict[KeyPath, list[str]] = {}
-    elements = [path for path in texts if isinstance(path[-1], int)]
-    for path in sorted(elements, key=lambda path: int(path[-1])):  # an element that was set stands last
-        lists.setdefault(path[:-1], []).append(texts.pop(path))
-    return texts | {path: f"[{', '.join(items)}]" for path, items in lists.items()}
-
-
-def _set_values(mission: Mission) -> Iterator[tuple[KeyPath, str]]:
-    """Values that options put into it, by path; below a key that is new, by the path that the option named."""
-    changed = {".".join(map(str, path)): path for path, event in mission.places.items() if isinstance(event, Changed)}
-    for change in mission.changes:
-        parts = parts_of(change.key)
-        yield changed.get(".".join(parts), parts), change.text
-
-
-def _text(event: object) -> object:
-    return getattr(event, "value", None)
-
-
-def _value(mission: Mission, path: KeyPath) -> Any:
-    """What a path means; None where the mission has no such attribute."""
-    value: Any = mission
-    for part in path:
-        if isinstance(value, Mapping):
-            value = value.get(part)
-        elif isinstance(part, int):
-            value = value[part] if isinstance(value, tuple) and part < len(value) else None
-        else:
-            value = getattr(value, part, None)
-    return value
-
-
-def _dotted(path: KeyPath) -> str:
-    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".")
-
-
-def _geometry(before: MissionFindings, after: MissionFindings) -> Iterator[Moved]:
-    """Numbers of the collection that differ by more than rounding."""
-    for (name, unit, old), (_, _, new) in zip(_numbers(before), _numbers(after), strict=True):
-        is_same = old == new or (old is not None and new is not None and math.isclose(old, new, rel_tol=1e-9))
-        if not is_same:
-            yield Moved(name, unit, old, new)
-
-
-def _numbers(found: MissionFindings) -> Iterator[tuple[str, str, float | None]]:
-    geometry = found.geometry
-    for name, state in (("transmitter", geometry.transmitter), ("receiver", geometry.receiver)):
-        yield f"{name} slant range", "m", state.slant_range
-        yield f"{name} azimuth", "deg", math.degrees(state.azimuth)
-        yield f"{name} elevation", "deg", math.degrees(state.elevation)
-        yield f"{name} squint", "deg", None if state.squint is None else math.degrees(state.squint)
-    yield "bistatic angle", "deg", math.degrees(geometry.bistatic_angle)
-    yield "look azimuth", "deg", math.degrees(geometry.look_azimuth)
-    yield "angle between range and Doppler gradients", "deg", math.degrees(geometry.gradient_angle)
-    yield "range resolution", "m", found.resolution.range
-    yield "cross-range resolution", "m", found.resolution.cross_range
+def _worse(status: str | None) -> str:
+    return "is not evaluated any more" if status == "not_evaluated" else "fails now"
 
 
 def _is_near(before: float | None, after: float | None) -> bool:

@@ -8,7 +8,8 @@ from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
-from bisar_budget.report.change.comparison import Change, MissionChange, Moved, RequirementMove
+from bisar_budget.report.change.comparison import Change, ChangeSet, Gate, MissionChange, Refusal, RequirementMove
+from bisar_budget.report.change.inputs import Moved
 from bisar_budget.report.words.escapes import markdown_text
 from bisar_budget.report.words.layout import table, wrapped
 from bisar_budget.report.words.requirements import overrides_lines, overrides_words
@@ -19,12 +20,43 @@ from bisar_budget.units import format_quantity
 FORMAT = "bisar-budget/diff/1"
 
 
-def as_text(missions: Sequence[MissionChange], tolerated: float | None, all_rows: bool = False) -> str:
+def as_text(comparison: ChangeSet, gate: Gate | None, all_rows: bool = False) -> str:
     """Write what changed, then a table per mission with the largest erosion first, and one summary line each."""
-    return "\n\n".join("\n".join(_text(mission, tolerated, all_rows)) for mission in missions) + "\n"
+    parts = [_text(mission, gate, all_rows) for mission in comparison.missions]
+    if refusals := _refusals(comparison, gate):
+        parts.append(_refused_lines(refusals))
+    if said := _of_no_mission(comparison, gate):
+        parts.append([line for text in said for line in wrapped(printable(text), "  ")])
+    return "\n\n".join("\n".join(lines) for lines in parts) + "\n"
 
 
-def _text(mission: MissionChange, tolerated: float | None, all_rows: bool) -> list[str]:
+def _of_no_mission(comparison: ChangeSet, gate: Gate | None) -> list[str]:
+    """Sentences on missions that came and went, on settings, and on what was not compared or not needed."""
+    sentences = [f"{file}: new, there is nothing to compare it with" for file in comparison.new]
+    if gate is None:
+        sentences += [f"{file}: the mission file is gone" for file in comparison.gone]
+        sentences += [f"{one.id}: {one.words}" for one in comparison.settings]
+    else:
+        sentences += [f"--allow {one}: lets nothing through" for one in comparison.unused(gate)]
+    outside = "is outside of the repository; before and after it is read as it is now"
+    return sentences + [f"{file} {outside}" for file in comparison.outside]
+
+
+def _refusals(of: MissionChange | ChangeSet, gate: Gate | None) -> list[Refusal]:
+    return [] if gate is None else of.refusals(gate)
+
+
+def _refused_lines(refusals: Sequence[Refusal]) -> list[str]:
+    """What a gate refuses, and what of it is let through, a block each."""
+    lines: list[str] = []
+    for title, is_allowed in (("Refused", False), ("Let through by --allow", True)):
+        texts = [f"  {one.id}: {one.words}" for one in refusals if one.is_allowed is is_allowed]
+        if texts:
+            lines += [title, *(line for text in texts for line in wrapped(printable(text), "    "))]
+    return lines
+
+
+def _text(mission: MissionChange, gate: Gate | None, all_rows: bool) -> list[str]:
     lines = [*wrapped(printable(f"{mission.before.file} -> {_named(mission.after)}"), "  ")]
     lines += [*overrides_lines(mission.after), ""]
     for title, moves in (("Inputs", mission.inputs), ("Geometry", mission.geometry)):
@@ -36,13 +68,18 @@ def _text(mission: MissionChange, tolerated: float | None, all_rows: bool) -> li
     if mission.requirements:
         texts = [f"  {one.name}: {_standings(one)}" for one in mission.requirements]
         lines += ["Requirements", *texts, ""]
-    if changes := _shown(mission, tolerated, all_rows):
+    if mission.loosened and gate is None:
+        texts = [printable(f"  {one.id}: {one.words}") for one in mission.loosened]
+        lines += ["Loosened", *(line for text in texts for line in wrapped(text, "    ")), ""]
+    if changes := _shown(mission, gate, all_rows):
         rows = [
             (printable(change.id), _use(change.before), _use(change.after), _erosion(change), _statuses(change))
             for change in changes
         ]
         lines += [*table([("row", "before", "after", "erosion", "status"), *rows]), ""]
-    return [*lines, *wrapped(_summary(mission, tolerated, all_rows), "  ")]
+    if refusals := _refusals(mission, gate):
+        lines += [*_refused_lines(refusals), ""]
+    return [*lines, *wrapped(_summary(mission, gate, all_rows), "  ")]
 
 
 def _named(found: MissionFindings) -> str:
@@ -50,9 +87,9 @@ def _named(found: MissionFindings) -> str:
     return f"{found.file} {changes_words(found.changes)}".rstrip()
 
 
-def _shown(mission: MissionChange, tolerated: float | None, all_rows: bool) -> list[Change]:
+def _shown(mission: MissionChange, gate: Gate | None, all_rows: bool) -> list[Change]:
     """Changes worth reading: those of 1 % or more, and those that a gate refuses."""
-    refused = mission.broken(tolerated) if tolerated is not None else []
+    refused = mission.broken(gate.tolerated) if gate is not None else []
     return [change for change in mission.changes if all_rows or not change.is_small or change in refused]
 
 
@@ -83,25 +120,30 @@ def _standings(one: RequirementMove) -> str:
     return f"{before} -> {after}"
 
 
-def _summary(mission: MissionChange, tolerated: float | None, all_rows: bool) -> str:
+def _summary(mission: MissionChange, gate: Gate | None, all_rows: bool) -> str:
     newly = sum(change.is_newly_failing for change in mission.changes)
-    hidden = len(mission.changes) - len(_shown(mission, tolerated, all_rows))
+    hidden = len(mission.changes) - len(_shown(mission, gate, all_rows))
     small = f" ({hidden} by less than 1 %, not shown without --all)" if hidden else ""
     count = len(mission.changes)
     text = f"{count} row{'s' if count != 1 else ''} changed{small}, {mission.unchanged} not, {newly} newly failing"
     if unmet := sum(one.is_newly_failing for one in mission.requirements):
         text += f"; {unmet} requirement{'s' if unmet != 1 else ''} newly failing"
-    if tolerated is not None:
-        refused = len(mission.broken(tolerated))
-        text += f"; {refused} refused (newly failing, or erosion above {percent(tolerated)})"
+    if mission.loosened:
+        text += f"; {len(mission.loosened)} loosened"
+    if gate is not None:
+        refusals = mission.refusals(gate)
+        refused = sum(not one.is_allowed for one in refusals)
+        text += f"; {refused} refused"
+        if len(refusals) > refused:
+            text += f", {len(refusals) - refused} let through by --allow"
     return text
 
 
-def as_markdown(missions: Sequence[MissionChange], tolerated: float | None, all_rows: bool = False) -> str:
+def as_markdown(comparison: ChangeSet, gate: Gate | None, all_rows: bool = False) -> str:
     """Write the same for the comment of a pull request, with declared and allowable values."""
     lines: list[str] = []
-    for mission in missions:
-        lines += [f"### {markdown_text(_named(mission.after))}: {_summary(mission, tolerated, all_rows)}", ""]
+    for mission in comparison.missions:
+        lines += [f"### {markdown_text(_named(mission.after))}: {_summary(mission, gate, all_rows)}", ""]
         if outside := overrides_words(mission.after, with_changes=False):
             lines += [f"From outside the file: {markdown_text(outside)}", ""]
         for title, moves in (("input", mission.inputs), ("geometry", mission.geometry)):
@@ -113,8 +155,11 @@ def as_markdown(missions: Sequence[MissionChange], tolerated: float | None, all_
                 lines.append(f"- {title} {' → '.join(said)}")
         for one in mission.requirements:
             lines.append(f"- requirement {markdown_text(one.name)}: {_standings(one).replace('->', '→')}")
-        lines += [""] if mission.inputs or mission.geometry or mission.requirements else []
-        changes = _shown(mission, tolerated, all_rows)
+        if gate is None:
+            lines += [f"- loosened {_arrow(one.id, one.words)}" for one in mission.loosened]
+        lines += _refused_items(_refusals(mission, gate))
+        lines += [""] if lines[-1] else []
+        changes = _shown(mission, gate, all_rows)
         if changes:
             lines.append("| row | declared | allowable | use before | use after | erosion | status |")
             lines.append("| --- | --- | --- | --- | --- | --- | --- |")
@@ -130,7 +175,19 @@ def as_markdown(missions: Sequence[MissionChange], tolerated: float | None, all_
             )
             lines.append(f"| {' | '.join(cells)} |")
         lines += [""] if changes else []
+    lines += _refused_items(_refusals(comparison, gate))
+    lines += [f"- {markdown_text(text)}" for text in _of_no_mission(comparison, gate)]
     return "\n".join(lines).rstrip("\n") + "\n"
+
+
+def _refused_items(refusals: Sequence[Refusal]) -> list[str]:
+    """What a gate refuses, and what of it is let through, an item each."""
+    marks = {False: "**refused**", True: "let through by --allow:"}
+    return [f"- {marks[one.is_allowed]} {_arrow(one.id, one.words)}" for one in refusals]
+
+
+def _arrow(id: str, words: str) -> str:
+    return f"{markdown_text(id)}: {' → '.join(map(markdown_text, words.split(' -> ')))}"
 
 
 def _values(change: Change, field: str, mission: MissionChange) -> str:
@@ -142,44 +199,58 @@ def _values(change: Change, field: str, mission: MissionChange) -> str:
     return texts[0] if texts[0] == texts[1] else " → ".join(texts)
 
 
-def as_json(version: str, missions: Sequence[MissionChange], tolerated: float | None) -> str:
+def as_json(version: str, comparison: ChangeSet, gate: Gate | None) -> str:
     """Write the contract; keys may be added, never changed or removed."""
     document = {
         "format": FORMAT,
         "version": version,
-        "tolerated_erosion": tolerated,
-        "missions": [
-            {
-                **{
-                    name: {
-                        "file": found.file,
-                        "status": found.status,
-                        "set": [change._asdict() for change in found.changes],
-                        "overrides": [one._asdict() for one in found.overrides],
-                    }
-                    for name, found in (("before", mission.before), ("after", mission.after))
-                },
-                "unchanged": mission.unchanged,
-                "inputs": [{"key": move.name, "before": move.before, "after": move.after} for move in mission.inputs],
-                "geometry": [move._asdict() for move in mission.geometry],
-                "requirements": [
-                    {**one._asdict(), "is_newly_failing": one.is_newly_failing} for one in mission.requirements
-                ],
-                "rows": [_document(change, tolerated) for change in mission.changes],
-            }
-            for mission in missions
-        ],
+        "tolerated_erosion": None if gate is None else gate.tolerated,
+        "allow": [] if gate is None else list(gate.allowed),
+        "allow_unused": [] if gate is None else comparison.unused(gate),
+        "gone": comparison.gone,
+        "new": comparison.new,
+        "settings": [one._asdict() for one in comparison.settings],
+        "outside_repository": comparison.outside,
+        "refused": [_refusal(one) for one in _refusals(comparison, gate)],
+        "missions": [_mission(mission, gate) for mission in comparison.missions],
     }
     return json.dumps(document, indent=2, allow_nan=False) + "\n"
 
 
-def _document(change: Change, tolerated: float | None) -> dict[str, Any]:
+def _mission(mission: MissionChange, gate: Gate | None) -> dict[str, Any]:
+    refusals = _refusals(mission, gate)
+    refused = {one.id for one in refusals if not one.is_allowed}
+    return {
+        **{
+            name: {
+                "file": found.file,
+                "status": found.status,
+                "set": [change._asdict() for change in found.changes],
+                "overrides": [one._asdict() for one in found.overrides],
+            }
+            for name, found in (("before", mission.before), ("after", mission.after))
+        },
+        "unchanged": mission.unchanged,
+        "inputs": [{"key": move.name, "before": move.before, "after": move.after} for move in mission.inputs],
+        "geometry": [move._asdict() for move in mission.geometry],
+        "requirements": [{**one._asdict(), "is_newly_failing": one.is_newly_failing} for one in mission.requirements],
+        "loosened": [one._asdict() for one in mission.loosened],
+        "refused": [_refusal(one) for one in refusals],
+        "rows": [_document(change, change.id in refused) for change in mission.changes],
+    }
+
+
+def _refusal(one: Refusal) -> dict[str, Any]:
+    return {"id": one.id, "reason": one.words, "is_allowed": one.is_allowed}
+
+
+def _document(change: Change, is_refused: bool) -> dict[str, Any]:
     keys = ("status", "declared", "allowable", "utilization", "margin", "line", "requirement_id")
     return {
         "id": change.id,
         "erosion": change.erosion,
         "is_newly_failing": change.is_newly_failing,
-        "is_refused": tolerated is not None and change.breaks(tolerated),
+        "is_refused": is_refused,
         **{
             name: None if row is None else {key: getattr(row, key) for key in keys}
             for name, row in (("before", change.before), ("after", change.after))

@@ -56,7 +56,7 @@ from bisar_budget.report.drawing.evidence_drawings import (
 )
 from bisar_budget.report.explain.explanation import chain, collection_chain
 from bisar_budget.report.formats import verification
-from bisar_budget.report.words.escapes import source_path
+from bisar_budget.report.words.identity import source_path
 from bisar_budget.report.words.missions import doubtful_model, head, multiple_of_pi, narrow_gradients, path_words
 from bisar_budget.report.words.requirements import (
     kind_names,
@@ -178,11 +178,11 @@ def _unusable(found: UnusableMission, style: Style, anchor: str) -> MissionPage:
     count = len(found.faults)
     return MissionPage(
         anchor=anchor,
-        file=source_path(found.file, style.root),
+        file=source_path(found.file, style),
         sha256=_digest(found.data),
         status="error",
         verdict=STATUS["error"].verdict,
-        name=source_path(found.file, style.root),
+        name=source_path(found.file, style),
         counts=f"{count} fault{'s' if count != 1 else ''}",
         faults=tuple((f"{fault.line or '–'}:{fault.column or '–'}", str(fault)) for fault in found.faults),
     )
@@ -195,7 +195,7 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
     rows = worst_first(found.rows)
     judged = [row for row in rows if STATUS[row.status].is_judged]
     evidence = {verdict.id: verdict for verdict in found.verdicts or ()}
-    file = source_path(found.file, style.root)
+    file = source_path(found.file, style)
     placed = mission if mission.file == file else mission._replace(file=file)  # the same name in every section
     allocation = found.allocation
     is_full = style.detail == "full"

@@ -11,7 +11,8 @@ from bisar_budget.findings.mission import MissionFindings, Report, UnusableMissi
 from bisar_budget.findings.row import worst_first
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
-from bisar_budget.report.words.escapes import command_property, command_text, markdown_text, source_path
+from bisar_budget.report.words.escapes import command_property, command_text, markdown_text
+from bisar_budget.report.words.identity import source_path
 from bisar_budget.report.words.requirements import overrides_words, requirement_finding, requirement_id, unseen
 from bisar_budget.report.words.sentences import finding, percent
 
@@ -39,7 +40,7 @@ def render(report: Report, style: Style) -> str:
 
 def _annotations(report: Report, style: Style) -> Iterator[_Annotation]:
     for mission in report.missions:
-        file = source_path(mission.file, style.root)
+        file = source_path(mission.file, style)
         if isinstance(mission, UnusableMission):
             for fault in mission.faults:
                 yield _Annotation("error", file, _place(fault), "Unusable mission file", str(fault))
@@ -92,7 +93,7 @@ def step_summary(report: Report, style: Style) -> str:
     lines = [f"### bisar-budget: {STATUS[report.status].text}, {_counted(report)}", ""]
     lines += ["| status | mission | worst row | use |", "| --- | --- | --- | --- |"]
     for mission in report.missions:
-        file = markdown_text(source_path(mission.file, style.root))
+        file = markdown_text(source_path(mission.file, style))
         if isinstance(mission, UnusableMission):
             fault = markdown_text(str(mission.faults[0]))
             lines.append(f"| {STATUS['error'].text} | {file} | {fault} | |")

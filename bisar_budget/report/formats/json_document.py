@@ -6,6 +6,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from bisar_budget.analysis.allocation import Split
+from bisar_budget.faults import Fault
 from bisar_budget.findings.mission import FileWarning, MissionFindings, UnusableMission
 from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import Row
@@ -69,24 +70,26 @@ def _indented(value: Any, levels: int, margin: str = "") -> str:
     return f"{opening}\n{inner}{content}\n{margin}{closing}"
 
 
+def fault_item(fault: Fault) -> dict[str, Any]:
+    """What is wrong with a file, as the contract has it."""
+    return {
+        "line": fault.line,
+        "column": fault.column,
+        "key": fault.key,
+        "message": fault.problem,
+        "given": fault.given or None,
+        "accepted": fault.accepted or None,
+        "hint": fault.hint or None,
+        "option": fault.option or None,
+    }
+
+
 def _unusable(mission: UnusableMission) -> dict[str, Any]:
     return {
         "file": mission.file,
         "name": None,
         "status": mission.status,
-        "errors": [
-            {
-                "line": fault.line,
-                "column": fault.column,
-                "key": fault.key,
-                "message": fault.problem,
-                "given": fault.given or None,
-                "accepted": fault.accepted or None,
-                "hint": fault.hint or None,
-                "option": fault.option or None,
-            }
-            for fault in mission.faults
-        ],
+        "errors": [fault_item(fault) for fault in mission.faults],
     }
 
 

@@ -9,7 +9,6 @@ Nothing is indented, and a row without verdict has no properties but its values:
 from collections import Counter
 from collections.abc import Iterator
 from functools import cache
-from os.path import splitext
 
 from bisar_budget.faults import changes_words
 from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
@@ -17,7 +16,8 @@ from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
-from bisar_budget.report.words.escapes import source_path, xml_text
+from bisar_budget.report.words.escapes import xml_text
+from bisar_budget.report.words.identity import Identity, distinct, identities, stem
 from bisar_budget.report.words.requirements import (
     declared_words,
     overrides_words,
@@ -31,19 +31,21 @@ def render(report: Report, style: Style) -> str:
     """Write one document; the shape is that of Jenkins' junit-10, with properties of cases as pytest writes them."""
     counts: Counter[str] = Counter()
     suites: list[str] = []
-    for mission in report.missions:
-        suites += _unusable(mission, style, counts) if isinstance(mission, UnusableMission) else ()
-        suites += _mission(mission, style, counts) if isinstance(mission, MissionFindings) else ()
+    named = identities(report.missions, style)
+    class_names = distinct([_class_name(one) for one in named], [(one.name,) for one in named])
+    for mission, identity, class_name in zip(report.missions, named, class_names, strict=True):
+        place = xml_text(class_name), identity.path
+        suites += _unusable(mission, *place, counts) if isinstance(mission, UnusableMission) else ()
+        suites += _mission(mission, *place, counts) if isinstance(mission, MissionFindings) else ()
     head = f'<testsuites name="bisar-budget" tests="{counts["tests"]}" failures="{counts["failures"]}"'
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', f'{head} errors="{counts["errors"]}" time="0">', *suites]
     return "\n".join([*lines, "</testsuites>"]) + "\n"
 
 
-def _unusable(mission: UnusableMission, style: Style, counts: Counter[str]) -> Iterator[str]:
+def _unusable(mission: UnusableMission, class_name: str, file: str, counts: Counter[str]) -> Iterator[str]:
     counts.update(tests=1, errors=1)
-    file = source_path(mission.file, style.root)
     yield _suite(file, tests=1, failures=0, errors=1, skipped=0)
-    yield f'<testcase classname="{_class_name(mission.file, style)}" name="mission file" time="0">'
+    yield f'<testcase classname="{class_name}" name="mission file" time="0">'
     count = len(mission.faults)
     message = f"cannot be used, {count} fault{'s' if count != 1 else ''}: {mission.faults[0]}"
     places = [f"{file}:{f.line or '-'}:{f.column or '-'}: {f}" for f in mission.faults]
@@ -53,14 +55,14 @@ def _unusable(mission: UnusableMission, style: Style, counts: Counter[str]) -> I
     yield "</testsuite>"
 
 
-def _mission(mission: MissionFindings, style: Style, counts: Counter[str]) -> Iterator[str]:
+def _mission(mission: MissionFindings, class_name: str, file: str, counts: Counter[str]) -> Iterator[str]:
     statuses = [*(one.status for one in mission.requirements), *(row.status for row in mission.rows)]
     outcomes = Counter(STATUS[name].junit for name in statuses)
     tests, failures = outcomes.total(), outcomes["failure"]
     counts.update(tests=tests, failures=failures)
     yield _suite(mission.name, tests=tests, failures=failures, errors=0, skipped=outcomes["skipped"])
     yield "<properties>"
-    yield _property("file", source_path(mission.file, style.root))
+    yield _property("file", file)
     yield _property("model", mission.model)
     yield _property("combine", mission.combine)
     if mission.changes:
@@ -71,7 +73,7 @@ def _mission(mission: MissionFindings, style: Style, counts: Counter[str]) -> It
     said = mission.document._asdict().items()
     yield from [_property(f"document_{name}", value) for name, value in said if value is not None]
     yield "</properties>"
-    class_name, file = _class_name(mission.file, style), xml_text(source_path(mission.file, style.root))
+    file = xml_text(file)
     for one in mission.requirements:
         yield from _requirement(one, class_name, file)
     for row in mission.rows:
@@ -165,8 +167,6 @@ def _escaped(text: str) -> str:
     return xml_text(text)
 
 
-def _class_name(file: str, style: Style) -> str:
-    """Path as a dotted name, as test tools group by: `missions/a.yaml` is missions.a."""
-    stem, suffix = splitext(source_path(file, style.root))
-    stem = stem if suffix in (".yaml", ".yml") else stem + suffix
-    return xml_text(stem.strip("/").replace(".", "_").replace("/", "."))
+def _class_name(identity: Identity) -> str:
+    """Dotted name of a mission, as test tools group by: `missions/a.yaml` is missions.a."""
+    return stem(identity.name).strip("/").replace(".", "_").replace("/", ".")

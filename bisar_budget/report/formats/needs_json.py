@@ -7,8 +7,7 @@ reStructuredText.
 
 import json
 import re
-from collections.abc import Iterator, Sequence
-from os.path import splitext
+from collections.abc import Container, Iterator, Sequence
 from typing import Any
 
 from bisar_budget.faults import changes_words
@@ -16,23 +15,29 @@ from bisar_budget.findings.mission import MissionFindings, Report, UnusableMissi
 from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import Row
 from bisar_budget.report import Style
-from bisar_budget.report.words.escapes import need_text, rst_text, source_path
+from bisar_budget.report.words.escapes import need_text, rst_text
+from bisar_budget.report.words.identity import distinct, identities, stem
 from bisar_budget.report.words.requirements import overrides_words, requirement_finding, requirement_id
 from bisar_budget.report.words.sentences import cause, measure
 
 
 def render(report: Report, style: Style) -> str:
     """Write every requirement and row of every mission; a file that cannot be used is one need, of status `error`."""
-    needs: dict[str, dict[str, Any]] = {}
-    for mission in report.missions:
-        file = source_path(mission.file, style.root)
+    names: list[tuple[str, ...]] = []
+    found: list[dict[str, Any]] = []
+    for mission, identity in zip(report.missions, identities(report.missions, style), strict=True):
         if isinstance(mission, UnusableMission):
-            _add(needs, file, "mission", _unusable(mission, file))
-        else:
-            for one in mission.requirements:
-                _add(needs, file, requirement_id(one), _requirement(one, mission, file))
-            for row in mission.rows:
-                _add(needs, file, row.id, _row(row, mission, file))
+            names.append(identity.of("mission"))
+            found.append(_unusable(mission, identity.path))
+            continue
+        names += [identity.of(requirement_id(one)) for one in mission.requirements]
+        found += [_requirement(one, mission, identity.path) for one in mission.requirements]
+        names += [identity.of(row.id, row.requirement_id) for row in mission.rows]
+        found += [_row(row, mission, identity.path) for row in mission.rows]
+    needs: dict[str, dict[str, Any]] = {}
+    for wanted, need in zip(distinct([_identifier(name) for name in names], names), found, strict=True):
+        identifier = _unused(wanted, needs)
+        needs[identifier] = {"id": identifier, **need}
     version = {
         "creator": {"program": "bisar-budget", "version": report.version},
         "needs": needs,
@@ -42,15 +47,17 @@ def render(report: Report, style: Style) -> str:
     return json.dumps(document, indent=1, allow_nan=False) + "\n"
 
 
-def _add(needs: dict[str, dict[str, Any]], file: str, subject: str, need: dict[str, Any]) -> None:
-    """Give a need an id that the default pattern of Sphinx-Needs accepts, `[A-Z0-9_]{5,}`, and no other has."""
-    stem = re.sub("[^A-Z0-9]+", "_", splitext(file)[0].upper()).strip("_")
-    wanted = identifier = f"BUDGET_{stem}_{re.sub('[^A-Z0-9]+', '_', subject.upper()).strip('_')}"
-    number = 2
-    while identifier in needs:
-        identifier = f"{wanted}_{number}"
-        number += 1
-    needs[identifier] = {"id": identifier, **need}
+def _identifier(name: tuple[str, ...]) -> str:
+    """Spell a name by the default pattern of Sphinx-Needs, `[A-Z0-9_]{5,}`."""
+    return "_".join(["BUDGET", *(re.sub("[^A-Z0-9]+", "_", stem(part).upper()).strip("_") for part in name)])
+
+
+def _unused(identifier: str, needs: Container[str]) -> str:
+    """Number the findings of a file that is named twice."""
+    unique, number = identifier, 2
+    while unique in needs:
+        unique, number = f"{identifier}_{number}", number + 1
+    return unique
 
 
 def _row(row: Row, mission: MissionFindings, file: str) -> dict[str, Any]:

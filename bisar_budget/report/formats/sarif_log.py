@@ -7,8 +7,6 @@ notifications of the tool.
 
 import json
 from collections.abc import Sequence
-from functools import cache
-from hashlib import sha256
 from typing import Any
 
 from bisar_budget.faults import Fault, Place, printable
@@ -17,7 +15,8 @@ from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import AppliedWaiver, Row
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
-from bisar_budget.report.words.escapes import source_path, uri
+from bisar_budget.report.words.escapes import uri
+from bisar_budget.report.words.identity import Identity, digest, identities, source_path
 from bisar_budget.report.words.requirements import overrides_words, requirement_finding, requirement_id, unseen
 from bisar_budget.report.words.sentences import finding
 
@@ -81,19 +80,20 @@ def render(report: Report, style: Style) -> str:
     results: list[dict[str, Any]] = []
     notifications = []
     artifacts: dict[str, dict[str, Any]] = {}  # by URI: a file may be named in two ways
-    for mission in report.missions:
+    for mission, identity in zip(report.missions, identities(report.missions, style), strict=True):
         location = _artifact_location(mission.file, style)
         artifacts.setdefault(location["uri"], {"location": location, "mimeType": "application/yaml"})
         artifact = {**location, "index": list(artifacts).index(location["uri"])}
         if isinstance(mission, UnusableMission):
             notifications += [_notification(fault, artifact) for fault in mission.faults]
             continue
-        results += [_requirement(one, mission, artifact) for one in unseen(mission)]
-        results += [_result(row, mission, artifact) for row in mission.rows if STATUS[row.status].sarif]
-        results += [_warning(warning, mission, artifact) for warning in mission.warnings]
+        results += [_requirement(one, mission, artifact, identity) for one in unseen(mission)]
+        results += [_result(row, mission, artifact, identity) for row in mission.rows if STATUS[row.status].sarif]
+        results += [_warning(warning, artifact, identity) for warning in mission.warnings]
         if outside := overrides_words(mission):
             said = f"From outside the file: {outside}"
-            results.append(_located("mission_file", "note", said, None, artifact, "from outside the file"))
+            name = identity.of("from outside the file")
+            results.append(_located("mission_file", "note", said, None, artifact, name))
     run = {
         "tool": {"driver": _driver(report.version)},
         "columnKind": "unicodeCodePoints",
@@ -139,15 +139,16 @@ def _rule(rule: str, short: str, help_text: str) -> dict[str, Any]:
 
 
 def _artifact_location(file: str, style: Style) -> dict[str, Any]:
-    path = "standard input" if file == "-" else source_path(file, style.root)
+    path = "standard input" if file == "-" else source_path(file, style)
     address = uri(path)
     return {"uri": address} if address.startswith("file:") else {"uri": address, "uriBaseId": SRCROOT}
 
 
-def _result(row: Row, mission: MissionFindings, artifact: dict[str, Any]) -> dict[str, Any]:
+def _result(row: Row, mission: MissionFindings, artifact: dict[str, Any], identity: Identity) -> dict[str, Any]:
     rule = "autofocus_pull_in" if row.subject.kind == "autofocus_pull_in" else row.metric
     rule = rule if rule in RULES else "other"
-    result = _located(rule, STATUS[row.status].sarif, finding(row, mission), row.line, artifact, row.id)
+    name = identity.of(row.id, row.requirement_id)
+    result = _located(rule, STATUS[row.status].sarif, finding(row, mission), row.line, artifact, name)
     result["properties"] = _properties(
         mission=mission.name,
         status=row.status,
@@ -168,9 +169,11 @@ def _result(row: Row, mission: MissionFindings, artifact: dict[str, Any]) -> dic
     return result
 
 
-def _requirement(one: JudgedRequirement, mission: MissionFindings, artifact: dict[str, Any]) -> dict[str, Any]:
-    level = STATUS[one.status].sarif
-    result = _located(one.key, level, requirement_finding(one), one.line, artifact, requirement_id(one))
+def _requirement(
+    one: JudgedRequirement, mission: MissionFindings, artifact: dict[str, Any], identity: Identity
+) -> dict[str, Any]:
+    level, name = STATUS[one.status].sarif, identity.of(requirement_id(one))
+    result = _located(one.key, level, requirement_finding(one), one.line, artifact, name)
     result["properties"] = _properties(
         mission=mission.name,
         status=one.status,
@@ -196,15 +199,15 @@ def _properties(**values: str | float | None) -> dict[str, str | float]:
     }
 
 
-def _warning(warning: FileWarning, mission: MissionFindings, artifact: dict[str, Any]) -> dict[str, Any]:
-    return _located("mission_file", "warning", warning.message, warning.line, artifact, warning.message)
+def _warning(warning: FileWarning, artifact: dict[str, Any], identity: Identity) -> dict[str, Any]:
+    name = identity.of(warning.message)
+    return _located("mission_file", "warning", warning.message, warning.line, artifact, name)
 
 
 def _located(
-    rule: str, level: str, message: str, line: int | None, artifact: dict[str, Any], subject: str
+    rule: str, level: str, message: str, line: int | None, artifact: dict[str, Any], name: tuple[str, ...]
 ) -> dict[str, Any]:
-    """Return a result; `subject` is what stays the same when lines move, and tells it from others in the file."""
-    name = printable(subject)
+    """Return a result; `name` stays the same when lines move, and tells it from others. Its subject comes last."""
     return {
         "ruleId": rule,
         "ruleIndex": _RULE_INDEX[rule],
@@ -213,17 +216,16 @@ def _located(
         "locations": [
             {
                 "physicalLocation": {"artifactLocation": artifact, "region": _region(line)},
-                "logicalLocations": [{"fullyQualifiedName": name, "kind": "member"}],
+                "logicalLocations": [{"fullyQualifiedName": printable(name[-1]), "kind": "member"}],
             }
         ],
         # Code scanning tells an old alert from a new one by this key alone.
-        "partialFingerprints": {"primaryLocationLineHash": _fingerprint(rule, artifact["uri"], name)},
+        "partialFingerprints": {"primaryLocationLineHash": _fingerprint(rule, *name)},
     }
 
 
-@cache
 def _fingerprint(*parts: str) -> str:
-    return sha256("\0".join(parts).encode()).hexdigest()[:16] + ":1"
+    return digest(*parts)[:16] + ":1"
 
 
 def _region(line: int | None) -> dict[str, int]:

@@ -68,19 +68,6 @@ def uri(path: str) -> str:
     return f"file:///{encoded.lstrip('/')}" if os.path.isabs(path) else encoded
 
 
-def source_path(file: str, root: str) -> str:
-    """Path of a mission file as a repository knows it: below `root`, with forward slashes.
-
-    Outside of it the path is absolute; without a root it stays as given.
-    """
-    if root:
-        file = os.path.abspath(file)
-        below = os.path.join(root, "")
-        if file.startswith(below):
-            file = file[len(below) :]
-    return file.replace(os.sep, "/")
-
-
 def spreadsheet_text(value: str | None) -> str | None:
     """Keep text of the user's own from being run: a spreadsheet takes what starts like a formula for one."""
     value = printable(value) if value else value
