@@ -417,7 +417,7 @@ class TestCheck:
             (["--check", "--kind", "imu", "f.yaml"], "--kind is for the list of parts"),
             (
                 ["f.yaml"],
-                "no part of the catalogue matches f.yaml; `bisar-budget sensors` lists them. It is a file: --check checks it",
+                "matches f.yaml; `bisar-budget sensors` lists them. It is a file: --check checks it",
             ),
             (
                 ["stim300", "stim30"],
