@@ -69,6 +69,29 @@ def shown(text: str) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
+def fault_words(problem: str, given: str = "", accepted: str = "", hint: str = "") -> str:
+    """Write `what is wrong (got value); what is accepted. Hint`, of which all but the first may be empty."""
+    text = problem
+    if given:
+        text += f" (got {given})"
+    if accepted:
+        text += f"; {accepted}"
+    return sentences(text, hint)
+
+
+def sentences(*texts: str) -> str:
+    """Join texts by full stops, but for those that end with a question mark; the last is left as it is."""
+    joined = ""
+    for text in filter(None, texts):
+        joined = f"{closed(joined)} {text}" if joined else text
+    return joined
+
+
+def closed(text: str) -> str:
+    """The text with a full stop at its end, if it has neither that nor a question mark."""
+    return text if text.endswith((".", "?")) else f"{text}."
+
+
 class SetValue(NamedTuple):
     """A value that an option puts in place of what a mission file says: `--set radar.bandwidth=150MHz`.
 
@@ -113,6 +136,11 @@ class Problem(NamedTuple):
     names_value: bool = False
     is_of_key: bool = False
 
+    @property
+    def words(self) -> str:
+        """What is wrong, what is accepted, and the hint."""
+        return fault_words(self.problem, "", self.accepted, self.hint)
+
 
 class InvalidValueError(ValueError):
     """A value that does not say what its key asks for."""
@@ -141,14 +169,7 @@ class Fault(NamedTuple):
         """Write `key: what is wrong (got value); what is accepted. Hint`, with the option before the key."""
         text = f"{self.option}: " if self.option else ""
         text += f"{self.key}: " if self.key and self.option != f"--set {self.key}" else ""
-        text += self.problem
-        if self.given:
-            text += f" (got {self.given})"
-        if self.accepted:
-            text += f"; {self.accepted}"
-        if self.hint:
-            text += f". {self.hint}"
-        return text
+        return text + fault_words(self.problem, self.given, self.accepted, self.hint)
 
 
 def file_fault(problem: str, hint: str = "") -> Fault:

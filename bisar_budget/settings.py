@@ -5,7 +5,7 @@ import re
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from bisar_budget.faults import shown
+from bisar_budget.faults import fault_words, shown
 from bisar_budget.resources import DISK, Files, UnreadableError
 
 TABLE = "tool.bisar-budget"
@@ -111,8 +111,9 @@ def _hold_to_type(file: str, key: str, value: object) -> None:
         from difflib import get_close_matches
 
         near = get_close_matches(key[:100], KEYS, 1)
-        hint = f" Did you mean {near[0]!r}?" if near else ""
-        raise SettingsError(f"{file}: {TABLE}.{shown(key)}: is not a known key; accepted: {', '.join(KEYS)}.{hint}")
+        hint = f"Did you mean {near[0]!r}?" if near else ""
+        problem = fault_words("is not a known key", "", f"accepted: {', '.join(KEYS)}", hint)
+        raise SettingsError(f"{file}: {TABLE}.{shown(key)}: {problem}")
     is_right = type(value) is kind and (kind is not list or all(type(name) is str for name in value))  # type: ignore[attr-defined]
     if type(value) is int:
         is_right = is_right and abs(value) < 1 << 64  # beyond it, it could not even be said

@@ -5,7 +5,7 @@ A small table of its own, because general unit libraries read `3 dBi` as three a
 
 import math
 import re
-from functools import cache
+from functools import cache, lru_cache
 
 from bisar_budget.constants import STANDARD_GRAVITY
 from bisar_budget.faults import InvalidValueError
@@ -76,13 +76,18 @@ SPEED = Dimension(
 ACCELERATION = Dimension(
     "an acceleration",
     "m/s^2",
-    {f"{unit}/s^2": factor for unit, factor in _LENGTHS.items()} | {"g": _G, "mg": 1e-3 * _G, "ug": 1e-6 * _G},
+    {f"{unit}/s^2": factor for unit, factor in _LENGTHS.items()}
+    | {"g": _G, "mg": 1e-3 * _G, "ug": 1e-6 * _G}
+    | {"Gal": 1e-2, "mGal": 1e-5, "uGal": 1e-8},
 )
 JERK = Dimension("a jerk", "m/s^3", {f"{unit}/s^3": factor for unit, factor in _LENGTHS.items()})
 SNAP = Dimension("a snap", "m/s^4", {f"{unit}/s^4": factor for unit, factor in _LENGTHS.items()})
 # Readers think in degrees, formulas in radians: 45 without its unit is one in one file and the other in the next.
 ANGLE = Dimension(
-    "an angle", "rad", _scaled("rad", "mun") | {"deg": math.pi / 180, "°": math.pi / 180}, usual=("deg", "rad")
+    "an angle",
+    "rad",
+    _scaled("rad", "mun") | {"deg": _DEGREE, "°": _DEGREE, "arcmin": _DEGREE / 60, "arcsec": _DEGREE / 3600},
+    usual=("deg", "rad"),
 )
 RATIO = Dimension("a number", "", {"": 1.0, "%": 1e-2, "ppm": 1e-6, "ppb": 1e-9, "s/s": 1.0})
 RATE = Dimension("a rate", "1/s", {"1/s": 1.0, "/s": 1.0, "s^-1": 1.0, "Hz": 1.0, "s/s^2": 1.0})
@@ -154,6 +159,46 @@ DIMENSIONS = (
     MEMORY,
 )
 
+# Spellings of data sheets, one after the other, as the tables of units have them: °/√hr is deg/sqrt(h).
+_SPELLINGS = (
+    ("[µμ]", "u"),  # the micro sign and the Greek letter
+    ("[º˚]", "°"),  # the ordinal sign and the ring, which stand in for the degree sign
+    (r"\*\*", "^"),
+    (r"\s*([/^])\s*", r"\1"),
+    ("²", "^2"),
+    ("³", "^3"),
+    ("⁴", "^4"),
+    ("s([23])", r"s^\1"),
+    (r"^\(([^()]*)\)/", r"\1/"),  # (deg/h)/√Hz
+    ("^°/", "deg/"),
+    (r"\bhr\b", "h"),
+    (r"(?:√|\b(?:sqrt|root|rt))[\s-]*\(?(s|h|hr|Hz)\b\)?", r"sqrt(\1)"),
+    (r"/(s|h|Hz)\^(?:0?\.5|\(?1/2\)?|½)$", r"/sqrt(\1)"),
+    (r"\(hr\)", "(h)"),
+)
+# What people write for a unit that is not spelt like it.
+_MEANT = {
+    "arcminute": "arcmin",
+    "arcsecond": "arcsec",
+    "as": "arcsec",
+    "asec": "arcsec",
+    "degree": "deg",
+    "dph": "deg/h",
+    "feet": "ft",
+    "foot": "ft",
+    "knot": "kn",
+    "meter": "m",
+    "metre": "m",
+    "micro-g": "ug",
+    "milli-g": "mg",
+    "percent": "%",
+    "radian": "rad",
+    "sec": "s",
+    "second": "s",
+}
+# Decibels against a carrier have no other unit near them: what is meant where one stands in the place of another.
+_DECIBELS = ("dB", "dBc")
+
 # By the unit that rows are in; a clock's linear term is a ratio of times.
 _OF_SI = {dimension.si: dimension for dimension in reversed(DIMENSIONS) if dimension.si} | {"s/s": RATIO}
 
@@ -204,14 +249,15 @@ def _parse_closely(value: object, dimension: Dimension) -> float:
         raise _invalid("must be a finite number" if is_nan_or_inf else f"must be {dimension.name}", dimension)
     digits = match[0].lstrip("+-")
     if digits[0] == "0" and digits[1:2].isdigit():
-        raise InvalidValueError("has a leading zero, which some YAML readers take for octal", "write it without")
+        raise InvalidValueError(
+            "has a leading zero, which some YAML readers take for octal", "write it without the zero"
+        )
     number, unit = float(match[0]), text[match.end() :].lstrip()
     scale = dimension.scales.get(unit)
     if not unit:
         return _bare(_finite(number, dimension), text, dimension)
     if scale is None:
-        unit = normal_unit(unit)
-        scale = dimension.scales.get(unit)
+        scale = dimension.scales.get(normal_unit(unit))
     if scale is None:
         raise _wrong_unit(unit, dimension)
     return _finite(number * scale[0] / scale[1], dimension)
@@ -270,7 +316,7 @@ def _pretty(given: str) -> str:
     """Write a unit of the tables behind a number: `um` is µm, `m/s^2` m/s², `deg/sqrt(h)` deg/√h."""
     text = given.replace("^2", "²").replace("^3", "³").replace("^4", "⁴").replace("°", "deg")
     text = re.sub(r"sqrt\((\w+)\)", r"√\1", text)
-    text = re.sub(r"^u(?=m|g|s|rad)", "µ", text)
+    text = re.sub(r"^u(?=m|g|s|rad|Gal)", "µ", text)
     return text.removeprefix("1") if text.startswith(("1/", "/")) else f" {text}"
 
 
@@ -341,26 +387,42 @@ def _finite(number: float, dimension: Dimension) -> float:
     return number
 
 
+@lru_cache(256)
 def normal_unit(unit: str) -> str:
-    """Write a unit as the tables of units do: `µrad` is `urad`, `m/s²` is `m/s^2`."""
-    unit = unit.strip().replace("µ", "u").replace("μ", "u").replace("²", "^2").replace("³", "^3").replace("⁴", "^4")
-    unit = re.sub(r"\s*([/^])\s*", r"\1", unit.replace("**", "^"))
-    unit = re.sub(r"√\(?(s|h|Hz)\)?", r"sqrt(\1)", unit)
-    return unit.replace("s2", "s^2").replace("s3", "s^3")
+    """Write a unit as the tables of units do: `µrad` is `urad`, `m/s²` is `m/s^2`, `°/√hr` is `deg/sqrt(h)`."""
+    unit = unit.strip()
+    for pattern, meant in _SPELLINGS:
+        unit = re.sub(pattern, meant, unit)
+    return unit
 
 
 def _invalid(problem: str, dimension: Dimension, hint: str = "") -> InvalidValueError:
     return InvalidValueError(problem, dimension.accepted, hint)
 
 
-def _wrong_unit(unit: str, dimension: Dimension) -> InvalidValueError:
-    from difflib import get_close_matches
-
-    others = [other for other in DIMENSIONS if unit in other.units]
-    if others:
-        return _invalid(f"must be {dimension.name}, but {unit!r} makes it {others[0].name}", dimension)
+def _wrong_unit(written: str, dimension: Dimension) -> InvalidValueError:
+    """Say that a unit is none of a dimension, or of another one, and which was meant."""
+    unit = normal_unit(written)
     if unit.startswith(","):
         return _invalid("has a decimal comma", dimension, "Write a point")
+    others = [other for other in DIMENSIONS if unit in other.units]
+    if others:
+        meant = dimension.si if unit in _DECIBELS and dimension.si.startswith("dB") else ""
+        problem = f"must be {dimension.name}, but {written!r} makes it {others[0].name}"
+    else:
+        meant = _nearest_unit(unit, dimension)
+        problem = f"has the unknown unit {written!r}"
+    return _invalid(problem, dimension, f"Did you mean {meant!r}?" if meant else "")
+
+
+def _nearest_unit(unit: str, dimension: Dimension) -> str:
+    """Unit of a dimension that is spelt nearly like one that nobody knows; empty if none is."""
+    from difflib import get_close_matches
+
+    word = unit.lower()
+    for spelling in (word, word.removesuffix("s")):
+        if (meant := _MEANT.get(spelling, "")) in dimension.units:
+            return meant
     folded = {known.lower(): known for known in dimension.units if known}
-    near = folded.get(unit.lower()) or next(iter(get_close_matches(unit, dimension.units, 1, 0.5)), None)
-    return _invalid(f"has the unknown unit {unit!r}", dimension, f"Did you mean {near!r}?" if near else "")
+    spelt = normal_unit(word.replace("hz", "Hz")).lower()  # in capitals, as in `DEG/HR`
+    return folded.get(word) or folded.get(spelt) or next(iter(get_close_matches(unit, dimension.units, 1, 0.6)), "")

@@ -27,7 +27,7 @@ from bisar_budget.cli.streams import (
     write_file,
 )
 from bisar_budget.constants import MAX_DRAWS, MAX_DRAWS_HERE
-from bisar_budget.faults import printable
+from bisar_budget.faults import closed, fault_words, printable
 from bisar_budget.report import FORMATS
 
 if TYPE_CHECKING:
@@ -58,7 +58,11 @@ class _Gate(click.Command):
         known = ["BISAR_BUDGET_DEBUG", *(str(option.envvar) for option in options.values())]
         for name in os.environ:
             if name.startswith("BISAR_BUDGET_") and name not in known:
-                raise click.UsageError(f"{printable(name)}: is not a known variable; known: {', '.join(known)}.")
+                from bisar_budget.mission.readers import did_you_mean
+
+                near = did_you_mean(name, tuple(known))
+                problem = fault_words("is not a known variable", "", f"accepted: {', '.join(known)}", near)
+                raise click.UsageError(f"{printable(name)}: {closed(problem)}")
         try:
             settings = project_settings(os.getcwd())
         except SettingsError as error:
@@ -422,7 +426,7 @@ def _explain(
 ) -> None:
     """Explain a row, or a requirement, in every mission that has it."""
     from bisar_budget.budget.check import check_mission
-    from bisar_budget.mission.readers import did_you_mean
+    from bisar_budget.findings.row import unknown_id
     from bisar_budget.report.explain.explanation import explain, explain_requirement
     from bisar_budget.report.words.requirements import overrides_lines, requirement_id
 
@@ -443,8 +447,8 @@ def _explain(
         said = overrides_lines(found._replace(overrides=given))
         texts.append(text + "".join(f"{line}\n" for line in said))
     if not texts:
-        hint = did_you_mean(row_id, tuple(known))
-        raise click.UsageError(f"--explain {printable(row_id)}: no row has this id. {hint or 'A check lists them.'}")
+        problem = closed(unknown_id(row_id, known, files[0], "row or requirement"))
+        raise click.UsageError(f"--explain {printable(row_id)}: {problem}")
     deliver("\n".join(texts), output)
 
 
@@ -482,7 +486,7 @@ def _append_step_summary(path: str, report: "Report", style: "Style") -> None:
             file.write(step_summary(report, style))
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
-        complain(f"Warning: cannot write the step summary {printable(path)}: {reason}")
+        complain(f"warning: cannot write the step summary {printable(path)}: {reason}")
 
 
 def _say_faults(missions: "Iterable[MissionFindings | UnusableMission | None]") -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from bisar_budget.cli.streams import EXIT_USAGE, FILE, TEXT_OR_JSON, complain, deliver, expand, spare
-from bisar_budget.faults import MissionError, file_fault, printable
+from bisar_budget.faults import MissionError, file_fault, printable, sentences
 
 if TYPE_CHECKING:
     from bisar_budget.mission.parts import Entry, PartError
@@ -71,7 +71,8 @@ def _listed(patterns: Sequence[str], kind: str | None) -> "list[Entry]":
             hint = did_you_mean(pattern, tuple(one.id for one in known))
             if os.path.exists(pattern):
                 hint = "It is a file: --check checks it"
-            complain(f"error: no part of the catalogue matches {printable(pattern)}. {hint}".rstrip())
+            listed = "`bisar-budget sensors` lists them"
+            complain(f"error: {sentences(f'no part of the catalogue matches {printable(pattern)}; {listed}', hint)}")
     if not all(matching.values()):
         sys.exit(EXIT_USAGE)
     return [one for one in known if any(one in found for found in matching.values())]

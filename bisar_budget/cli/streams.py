@@ -61,7 +61,7 @@ def _read_changes(ctx: click.Context, param: click.Parameter, texts: tuple[str, 
     try:
         return read_changes(texts)
     except InvalidValueError as error:
-        raise click.UsageError(f"--set: {error.problem.problem}; {error.problem.accepted}.") from None
+        raise click.UsageError(f"--set: {error.problem.words}.") from None
 
 
 def set_option(what: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:

@@ -29,7 +29,7 @@ def check_options(texts: Sequence[str], formats: Sequence[str]) -> None:
     if not any(FORMATS[name].is_illustrated for name in formats):
         raise click.UsageError(
             "--sweep is shown in a compliance report; accepted: --report FILE.html or FILE.md, or --format html or "
-            "markdown. bisar-budget sweep writes tables and plots."
+            "markdown. `bisar-budget sweep` writes tables and plots."
         )
     if len(texts) > 2:
         raise click.UsageError(f"--sweep draws one key or two, and there are {len(texts)}.")
@@ -69,8 +69,8 @@ def _cases(mission: Mission, texts: Sequence[str]) -> Grid:
             raise QuestionError(f"{_OPTION} {one.key}: has one value; accepted: several. --set puts in one")
     if cases.count > MAX_CASES:
         raise QuestionError(
-            f"{_OPTION}: {cases.count} cases; accepted: up to {MAX_CASES}, for which a page has room. bisar-budget "
-            "sweep checks more"
+            f"{_OPTION}: {cases.count} cases; accepted: up to {MAX_CASES}, for which a page has room. "
+            "`bisar-budget sweep` checks more"
         )
     return cases
 

@@ -87,12 +87,16 @@ def verify(
 
 def verify_all(missions: "Sequence[Mission]", only: str, jobs: int | None) -> "list[VerifiedMission]":
     """Verify missions, with a progress bar where somebody watches."""
+    from bisar_budget.findings.row import where_ids_are
     from bisar_budget.simulate.image_formation import is_compiled
     from bisar_budget.verify.limits import rows_to_verify, seconds_to_verify, verify_mission
 
     total = sum(len(rows_to_verify(mission, only)) for mission in missions)
     if not total and only != "*":
-        raise click.UsageError(f"--only {printable(only)}: no row with a limit matches; nothing was verified.")
+        listed = where_ids_are(missions[0].file)
+        raise click.UsageError(
+            f"--only {printable(only)}: no row with a limit matches, nothing was verified; {listed}."
+        )
     jobs = jobs or (1 if is_compiled() else cores())
     seconds = sum(seconds_to_verify(mission, only, jobs) for mission in missions)
     foretell(seconds, f"Forming the images of {total} rows", "--only looks at some of them" + faster(jobs))

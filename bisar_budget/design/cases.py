@@ -331,9 +331,7 @@ def _wrong_word(choices: Choices, word: str) -> str:
     try:
         choices.reader.leaf(word)
     except InvalidValueError as error:
-        wrong = error.problem
-        said = "; ".join(filter(None, (wrong.problem, wrong.accepted)))
-        return f"{shown(word)!r} {said}" + (f". {wrong.hint}" if wrong.hint else "")
+        return f"{shown(word)!r} {error.problem.words}"
     return ""
 
 
@@ -346,9 +344,7 @@ def _read(option: str, number: Number, texts: Sequence[str]) -> tuple[Number, tu
         try:
             values.append(number.reader.leaf(whole))
         except InvalidValueError as error:
-            wrong = error.problem
-            parts = (f"{option}: {shown(text.strip())!r} {wrong.problem}", wrong.accepted, wrong.hint)
-            raise QuestionError("; ".join(filter(None, parts))) from None
+            raise QuestionError(f"{option}: {shown(text.strip())!r} {error.problem.words}") from None
     return number._replace(unit=_said_in(units[-1], number.dimension)), tuple(values)
 
 

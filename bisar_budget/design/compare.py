@@ -84,8 +84,8 @@ def compare_parts(
     tried = [(one, search.checked(one, today)) for one in search.candidates]
     found = [checked.findings for _, checked in tried if checked.findings is not None]
     if not found:
-        why = tried[0][1].reason if tried else "The catalogue has none of its kind"
-        raise QuestionError(f"{key}: no part makes a mission. {why}")
+        why = tried[0][1].reason if tried else "the catalogue has none of its kind"
+        raise QuestionError(f"{key}: no part makes a mission: {why}")
     hold_to_decisions(found, row)
     if not any(checked.figures for _, checked in tried):
         raise QuestionError(f"{key}: the file states every figure itself; nothing of a part would be taken")

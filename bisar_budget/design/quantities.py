@@ -6,7 +6,7 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from typing import Any, NamedTuple
 
 from bisar_budget import units
-from bisar_budget.faults import InvalidValueError, shown
+from bisar_budget.faults import InvalidValueError, fault_words, shown
 from bisar_budget.mission import later
 from bisar_budget.mission.bounds import DIRECTION, ELEVATION, LATITUDE
 from bisar_budget.mission.changes import apply_changes, next_name, parts_of
@@ -107,10 +107,9 @@ def number_of(tree: dict[str, Any], key: str, of_all: str = "") -> Number:
     if isinstance(reader, Section):
         raise QuestionError(f"{key}: is a section; accepted: one of its keys, {', '.join(reader.keys)}")
     if not isinstance(reader, Quantity):
-        hint = ". sweep --vary compares what it can be" if reader.is_word else ""
-        raise QuestionError(
-            f"{key}: is no number with a unit; accepted: one that is, such as collection.aperture_time{hint}"
-        )
+        accepted = "accepted: one that is, such as collection.aperture_time"
+        hint = "`bisar-budget sweep --vary` compares what it can be" if reader.is_word else ""
+        raise QuestionError(f"{key}: {fault_words('is no number with a unit', '', accepted, hint)}")
     return as_number(key, reader, value)
 
 
@@ -149,6 +148,7 @@ def as_number(key: str, reader: Quantity, value: Any) -> Number:
     dimension = reader.dimension
     number = parse_quantity(value, dimension) if isinstance(value, str) else None
     unit = _UNIT.sub("", value).strip() if isinstance(value, str) else ""
+    unit = unit if unit in dimension.scales else units.normal_unit(unit)
     if unit not in dimension.scales or not unit:
         unit = "deg" if dimension is units.ANGLE else dimension.usual[0] if dimension.usual else dimension.si
     return Number(key, reader, number, unit if unit in dimension.scales else "")
@@ -175,15 +175,14 @@ def _found(tree: dict[str, Any], key: str) -> tuple[Reader, Any]:
         if isinstance(reader, Section) and part in reader.later:
             raise QuestionError(f"{key}: {later.PROBLEM}; {reader.later[part]}")
         if inner is None:
-            known = f"; accepted: {', '.join(reader.keys)}" if isinstance(reader, Section) else ""
-            hint = nearest_keys(key)
-            raise QuestionError(
-                f"{shown(key)}: {shown(part)!r} is not a known key{known}{f'. {hint}' if hint else ''}"
-            )
+            known = f"accepted: {', '.join(reader.keys)}" if isinstance(reader, Section) else ""
+            problem = fault_words(f"{shown(part)!r} is not a known key", "", known, nearest_keys(key))
+            raise QuestionError(f"{shown(key)}: {problem}")
         if isinstance(reader, ListOf | TextList | Triple):
             listed = value if isinstance(value, list) else []
             if int(part) >= len(listed):
-                raise QuestionError(f"{key}: the list has {len(listed)} entries, and none has the number {part}")
+                entries = f"{len(listed)} entr{'y' if len(listed) == 1 else 'ies'}"
+                raise QuestionError(f"{key}: the list has {entries}, and none has the number {part}")
             value = listed[int(part)]
         else:
             value = value.get(part) if isinstance(value, dict) else None
@@ -259,9 +258,7 @@ def _end(number: Number, between: str, text: str) -> float:
     try:
         return number.reader.leaf(text)
     except InvalidValueError as error:
-        said, accepted, hint = error.problem[:3]
-        parts = [f"--between {shown(between)}: {shown(text)!r} {said}", accepted, hint]
-        raise QuestionError("; ".join(filter(None, parts))) from None
+        raise QuestionError(f"--between {shown(between)}: {shown(text)!r} {error.problem.words}") from None
 
 
 def _example(number: Number) -> str:

@@ -85,7 +85,7 @@ def solve(
     crossings = tuple(search.crossing(low, high) for low, high in pairwise(scanned) if low.complies != high.complies)
     missions = [state for state in scanned if not state.reason]
     if not missions:
-        raise QuestionError(f"{key}: no value of the range makes a mission. {scanned[0].reason}")
+        raise QuestionError(f"{key}: no value of the range makes a mission: {scanned[0].reason}")
     nearest = search.evaluate(_nearest(missions).value)
     return Solution(
         file=mission.file,

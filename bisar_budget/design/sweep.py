@@ -28,13 +28,12 @@ from bisar_budget.design.cases import Cases, words_of
 from bisar_budget.design.quantities import Choices, Number, QuestionError, number_of, tree_of
 from bisar_budget.design.swept import Column, Part, Swept, Values
 from bisar_budget.design.variation import ALIKE, Variation, breaking, standing
-from bisar_budget.faults import Fault, MissionError, SetValue, shown
-from bisar_budget.findings.row import Row
+from bisar_budget.faults import Fault, MissionError, SetValue, fault_words, shown
+from bisar_budget.findings.row import Row, unknown_id
 from bisar_budget.findings.status import RANK, STATUS
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.named import Named
-from bisar_budget.mission.readers import did_you_mean
 from bisar_budget.workers import worker_pool
 
 if TYPE_CHECKING:
@@ -212,8 +211,7 @@ class Asked:
                     f"--column {one.name}: {one.field!r} is no field of a row; accepted: {', '.join(_FIELDS)}"
                 )
             if one.row not in rows:
-                hint = did_you_mean(one.row, tuple(rows)) or "A check lists them."
-                raise QuestionError(f"--column {one.name}: no row has the id {one.row!r}. {hint}")
+                raise QuestionError(f"--column {one.name}: {unknown_id(one.row, rows, self.question.file)}")
             unit = rows[one.row].unit if one.field in _IN_UNIT else _UNITS.get(one.field, "")
             yield Column(one.name, unit, _FIELDS[one.field].format(one.row), is_text=one.is_text)
 
@@ -594,5 +592,4 @@ def _of_row(name: str) -> tuple[str, str]:
 
 def _said(fault: Fault) -> str:
     """What is wrong, and what would not be."""
-    said = "; ".join(filter(None, (fault.problem, fault.accepted)))
-    return f"{said}. {fault.hint}" if fault.hint and "Read with" not in fault.hint else said
+    return fault_words(fault.problem, "", fault.accepted, "" if "Read with" in fault.hint else fault.hint)

@@ -6,13 +6,12 @@ from typing import NamedTuple
 from bisar_budget.design.quantities import Number, QuestionError
 from bisar_budget.faults import SetValue
 from bisar_budget.findings.mission import MissionFindings
-from bisar_budget.findings.row import Row
+from bisar_budget.findings.row import Row, unknown_id
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.named import Named
-from bisar_budget.mission.readers import did_you_mean
 
 ALIKE = 1e-9  # of a utilization: a common error along x and along y may bind alike, but for rounding
 
@@ -120,7 +119,6 @@ def hold_to_decisions(findings: Sequence[MissionFindings], row_id: str | None) -
     rows = [row for found in findings for row in found.rows]
     statuses = [STATUS[row.status] for row in rows if row.id == row_id]
     if not statuses:
-        hint = did_you_mean(row_id, tuple(row.id for row in rows))
-        raise QuestionError(f"--row {row_id}: no row has this id. {hint or 'A check lists them.'}")
+        raise QuestionError(f"--row {row_id}: {unknown_id(row_id, (row.id for row in rows), findings[0].file)}")
     if not any(status.gates for status in statuses):
         raise QuestionError(f"--row {row_id}: is {statuses[0].words}: nothing is judged there")

@@ -1,13 +1,15 @@
 """One row of a budget: what it is about, its numbers, its status."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from datetime import date
 from typing import Any, NamedTuple
 
 from bisar_budget import phrases
 from bisar_budget.effects.subject import Subject
+from bisar_budget.faults import printable, sentences
 from bisar_budget.findings.status import RANK
 from bisar_budget.geometry import GroundVector
+from bisar_budget.mission.readers import did_you_mean
 from bisar_budget.phrases import Note
 
 DECLARE = "declare"  # requirements.declare, and the metric of its row
@@ -118,6 +120,19 @@ class Row(NamedTuple):
         if not (self.waivers or self.refuted):
             return self.remarks
         return (*self.remarks, *(waiver.words for waiver in self.waivers), *self.refuted)
+
+
+def where_ids_are(file: str) -> str:
+    """The command that lists the ids of a mission's rows."""
+    from shlex import quote
+
+    return f"`bisar-budget check {quote(printable(file))} --all` lists them"
+
+
+def unknown_id(row_id: str, known: Iterable[str], file: str, of_what: str = "row") -> str:
+    """Say that nothing of a mission has an id, where ids are found, and which is the nearest."""
+    problem = f"no {of_what} has this id; {where_ids_are(file)}"
+    return sentences(problem, did_you_mean(row_id, tuple(known)))
 
 
 def worst_first(rows: Sequence[Row]) -> list[Row]:

@@ -70,7 +70,8 @@ def _apply(tree: Tree, change: SetValue) -> None:
         if name is None:
             tree.changes[path] = change
             is_list = isinstance(container, list)
-            problem = f"has {len(container)} entries, and none has this number" if is_list else "has no keys"
+            entries = f"{len(container)} entr{'y' if len(container) == 1 else 'ies'}" if is_list else ""
+            problem = f"has {entries}, and none has this number" if is_list else "has no keys"
             accepted = f"accepted: 0 to {len(container)}, where the last adds one" if is_list else ""
             given = "" if is_list else shown(str(container))
             tree.fault(None, path, problem, given=parts[0] if is_list else given, accepted=accepted)
@@ -129,10 +130,10 @@ def _value(tree: Tree, change: SetValue, path: KeyPath) -> Any:
         value = tree.node(next_event, next_event(), path)
         while type(event := next_event()) is not yaml.StreamEndEvent:
             if type(event) is yaml.DocumentStartEvent:
-                tree.fault(None, path, "has a second YAML document", accepted="one value")
+                tree.fault(None, path, "has a second YAML document", accepted="accepted: one value")
                 raise UnusableError
     except yaml.MarkedYAMLError as error:
-        said = " ".join(filter(None, (error.context, error.problem)))
+        said = ", ".join(filter(None, (error.context, error.problem)))
         tree.fault(None, path, f"is not valid YAML: {said}", given=shown(change.text))
         return INVALID
     except yaml.reader.ReaderError as error:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import BinaryIO, cast
 
-from bisar_budget.faults import Fault, MissionError, SetValue, changes_words, file_fault
+from bisar_budget.faults import Fault, MissionError, SetValue, changes_words, file_fault, sentences
 from bisar_budget.mission.model import MISSION, Mission, PartFile, flies_on_earth, names_files, names_parts
 from bisar_budget.mission.readers import INVALID
 from bisar_budget.mission.tree import MAX_BYTES, UnusableError, read_tree
@@ -111,7 +111,7 @@ def parse_mission(
 
             mission = with_parts(mission, _noted(find or finder_of(folder), parts), tree.report)
     if tree.faults:
-        ordered = tree.in_order()
+        ordered = tuple([_with_hint(fault) for fault in tree.in_order()])
         if changes:
             ordered = tuple([_with_changes(fault, changes) for fault in ordered])
         raise MissionError(file, ordered)
@@ -137,15 +137,23 @@ def folder_of(file: str) -> str:
     return os.path.dirname(file) if file != "-" else ""
 
 
+def _with_hint(fault: Fault) -> Fault:
+    """Say of an unknown key which was meant, or which section has it."""
+    is_unknown = fault.problem.endswith("is not a known key")
+    if not is_unknown or (fault.hint and not fault.hint.startswith("Did you mean")):
+        return fault
+    from bisar_budget.mission.changes import parts_of
+    from bisar_budget.mission.keys import nearest_keys, section_hint
+
+    if not fault.option:
+        return fault._replace(hint=section_hint(fault.key, fault.hint))
+    asked = fault.option.removeprefix("--set ")
+    is_above = ".".join(parts_of(asked)).startswith(".".join(parts_of(fault.key)))
+    return fault._replace(hint=nearest_keys(asked if is_above else fault.key))
+
+
 def _with_changes(fault: Fault, changes: Sequence[SetValue]) -> Fault:
-    """Say of an unknown key of an option which was meant, and with what options a fault of the file was found.
-
-    Without them there may be none.
-    """
-    if fault.option:
-        if fault.hint or not fault.problem.endswith("is not a known key"):
-            return fault
-        from bisar_budget.mission.keys import nearest_keys
-
-        return fault._replace(hint=nearest_keys(fault.option.removeprefix("--set ")))
-    return fault._replace(hint=f"{fault.hint}{'. ' if fault.hint else ''}Read with {changes_words(changes)}")
+    """Say with what options a fault of the file was found: without them there may be none."""
+    return (
+        fault if fault.option else fault._replace(hint=sentences(fault.hint, f"Read with {changes_words(changes)}"))
+    )

@@ -10,7 +10,16 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from typing import Annotated, Any, NamedTuple
 
-from bisar_budget.faults import Fault, InvalidValueError, KeyPath, MissionError, Problem, file_fault, shown
+from bisar_budget.faults import (
+    Fault,
+    InvalidValueError,
+    KeyPath,
+    MissionError,
+    Problem,
+    file_fault,
+    sentences,
+    shown,
+)
 from bisar_budget.geometry import Vector
 from bisar_budget.mission.bounds import COORDINATE, VELOCITY
 from bisar_budget.mission.instruments import (
@@ -152,6 +161,14 @@ class PartError(Exception):
     def __str__(self) -> str:
         """Say all of it."""
         return "; ".join(map(str, self.args))
+
+
+class UnknownPartError(PartError):
+    """No part of the catalogue has a name; `hint` says where names are found, and which is the nearest."""
+
+    def __init__(self, hint: str) -> None:
+        super().__init__("is no part of the catalogue")
+        self.hint = hint
 
 
 def evidence(part: Part, figure: str) -> str:
@@ -400,7 +417,7 @@ def _file_of(name: str, beside: str, files: Files) -> str:
                 if file in there:
                     return os.path.join(folder, file)
     near = did_you_mean(name.lower(), tuple(catalogue(places, files)))
-    raise PartError(f"is no part of the catalogue; `bisar-budget sensors` lists them{'. ' if near else ''}{near}")
+    raise UnknownPartError(sentences("`bisar-budget sensors` lists them", near))
 
 
 def with_parts(mission: Mission, find: Find, report: Report) -> Any:
@@ -497,6 +514,10 @@ def _parts_of(names: str | tuple[str, ...] | None, path: KeyPath, kinds: Sequenc
             part, written = _parsed(*find(name))
             if part.kind not in kinds:
                 raise PartError(f"is an {part.kind}" if part.kind != "gnss" else "is a GNSS receiver")
+        except UnknownPartError as error:
+            report(here, Problem(str(error), f"accepted: parts of the kind {' or '.join(kinds)}", error.hint))
+            is_valid = False
+            continue
         except PartError as error:
             # What is wrong with its file says what is accepted there, and names the file.
             accepted = "" if error.faults else f"accepted: parts of the kind {' or '.join(kinds)}"

@@ -111,7 +111,7 @@ class Quantity(Reader):
             return ""  # only a zero comes so far without its unit
         if "%" in self.dimension.units:
             try:
-                return f"Did you mean {text} %?" if self.leaf(f"{text} %") is not None else ""
+                return f"Did you mean '{text} %'?" if self.leaf(f"{text} %") is not None else ""
             except InvalidValueError:
                 return ""
         return f"A bare number is in {self.dimension.si}" if self.dimension.si not in ("", "dB") else ""
@@ -373,7 +373,7 @@ class Section(Reader):
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
         """Read every key, report every fault."""
         if not isinstance(value, dict):
-            report(path, Problem("must be a mapping of keys to values"))
+            report(path, Problem("must be a mapping of keys to values", f"accepted: {', '.join(self.keys)}"))
             return INVALID
         is_valid = True
         values = {}

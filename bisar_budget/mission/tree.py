@@ -116,7 +116,8 @@ class Tree:
         self.root = self.node(next_event, next_event(), ())
         while type(event := next_event()) is not yaml.StreamEndEvent:
             if type(event) is yaml.DocumentStartEvent:
-                self.fault(event.start_mark, (), "has a second YAML document", accepted=f"one {self.what} to a file")
+                one = f"accepted: one {self.what} in a file"
+                self.fault(event.start_mark, (), "has a second YAML document", accepted=one)
                 raise UnusableError
 
     def node(self, next_event: Callable[[], Any], event: Any, path: KeyPath) -> Any:
@@ -150,7 +151,7 @@ class Tree:
             if event.flow_style:
                 self._decimal_commas(items, path)
         if event.tag is not None and event.tag != "!":
-            self.fault(mark, path, "carries a YAML tag", given=shown(event.tag), accepted="plain values")
+            self.fault(mark, path, "carries a YAML tag", given=shown(event.tag), accepted="accepted: plain values")
             return INVALID
         return value
 
@@ -172,7 +173,7 @@ class Tree:
                 given = shown(f"{before.value},{item.value}")
                 problem, accepted = (
                     "may be half of a number with a decimal comma",
-                    "a point, or a blank behind commas",
+                    "accepted: a point, or a blank behind commas",
                 )
                 self.fault(item.start_mark, (*path, index), problem, given=given, accepted=accepted)
 
@@ -188,7 +189,7 @@ class Tree:
             if key in mapping:
                 first = self.keys[here].start_mark.line + 1
                 problem = f"is a duplicate key; the first is in line {first}"
-                self.fault(mark, here, problem, accepted="each key once")
+                self.fault(mark, here, problem, accepted="accepted: each key once")
                 self.node(next_event, next_event(), (*path, f"{key} (again)"))
                 continue
             self.keys[here] = event
@@ -225,7 +226,7 @@ def read_tree(data: bytes | str, file: str, what: str = "mission") -> Tree:
             tree.faults.append(file_fault(problem, _STARTS[what]))
     except yaml.MarkedYAMLError as error:
         place = error.problem_mark or error.context_mark
-        problem = f"is not valid YAML: {' '.join(filter(None, (error.context, error.problem)))}"
+        problem = f"is not valid YAML: {', '.join(filter(None, (error.context, error.problem)))}"
         tree.fault(place, (), problem)
         raise MissionError(file, tuple(tree.faults)) from None
     except yaml.reader.ReaderError as error:

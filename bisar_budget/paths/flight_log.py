@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import units
-from bisar_budget.faults import InvalidValueError, shown
+from bisar_budget.faults import InvalidValueError, fault_words, shown
 from bisar_budget.paths.earth import EQUATORIAL_RADIUS, FLATTENING
 from bisar_budget.paths.flight import Log, PathFileError
 from bisar_budget.paths.instant import DAY, Instant, parse_instant
@@ -265,8 +265,7 @@ def _measured(name: str, index: int, unit: str | None, refuse: Callable[[str], N
     try:
         return _Column(name, index, shown(unit), units.parse_quantity(f"1 {unit}", dimension))
     except InvalidValueError as error:
-        hint = f". {error.problem.hint}" if error.problem.hint else ""
-        refuse(f"{name} {error.problem.problem}; write '{example}'{hint}")
+        refuse(fault_words(f"{name} {error.problem.problem}", "", f"write '{example}'", error.problem.hint))
 
 
 def _all_rows(lines: list[str], header: _Header, name: str) -> _Rows:

@@ -154,7 +154,7 @@ def test_text_and_json(run: Callable) -> None:
         ([UAV, "--for", SENSOR, "--between", "1..2"], f"--between: {SENSOR} names parts of the catalogue"),
         ([UAV, "--for", SENSOR, "--scale"], f"--scale: {SENSOR} names parts of the catalogue"),
         ([UAV, "--for", "platforms.relay.oscillator.sensor"], "'relay' is not a known key"),
-        ([UAV, "--for", SENSOR, "--row", "receiver.velocity.q"], "no row has this id. Did you mean"),
+        ([UAV, "--for", SENSOR, "--row", "receiver.velocity.q"], "no row has this id; `bisar-budget check"),
         ([UAV, "--for", SENSOR, "--set", f"{SENSOR}=stim30"], "is no part of the catalogue"),
         ([OCXO, "--for", OSCILLATOR, "--set", "radar.bandwidth=1 m"], "must be a frequency"),
     ],

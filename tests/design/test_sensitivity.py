@@ -417,7 +417,7 @@ def test_the_bars_are_the_slopes() -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--row", "transmitter.aceleration.x"], "no row has this id. Did you mean 'transmitter.acceleration.x'?"),
+        (["--row", "transmitter.aceleration.x"], "--all` lists them. Did you mean 'transmitter.acceleration.x'?"),
         (["--row", "receiver.velocity.x"], "is not declared: nothing is judged there"),
         (["--plot", "a.gif"], "a.gif: the suffix must be one of .svg, .png, .pdf"),
         (["--plot", "a.svg", str(MISSIONS / "tandem_x.yaml")], "--plot draws one mission."),

@@ -574,7 +574,7 @@ def test_processes_find_the_same(monkeypatch) -> None:
     ("column", "says"),
     [
         ("receiver.acceleration.x.size", "'size' is no field of a row; accepted: status, declared"),
-        ("reciever.acceleration.x.allowable", "no row has the id 'reciever.acceleration.x'. Did you mean"),
+        ("reciever.acceleration.x.allowable", "--all` lists them. Did you mean 'receiver.acceleration.x'"),
         ("nothing", "'nothing' is no field"),
     ],
 )

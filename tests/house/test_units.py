@@ -60,6 +60,83 @@ def test_reads(text: object, dimension: units.Dimension, value: float) -> None:
     assert parse_quantity(text, dimension) == pytest.approx(value, rel=1e-15)
 
 
+# One of each, in SI, from the definitions: a degree is π/180, an hour 3600 s, a gal 0.01 m/s², g 9.80665 m/s².
+DATA_SHEETS = (
+    (units.ANGULAR_RATE, 4.848136811e-6, "°/hr", "°/h", "deg/hr", "deg/h", "deg / hr", "º/h", "˚/hr"),
+    (units.ANGULAR_RATE, 1.745329252e-2, "°/s", "deg/s"),
+    (units.ANGLE_RANDOM_WALK, 2.908882087e-4, "°/√h", "°/√hr", "deg/√hr", "deg/sqrt(hr)", "deg/sqrt(h)", "deg/rt-hr"),
+    (units.ANGLE_RANDOM_WALK, 2.908882087e-4, "°/root-hr", "deg/rt(hr)", "deg/rthr", "deg/hr^0.5"),
+    (units.ANGLE_RANDOM_WALK, 2.908882087e-4, "°/h^(1/2)", "°/h^½"),
+    (units.ANGLE_RANDOM_WALK, 4.848136811e-6, "°/h/√Hz", "°/hr/√Hz", "(°/hr)/√Hz", "deg/h/rt-Hz"),
+    (units.ANGLE_RANDOM_WALK, 1.745329252e-2, "°/s/√Hz", "(deg/s)/√Hz"),
+    (units.VELOCITY_RANDOM_WALK, 9.80665e-6, "µg/√Hz", "μg/√Hz", "ug/√Hz", "µg/√(Hz)", "µg/rt-Hz", "ug/sqrt(Hz)"),
+    (units.VELOCITY_RANDOM_WALK, 1 / 60, "m/s/√h", "m/s/√hr", "m/s/sqrt(hr)"),
+    (units.ACCELERATION, 1e-5, "mGal"),
+    (units.ACCELERATION, 1e-2, "Gal"),
+    (units.ACCELERATION, 1e-8, "µGal", "μGal", "uGal"),
+    (units.ACCELERATION, 9.80665e-6, "µg", "μg", "ug"),
+    (units.ANGLE, 4.848136811e-6, "arcsec"),
+    (units.ANGLE, 2.908882087e-4, "arcmin"),
+    (units.ANGLE, 1e-3, "mrad"),
+    (units.TONE, 1.0, "dBc"),
+    (units.PHASE_NOISE, 1.0, "dBc/Hz"),
+)
+
+
+@pytest.mark.parametrize(
+    ("dimension", "value", "unit"), [(d, v, unit) for d, v, *texts in DATA_SHEETS for unit in texts]
+)
+def test_reads_units_as_data_sheets_write_them(dimension: units.Dimension, value: float, unit: str) -> None:
+    assert parse_quantity(f"1 {unit}", dimension) == pytest.approx(value, rel=1e-9)
+    assert parse_quantity(f"250{unit}", dimension) == pytest.approx(250 * value, rel=1e-9)
+
+
+@pytest.mark.parametrize("dimension", units.DIMENSIONS, ids=lambda one: one.name)
+def test_every_unit_is_read_back_as_a_report_writes_it(dimension: units.Dimension) -> None:
+    """Reports speak in the unit of the file: `format_in` writes it, the next file may copy it."""
+    for unit in filter(None, dimension.units):
+        written = units.format_in(0.5 * parse_quantity(f"1 {unit}", dimension), dimension.si or "s/s", unit, 6)
+        expected = 0.5 * parse_quantity(f"1 {unit}", dimension)
+        assert parse_quantity(written, dimension) == pytest.approx(expected, rel=1e-5), written
+
+
+@pytest.mark.parametrize(
+    ("text", "dimension", "hint"),
+    [
+        ("-30 dBc", units.POWER_RATIO, "Did you mean 'dB'?"),
+        ("-95 dBc", units.PHASE_NOISE, "Did you mean 'dBc/Hz'?"),
+        ("-95 dB", units.PHASE_NOISE, "Did you mean 'dBc/Hz'?"),
+        ("-95 dBc/hz", units.PHASE_NOISE, "Did you mean 'dBc/Hz'?"),
+        ("-90 dB", units.TONE, "Did you mean 'dBc'?"),
+        ("-90 dBc/Hz", units.TONE, ""),  # a density is no level
+        ("3 as", units.ANGLE, "Did you mean 'arcsec'?"),
+        ("3 arcseconds", units.ANGLE, "Did you mean 'arcsec'?"),
+        ("3 Degrees", units.ANGLE, "Did you mean 'deg'?"),
+        ("3 mgal", units.ACCELERATION, "Did you mean 'mGal'?"),
+        ("3 dph", units.ANGULAR_RATE, "Did you mean 'deg/h'?"),
+        ("3 deg/hour", units.ANGULAR_RATE, "Did you mean 'deg/h'?"),
+        ("3 DEG/HR", units.ANGULAR_RATE, "Did you mean 'deg/h'?"),
+        ("3 deg/√HR", units.ANGLE_RANDOM_WALK, "Did you mean 'deg/sqrt(h)'?"),
+        ("3 µg/√hz", units.VELOCITY_RANDOM_WALK, "Did you mean 'ug/sqrt(Hz)'?"),
+        ("3 micro-g", units.ACCELERATION, "Did you mean 'ug'?"),
+        ("3 sec", units.TIME, "Did you mean 's'?"),
+        ("3 meters", units.LENGTH, "Did you mean 'm'?"),
+        ("3 °/√h", units.ANGULAR_RATE, ""),
+        ("6 parsec", units.TIME, ""),  # nothing near: not 'ps'
+    ],
+)
+def test_a_unit_of_data_sheets_that_is_not_read_gets_a_hint(text: str, dimension: units.Dimension, hint: str) -> None:
+    with pytest.raises(InvalidValueError) as error:
+        parse_quantity(text, dimension)
+    assert error.value.problem.hint == hint
+
+
+def test_an_unknown_unit_is_named_as_it_was_written() -> None:
+    with pytest.raises(InvalidValueError) as error:
+        parse_quantity("3 µparsec", units.LENGTH)
+    assert error.value.problem.problem == "has the unknown unit 'µparsec'"
+
+
 def test_decimal_prefixes_add_no_rounding() -> None:
     assert parse_quantity("5 mm/s^2", units.ACCELERATION) == 0.005
     assert parse_quantity("20 um", units.LENGTH) == 20e-6

@@ -58,7 +58,7 @@ def test_an_entry_is_added_behind_the_last() -> None:
     listed = TEXT + "other_errors:\n  - {name: a, quadratic_phase_error: 1 deg}\n"
     mission = changed("other_errors.1={name: b, quadratic_phase_error: 2 deg}", data=listed)
     assert [other.name for other in mission.other_errors] == ["a", "b"]
-    assert "other_errors: has 1 entries, and none has this number (got 3); accepted: 0 to 1" in fault(
+    assert "other_errors: has 1 entry, and none has this number (got 3); accepted: 0 to 1" in fault(
         "other_errors.3.name=c", data=listed
     )
 

@@ -68,9 +68,12 @@ BROKEN = {
     ),
     "a blank name": (IMU.replace("name: x", "name: ' '"), "f.yaml:2:7: name: must not be empty"),
     "a NUL": (IMU.replace("name: x", r'name: "\0"'), "f.yaml:2:7: name: must be one line of printable text"),
-    "two documents": (IMU + "---\n" + IMU, "f.yaml:5:1: has a second YAML document; one part to a file"),
+    "two documents": (IMU + "---\n" + IMU, "f.yaml:5:1: has a second YAML document; accepted: one part in a file"),
     "an alias": (IMU + "says: *y\n", "f.yaml:5:7: says: is an alias (*); write the value out"),
-    "a key twice": (IMU + "name: z\n", "f.yaml:5:1: name: is a duplicate key; the first is in line 2; each key once"),
+    "a key twice": (
+        IMU + "name: z\n",
+        "f.yaml:5:1: name: is a duplicate key; the first is in line 2; accepted: each key once",
+    ),
     "no YAML": ("kind: [imu\n", "f.yaml:2:1: is not valid YAML"),
     "nothing": ("# nothing\n", "f.yaml: is empty. A part begins with kind: imu, kind: gnss or kind: oscillator"),
     "binary": ("\x00\x01", "f.yaml:1: is not a text file"),
@@ -412,8 +415,14 @@ class TestCheck:
             (["--check"], "--check needs FILE"),
             (["--check", ""], "the name of a file is empty"),
             (["--check", "--kind", "imu", "f.yaml"], "--kind is for the list of parts"),
-            (["f.yaml"], "no part of the catalogue matches f.yaml. It is a file: --check checks it"),
-            (["stim300", "stim30"], "no part of the catalogue matches stim30. Did you mean 'stim300'?"),
+            (
+                ["f.yaml"],
+                "matches f.yaml; `bisar-budget sensors` lists them. It is a file: --check checks it",
+            ),
+            (
+                ["stim300", "stim30"],
+                "no part of the catalogue matches stim30; `bisar-budget sensors` lists them. Did you mean 'stim300'?",
+            ),
         ],
     )
     def test_wrong_usage(self, arguments: list[str], said: str, tmp_path: Path, run: Run, monkeypatch: Any) -> None:

@@ -292,7 +292,7 @@ class TestRequirements:
 
     @pytest.mark.parametrize(
         ("asked", "hint"),
-        [("requirement.pslr", "no row has this id"), ("requirement.quadratic_phase_eror", "Did you")],
+        [("requirement.pslr", "no row or requirement has this id"), ("requirement.quadratic_phase_eror", "Did you")],
     )
     def test_one_that_the_mission_does_not_have_is_2(self, run, asked: str, hint: str) -> None:
         result = run("check", "-", "--explain", asked, input=mission_text())

@@ -230,7 +230,10 @@ class TestCommand:
 
     @pytest.mark.parametrize(
         ("row_id", "hint"),
-        [("receiver.velocty.x", "Did you mean 'receiver.velocity.x'?"), ("%", "A check lists them")],
+        [
+            ("receiver.velocty.x", "Did you mean 'receiver.velocity.x'?"),
+            ("%", "no row or requirement has this id; `bisar-budget check - --all` lists them.\n"),
+        ],
     )
     def test_an_unknown_id_is_2_with_a_hint(self, run, row_id, hint) -> None:
         result = run("check", "-", "--explain", row_id, input=mission_text())

@@ -73,7 +73,7 @@ def finding(row: Row, mission: MissionFindings) -> str:
     """Say both, and which requirement of the project it concerns."""
     why = cause(row)
     own_id = f" [{row.requirement_id}]" if row.requirement_id else ""
-    return f"{row.id}{own_id}: {measure(row, mission)}{f'. {why}' if why else ''}"
+    return f"{row.id}{own_id}: {measure(row, mission)}{f'. {sentence(why)}' if why else ''}"
 
 
 def sentence(text: str) -> str:
