@@ -87,7 +87,7 @@ class _Gate(click.Command):
 
 
 def _hold_below(folder: str, report: str) -> None:
-    """Hold a report that a repository asks for to its own folder: a check of somebody's missions writes nowhere else."""
+    """Hold a report that settings ask for to their folder: a check of somebody's missions writes nowhere else."""
     inside = os.path.join(os.path.realpath(folder), "")
     if not os.path.realpath(report).startswith(inside):
         shown = printable(os.path.relpath(report, folder))
