@@ -62,6 +62,32 @@ def content(file: str, most: int, called: str | None = None) -> bytes:
         raise UnreadableError("is no name of a file") from None
 
 
+def locked(folder: str) -> int | None:
+    """Lock a folder for this process, until it closes what is returned or ends; None where no lock can be had.
+
+    Raises
+    ------
+    BlockingIOError
+        Another process has it.
+    OSError
+        There is no such folder, or it is not for this user.
+    """
+    try:
+        import fcntl
+    except ImportError:  # Windows
+        return None
+    opened = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    try:
+        fcntl.flock(opened, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(opened)
+        raise
+    except OSError:  # a file system without locks
+        os.close(opened)
+        return None
+    return opened
+
+
 def cores() -> int:
     """Processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -12,7 +12,7 @@ from typing import Any, NoReturn
 
 import click
 
-from bisar_budget import __version__
+from bisar_budget import __version__, memory
 from bisar_budget.cli.streams import EXIT_INTERRUPTED, EXIT_OUR_FAULT, complain, drop_output, fail
 from bisar_budget.faults import WorkerLostError, printable
 from bisar_budget.resources import FILES_READ, docstring
@@ -33,6 +33,7 @@ _MODULES = {
     "sweep": "sweep",
     "verify": "verify",
 }
+_FRUGAL = ("init", "schema")  # without NumPy
 
 
 def _command(name: str) -> click.Command:
@@ -51,6 +52,8 @@ class _Commands(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in _MODULES:
             return None
+        if cmd_name not in _FRUGAL:
+            _hold_to_memory(cmd_name)
         command = _command(cmd_name)
         command.help = command.help or docstring(command.callback)  # without one under -OO
         return command
@@ -80,13 +83,11 @@ class _Commands(click.Group):
             if error.errno in _NO_ROOM:
                 drop_output()
                 fail(f"cannot write standard output: {error.strerror}")
-            if error.errno in (errno.EMFILE, errno.ENFILE, errno.ENOMEM):
+            if error.errno in (errno.EMFILE, errno.ENFILE, errno.EAGAIN):
                 fail(f"the system refuses: {error.strerror}")
             if not _has_folder():
                 fail("the current folder is gone; a name that does not start with / leads nowhere")
             _own_fault(error)
-        except MemoryError:
-            fail("the system refuses: memory ran out")
         except WorkerLostError as error:
             fail(f"{error}; fewer processes (--jobs 1) or a smaller simulation.memory_limit need less")
         except Exception as error:
@@ -102,9 +103,23 @@ def _has_folder() -> bool:
     return True
 
 
-def _own_fault(error: Exception) -> NoReturn:
+def _hold_to_memory(command: str) -> None:
+    """Refuse a command for which the system allows too little memory: NumPy would end it, with 1."""
+    memory.spare_threads()
+    allowed = memory.limit()
+    if allowed is not None and allowed < memory.LEAST:
+        fail(f"{memory.limit_words()}; {command} needs at least {memory.LEAST >> 20} MB of memory")
+
+
+def _own_fault(error: BaseException) -> NoReturn:
+    """Say that the tool crashed, or memory ran out, and exit; BISAR_BUDGET_DEBUG shows where, and changes no code."""
     if os.environ.get("BISAR_BUDGET_DEBUG"):
-        raise error
+        import traceback
+
+        complain("".join(traceback.format_exception(error)).rstrip("\n"))
+    if memory.ran_out(error):
+        allowed = memory.limit_words()
+        fail(f"the system refuses: memory ran out{f'; {allowed}' if allowed else ''}")
     complain(
         f"bisar-budget {__version__}: a fault of the tool itself, nothing was judged "
         f"({type(error).__name__}: {printable(str(error))}).\n"
