@@ -9,7 +9,10 @@ import errno
 import os
 from collections.abc import Iterator
 
-LEAST = 192 << 20  # bytes; NumPy with one thread of OpenBLAS takes 134 MB of address space, a check some more
+# Address space, bytes. Below it the libraries were seen to end the process, or to say that they are not installed.
+LEAST = 192 << 20  # NumPy with one thread of OpenBLAS takes 134 MB, a check some more
+OF_TABLES = 400 << 20
+OF_CLUSTER = 1 << 30
 _SPACIOUS = 2 << 30  # bytes; LLVM hangs in 400 MB, and each core adds threads to what Numba takes
 _NEAR = 32 << 20  # bytes; what a library asks for at once
 _WORDS = ("failed to map segment", "annot allocate memory", "bad_alloc", "out of memory")
@@ -28,13 +31,20 @@ def limit() -> int | None:
 def limit_words() -> str:
     """What the limit is, for a message; empty without one."""
     allowed = limit()
-    return "" if allowed is None else f"the system allows this process {allowed >> 20} MB (ulimit -v, ulimit -d)"
+    return "" if allowed is None else f"the system allows {allowed >> 20} MB (ulimit -v, ulimit -d)"
 
 
 def spare_threads() -> None:
     """Let libraries that are not loaded yet do with one thread, under a limit: each other one takes tens of MB."""
     if limit() is not None:
         os.environ.update(OPENBLAS_NUM_THREADS="1", ARROW_DEFAULT_MEMORY_POOL="system")
+
+
+def hold_room(needed: int, what: str) -> None:
+    """Raise a `MemoryError` where the system allows less than is known to be needed for something. [B]"""
+    allowed = limit()
+    if allowed is not None and allowed < needed:
+        raise MemoryError(f"{what} needs at least {needed >> 20} MB of memory; {limit_words()}")
 
 
 def is_spacious() -> bool:

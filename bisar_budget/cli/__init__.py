@@ -15,7 +15,7 @@ import click
 from bisar_budget import __version__, memory
 from bisar_budget.cli.streams import EXIT_INTERRUPTED, EXIT_OUR_FAULT, complain, drop_output, fail
 from bisar_budget.faults import WorkerLostError, printable
-from bisar_budget.resources import FILES_READ, docstring
+from bisar_budget.resources import docstring, hold_files, release_files
 
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
 # Each command to the module that has it, imported when it is asked for.
@@ -53,14 +53,15 @@ class _Commands(click.Group):
         if cmd_name not in _MODULES:
             return None
         if cmd_name not in _FRUGAL:
-            _hold_to_memory(cmd_name)
+            memory.spare_threads()
+            memory.hold_room(memory.LEAST, cmd_name)
         command = _command(cmd_name)
         command.help = command.help or docstring(command.callback)  # without one under -OO
         return command
 
     def main(self, *args: Any, **kwargs: Any) -> Any:
         self.help = self.help or docstring(self.callback)
-        FILES_READ.clear()
+        hold_files()
         output = sys.stdout
         kwargs["standalone_mode"] = False  # click would exit with 1 on an interrupt or a broken pipe
         kwargs["prog_name"] = "bisar-budget"  # whatever name it was called by
@@ -92,6 +93,8 @@ class _Commands(click.Group):
             fail(f"{error}; fewer processes (--jobs 1) or a smaller simulation.memory_limit need less")
         except Exception as error:
             _own_fault(error)
+        finally:
+            release_files()
 
 
 def _has_folder() -> bool:
@@ -103,14 +106,6 @@ def _has_folder() -> bool:
     return True
 
 
-def _hold_to_memory(command: str) -> None:
-    """Refuse a command for which the system allows too little memory: NumPy would end it, with 1."""
-    memory.spare_threads()
-    allowed = memory.limit()
-    if allowed is not None and allowed < memory.LEAST:
-        fail(f"{memory.limit_words()}; {command} needs at least {memory.LEAST >> 20} MB of memory")
-
-
 def _own_fault(error: BaseException) -> NoReturn:
     """Say that the tool crashed, or memory ran out, and exit; BISAR_BUDGET_DEBUG shows where, and changes no code."""
     if os.environ.get("BISAR_BUDGET_DEBUG"):
@@ -118,8 +113,8 @@ def _own_fault(error: BaseException) -> NoReturn:
 
         complain("".join(traceback.format_exception(error)).rstrip("\n"))
     if memory.ran_out(error):
-        allowed = memory.limit_words()
-        fail(f"the system refuses: memory ran out{f'; {allowed}' if allowed else ''}")
+        said = str(error) if isinstance(error, MemoryError) and error.args else memory.limit_words()
+        fail(f"the system refuses: memory ran out{f'; {said}' if said else ''}")
     complain(
         f"bisar-budget {__version__}: a fault of the tool itself, nothing was judged "
         f"({type(error).__name__}: {printable(str(error))}).\n"

@@ -19,6 +19,7 @@ from bisar_budget.design.cases import Cases, CaseTable, Grid
 from bisar_budget.design.sweep import Asked, Chunks
 from bisar_budget.design.swept import Part, Values
 from bisar_budget.faults import changes_words
+from bisar_budget.memory import OF_TABLES, hold_room
 from bisar_budget.mission.named import Named
 from bisar_budget.resources import UnreadableError, content, locked
 
@@ -44,7 +45,8 @@ class PartsError(Exception):
 
 
 def check_library() -> None:
-    """Raise a `PartsError` where parts cannot be written."""
+    """Raise a `PartsError` where parts cannot be written, a `MemoryError` where there is no room for that."""
+    hold_room(OF_TABLES, "--resume")
     try:
         import pyarrow  # noqa: F401
     except ImportError:

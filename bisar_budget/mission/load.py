@@ -13,6 +13,7 @@ from bisar_budget.faults import Fault, MissionError, SetValue, changes_words
 from bisar_budget.mission.model import MISSION, Mission, flies_on_earth, names_files, names_parts
 from bisar_budget.mission.readers import INVALID
 from bisar_budget.mission.tree import MAX_BYTES, UnusableError, file_fault, read_tree
+from bisar_budget.resources import UnreadableError, held
 
 
 def load_mission(path: str, model: str | None = None, changes: Sequence[SetValue] = ()) -> Mission:
@@ -26,14 +27,8 @@ def load_mission(path: str, model: str | None = None, changes: Sequence[SetValue
         The file cannot be read, or is no usable mission; carries every fault.
     """
     try:
-        if path == "-":
-            if sys.stdin is None:
-                raise ValueError("standard input is closed")
-            data = _bounded(sys.stdin.buffer)
-        else:
-            with open(path, "rb") as file:
-                data = _bounded(file)
-    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
+        data = held(path, MAX_BYTES, lambda: _content(path))
+    except (OSError, ValueError, UnreadableError) as error:  # ValueError: a NUL in the name
         reason = getattr(error, "strerror", None) or str(error)
         is_pattern = isinstance(error, FileNotFoundError) and any(char in path for char in "*?[")
         problem = "not found, and no file matches the pattern" if is_pattern else f"cannot be read: {reason}"
@@ -43,6 +38,15 @@ def load_mission(path: str, model: str | None = None, changes: Sequence[SetValue
     except MissionError as error:
         error.data = data if len(data) <= MAX_BYTES else None
         raise
+
+
+def _content(path: str) -> bytes:
+    if path == "-":
+        if sys.stdin is None:
+            raise ValueError("standard input is closed")
+        return _bounded(sys.stdin.buffer)
+    with open(path, "rb") as file:
+        return _bounded(file)
 
 
 def _bounded(file: BinaryIO) -> bytes:
