@@ -1,8 +1,8 @@
 """Memory that the system allows a process (`ulimit -v`, `ulimit -d`), looked at before libraries take their share.
 
-A library in C ends the process where it gets none: OpenBLAS, when NumPy is imported or first multiplies matrices, with
-1 or with the signal of an interrupt, and LLVM never returns. No code here sees that, so what is known to be needed is
-held to the limit before.
+A library in C ends the process where it gets none: OpenBLAS, when NumPy is imported or first multiplies matrices,
+with 1 or with the signal of an interrupt, and LLVM never returns. No code here sees that, so what is known to be
+needed is held to the limit before.
 """
 
 import errno
@@ -12,7 +12,7 @@ from collections.abc import Iterator
 # Address space, bytes. Below it the libraries were seen to end the process, or to say that they are not installed.
 LEAST = 192 << 20  # NumPy with one thread of OpenBLAS takes 134 MB, a check some more
 OF_TABLES = 400 << 20
-OF_CLUSTER = 1 << 30
+OF_CLUSTER = 3 << 29
 _SPACIOUS = 2 << 30  # bytes; LLVM hangs in 400 MB, and each core adds threads to what Numba takes
 _NEAR = 32 << 20  # bytes; what a library asks for at once
 _WORDS = ("failed to map segment", "annot allocate memory", "bad_alloc", "out of memory")
@@ -54,7 +54,7 @@ def is_spacious() -> bool:
 
 
 def ran_out(error: BaseException) -> bool:
-    """Whether an error, or one that led to it, is of memory; under a limit that was all but reached any is taken so."""
+    """Whether an error, or one that led to it, is of memory; under a limit that was all but reached any is."""
     return any(map(_says_memory, _causes(error))) or _is_near_limit()
 
 

@@ -342,7 +342,10 @@ def replacing(path: str) -> Iterator[str]:
         fail(f"cannot write {path}: {os.strerror(number) if number else error}")
     finally:
         if temporary is not None:
-            _remove(temporary)
+            with suppress(OSError):
+                os.unlink(file)
+            with suppress(OSError):  # to list it first would need memory, of which there may be none
+                os.rmdir(temporary)
         if lock is not None:
             os.close(lock)
 

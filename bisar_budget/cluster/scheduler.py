@@ -49,7 +49,10 @@ class ClusterError(Exception):
 
 
 def check_address(address: str) -> None:
-    """Refuse what is no address of a scheduler, or a scheduler without its libraries, by a `ClusterError`; without memory by another."""
+    """Refuse what is no address of a scheduler, or a scheduler without its libraries, by a `ClusterError`.
+
+    A `MemoryError` says that there is no room for them.
+    """
     if not (_ADDRESS.fullmatch(address) or _LOCAL.fullmatch(address)):
         raise ClusterError(f"--scheduler {printable(address)}: is no scheduler; {_ACCEPTED}")
     hold_room(OF_CLUSTER, "--scheduler")

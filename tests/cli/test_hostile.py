@@ -936,7 +936,7 @@ class TestLittleMemory:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX limits and locks")
-class TestOutputs:
+class TestUnfinishedOutputs:
     """What a full disk, and a run that was killed, leave."""
 
     @pytest.mark.parametrize("suffix", ["csv", "parquet", "nc"])

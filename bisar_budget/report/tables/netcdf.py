@@ -48,7 +48,7 @@ def write(described: Described, parts: Iterable[Part], path: str) -> None:
 
 
 def _hold_to_room(path: str) -> None:
-    """Write on to a file that the library could not write; the `OSError` of the system says why, the library's not."""
+    """Write on to a file that the library could not write: the `OSError` of the system says why."""
     with open(path, "ab") as file:
         file.write(bytes(_PROBED))
         file.flush()
