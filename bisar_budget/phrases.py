@@ -795,4 +795,5 @@ def drawn_without_coverage() -> str:
 @phrase
 def waived(line: int | None, until: date, reason: str, is_expired: bool) -> str:
     """Of a row that fails."""
-    return f"{'expired ' if is_expired else ''}waiver of line {line}, until {until}: {reason}"
+    place = "--set" if line is None else f"line {line}"
+    return f"{'expired ' if is_expired else ''}waiver of {place}, until {until}: {reason}"

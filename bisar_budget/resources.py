@@ -3,6 +3,7 @@
 import os
 import stat
 import sys
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, BinaryIO, Protocol
 
 if TYPE_CHECKING:
@@ -20,6 +21,64 @@ def resource(*parts: str) -> "Path":
 
 # Device and inode of the files that `content` gave since a command began: no result may replace one.
 FILES_READ: set[tuple[int, int]] = set()
+
+
+class FilesHeld:
+    """What the files that a command reads were when it first read them: all of its formats and reports are of that.
+
+    Contents are kept up to 64 MB together, then hashes: a larger file that changes meanwhile is refused.
+    """
+
+    def __init__(self) -> None:
+        self.known: dict[tuple[str, int], bytes | UnreadableError] = {}
+        self.hashes: dict[tuple[str, int], bytes] = {}
+        self.room = _MOST_HELD
+
+    def content(self, file: str, most: int, read: Callable[[], bytes]) -> bytes:
+        """Content of a file as it was read first, at most so many bytes and one; else `read` gives it."""
+        key = (file if file == "-" else os.path.normpath(file), most)
+        known = self.known.get(key)
+        if isinstance(known, bytes):
+            return known
+        if known is not None:
+            raise known
+        try:
+            data = read()
+        except UnreadableError as error:
+            self.known[key] = error
+            raise
+        if len(data) <= self.room and key not in self.hashes:
+            self.room -= len(data)
+            self.known[key] = data
+            return data
+        from hashlib import sha256
+
+        digest = sha256(data).digest()
+        if self.hashes.setdefault(key, digest) != digest:
+            raise UnreadableError(f"{file} changed while this command was reading it")
+        return data
+
+
+_MOST_HELD = 64 << 20  # bytes
+_held: FilesHeld | None = None  # none outside of a command: who calls functions reads what is there
+
+
+def hold_files() -> None:
+    """Begin a command: no file was read yet, and each that is read stays as it was."""
+    global _held
+    FILES_READ.clear()
+    _held = FilesHeld()
+
+
+def release_files() -> None:
+    """End a command: files are read as they are."""
+    global _held
+    _held = None
+
+
+def held(file: str, most: int, read: Callable[[], bytes]) -> bytes:
+    """Content of a file as this command read it first; outside of a command, as `read` gives it."""
+    return read() if _held is None else _held.content(file, most, read)
 
 
 class UnreadableError(Exception):
@@ -47,7 +106,10 @@ def content(file: str, most: int, called: str | None = None) -> bytes:
     UnreadableError
         It cannot be read, or is no regular file: a pipe would be waited for, and a device never ends.
     """
-    called = file if called is None else called
+    return held(file, most, lambda: _read(file, most, file if called is None else called))
+
+
+def _read(file: str, most: int, called: str) -> bytes:
     try:
         found = os.stat(file)
         if not stat.S_ISREG(found.st_mode):
@@ -94,6 +156,32 @@ class Disk:
 
 
 DISK = Disk()
+
+
+def locked(folder: str) -> int | None:
+    """Lock a folder for this process, until it closes what is returned or ends; None where no lock can be had.
+
+    Raises
+    ------
+    BlockingIOError
+        Another process has it.
+    OSError
+        There is no such folder, or it is not for this user.
+    """
+    try:
+        import fcntl
+    except ImportError:  # Windows
+        return None
+    opened = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    try:
+        fcntl.flock(opened, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(opened)
+        raise
+    except OSError:  # a file system without locks
+        os.close(opened)
+        return None
+    return opened
 
 
 def cores() -> int:

@@ -12,10 +12,10 @@ from typing import Any, NoReturn
 
 import click
 
-from bisar_budget import __version__
+from bisar_budget import __version__, memory
 from bisar_budget.cli.streams import EXIT_INTERRUPTED, EXIT_OUR_FAULT, complain, drop_output, fail
 from bisar_budget.faults import WorkerLostError, printable
-from bisar_budget.resources import FILES_READ, docstring
+from bisar_budget.resources import docstring, hold_files, release_files
 
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
 # Each command to the module that has it, imported when it is asked for.
@@ -33,6 +33,7 @@ _MODULES = {
     "sweep": "sweep",
     "verify": "verify",
 }
+_FRUGAL = ("init", "schema")  # without NumPy
 
 
 def _command(name: str) -> click.Command:
@@ -51,13 +52,16 @@ class _Commands(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in _MODULES:
             return None
+        if cmd_name not in _FRUGAL:
+            memory.spare_threads()
+            memory.hold_room(memory.LEAST, cmd_name)
         command = _command(cmd_name)
         command.help = command.help or docstring(command.callback)  # without one under -OO
         return command
 
     def main(self, *args: Any, **kwargs: Any) -> Any:
         self.help = self.help or docstring(self.callback)
-        FILES_READ.clear()
+        hold_files()
         output = sys.stdout
         kwargs["standalone_mode"] = False  # click would exit with 1 on an interrupt or a broken pipe
         kwargs["prog_name"] = "bisar-budget"  # whatever name it was called by
@@ -80,17 +84,17 @@ class _Commands(click.Group):
             if error.errno in _NO_ROOM:
                 drop_output()
                 fail(f"cannot write standard output: {error.strerror}")
-            if error.errno in (errno.EMFILE, errno.ENFILE, errno.ENOMEM):
+            if error.errno in (errno.EMFILE, errno.ENFILE, errno.EAGAIN):
                 fail(f"the system refuses: {error.strerror}")
             if not _has_folder():
                 fail("the current folder is gone; a name that does not start with / leads nowhere")
             _own_fault(error)
-        except MemoryError:
-            fail("the system refuses: memory ran out")
         except WorkerLostError as error:
             fail(f"{error}; fewer processes (--jobs 1) or a smaller simulation.memory_limit need less")
         except Exception as error:
             _own_fault(error)
+        finally:
+            release_files()
 
 
 def _has_folder() -> bool:
@@ -102,9 +106,15 @@ def _has_folder() -> bool:
     return True
 
 
-def _own_fault(error: Exception) -> NoReturn:
+def _own_fault(error: BaseException) -> NoReturn:
+    """Say that the tool crashed, or memory ran out, and exit; BISAR_BUDGET_DEBUG shows where, and changes no code."""
     if os.environ.get("BISAR_BUDGET_DEBUG"):
-        raise error
+        import traceback
+
+        complain("".join(traceback.format_exception(error)).rstrip("\n"))
+    if memory.ran_out(error):
+        said = str(error) if isinstance(error, MemoryError) and error.args else memory.limit_words()
+        fail(f"the system refuses: memory ran out{f'; {said}' if said else ''}")
     complain(
         f"bisar-budget {__version__}: a fault of the tool itself, nothing was judged "
         f"({type(error).__name__}: {printable(str(error))}).\n"

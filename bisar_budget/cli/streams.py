@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import click
 
 from bisar_budget.faults import printable
-from bisar_budget.resources import FILES_READ
+from bisar_budget.resources import FILES_READ, locked
 
 if TYPE_CHECKING:
     from click import ParamType as ParamType
@@ -29,6 +29,7 @@ else:
             return cls
 
 
+_TEMPORARY = (".bisar-budget.", ".tmp")  # how the name of a temporary folder begins and ends
 EXIT_BROKEN, EXIT_USAGE, EXIT_OUR_FAULT, EXIT_INTERRUPTED = 1, 2, 3, 130
 
 
@@ -315,14 +316,12 @@ def write_file(path: str, content: str | bytes) -> None:
 
 @contextmanager
 def replacing(path: str) -> Iterator[str]:
-    """Give the name of a file to write, which replaces `path` at the end: it is beside it, and is then renamed.
+    """Give the name of a file to write, which replaces `path` at the end: it is in a folder beside it.
 
     A link keeps pointing where it does; what is no file, a device or a pipe, is written to as it is. An error, or an
-    interrupt, leaves what was there.
+    interrupt, leaves what was there. What a command that was killed left beside it is removed.
     """
-    import tempfile
-
-    temporary = None
+    temporary = lock = None
     try:
         target = os.path.realpath(path)
         if _was_read(target):
@@ -332,17 +331,60 @@ def replacing(path: str) -> Iterator[str]:
             return
         folder = os.path.dirname(target)
         os.makedirs(folder, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=folder, prefix=".bisar-budget.", delete=False) as file:
-            temporary = file.name
-        yield temporary
+        remove_left(folder)
+        temporary, lock = _own_folder(folder)
+        file = os.path.join(temporary, f"output{os.path.splitext(target)[1]}")
+        yield file
         mask = os.umask(0)
         os.umask(mask)
-        os.chmod(temporary, 0o666 & ~mask)  # a temporary file is private, a report is not
-        os.replace(temporary, target)
+        os.chmod(file, 0o666 & ~mask)  # whatever a library made of it
+        os.replace(file, target)
     except BaseException as error:
-        if temporary is not None:
-            with suppress(OSError):
-                os.unlink(temporary)
         if not isinstance(error, OSError) and not (isinstance(error, ValueError) and temporary is None):  # a NUL
             raise
-        fail(f"cannot write {path}: {getattr(error, 'strerror', None) or error}")
+        number = getattr(error, "errno", None)  # libraries put words of their own around the system's
+        fail(f"cannot write {path}: {os.strerror(number) if number else error}")
+    finally:
+        if temporary is not None:
+            with suppress(OSError):
+                os.unlink(file)
+            with suppress(OSError):  # to list it first would need memory, of which there may be none
+                os.rmdir(temporary)
+        if lock is not None:
+            os.close(lock)
+
+
+def _own_folder(folder: str) -> tuple[str, int | None]:
+    """Make a folder in a folder, and lock it as long as this process lives: no other command takes it for left."""
+    import tempfile
+
+    while True:
+        made = tempfile.mkdtemp(_TEMPORARY[1], _TEMPORARY[0], folder)
+        try:
+            lock = locked(made)
+        except (BlockingIOError, FileNotFoundError):  # another command just found it unlocked, and removes it
+            continue
+        if os.path.isdir(made):
+            return made, lock
+        if lock is not None:
+            os.close(lock)
+
+
+def remove_left(folder: str) -> None:
+    """Remove temporary folders of commands that are no more: nobody has their lock."""
+    with os.scandir(folder) as found:
+        left = [one.path for one in found if one.name.startswith(_TEMPORARY[0]) and one.name.endswith(_TEMPORARY[1])]
+    for path in left:
+        with suppress(OSError):  # one that lives, that is gone by now, or that is another's
+            lock = locked(path)
+            if lock is not None:
+                _remove(path)
+                os.close(lock)
+
+
+def _remove(folder: str) -> None:
+    """Remove a temporary folder and the files in it."""
+    with suppress(OSError):
+        for name in os.listdir(folder):
+            os.unlink(os.path.join(folder, name))
+        os.rmdir(folder)

@@ -19,8 +19,9 @@ from bisar_budget.design.cases import Cases, CaseTable, Grid
 from bisar_budget.design.sweep import Asked, Chunks
 from bisar_budget.design.swept import Part, Values
 from bisar_budget.faults import changes_words
+from bisar_budget.memory import OF_TABLES, hold_room
 from bisar_budget.mission.named import Named
-from bisar_budget.resources import UnreadableError, content
+from bisar_budget.resources import UnreadableError, content, locked
 
 FORMAT = "bisar-budget/sweep-parts/1"
 _MANIFEST = "manifest.json"
@@ -44,7 +45,8 @@ class PartsError(Exception):
 
 
 def check_library() -> None:
-    """Raise a `PartsError` where parts cannot be written."""
+    """Raise a `PartsError` where parts cannot be written, a `MemoryError` where there is no room for that."""
+    hold_room(OF_TABLES, "--resume")
     try:
         import pyarrow  # noqa: F401
     except ImportError:
@@ -129,7 +131,9 @@ class PartsFolder:
         self.path, self.mark, self.done = path, mark_of(manifest), set[int]()
         try:
             os.makedirs(path, exist_ok=True)
-            self._lock = _locked(path)
+            self._lock = locked(os.path.realpath(path))
+        except BlockingIOError:
+            raise PartsError(f"another command works on {path}; accepted: wait for it, or another output") from None
         except OSError as error:
             raise PartsError(f"cannot write {path}: {error.strerror or error}") from None
         try:
@@ -142,7 +146,11 @@ class PartsFolder:
             raise
 
     def _begin(self, manifest: Mapping[str, Any], is_resumed: bool) -> None:
-        """Hold what is there to the manifest, or write it."""
+        """Hold what is there to the manifest, or write it; remove what a command that was killed was writing."""
+        if self._lock is not None:
+            for name in os.listdir(self.path):
+                if name.startswith((".part-", f".{_MANIFEST}.")):
+                    os.unlink(self._file(name))
         there = self._manifest()
         if there is not None and not is_resumed:
             raise PartsError(
@@ -256,30 +264,6 @@ class PartsFolder:
 
     def _file(self, name: str) -> str:
         return os.path.join(self.path, name)
-
-
-def _locked(path: str) -> int | None:
-    """Lock a folder for this process, until it closes what is returned or ends; None where no lock can be had.
-
-    Raises
-    ------
-    PartsError
-        Another command has it.
-    """
-    try:
-        import fcntl
-    except ImportError:  # Windows
-        return None
-    folder = os.open(path, os.O_RDONLY)
-    try:
-        fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        os.close(folder)
-        raise PartsError(f"another command works on {path}; accepted: wait for it, or another output") from None
-    except OSError:  # a file system without locks
-        os.close(folder)
-        return None
-    return folder
 
 
 def _name(start: int) -> str:

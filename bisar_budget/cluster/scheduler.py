@@ -24,6 +24,7 @@ from bisar_budget import __version__
 from bisar_budget.cluster.parts_folder import encoded
 from bisar_budget.design.sweep import Asked, Chunks, Question, part_of
 from bisar_budget.faults import MissionError, printable
+from bisar_budget.memory import OF_CLUSTER, hold_room
 from bisar_budget.monte_carlo.draws import Drawer, Drawing, DrawsPiece, Tally
 
 _ADDRESS = re.compile(r"(?:tcp|tls)://\S+:\d{1,5}", re.ASCII)
@@ -48,9 +49,13 @@ class ClusterError(Exception):
 
 
 def check_address(address: str) -> None:
-    """Refuse what is no address of a scheduler, or a scheduler without its libraries, by a `ClusterError`."""
+    """Refuse what is no address of a scheduler, or a scheduler without its libraries, by a `ClusterError`.
+
+    A `MemoryError` says that there is no room for them.
+    """
     if not (_ADDRESS.fullmatch(address) or _LOCAL.fullmatch(address)):
         raise ClusterError(f"--scheduler {printable(address)}: is no scheduler; {_ACCEPTED}")
+    hold_room(OF_CLUSTER, "--scheduler")
     try:
         import distributed  # noqa: F401
         import pyarrow  # noqa: F401

@@ -33,7 +33,7 @@ from bisar_budget.findings.row import Row, unknown_id
 from bisar_budget.findings.status import RANK, STATUS
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.named import Named
+from bisar_budget.mission.named import Named, named_by
 from bisar_budget.workers import worker_pool
 
 if TYPE_CHECKING:
@@ -257,10 +257,14 @@ class Asked:
             for start in starts:
                 yield self.engine.part(*self.sent(chunks, start))
             return
+        question = self.question
+        if question.named is None:  # the processes shall see what this one saw
+            words = [SetValue(one.key, word) for one, chosen in words_of(self.cases) for word in chosen]
+            question = question._replace(named=named_by(self.mission, words)[1])
         with worker_pool(jobs, "spawn") as pool:
             waiting: deque[Future[Part]] = deque()
             for start in starts:
-                waiting.append(pool.submit(part_of, self.question, *self.sent(chunks, start)))
+                waiting.append(pool.submit(part_of, question, *self.sent(chunks, start)))
                 if len(waiting) > 3 * jobs:  # none is far ahead of what has been asked for
                     yield waiting.popleft().result()
             while waiting:

@@ -12,7 +12,7 @@ from bisar_budget.faults import Fault, MissionError, SetValue, changes_words, fi
 from bisar_budget.mission.model import MISSION, Mission, PartFile, flies_on_earth, names_files, names_parts
 from bisar_budget.mission.readers import INVALID
 from bisar_budget.mission.tree import MAX_BYTES, UnusableError, read_tree
-from bisar_budget.resources import standard_input
+from bisar_budget.resources import UnreadableError, held, standard_input
 
 _Find = Callable[[str], tuple[str, bytes]]
 
@@ -28,12 +28,8 @@ def load_mission(path: str, model: str | None = None, changes: Sequence[SetValue
         The file cannot be read, or is no usable mission; carries every fault.
     """
     try:
-        if path == "-":
-            data = _bounded(standard_input())
-        else:
-            with open(path, "rb") as file:
-                data = _bounded(file)
-    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
+        data = held(path, MAX_BYTES, lambda: _content(path))
+    except (OSError, ValueError, UnreadableError) as error:  # ValueError: a NUL in the name
         reason = getattr(error, "strerror", None) or str(error)
         is_pattern = isinstance(error, FileNotFoundError) and any(char in path for char in "*?[")
         problem = "not found, and no file matches the pattern" if is_pattern else f"cannot be read: {reason}"
@@ -43,6 +39,13 @@ def load_mission(path: str, model: str | None = None, changes: Sequence[SetValue
     except MissionError as error:
         error.data = data if len(data) <= MAX_BYTES else None
         raise
+
+
+def _content(path: str) -> bytes:
+    if path == "-":
+        return _bounded(standard_input())
+    with open(path, "rb") as file:
+        return _bounded(file)
 
 
 def _bounded(file: BinaryIO) -> bytes:

@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.memory import is_spacious
 from bisar_budget.monte_carlo.sums import ExactPaths, Sums, paths_of
 from bisar_budget.monte_carlo.variables import Floats, HeldSum, Variable
 
@@ -211,7 +212,9 @@ def _fill_normal(generator: np.random.Generator, out: Floats) -> None:
 
 @cache
 def _compiled() -> Callable[[np.random.Generator, Floats], None]:
-    """The same, compiled where Numba is there and can keep what it compiles."""
+    """The same, compiled where Numba is there, has room and can keep what it compiles."""
+    if not is_spacious():
+        return _fill_normal
     try:
         from bisar_budget.monte_carlo.compiled import fill_normal
     except (ImportError, RuntimeError):

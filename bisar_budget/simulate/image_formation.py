@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 
 from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.memory import is_spacious
 from bisar_budget.simulate.phase_history import Complexes, Floats, PhaseHistory, is_even, split
 from bisar_budget.simulate.range_profile import (
     carrier_frequency,
@@ -145,7 +146,9 @@ def bytes_held(kernel: Kernel) -> float:
 
 @cache
 def is_compiled() -> bool:
-    """Whether images are formed by compiled kernels: Numba is there and can keep what it compiles."""
+    """Whether images are formed by compiled kernels: Numba is there, has room and can keep what it compiles."""
+    if not is_spacious():
+        return False
     try:
         import bisar_budget.simulate.compiled  # noqa: F401
     except (ImportError, RuntimeError):  # not installed, or nowhere to keep what it compiles

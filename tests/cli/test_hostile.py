@@ -22,13 +22,15 @@ from typing import NamedTuple
 import pytest
 from click.testing import CliRunner
 
+from bisar_budget import resources
 from bisar_budget.budget import fleet
 from bisar_budget.budget.check import check_mission
 from bisar_budget.cli import _end as end
 from bisar_budget.cli import cli
-from bisar_budget.cli.streams import harmless
+from bisar_budget.cli.streams import harmless, replacing, write_file
 from bisar_budget.faults import MissionError
 from bisar_budget.findings.mission import Report
+from bisar_budget.mission import load
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.tree import MAX_FAULTS
 from bisar_budget.report import FORMATS, Style, render
@@ -888,6 +890,151 @@ class TestSystem:
     def test_memory_that_runs_out_is_2(self, mission) -> None:
         done = self.while_checking(mission, "raise MemoryError")
         assert (done.returncode, done.stderr) == (2, b"Error: the system refuses: memory ran out\n")
+
+    def test_a_crash_is_3_with_its_traceback_too(self, mission) -> None:
+        """BISAR_BUDGET_DEBUG made it 1: a requirement that is broken."""
+        done = self.while_checking(mission, "raise KeyError('x')", BISAR_BUDGET_DEBUG="1")
+        assert done.returncode == 3
+        assert b"Traceback" in done.stderr
+        assert b"a fault of the tool itself" in done.stderr
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems do not hold to RLIMIT_AS")
+class TestLittleMemory:
+    """OpenBLAS ended the process with 1 or 130, LLVM hung or was a fault of the tool, Arrow ended with SIGSEGV."""
+
+    @staticmethod
+    def within(megabytes: int, *arguments) -> Done:
+        import resource
+
+        size = megabytes << 20
+        return spawn(*arguments, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (size, size)))
+
+    @pytest.mark.parametrize("megabytes", [100, 130, 191])
+    def test_too_little_is_2_and_says_so(self, mission, megabytes: int) -> None:
+        done = self.within(megabytes, "check", mission)
+        words = f"memory ran out; check needs at least 192 MB of memory; the system allows {megabytes} MB"
+        assert (done.returncode, done.stdout) == (2, b"")
+        assert words.encode() in done.stderr
+
+    def test_as_much_as_is_needed_is_enough(self, mission) -> None:
+        done = self.within(192, "check", mission)
+        assert (done.returncode, done.stderr) == (0, b"")
+
+    def test_images_are_formed_without_llvm(self, tmp_path) -> None:
+        path = tmp_path / "m.yaml"
+        path.write_text(mission_text(**SMALL, timing_error__quadratic=6e-13))
+        done = self.within(300, "simulate", path)
+        assert (done.returncode, done.stderr) == (0, b"")
+
+    def test_tables_say_what_they_need(self, mission, tmp_path) -> None:
+        output = tmp_path / "t.parquet"
+        done = self.within(399, "sweep", mission, "--vary", "collection.aperture_time=1:2s:3", "-o", output)
+        assert done.returncode == 2
+        assert b"Parquet needs at least 400 MB of memory" in done.stderr
+        assert not output.exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX limits and locks")
+class TestUnfinishedOutputs:
+    """What a full disk, and a run that was killed, leave."""
+
+    @pytest.mark.parametrize("suffix", ["csv", "parquet", "nc"])
+    def test_a_file_that_may_not_grow_is_called_so(self, mission, tmp_path, suffix: str) -> None:
+        """NetCDF said `NetCDF: HDF error`, or nothing."""
+        import resource
+
+        pytest.importorskip({"csv": "numpy", "parquet": "pyarrow", "nc": "netCDF4"}[suffix])
+        folder = tmp_path / "out"
+        folder.mkdir()
+        done = spawn(
+            *("sweep", mission, "--vary", "collection.aperture_time=1:6s:3000", "-o", folder / f"t.{suffix}"),
+            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (9000, 9000)),
+        )
+        assert done.returncode == 2
+        assert done.stderr.endswith(b": File too large\n")
+        assert list(folder.iterdir()) == []
+
+    def test_what_a_killed_run_left_is_removed_by_the_next(self, mission, tmp_path) -> None:
+        script = (
+            "import os, signal\n"
+            "from bisar_budget.cli import main\n"
+            "os.chmod = lambda *a: os.kill(os.getpid(), signal.SIGKILL)\n"
+            "main()\n"
+        )
+        folder = tmp_path / "out"
+        arguments = ["check", str(mission), "-o", str(folder / "r.html")]
+        killed = subprocess.run([sys.executable, "-c", script, *arguments], cwd=ROOT)
+        assert killed.returncode == -signal.SIGKILL
+        assert [path.name.startswith(".bisar-budget.") for path in folder.iterdir()] == [True]
+        assert run(*arguments).returncode == 0
+        assert [path.name for path in folder.iterdir()] == ["r.html"]
+
+    def test_what_another_run_is_writing_stays(self, tmp_path) -> None:
+        with replacing(str(tmp_path / "r.txt")) as name:
+            Path(name).write_text("first")
+            write_file(str(tmp_path / "r.txt"), "second")
+        assert (tmp_path / "r.txt").read_text() == "first"
+        assert [path.name for path in tmp_path.iterdir()] == ["r.txt"]
+
+    def test_a_folder_of_somebody_else_stays(self, tmp_path) -> None:
+        other = tmp_path / ".bisar-budget.notes"
+        other.mkdir()
+        write_file(str(tmp_path / "r.txt"), "text")
+        assert other.is_dir()
+
+
+class TestFilesThatChange:
+    """A file that changes during a run was another one in the next format, mission or process."""
+
+    def test_a_mission_is_read_once(self, mission, monkeypatch) -> None:
+        real = load._content
+        reads = []
+
+        def content(path: str) -> bytes:
+            reads.append(path)
+            return real(path).replace(b"6.0e-13", b"5e-12") if len(reads) > 1 else real(path)
+
+        monkeypatch.setattr(load, "_content", content)
+        done = run("diff", mission, "--set", "name=other")
+        assert (done.returncode, len(reads)) == (0, 1)
+
+    def test_a_file_is_one_version_during_a_command(self, tmp_path) -> None:
+        path = tmp_path / "part.yaml"
+        path.write_bytes(b"one")
+        resources.hold_files()
+        try:
+            assert resources.content(str(path), 100) == b"one"
+            path.write_bytes(b"two")
+            assert resources.content(str(path), 100) == b"one"
+        finally:
+            resources.release_files()
+        assert resources.content(str(path), 100) == b"two"
+
+    def test_one_too_large_to_be_kept_is_refused(self, tmp_path, monkeypatch) -> None:
+        monkeypatch.setattr(resources, "_MOST_HELD", 2)
+        path = tmp_path / "log.csv"
+        path.write_bytes(b"one")
+        resources.hold_files()
+        try:
+            assert resources.content(str(path), 100) == b"one"
+            assert resources.content(str(path), 100) == b"one"
+            path.write_bytes(b"two")
+            with pytest.raises(resources.UnreadableError, match="changed while this command was reading it"):
+                resources.content(str(path), 100)
+        finally:
+            resources.release_files()
+
+
+@pytest.mark.parametrize("format_name", list(FORMATS))
+def test_a_waiver_of_an_option_has_no_line(mission, format_name: str) -> None:
+    """It was a waiver of line None."""
+    waiver = "waivers=[{id: timing.quadratic, until: 2027-01-01, reason: r}]"
+    done = run(
+        "check", mission, "--set", waiver, "--set", "timing_error.quadratic=9e-12 1/s", "--format", format_name
+    )
+    assert b"line None" not in done.stdout
+    assert done.returncode in (0, 1)
 
 
 @pytest.mark.parametrize("format_name", ["html", "markdown"])

@@ -3,6 +3,8 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
+from bisar_budget.memory import OF_TABLES, hold_room
+
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
@@ -52,6 +54,7 @@ def writer_of(suffix: str) -> Writer:
     """
     name, module, library = TABLES[suffix]
     if library:
+        hold_room(OF_TABLES, name)
         try:
             import_module(library)
         except ImportError:

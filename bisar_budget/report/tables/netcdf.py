@@ -4,6 +4,7 @@ Texts are flags, numbers with a list of what they mean; reasons, of which every 
 strings. Numbers without a value are NaN.
 """
 
+import os
 from collections.abc import Iterable, Iterator, Mapping
 from math import prod
 from typing import Any
@@ -17,6 +18,7 @@ from bisar_budget.report.tables.described import Described
 
 _UNITS = {"": "1", "deg": "degree", "°": "degree"}  # as UDUNITS has them
 _TITLES = {"mission": "title"}
+_PROBED = 1 << 20  # bytes: what is left of a disk is less than the library asked for
 _NONE = "none"  # the meaning of a flag that says nothing
 
 
@@ -41,7 +43,16 @@ def write(described: Described, parts: Iterable[Part], path: str) -> None:
     except RuntimeError as error:  # of the library: the disk is full, or a file may not become so large
         if type(error) is not RuntimeError:  # what the parts ended with
             raise
+        _hold_to_room(path)
         raise OSError(None, str(error)) from None
+
+
+def _hold_to_room(path: str) -> None:
+    """Write on to a file that the library could not write: the `OSError` of the system says why."""
+    with open(path, "ab") as file:
+        file.write(bytes(_PROBED))
+        file.flush()
+        os.fsync(file.fileno())
 
 
 def _dimensions(file: Any, described: Described) -> list[Column]:

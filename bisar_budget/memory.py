@@ -1,0 +1,86 @@
+"""Memory that the system allows a process (`ulimit -v`, `ulimit -d`), looked at before libraries take their share.
+
+A library in C ends the process where it gets none: OpenBLAS, when NumPy is imported or first multiplies matrices,
+with 1 or with the signal of an interrupt, and LLVM never returns. No code here sees that, so what is known to be
+needed is held to the limit before.
+"""
+
+import errno
+import os
+from collections.abc import Iterator
+
+# Address space, bytes. Below it the libraries were seen to end the process, or to say that they are not installed.
+LEAST = 192 << 20  # NumPy with one thread of OpenBLAS takes 134 MB, a check some more
+OF_TABLES = 400 << 20
+OF_CLUSTER = 3 << 29
+_SPACIOUS = 2 << 30  # bytes; LLVM hangs in 400 MB, and each core adds threads to what Numba takes
+_NEAR = 32 << 20  # bytes; what a library asks for at once
+_WORDS = ("failed to map segment", "annot allocate memory", "bad_alloc", "out of memory")
+
+
+def limit() -> int | None:
+    """Address space that the system allows this process [B]; None where there is no limit."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return None
+    soft = [resource.getrlimit(kind)[0] for kind in (resource.RLIMIT_AS, resource.RLIMIT_DATA)]
+    return min((one for one in soft if one != resource.RLIM_INFINITY), default=None)
+
+
+def limit_words() -> str:
+    """What the limit is, for a message; empty without one."""
+    allowed = limit()
+    return "" if allowed is None else f"the system allows {allowed >> 20} MB (ulimit -v, ulimit -d)"
+
+
+def spare_threads() -> None:
+    """Let libraries that are not loaded yet do with one thread, under a limit: each other one takes tens of MB."""
+    if limit() is not None:
+        os.environ.update(OPENBLAS_NUM_THREADS="1", ARROW_DEFAULT_MEMORY_POOL="system")
+
+
+def hold_room(needed: int, what: str) -> None:
+    """Raise a `MemoryError` where the system allows less than is known to be needed for something. [B]"""
+    allowed = limit()
+    if allowed is not None and allowed < needed:
+        raise MemoryError(f"{what} needs at least {needed >> 20} MB of memory; {limit_words()}")
+
+
+def is_spacious() -> bool:
+    """Whether there is room for LLVM."""
+    allowed = limit()
+    return allowed is None or allowed >= _SPACIOUS
+
+
+def ran_out(error: BaseException) -> bool:
+    """Whether an error, or one that led to it, is of memory; under a limit that was all but reached any is."""
+    return any(map(_says_memory, _causes(error))) or _is_near_limit()
+
+
+def _says_memory(error: BaseException) -> bool:
+    if isinstance(error, MemoryError) or (isinstance(error, OSError) and error.errno == errno.ENOMEM):
+        return True
+    words = (*_WORDS, "can't start new thread") if limit() is not None else _WORDS
+    return any(one in str(error) for one in words)
+
+
+def _causes(error: BaseException | None) -> Iterator[BaseException]:
+    seen: set[int] = set()
+    while error is not None and id(error) not in seen:
+        seen.add(id(error))
+        yield error
+        error = error.__cause__ or error.__context__
+
+
+def _is_near_limit() -> bool:
+    """Whether the process once had all but a little of what it may have."""
+    allowed = limit()
+    if allowed is None:
+        return False
+    try:
+        with open("/proc/self/status", encoding="ascii") as file:
+            peak = next(int(line.split()[1]) << 10 for line in file if line.startswith("VmPeak"))
+    except (OSError, StopIteration):  # no Linux
+        return False
+    return peak > allowed - _NEAR
