@@ -372,7 +372,7 @@ def signals(seeds: range) -> Outcome:
 
 
 def limits(seeds: range) -> Outcome:
-    """Run with few descriptors, small files or full devices: 2, with a message, or the result."""
+    """Run with few descriptors, small files, little memory or full devices: 2, with a message, or the result."""
     import resource
 
     tried, missed = Counter[str](), list[str]()
@@ -383,6 +383,7 @@ def limits(seeds: range) -> Outcome:
             (
                 (resource.RLIMIT_NOFILE, random.randint(4, 24)),
                 (resource.RLIMIT_FSIZE, random.randint(0, 20_000)),
+                (resource.RLIMIT_AS, random.randint(30, 400) << 20),
             )
         )
         with TemporaryDirectory() as folder, open("/dev/full", "wb") as full:
@@ -429,6 +430,9 @@ def limits(seeds: range) -> Outcome:
                 continue  # Python itself does not start with so few
             if done.returncode not in (0, 1, 2) or b"Traceback" in done.stderr:
                 missed.append(f"limits {seed}: {arguments} exits with {done.returncode}: {done.stderr[-300:]!r}")
+            is_unsaid = done.returncode == 2 and b"emory" not in done.stderr and output is not full
+            if kind == resource.RLIMIT_AS and is_unsaid:
+                missed.append(f"limits {seed}: {arguments} says nothing of memory: {done.stderr[-300:]!r}")
             left = [path.name for path in Path(folder).iterdir() if path.name.startswith(".")]
             text = report.read_text(encoding="utf-8")
             if left or not (text == "old" or text.rstrip().endswith("</html>")):
