@@ -62,6 +62,8 @@ class Revision:
         if not is_known:
             raise RevisionError(f"the repository of {near} has no revision {printable(name)}")
         self._commit = commit.decode().strip()
+        self._known: dict[str, _Object] = {}
+        self._listed: dict[str, list[str]] = {}
 
     def content(self, file: str, most: int, called: str | None = None) -> bytes:
         """Content of a file then; arguments and `UnreadableError` are those of `resources.content`."""
@@ -84,8 +86,10 @@ class Revision:
         found = self._object(inside)
         if found.kind != b"tree":
             raise FileNotFoundError(folder)
-        _, names, _ = _git(found.top, "ls-tree", "-z", "--name-only", found.hash)
-        return sorted(os.fsdecode(name) for name in names.split(b"\0") if name)
+        if found.hash not in self._listed:
+            _, names, _ = _git(found.top, "ls-tree", "-z", "--name-only", found.hash)
+            self._listed[found.hash] = sorted(os.fsdecode(name) for name in names.split(b"\0") if name)
+        return self._listed[found.hash]
 
     def has(self, file: str) -> bool:
         """Whether there was such a file; raises `RevisionError` where the revision alone does not tell."""
@@ -142,8 +146,13 @@ class Revision:
         return None
 
     def _object(self, inside: str) -> "_Object":
-        """Find what stands at a path; of nothing what git says instead."""
-        return _object(self.top, self._commit, inside)
+        """Find what stands at a path; of nothing what git says instead. Settings and parts are asked for again."""
+        found = self._known.get(inside)
+        if found is None:
+            found = _object(self.top, self._commit, inside)
+            if len(found.content) <= MAX_BYTES:  # a log may be large, and is read once
+                self._known[inside] = found
+        return found
 
 
 def _matches(parts: Sequence[str], pattern: Sequence[str]) -> bool:

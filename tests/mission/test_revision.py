@@ -129,7 +129,10 @@ def test_a_submodule_or_a_link_that_became_a_folder_is_not_new(
     (repository / "out").unlink()
     (repository / "out").mkdir()
     revision = Revision("sub/a.yaml", "HEAD")
-    for file, words in (("sub/a.yaml", "is in a submodule whose commit is not here"), ("out/a.yaml", "is a link out")):
+    for file, words in (
+        ("sub/a.yaml", "is in a submodule whose commit is not here"),
+        ("out/a.yaml", "is a link out"),
+    ):
         with pytest.raises(RevisionError, match=words):
             revision.has(file)
     assert not revision.has("new.yaml")
@@ -145,3 +148,19 @@ def test_variables_of_a_hook_name_no_other_repository(
     monkeypatch.setenv(name, str(other / ".git" if name == "GIT_DIR" else other))
     monkeypatch.chdir(repository / "m")
     assert Revision("a.yaml", "HEAD").has("a.yaml")
+
+
+def test_git_is_asked_once_for_what_every_mission_shares(repository: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Settings and folders of parts: sixteen processes for each mission."""
+    from bisar_budget.mission import revision as module
+
+    asked: list[tuple[str, ...]] = []
+    ask = module._git
+    monkeypatch.setattr(module, "_git", lambda *said, **given: asked.append(said[1:]) or ask(*said, **given))
+    revision = Revision("a.yaml", "HEAD")
+    for is_first in (True, False):
+        asked.clear()
+        assert not revision.has("pyproject.toml")
+        assert revision.content("m/a.yaml", 100) == b"m/a.yaml"
+        assert "a.yaml" in revision.names("m")
+        assert bool(asked) is is_first

@@ -151,7 +151,8 @@ def test_a_pattern_is_no_part_of_one_with_other_wildcards() -> None:
     """Of `?` and `[…]` in the old waiver nothing is concluded: `receiver.velocity.??` would match its `*` as text."""
     for old, new in (("receiver.velocity.?", "receiver.velocity.*"), ("receiver.[!t]*", "receiver.*")):
         before, after = (
-            findings(**{**ERRORS, "waivers": [{"id": id, "until": "2027-01-31", "reason": "open"}]}) for id in (old, new)
+            findings(**{**ERRORS, "waivers": [{"id": id, "until": "2027-01-31", "reason": "open"}]})
+            for id in (old, new)
         )
         assert [one.id for one in compare(before, after).loosened] == [new]
 
