@@ -76,7 +76,9 @@ def _has_source(platform: Platform, kind: str) -> bool:
     if kind == "oscillator":
         return platform.oscillator is not None and bool(platform.oscillator.source)
     if kind == "imu":
-        return bool((error.imu is not None and error.imu.source) or error.source)
+        stated = {} if error.imu is None else error.imu._asdict()
+        source = stated.pop("source", None)
+        return bool(source) or all(error.evidence(key) for key, figure in stated.items() if figure is not None)
     if kind == "random":
         return bool(error.evidence("random")) or all(process.source for process in error.random)
     return bool(error.source if kind == "vibration" else error.evidence(kind))

@@ -14,7 +14,10 @@ from bisar_budget.mission.paths import reader_of
 from bisar_budget.mission.tree import MAX_BYTES
 from bisar_budget.resources import DISK, UnreadableError
 
-_SUBMODULE = b"160000"  # mode of an entry that is a commit of another repository
+# Modes of an entry that is a commit of another repository, and of a link.
+_SUBMODULE, _LINK = b"160000", b"120000"
+# Left by a hook, they would put another repository, or another top, in the place of that of the missions.
+_OF_ANOTHER = ("GIT_DIR", "GIT_WORK_TREE", "GIT_COMMON_DIR", "GIT_NAMESPACE", "GIT_PREFIX")
 
 
 class RevisionError(Exception):
@@ -59,6 +62,8 @@ class Revision:
         if not is_known:
             raise RevisionError(f"the repository of {near} has no revision {printable(name)}")
         self._commit = commit.decode().strip()
+        self._known: dict[str, _Object] = {}
+        self._listed: dict[str, list[str]] = {}
 
     def content(self, file: str, most: int, called: str | None = None) -> bytes:
         """Content of a file then; arguments and `UnreadableError` are those of `resources.content`."""
@@ -81,24 +86,43 @@ class Revision:
         found = self._object(inside)
         if found.kind != b"tree":
             raise FileNotFoundError(folder)
-        _, names, _ = _git(found.top, "ls-tree", "-z", "--name-only", found.hash)
-        return sorted(os.fsdecode(name) for name in names.split(b"\0") if name)
+        if found.hash not in self._listed:
+            _, names, _ = _git(found.top, "ls-tree", "-z", "--name-only", found.hash)
+            self._listed[found.hash] = sorted(os.fsdecode(name) for name in names.split(b"\0") if name)
+        return self._listed[found.hash]
 
     def has(self, file: str) -> bool:
-        """Whether there was such a file."""
+        """Whether there was such a file; raises `RevisionError` where the revision alone does not tell."""
         inside = self._inside(file)
-        return inside is not None and self._object(inside).kind == b"blob"
+        found = _Object(b"missing") if inside is None else self._object(inside)
+        if found.kind in (b"symlink", b"submodule"):
+            raise RevisionError(f"{file} {_why_not(found)} revision {printable(self.name)}")
+        return found.kind == b"blob"
 
     def matching(self, pattern: str) -> list[str]:
         """Files of the revision that a name or a glob pattern names from the current folder, sorted."""
         inside = self._inside(pattern)
         if inside is None:
             return []
-        _, names, _ = _git(self.top, "ls-tree", "-r", "-z", "--name-only", self._commit)
         wanted = inside.split("/")
         write = str if os.path.isabs(pattern) else os.path.relpath
-        files = [os.fsdecode(name) for name in names.split(b"\0") if name]
+        files = self._files(wanted, _Object(b"tree", hash=self._commit, top=self.top))
         return sorted(write(os.path.join(self.top, file)) for file in files if _matches(file.split("/"), wanted))
+
+    def _files(self, wanted: Sequence[str], tree: "_Object", above: str = "", way: tuple[str, ...] = ()) -> list[str]:
+        """Paths of the files below a tree, in submodules and linked folders that a pattern may look into too."""
+        _, entries, _ = _git(tree.top, "ls-tree", "-r", "-z", tree.hash)
+        files = []
+        for entry in filter(None, entries.split(b"\0")):
+            head, _, name = entry.partition(b"\t")
+            file = above + os.fsdecode(name)
+            if head.startswith((_SUBMODULE, _LINK)) and _leads_to(file.split("/"), wanted):
+                found = self._object(file)
+                if found.kind == b"tree" and found.hash not in way:  # a link to a folder above itself
+                    files += self._files(wanted, found, f"{file}/", (*way, tree.hash, found.hash))
+                    continue
+            files.append(file)
+        return files
 
     def path_of(self, file: str) -> str:
         """Path of a file from the top of the repository, with forward slashes; of one outside as given."""
@@ -122,8 +146,13 @@ class Revision:
         return None
 
     def _object(self, inside: str) -> "_Object":
-        """Find what stands at a path; of nothing what git says instead."""
-        return _object(self.top, self._commit, inside)
+        """Find what stands at a path; of nothing what git says instead. Settings and parts are asked for again."""
+        found = self._known.get(inside)
+        if found is None:
+            found = _object(self.top, self._commit, inside)
+            if len(found.content) <= MAX_BYTES:  # a log may be large, and is read once
+                self._known[inside] = found
+        return found
 
 
 def _matches(parts: Sequence[str], pattern: Sequence[str]) -> bool:
@@ -135,6 +164,12 @@ def _matches(parts: Sequence[str], pattern: Sequence[str]) -> bool:
         return _matches(parts, pattern[1:]) or (is_open and _matches(parts[1:], pattern))
     is_name = bool(parts) and (parts[0] == pattern[0] or (is_open and fnmatchcase(parts[0], pattern[0])))
     return is_name and _matches(parts[1:], pattern[1:])
+
+
+def _leads_to(folder: Sequence[str], pattern: Sequence[str]) -> bool:
+    """Whether a pattern may name files below a folder."""
+    start = pattern[: len(folder)]
+    return "**" in start or (len(folder) < len(pattern) and _matches(folder, start))
 
 
 def _top(folder: str) -> tuple[str, str]:
@@ -170,7 +205,9 @@ def _object(top: str, commit: str, inside: str) -> _Object:
         _, entry, _ = _git(top, "ls-tree", "-z", commit, "--", module)
         if entry.startswith(_SUBMODULE):
             below = "/".join(parts[length:]) or os.curdir
-            return _object(os.path.join(top, module), entry.split()[2].decode(), below)
+            folder, its_commit = os.path.join(top, module), entry.split()[2].decode()
+            is_here, _, _ = _git(folder, "cat-file", "-e", its_commit)
+            return _object(folder, its_commit, below) if is_here else _Object(b"submodule")
     return _Object(words[0] if words else b"missing")
 
 
@@ -187,6 +224,8 @@ def _why_not(found: _Object) -> str:
     """What git says instead of a file: `symlink` with the way out of the tree, or why a link has no end."""
     if found.kind == b"symlink":
         return f"is a link out of the repository, to {printable(os.fsdecode(found.content))}, in"
+    if found.kind == b"submodule":
+        return "is in a submodule whose commit is not here (`git submodule update --init`), in"
     if found.kind in (b"dangling", b"loop", b"notdir"):
         return "is a link that leads nowhere in"
     return "is a folder in" if found.kind == b"tree" else "is not in"
@@ -217,8 +256,9 @@ def _git(folder: str, *arguments: str, given: bytes = b"") -> tuple[bool, bytes,
     """Whether git did it, what it wrote, and what it refuses that has nothing to do with what was asked."""
     # A folder can have the files of a bare repository among those that are committed: its revisions, its settings.
     command = ["git", "-c", "safe.bareRepository=explicit", "-C", folder, *arguments]
+    variables = {name: value for name, value in os.environ.items() if name not in _OF_ANOTHER}
     try:
-        done = run(command, input=given, capture_output=True, check=False)
+        done = run(command, input=given, capture_output=True, check=False, env=variables)
     except OSError:
         raise RevisionError("git cannot be run; --base needs it") from None
     except ValueError:  # a NUL in the name

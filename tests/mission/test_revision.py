@@ -93,3 +93,74 @@ def test_a_folder_that_became_a_repository_does_not_answer_for_itself(repository
     git(repository / "m", "init", "-q")
     commit(repository / "m")
     assert Revision("m/a.yaml", "HEAD").content("m/a.yaml", 100) == b"m/a.yaml"
+
+
+def test_a_folder_of_the_revision_that_another_repository_or_a_link_holds(
+    repository: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """A mission that is gone from a linked folder, or from a submodule, was not missed."""
+    other = tmp_path_factory.mktemp("other")
+    (other / "a.yaml").write_text("theirs")
+    git(other, "init", "-q")
+    commit(other)
+    git(repository, "-c", "protocol.file.allow=always", "submodule", "add", "-q", str(other), "sub")
+    (repository / "link").symlink_to("m")
+    (repository / "m" / "up").symlink_to("..")
+    commit(repository)
+    (repository / "sub" / "a.yaml").unlink()
+    (repository / "m" / "b.yml").unlink()
+    for pattern, files in (("sub/*.yaml", ["sub/a.yaml"]), ("link/*.yml", ["link/b.yml"]), ("s*/*", ["sub/a.yaml"])):
+        assert Revision(pattern, "HEAD").matching(pattern) == files
+    assert "sub/a.yaml" in Revision("**/*.yaml", "HEAD").matching("**/*.yaml")
+
+
+def test_a_submodule_or_a_link_that_became_a_folder_is_not_new(
+    repository: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """Its missions were compared with nothing, as if they were new."""
+    other = tmp_path_factory.mktemp("other")
+    (other / "a.yaml").write_text("theirs")
+    git(other, "init", "-q")
+    commit(other)
+    git(repository, "-c", "protocol.file.allow=always", "submodule", "add", "-q", str(other), "sub")
+    (repository / "out").symlink_to(other)
+    commit(repository)
+    (repository / "sub" / ".git").unlink()
+    (repository / "out").unlink()
+    (repository / "out").mkdir()
+    revision = Revision("sub/a.yaml", "HEAD")
+    for file, words in (
+        ("sub/a.yaml", "is in a submodule whose commit is not here"),
+        ("out/a.yaml", "is a link out"),
+    ):
+        with pytest.raises(RevisionError, match=words):
+            revision.has(file)
+    assert not revision.has("new.yaml")
+
+
+@pytest.mark.parametrize("name", ["GIT_DIR", "GIT_WORK_TREE"])
+def test_variables_of_a_hook_name_no_other_repository(
+    repository: Path, name: str, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    other = tmp_path_factory.mktemp("other")
+    git(other, "init", "-q")
+    monkeypatch.setenv("GIT_DIR", str(repository / ".git"))
+    monkeypatch.setenv(name, str(other / ".git" if name == "GIT_DIR" else other))
+    monkeypatch.chdir(repository / "m")
+    assert Revision("a.yaml", "HEAD").has("a.yaml")
+
+
+def test_git_is_asked_once_for_what_every_mission_shares(repository: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Settings and folders of parts: sixteen processes for each mission."""
+    from bisar_budget.mission import revision as module
+
+    asked: list[tuple[str, ...]] = []
+    ask = module._git
+    monkeypatch.setattr(module, "_git", lambda *said, **given: asked.append(said[1:]) or ask(*said, **given))
+    revision = Revision("a.yaml", "HEAD")
+    for is_first in (True, False):
+        asked.clear()
+        assert not revision.has("pyproject.toml")
+        assert revision.content("m/a.yaml", 100) == b"m/a.yaml"
+        assert "a.yaml" in revision.names("m")
+        assert bool(asked) is is_first

@@ -50,6 +50,9 @@ class Change(NamedTuple):
         """What it does to the limit, for a gate that refuses it."""
         if self.is_newly_failing:
             return _worse(_status(self.after))
+        before, after = self.use
+        if 1 - before <= UTILIZATION_TOLERANCE:
+            return f"had used up its limit and uses more: {percent(before)} -> {percent(after)}"
         return f"uses up {percent(self.erosion)} of what was left of its limit"
 
     @property
@@ -66,8 +69,12 @@ class Change(NamedTuple):
         return _is_near(before.declared, after.declared) and _is_near(before.allowable, after.allowable)
 
     def breaks(self, tolerated: float) -> bool:
-        """Whether it newly fails, or a row that is judged loses more than the tolerated part of what was left."""
+        """Whether it newly fails, or a row that is judged loses more than the tolerated part of what was left.
+
+        So does one that a waiver keeps from failing, before as after: it was granted for the row as it stood.
+        """
         is_judged = self.after is not None and STATUS[self.after.status].is_held
+        is_judged = is_judged or _status(self.before) == _status(self.after) == "waived"
         return self.is_newly_failing or (is_judged and self.erosion > tolerated + UTILIZATION_TOLERANCE)
 
 
@@ -214,7 +221,7 @@ def _is_newly_broken(before: str | None, after: str | None) -> bool:
 
 
 def _worse(status: str | None) -> str:
-    return "is not evaluated any more" if status == "not_evaluated" else "fails now"
+    return "is not evaluated now" if status == "not_evaluated" else "fails now"
 
 
 def _is_near(before: float | None, after: float | None) -> bool:

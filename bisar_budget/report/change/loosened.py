@@ -16,12 +16,13 @@ from bisar_budget.findings.row import Row
 from bisar_budget.mission.model import Mission, Requirements, Waiver
 from bisar_budget.report.change.inputs import dotted, written
 from bisar_budget.settings import TABLE
-from bisar_budget.units import format_quantity
 
 _SUMS = (*NAMES, "autofocus_pull_in")  # kinds of rows that are no error
+_COMPUTED = ("oscillator", "spatial_variance")  # the file states no such number: a zero is a result
 # Each asks for more than the one before it.
 _RULES = {"combine": ("each", "rss", "sum"), "model": ("published", "full", "strictest")}
 
+_NAMED = ("other", "random")  # kinds of error of which a file may state several, each with a name
 _NUMBERS = (("autofocus", "n_pull", 1), ("allocation", "coverage_factor", -1), ("allocation", "warn_above", 1))
 
 
@@ -92,15 +93,24 @@ def _rules(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened
         if new is not None and (old is None or _is_above(sign * new, sign * old)):
             path = (section, key)
             yield Loosened(dotted(path), _said(missions[0], path, old), _said(missions[1], path, new))
-    for metric in ("qpe", "pslr", "islr"):
-        old, new = (getattr(found.allocation, metric).reserve for found in (before, after))
-        if _is_above(old, new):
-            name = {"qpe": "quadratic_phase_error"}.get(metric, metric)
-            yield Loosened(f"allocation.split.{name}.reserve", f"{old:.4g}", f"{new:.4g}")
+    if missions[0].allocation.split != missions[1].allocation.split:
+        yield from _shares(before, after)
     words = {"combine": (before.combine, after.combine), "model": (before.model, after.model)}
     for key, (old_rule, new_rule) in words.items():
         if _RULES[key].index(new_rule) < _RULES[key].index(old_rule):
             yield Loosened(f"allocation.{key}", old_rule, new_rule)
+
+
+def _shares(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
+    """Reserves that are smaller, and shares that grow by more than their reserve gave."""
+    for metric, key in (("qpe", "quadratic_phase_error"), ("pslr", "pslr"), ("islr", "islr")):
+        old, new = (getattr(found.allocation, metric) for found in (before, after))
+        if _is_above(old.reserve, new.reserve):
+            yield Loosened(f"allocation.split.{key}.reserve", f"{old.reserve:.4g}", f"{new.reserve:.4g}")
+        given = max(0.0, old.reserve - new.reserve)
+        for owner in PLATFORMS if new.clock is None else (*PLATFORMS, "clock"):
+            if _is_above(new.of(owner), old.of(owner) + given):
+                yield Loosened(f"allocation.split.{key}.{owner}", f"{old.of(owner):.4g}", f"{new.of(owner):.4g}")
 
 
 def _waivers(before: Mission, after: Mission) -> Iterator[Loosened]:
@@ -114,8 +124,11 @@ def _waivers(before: Mission, after: Mission) -> Iterator[Loosened]:
 
 
 def _names_as_much(old: Waiver, new: Waiver) -> bool:
+    """Whether an earlier waiver names every row that one names; of a pattern in brackets nothing is said."""
     is_one_row = not any(char in new.id for char in "*?[")
-    return old.id == new.id or (is_one_row and fnmatchcase(new.id, old.id))
+    # A star of the old one takes wildcards of the new one too, and what stands beside the star is in both.
+    is_part = "[" not in new.id and not any(char in old.id for char in "?[")
+    return old.id == new.id or ((is_one_row or is_part) and fnmatchcase(new.id, old.id))
 
 
 def _waived_rows(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
@@ -130,11 +143,26 @@ def _waived_rows(before: MissionFindings, after: MissionFindings) -> Iterator[Lo
 
 
 def _errors(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
-    """Errors that the file declares no more; of motion along whatever axes."""
-    still = {_error(row) for row in after.rows if row.declared is not None}
+    """Errors that the file declares no more, or as zero; of motion along whatever axes."""
+    old, new = _declared(before), _declared(after)
     for name in dict.fromkeys(_error(row) for row in before.rows if row.declared is not None and row.is_independent):
-        if name not in still and name.rpartition(".")[2] not in _SUMS:
+        if name.rpartition(".")[2] in _SUMS:
+            continue
+        if name not in new:
             yield Loosened(name, "declared", "not declared")
+        elif old[name] and not new[name]:
+            yield Loosened(name, "declared", "zero")
+
+
+def _declared(found: MissionFindings) -> dict[str, bool]:
+    """Errors that a file declares, and whether as more than zero along any axis."""
+    declared: dict[str, bool] = {}
+    for row in found.rows:
+        if row.declared is not None:
+            name = _error(row)
+            is_more = row.declared != 0 or row.subject.kind in _COMPUTED
+            declared[name] = declared.get(name, False) or is_more
+    return declared
 
 
 def _error(row: Row) -> str:
@@ -143,11 +171,23 @@ def _error(row: Row) -> str:
 
 
 def _sources(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
-    """Kinds of error that state their source no more."""
+    """Kinds of error that state their source no more; of those with a name each by its own."""
     had = set(before.kinds.declared) - set(before.kinds.without_source)
-    for kind in after.kinds.without_source:
-        if kind in had:
-            yield Loosened(f"{kind}.source", "stated", "none")
+    gone = [kind for kind in after.kinds.without_source if kind in had and kind.rpartition(".")[2] not in _NAMED]
+    old, new = (_named_sources(found.analysed().mission) for found in (before, after))
+    gone += [name for name, source in new.items() if old.get(name) and not source]
+    for name in gone:
+        yield Loosened(f"{name}.source", "stated", "none")
+
+
+def _named_sources(mission: Mission) -> dict[str, str | None]:
+    """Source of each error that has a name of its own, by the id of its row."""
+    sources = {f"other.{one.name}": one.source for one in mission.other_errors}
+    for platform in PLATFORMS:
+        error = getattr(mission.platforms, platform).motion_error
+        evidence = error.evidence("random")
+        sources |= {f"{platform}.random.{one.name}": one.source or evidence for one in error.random}
+    return sources
 
 
 def _is_above(one: float, other: float) -> bool:
@@ -158,5 +198,5 @@ def _is_above(one: float, other: float) -> bool:
 def _said(mission: Mission, path: tuple[str, ...], value: float | None) -> str:
     if value is None:
         return "none"
-    default = format_quantity(value, "rad" if path[-1] == "quadratic_phase_error" else "")
+    default = f"{math.degrees(value):g} deg" if path[-1] == "quadratic_phase_error" else f"{value:g}"
     return written(mission).get(path, f"{default} (default)")
