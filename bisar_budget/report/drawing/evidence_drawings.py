@@ -6,7 +6,8 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from bisar_budget.findings.images import FLOOR_DB, ImageEvidence, PointImage, Verdict
-from bisar_budget.report.drawing.svg import Box, Canvas, Point, axis_number, round_step, ticks
+from bisar_budget.report.drawing.axes import axis_number, round_step, ticks
+from bisar_budget.report.drawing.svg import Box, Canvas, Point
 from bisar_budget.units import format_limit, format_quantity
 
 _WIDTH, _HEIGHT = 520.0, 190.0  # px, of the drawing and of one panel
