@@ -36,7 +36,7 @@ def figure_file(figure: Any, kind: str, dpi: int = 110) -> bytes:
     return file.getvalue()
 
 
-def drawing_file(svg: str, kind: str) -> bytes:
+def drawing_file(svg: str, kind: str, dpi: int = 192) -> bytes:
     """Give the file of a drawing of `svg.Canvas`, of a kind of `KINDS`: PNG and PDF as on white paper."""
     if kind == "svg":
         return svg.encode()
@@ -44,7 +44,7 @@ def drawing_file(svg: str, kind: str) -> bytes:
     width, height = (float(drawing.get(side, "")) / _INCH for side in ("width", "height"))
     page = new_figure(figsize=(width, height), layout="none")
     paint(page.add_axes((0, 0, 1, 1)), drawing)
-    return figure_file(page, kind, dpi=192)
+    return figure_file(page, kind, dpi)
 
 
 def paint(panel: Any, drawing: ElementTree.Element) -> None:
@@ -53,6 +53,7 @@ def paint(panel: Any, drawing: ElementTree.Element) -> None:
     from matplotlib.patheffects import withStroke
 
     panel.set(xlim=(0, float(drawing.get("width", ""))), ylim=(float(drawing.get("height", "")), 0))
+    panel.set_aspect("equal")
     panel.axis("off")
     rules = _rules(drawing.findtext("{*}style", ""))
     for order, element in enumerate(drawing):

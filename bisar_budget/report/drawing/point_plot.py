@@ -1,17 +1,20 @@
 """Figures 3 to 7 of Rigling & Moses for a mission of one's own: drawn, saved, and said in a few lines."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from io import BytesIO
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.faults import SetValue, changes_words, printable
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
-from bisar_budget.report.drawing.figure import BETTER, GRID, WORSE, figure_file, new_figure
+from bisar_budget.report.drawing.evidence_drawings import FOCUSED, WITH_ERRORS, WITHOUT_ERROR, Curve, cut_panel
+from bisar_budget.report.drawing.figure import GRID, WORSE, drawing_file, figure_file, new_figure, paint
 from bisar_budget.report.drawing.point_figures import FLOOR_DB, ImagePanel, Limits, Sheet, rotated_back, sheet
+from bisar_budget.report.drawing.svg import Canvas
 from bisar_budget.report.words.layout import wrapped
 from bisar_budget.simulate.impulse_response import ImpulseResponse
 from bisar_budget.simulate.phase_history import Floats
@@ -21,11 +24,7 @@ _RESTORED_DB = 1.0  # below the error-free peak; a focused response is within a 
 _EQUAL = 8.0  # an image that is not longer for its width than this has equal scales
 _NOT_FORMED = "#3a3a3a"  # beside a patch that is narrower than the panel
 _TRUE, _AT = "#5fd3f3", "#7CFC9A"
-_CUT_STYLES: tuple[Mapping[str, Any], ...] = (
-    {"color": "#888888", "lw": 3},
-    {"color": WORSE},
-    {"color": BETTER, "ls": "--"},
-)
+_CUT_SIZE = (300.0, 170.0)  # px of the drawing of the cuts, of its frame
 
 
 def drawn(images: PointImages, title: str, kind: str) -> bytes:
@@ -51,7 +50,6 @@ def figure(drawn: Sheet, title: str) -> Any:
             ({"ls": "none", "marker": "o", "color": WORSE, "ms": 5}, "points of (29)"),
         )
     ]
-    key.add_artist(key.legend(handles=panels[0, 3].lines, loc="upper center", fontsize=10, frameon=False))
     key.legend(handles=marks, loc="lower center", facecolor=_NOT_FORMED, labelcolor="white", fontsize=10)
     page.suptitle(printable(title), parse_math=False)  # a name is no formula
     return page
@@ -59,11 +57,11 @@ def figure(drawn: Sheet, title: str) -> Any:
 
 def drawn_panel(name: str, drawn: Sheet) -> bytes:
     """Draw a single panel, small, for a page, as a PNG file; `name` is one of `PANELS`."""
+    if name == "cuts":
+        return drawing_file(_cuts_drawing(drawn), "png", dpi=112)
     page = new_figure(figsize=(4.4, 3.6))
     panel = page.subplots()
     artist = PANELS[name](panel, drawn)
-    if name == "cuts":
-        panel.legend(fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.06), frameon=False)  # above the data
     if artist is not None:
         page.colorbar(artist, ax=panel, pad=0.02).set_label("dB to the error-free peak")
     return figure_file(page, "png", dpi=80)
@@ -279,14 +277,20 @@ def _point_to(panel: Any, place: Floats, middle: Floats, color: str) -> None:
     panel.annotate("", tuple(tip), tuple(start), "axes fraction", "axes fraction", arrowprops=arrow)
 
 
+def _cuts_drawing(drawn: Sheet) -> str:
+    """The cross-range cuts, as a report draws them."""
+    canvas = Canvas()
+    styles = (WITHOUT_ERROR, WITH_ERRORS, FOCUSED)
+    curves = [
+        Curve(cut.label, cut.place.tolist(), cut.level_db.tolist(), style)
+        for cut, style in zip(drawn.cuts, styles, strict=True)
+    ]
+    bottom = cut_panel(canvas, 0.0, *_CUT_SIZE, "Cross-range cuts", [*curves[1:], curves[0]])
+    return canvas.document((_CUT_SIZE[0], bottom + 4), "cuts", "Cross-range cuts", "Power along y′.")
+
+
 def _cuts(panel: Any, drawn: Sheet) -> None:
-    for cut, style in zip(drawn.cuts, _CUT_STYLES, strict=True):
-        panel.plot(cut.place, cut.level_db, label=cut.label, **style)
-    places = [cut.place for cut in drawn.cuts]
-    panel.set(xlabel="y′ [m]", ylabel="dB to the error-free peak", ylim=(-40, 2))
-    panel.set(xlim=(min(float(one.min()) for one in places), max(float(one.max()) for one in places)))
-    panel.grid(color=GRID, lw=0.5)
-    panel.set_title("Cross-range cuts")
+    paint(panel, ElementTree.fromstring(_cuts_drawing(drawn)))
 
 
 PANELS: dict[str, Callable[[Any, Sheet], Any]] = {

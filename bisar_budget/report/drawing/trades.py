@@ -207,27 +207,27 @@ def regions(rows: NDArray[Any]) -> list[MapRegion]:
     for first, second in np.argwhere(~seen).tolist():
         if seen[first, second]:
             continue
-        one = _connected(rows == rows[first, second], (first, second))
-        seen |= one
-        if one.mean() >= _LABELLED:
+        cells = _connected(rows, seen, (first, second))
+        if len(cells) >= _LABELLED * rows.size:
+            one = np.zeros(rows.shape, bool)
+            one[tuple(np.transpose(cells))] = True
             place = _innermost(one)
             along = (_run(one[:, place[1]], place[0]), _run(one[place[0]], place[1]))
             found.append(MapRegion(str(rows[first, second]), place, along))
     return found
 
 
-def _connected(mask: NDArray[np.bool_], start: tuple[int, int]) -> NDArray[np.bool_]:
-    """Cells of a mask that hang together with one of them, side by side."""
-    found = np.zeros_like(mask)
-    found[start] = True
-    front = [start]
-    while front:
-        first, second = front.pop()
+def _connected(rows: NDArray[Any], seen: NDArray[np.bool_], start: tuple[int, int]) -> list[tuple[int, int]]:
+    """Cells of one row that hang together with a first one, side by side; they are seen then."""
+    cells = [start]
+    seen[start] = True
+    for first, second in cells:  # it grows
         for cell in ((first - 1, second), (first + 1, second), (first, second - 1), (first, second + 1)):
-            if 0 <= cell[0] < mask.shape[0] and 0 <= cell[1] < mask.shape[1] and mask[cell] and not found[cell]:
-                found[cell] = True
-                front.append(cell)
-    return found
+            is_inside = 0 <= cell[0] < rows.shape[0] and 0 <= cell[1] < rows.shape[1]
+            if is_inside and not seen[cell] and rows[cell] == rows[start]:
+                seen[cell] = True
+                cells.append(cell)
+    return cells
 
 
 def _innermost(mask: NDArray[np.bool_]) -> tuple[int, int]:
