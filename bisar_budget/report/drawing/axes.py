@@ -118,19 +118,19 @@ def grid(canvas: Canvas, frame: Box, across: Scale | None, up: Scale | None) -> 
         canvas.lines([((frame.left, y), (frame.right, y)) for y in places], "grid")
 
 
-class Entry(NamedTuple):
+class LegendLine(NamedTuple):
     """One line of a legend: its words, and how its mark is drawn from the left middle of 25 px."""
 
     words: str
     mark: Callable[[Point], None]
 
 
-def line_entry(canvas: Canvas, words: str, style: str) -> Entry:
-    """Entry of a line of some style."""
-    return Entry(words, lambda at: canvas.lines([(at, (at[0] + 25, at[1]))], style))
+def line_entry(canvas: Canvas, words: str, style: str) -> LegendLine:
+    """LegendLine of a line of some style."""
+    return LegendLine(words, lambda at: canvas.lines([(at, (at[0] + 25, at[1]))], style))
 
 
-def legend(canvas: Canvas, top: float, width: float, entries: Sequence[Entry]) -> float:
+def legend(canvas: Canvas, top: float, width: float, entries: Sequence[LegendLine]) -> float:
     """Write entries in lines below a drawing; returns where they end. [px]"""
     x, y = _INDENT, top + 20
     for entry in entries:

@@ -20,7 +20,7 @@ from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission
 from bisar_budget.report.drawing import status_colours
 from bisar_budget.report.drawing.axes import (
-    Entry,
+    LegendLine,
     Scale,
     axis_number,
     grid,
@@ -166,9 +166,9 @@ def _value_scale(values: Floats, start: float, end: float, *, is_use: bool) -> S
     return Scale(low - margin, high + margin, start, end)
 
 
-def _swatches(canvas: Canvas, statuses: Sequence[str]) -> Iterator[Entry]:
+def _swatches(canvas: Canvas, statuses: Sequence[str]) -> Iterator[LegendLine]:
     for name in statuses:
-        yield Entry(status_colours.status_words(name), lambda at, name=name: _swatch(canvas, at, name))  # type: ignore[misc]
+        yield LegendLine(status_colours.status_words(name), lambda at, name=name: _swatch(canvas, at, name))  # type: ignore[misc]
 
 
 def _swatch(canvas: Canvas, at: Point, status: str) -> None:
@@ -177,8 +177,8 @@ def _swatch(canvas: Canvas, at: Point, status: str) -> None:
     outline(canvas, box, "frame")
 
 
-def _mark(canvas: Canvas, words: str = "this mission", style: str = "own") -> Entry:
-    return Entry(words, lambda at: canvas.circle((at[0] + 13, at[1]), 5 if style == "own" else 3, style))
+def _mark(canvas: Canvas, words: str = "this mission", style: str = "own") -> LegendLine:
+    return LegendLine(words, lambda at: canvas.circle((at[0] + 13, at[1]), 5 if style == "own" else 3, style))
 
 
 # ---------------------------------------------------------------- one key
@@ -421,6 +421,7 @@ def _heat(
 ) -> None:
     """A column in colours with their scale beside it, in equal ratios where it spans more than two decades."""
     shown = np.asarray(trade.values[trade.column], float)
+    shown = np.where(np.isfinite(shown), shown, np.nan)
     finite = shown[np.isfinite(shown)]
     if not finite.size:
         return
@@ -455,7 +456,7 @@ def _in_cells(canvas: Canvas, trade: Trade, columns: Sequence[float], lines: Seq
 
 def _names(
     canvas: Canvas, rows: NDArray[Any], plane: _Plane, columns: Sequence[float], lines: Sequence[float]
-) -> list[Entry]:
+) -> list[LegendLine]:
     """The name of a row in each region, upright where it is tall, else a letter that the legend explains."""
     letters: dict[str, str] = {}
     named = set()
@@ -479,7 +480,7 @@ def _names(
             half = 8.0
         canvas.text((min(max(x, columns[0] + half), columns[-1] - half), y + 4), [row], "", "middle")
     entries = [
-        Entry(row, lambda at, letter=letter: canvas.text((at[0] + 13, at[1] + 4), [letter], "", "middle"))  # type: ignore[misc]
+        LegendLine(row, lambda at, letter=letter: canvas.text((at[0] + 13, at[1] + 4), [letter], "", "middle"))  # type: ignore[misc]
         for row, letter in letters.items()
     ]
     occurring = set(rows.ravel().tolist()) - {""}
@@ -507,7 +508,7 @@ def _from_above(around: Axis, radius: Axis, frame: Box) -> _Plane:
     )
 
 
-def _around(canvas: Canvas, plane: _Plane, around: Axis, geometry: BistaticGeometry) -> list[Entry]:
+def _around(canvas: Canvas, plane: _Plane, around: Axis, geometry: BistaticGeometry) -> list[LegendLine]:
     """Directions, circles with their numbers, and at the rim where the other platform stands."""
     turn = (0.0, 2 * math.pi)
     names = {0: "east", 90: "north", 180: "west", 270: "south"}
@@ -535,7 +536,7 @@ def _around(canvas: Canvas, plane: _Plane, around: Axis, geometry: BistaticGeome
     points = [plane.at(angle, _RIM - 7), *(plane.at(angle + side, _RIM + 6) for side in (0.045, -0.045))]
     canvas.polygon(points, f"solid {other}")
     return [
-        Entry(
+        LegendLine(
             f"direction of the {other}",
             lambda at: canvas.polygon(
                 [(at[0] + 6, at[1]), *((at[0] + 19, at[1] + side) for side in (7, -7))], f"solid {other}"
