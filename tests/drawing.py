@@ -25,13 +25,14 @@ class Drawing:
         x, y = turned[:2] or (found.get("x", ""), found.get("y", ""))
         return float(x), float(y)
 
-    def _paths(self, style: str) -> list[str]:
+    def paths(self, style: str) -> list[str]:
+        """What the paths of a style are, in SVG's words."""
         return [path.get("d", "") for path in self.root.iter(f"{SVG}path") if path.get("class") == style]
 
     def lines(self, style: str) -> list[list[Point]]:
         """Points of each path of a style."""
         return [
-            [(float(x), float(y)) for x, y in re.findall(r"([\d.-]+) ([\d.-]+)", path)] for path in self._paths(style)
+            [(float(x), float(y)) for x, y in re.findall(r"([\d.-]+) ([\d.-]+)", path)] for path in self.paths(style)
         ]
 
     def line(self, style: str) -> list[Point]:
@@ -40,8 +41,13 @@ class Drawing:
 
     def boxes(self, style: str) -> list[tuple[float, float, float, float]]:
         """Rectangles of a style: left, top, right, bottom; that of a legend is the last one of a path of its own."""
-        pattern = r"M([\d.-]+) ([\d.-]+)H([\d.-]+)V([\d.-]+)"
-        return [tuple(map(float, box)) for box in re.findall(pattern, self._paths(style)[0])]  # type: ignore[misc]
+        return [self.box(box) for box in self.paths(style)[0].split("Z")[:-1]]
+
+    @staticmethod
+    def box(path: str) -> tuple[float, float, float, float]:
+        """Left, top, right and bottom of a rectangle."""
+        left, top, right, bottom = (float(number) for number in re.findall(r"-?[\d.]+", path)[:4])
+        return left, top, right, bottom
 
     def circles(self, style: str) -> list[Point]:
         """Middles of the circles of a style."""

@@ -337,7 +337,7 @@ class _Run:
             self.mission.file,
             f"Trade study: {' and '.join(axis.key for axis in trade.axes)}, {self.mission.name}",
             self._summary(),
-            head=head_of(trade, self.mission, is_polar=is_polar),
+            above=head_of(trade, self.mission, is_polar=is_polar),
             seen_from_above=self.mission.geometry if is_polar else None,
         )
         write_file(plot, drawing_file(drawing, os.path.splitext(plot)[1][1:].lower()))

@@ -72,8 +72,8 @@ def drawn(
 ) -> Drawing:
     """The drawing that `sweep --plot` writes."""
     seen_from_above = mission.geometry if is_polar else None
-    head = head_of(shown, mission, is_polar=is_polar)
-    return Drawing(trade_drawing(shown, rows or {}, "m", "t", "d", head=head, seen_from_above=seen_from_above))
+    above = head_of(shown, mission, is_polar=is_polar)
+    return Drawing(trade_drawing(shown, rows or {}, "m", "t", "d", above=above, seen_from_above=seen_from_above))
 
 
 def uses(drawing: Drawing, style: str) -> list[float]:
@@ -368,7 +368,7 @@ class TestPlots:
     @pytest.mark.parametrize(("kind", "start"), [("png", b"\x89PNG"), ("pdf", b"%PDF"), ("svg", b"<svg")])
     def test_a_file_of_each_kind(self, kind: str, start: bytes) -> None:
         shown = trade(f"{TIME}=0.1:3s:30", f"{AZIMUTH}=0:90deg:10")
-        drawing = trade_drawing(shown, {}, "m", "t", "d", head=head_of(shown, MISSION, is_polar=False))
+        drawing = trade_drawing(shown, {}, "m", "t", "d", above=head_of(shown, MISSION, is_polar=False))
         file = drawing_file(drawing, kind)
         assert file.startswith(start)
         assert file == drawing_file(drawing, kind)

@@ -70,6 +70,13 @@ def short(word: str, room: float) -> str:
     return text
 
 
+def head(canvas: Canvas, lines: Sequence[str]) -> float:
+    """Write lines above a drawing that stands alone, its name first; returns where the drawing begins. [px]"""
+    for place, line in enumerate(lines):
+        canvas.text((8, 18 + place * LINE_HEIGHT), [line], "small" if place else "name")
+    return 16 + len(lines) * LINE_HEIGHT if lines else 10.0
+
+
 def x_axis(canvas: Canvas, frame: Box, scale: Scale, label: str, words: Sequence[str] = ()) -> float:
     """Write numbers or words below a frame, and what they are; returns where they end. [px]"""
     bottom = frame.bottom

@@ -7,9 +7,6 @@ from io import BytesIO
 from typing import Any
 from xml.etree import ElementTree
 
-WORSE, BETTER = "#c1502e", "#1f5fa8"  # of lines and bars: what uses more of a limit, and less
-PALE_WORSE, PALE_BETTER = "#e6b9ab", "#a5bfdc"
-GRID = "#dddddd"
 KINDS = ("png", "svg", "pdf")
 _POINT, _INCH = 0.75, 96.0  # points of a pixel of an SVG drawing, pixels of an inch
 

@@ -12,7 +12,7 @@ from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.faults import SetValue, changes_words, printable
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
 from bisar_budget.report.drawing.evidence_drawings import FOCUSED, WITH_ERRORS, WITHOUT_ERROR, Curve, cut_panel
-from bisar_budget.report.drawing.figure import GRID, WORSE, drawing_file, figure_file, new_figure, paint
+from bisar_budget.report.drawing.figure import drawing_file, figure_file, new_figure, paint
 from bisar_budget.report.drawing.point_figures import FLOOR_DB, ImagePanel, Limits, Sheet, rotated_back, sheet
 from bisar_budget.report.drawing.svg import Canvas
 from bisar_budget.report.words.layout import wrapped
@@ -22,6 +22,7 @@ from bisar_budget.simulate.point import PointImages
 
 _RESTORED_DB = 1.0  # below the error-free peak; a focused response is within a fraction of it
 _EQUAL = 8.0  # an image that is not longer for its width than this has equal scales
+_MARKED, _GRID = "#c1502e", "#dddddd"  # of lines that approximate or mark, of a grid
 _NOT_FORMED = "#3a3a3a"  # beside a patch that is narrower than the panel
 _TRUE, _AT = "#5fd3f3", "#7CFC9A"
 _CUT_SIZE = (300.0, 170.0)  # px of the drawing of the cuts, of its frame
@@ -47,7 +48,7 @@ def figure(drawn: Sheet, title: str) -> Any:
         for style, label in (
             (_stands(_TRUE), "where the target stands"),
             (_put(_AT), "where (25) puts it"),
-            ({"ls": "none", "marker": "o", "color": WORSE, "ms": 5}, "points of (29)"),
+            ({"ls": "none", "marker": "o", "color": _MARKED, "ms": 5}, "points of (29)"),
         )
     ]
     key.legend(handles=marks, loc="lower center", facecolor=_NOT_FORMED, labelcolor="white", fontsize=10)
@@ -194,13 +195,13 @@ def _peak_and_width(response: ImpulseResponse | None, clean: ImpulseResponse | N
 def _range_error(panel: Any, drawn: Sheet) -> None:
     panel.plot(drawn.slow_time, drawn.range_error_mm, color="black")
     for segment in drawn.segments:
-        panel.plot(*segment.T, "--", color=WORSE)
+        panel.plot(*segment.T, "--", color=_MARKED)
     panel.set(title="Fig. 3: range error, three segments", xlabel="slow time [s]", ylabel="range error [mm]")
-    panel.grid(color=GRID, lw=0.5)
+    panel.grid(color=_GRID, lw=0.5)
 
 
 def _points(panel: Any, drawn: Sheet) -> None:
-    panel.plot(*drawn.points.T, "o-", color=WORSE, zorder=3)
+    panel.plot(*drawn.points.T, "o-", color=_MARKED, zorder=3)
     panel.plot(0, 0, **_stands("#1b7fa3"))
     panel.plot(*drawn.points[1], **_put("#2a8f4f"))
     panel.set(title=f"Fig. 4: points of the segments, (29)\nby {drawn.points_by}", xlabel="x [m]", ylabel="y [m]")
@@ -213,7 +214,7 @@ def _points(panel: Any, drawn: Sheet) -> None:
     half = 0.65 * max(float((high - low).max()), span)
     (x, y) = (low + high) / 2
     panel.set(xlim=(x - half, x + half), ylim=(y - half, y + half), aspect="equal")
-    panel.grid(color=GRID, lw=0.5)
+    panel.grid(color=_GRID, lw=0.5)
 
 
 def _image(panel: Any, picture: ImagePanel, *, with_points: bool = False) -> Any:
@@ -237,7 +238,7 @@ def _image(panel: Any, picture: ImagePanel, *, with_points: bool = False) -> Any
     panel.set(xlim=(left, right), ylim=(bottom, top), facecolor=_NOT_FORMED)
     if with_points:
         for three in picture.points:
-            panel.plot(*three.T, "o-", color=WORSE, ms=4, lw=0.8)
+            panel.plot(*three.T, "o-", color=_MARKED, ms=4, lw=0.8)
     panel.plot(*picture.shown_places.T, **_put(_AT))
     panel.plot(*picture.true_places.T, **_stands(_TRUE))
     for true in picture.true_places:

@@ -24,6 +24,7 @@ from bisar_budget.report.drawing.axes import (
     Scale,
     axis_number,
     grid,
+    head,
     legend,
     line_entry,
     outline,
@@ -31,12 +32,12 @@ from bisar_budget.report.drawing.axes import (
     x_axis,
     y_axis,
 )
-from bisar_budget.report.drawing.svg import LINE_HEIGHT, Box, Canvas, Point, text_width
+from bisar_budget.report.drawing.svg import Box, Canvas, Point, text_width
 from bisar_budget.report.drawing.trades import borders, level_lines, per_word, regions, runs, thinned
 from bisar_budget.report.words.sentences import percent
 
 _WIDTH, _HEIGHT = 560.0, 270.0  # of a drawing, of its frame [px]
-_LEFT, _RIGHT, _TOP = 58.0, 12.0, 10.0  # px around the frame
+_LEFT, _RIGHT = 58.0, 12.0  # px beside the frame
 _MOST_LEFT = 190.0  # px that names at an axis may take
 _BAR = 24.0  # px for a word
 _RIM = 165.0  # px, of a polar map
@@ -62,7 +63,7 @@ def trade_drawing(
     title: str,
     description: str,
     *,
-    head: Sequence[str] = (),
+    above: Sequence[str] = (),
     seen_from_above: BistaticGeometry | None = None,
 ) -> str:
     """Draw a sweep over one key or two as SVG.
@@ -77,17 +78,13 @@ def trade_drawing(
         What makes the ids of the drawing its own.
     title, description : str
         What it shows, and what it says to who cannot see it.
-    head : Sequence[str]
+    above : Sequence[str]
         Lines above it, the name first: for a drawing that stands alone.
     seen_from_above : BistaticGeometry, optional
         Draws a polar map, with the place of the platform that does not move around.
     """
     canvas = Canvas()
-    top = _TOP
-    for place, line in enumerate(head):
-        canvas.text((8, top + 8), [line], "small" if place else "name")
-        top += LINE_HEIGHT
-    top += 6 if head else 0
+    top = head(canvas, above)
     by_word = per_word(trade)
     if by_word is not None or (len(trade.axes) == 1 and not trade.axes[0].words):
         bottom = _curves(canvas, top, trade, rows, by_word[1] if by_word else {})
