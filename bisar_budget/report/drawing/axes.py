@@ -126,7 +126,7 @@ def grid(canvas: Canvas, frame: Box, across: Scale | None, up: Scale | None) -> 
 
 
 class LegendLine(NamedTuple):
-    """One line of a legend: its words, and how its mark is drawn from the left middle of 25 px."""
+    """One entry of a legend: its words, and how its mark is drawn from the left middle of 25 px."""
 
     words: str
     mark: Callable[[Point], None]
@@ -135,6 +135,16 @@ class LegendLine(NamedTuple):
 def line_entry(canvas: Canvas, words: str, style: str) -> LegendLine:
     """LegendLine of a line of some style."""
     return LegendLine(words, lambda at: canvas.lines([(at, (at[0] + 25, at[1]))], style))
+
+
+def box_entry(canvas: Canvas, words: str, *styles: str) -> LegendLine:
+    """Entry for a rectangle of some styles, one over the other."""
+
+    def mark(at: Point) -> None:
+        for style in styles:
+            canvas.boxes([Box(at[0] + 4, at[1] - 5, at[0] + 22, at[1] + 5)], style)
+
+    return LegendLine(words, mark)
 
 
 def legend(canvas: Canvas, top: float, width: float, entries: Sequence[LegendLine]) -> float:

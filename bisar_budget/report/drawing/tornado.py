@@ -5,7 +5,7 @@ All bars are for the same part: 1 % of a number, of a radian, of a power, of the
 
 from bisar_budget.design.slopes import EVEN, Sensitivity, Slope
 from bisar_budget.faults import changes_words, printable
-from bisar_budget.report.drawing.axes import LegendLine, Scale, grid, head, legend, short, x_axis
+from bisar_budget.report.drawing.axes import Scale, box_entry, grid, head, legend, short, x_axis
 from bisar_budget.report.drawing.figure import drawing_file
 from bisar_budget.report.drawing.svg import Box, Canvas, text_width
 from bisar_budget.report.words.sentences import percent
@@ -53,13 +53,7 @@ def tornado_drawing(found: Sensitivity) -> str:
     if not shown:
         canvas.text((zero, middle), ["no number changes it"], "", "middle")
     bottom = x_axis(canvas, frame, along, "percentage points")
-    entries = [
-        LegendLine(
-            f"the number is {part}",
-            lambda at, style=style: canvas.boxes([Box(at[0] + 4, at[1] - 5, at[0] + 22, at[1] + 5)], f"bar{style}"),  # type: ignore[misc]
-        )
-        for part, style in _PARTS.items()
-    ]
+    entries = [box_entry(canvas, f"the number is {part}", f"bar{style}") for part, style in _PARTS.items()]
     bottom = legend(canvas, bottom, _WIDTH, entries)
     return canvas.document((_WIDTH, bottom + 4), f"tornado {found.name}", f"Sensitivity: {name}", what, _STYLE)
 

@@ -23,6 +23,7 @@ from bisar_budget.report.drawing.axes import (
     LegendLine,
     Scale,
     axis_number,
+    box_entry,
     grid,
     head,
     legend,
@@ -163,15 +164,8 @@ def _value_scale(values: Floats, start: float, end: float, *, is_use: bool) -> S
     return Scale(low - margin, high + margin, start, end)
 
 
-def _swatches(canvas: Canvas, statuses: Sequence[str]) -> Iterator[LegendLine]:
-    for name in statuses:
-        yield LegendLine(status_colours.status_words(name), lambda at, name=name: _swatch(canvas, at, name))  # type: ignore[misc]
-
-
-def _swatch(canvas: Canvas, at: Point, status: str) -> None:
-    box = Box(at[0] + 4, at[1] - 5, at[0] + 22, at[1] + 5)
-    canvas.boxes([box], f"is-{status}")
-    outline(canvas, box, "frame")
+def _swatches(canvas: Canvas, statuses: Sequence[str]) -> list[LegendLine]:
+    return [box_entry(canvas, status_colours.status_words(name), f"is-{name}", "frame") for name in statuses]
 
 
 def _mark(canvas: Canvas, words: str = "this mission", style: str = "own") -> LegendLine:
@@ -353,7 +347,7 @@ def _map(canvas: Canvas, top: float, trade: Trade, geometry: BistaticGeometry | 
         frame = frame._replace(top=frame.top + 24, bottom=frame.top + 24 + 2 * _RIM)
     columns, lines = _cuts(x, plane.across), _cuts(y, plane.up)
     statuses = [name for name in trade.statuses if not trade.column or status_colours.has_no_mission(name)]
-    entries = list(_swatches(canvas, statuses))
+    entries = _swatches(canvas, statuses)
     for name in statuses:
         plane.fill(canvas, _cells(trade.values["status"] == name, columns, lines), f"is-{name}")
     if trade.column:
