@@ -16,7 +16,7 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.findings.trade import TradeStudy
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import FORMATS
-from bisar_budget.report.drawing.trades import Gathered, rows_that_matter, varying_keys
+from bisar_budget.report.drawing.trades import Gathered, uses_of_rows
 from bisar_budget.report.tables.described import Described
 from bisar_budget.resources import cores
 
@@ -95,16 +95,11 @@ def _study(
         return found
 
     trade = gathered(()).trade()
-    rows = {}
-    if len(varying_keys(cases)) == 1:
-        names = {f"{row}.utilization": row for row in rows_that_matter(trade)}
-        values = gathered(tuple(names)).trade().values if names else {}
-        rows = {row: values[name] for name, row in names.items()}
     statuses = trade.values["status"].ravel().tolist()
     return TradeStudy(
         asked=tuple(texts),
         trade=trade,
-        rows=rows,
+        rows=uses_of_rows(trade, gathered),
         cases=cases.count,
         complying=sum(name != "error" and not STATUS[name].fails for name in statuses),
         unevaluated=statuses.count("not_evaluated"),

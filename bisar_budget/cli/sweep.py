@@ -318,22 +318,29 @@ class _Run:
 
     def _draw(self, plot: str, gathered: "Gathered", is_polar: bool) -> None:
         """Draw what was gathered; over one key also the rows that are the worst somewhere."""
-        from bisar_budget.report.drawing import trade_plot
-        from bisar_budget.report.drawing.trades import Gathered, rows_that_matter
+        from bisar_budget.report.drawing.figure import drawing_file
+        from bisar_budget.report.drawing.trade_drawing import head_of, trade_drawing
+        from bisar_budget.report.drawing.trades import Gathered, uses_of_rows
         from bisar_budget.report.tables.described import Described
 
-        trade = gathered.trade(is_polar=is_polar)
-        uses = {}
-        if len(trade.axes) == 1 and not trade.column:
-            names = {f"{row}.utilization": row for row in rows_that_matter(trade)}
-            swept = self.swept(self.cases, tuple(names))
-            again = Gathered(Described(swept, self.cases, self.mission, __version__), tuple(names))
+        def again(columns: Sequence[str]) -> Gathered:
+            swept = self.swept(self.cases, columns)
+            found = Gathered(Described(swept, self.cases, self.mission, __version__), columns)
             for part in swept.parts:
-                again.add(part)
-            found = again.trade().values
-            uses = {row: found[name] for name, row in names.items()}
-        kind = os.path.splitext(plot)[1][1:].lower()
-        write_file(plot, trade_plot.drawn(trade, uses, self.mission, kind, is_polar=is_polar))
+                found.add(part)
+            return found
+
+        trade = gathered.trade(is_polar=is_polar)
+        drawing = trade_drawing(
+            trade,
+            uses_of_rows(trade, again),
+            self.mission.file,
+            f"Trade study: {' and '.join(axis.key for axis in trade.axes)}, {self.mission.name}",
+            self._summary(),
+            above=head_of(trade, self.mission, is_polar=is_polar),
+            seen_from_above=self.mission.geometry if is_polar else None,
+        )
+        write_file(plot, drawing_file(drawing, os.path.splitext(plot)[1][1:].lower()))
 
     @property
     def is_unjudged(self) -> bool:

@@ -3,11 +3,13 @@
 import cmath
 import json
 import math
+import re
 from collections.abc import Callable
 from datetime import date
 from io import StringIO
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from bisar_budget import evaluators
@@ -24,6 +26,7 @@ from bisar_budget.mission.model import names_parts
 from bisar_budget.mission.parts import taken_figures
 from bisar_budget.report.drawing import tornado
 from tests.conftest import ROOT, mission_text
+from tests.drawing import Drawing
 
 MISSIONS = ROOT / "specs" / "missions"
 SECTION_V = str(MISSIONS / "rigling_moses_section_v.yaml")
@@ -401,17 +404,27 @@ def test_a_plot_is_a_file_of_its_kind_and_the_same_each_time(run: Callable, tmp_
         assert run("sensitivity", SECTION_V, "--plot", file).exit_code == 0
     first, second = (file.read_bytes() for file in files)
     assert first == second
-    assert first.startswith(b"\x89PNG" if suffix == "png" else b"<?xml")
+    assert first.startswith(b"\x89PNG" if suffix == "png" else b"<svg")
 
 
 def test_the_bars_are_the_slopes() -> None:
+    """A larger number to the side of its slope, strong; a smaller one to the other, pale; in percentage points."""
     found = ask()
-    (panel,) = tornado.figure(found).axes
-    widths = [bar.get_width() for bar in panel.patches]
-    assert widths[::2] == pytest.approx([100 * slope.change for slope in found.shown])
-    assert widths[1::2] == pytest.approx([-100 * slope.change for slope in found.shown])
-    labels = [label.get_text() for label in panel.get_yticklabels()]
+    drawing = Drawing(tornado.tornado_drawing(found))
+    labels = drawing.texts[3:]
     assert labels[0] == "collection.aperture_time = 6 s, 1 %"
+    numbers = {text: drawing.place(text)[0] for text in labels if re.fullmatch(r"−?[\d.]+", text)}
+    values = [float(text.replace("−", "-")) for text in numbers]
+    scale, zero = np.polyfit(values, list(numbers.values()), 1)
+    for style, part in (("", 1), (" pale", -1)):
+        changes = [100 * part * slope.change for slope in found.shown]
+        for tone, side in (("worse", 1), ("better", -1)):
+            want = [change for change in changes if (change > 0) == (side > 0)]
+            bars = [drawing.box(path) for path in drawing.paths(tone + style)]
+            ends = [right if side > 0 else left for left, _, right, _ in bars]
+            assert [(end - zero) / scale for end in ends] == pytest.approx(want, abs=0.01 / scale)
+            starts = [left if side > 0 else right for left, _, right, _ in bars]
+            assert starts == pytest.approx([zero] * len(starts), abs=0.01)
 
 
 @pytest.mark.parametrize(

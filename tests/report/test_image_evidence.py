@@ -46,7 +46,7 @@ def curves(root: ElementTree.Element) -> list[tuple[str, np.ndarray]]:
     found = []
     for element in root.iter(f"{SVG}path"):
         numbers = [float(part) for part in re.findall(r"-?[\d.]+", element.get("d", ""))]
-        if len(numbers) > 8:
+        if len(numbers) > 8 and element.get("class") != "grid":
             found.append((element.get("class", ""), np.array(numbers).reshape(-1, 2)))
     return found
 

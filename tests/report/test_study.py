@@ -7,15 +7,15 @@ import shlex
 from datetime import date
 from itertools import pairwise
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
 from bisar_budget.cli.studies import with_studies
 from bisar_budget.findings.mission import MissionFindings
-from bisar_budget.report.drawing.study_drawing import level_lines
+from bisar_budget.report.drawing.trades import level_lines
 from tests.conftest import ROOT
+from tests.drawing import Drawing
 from tests.page import read_page
 
 SECTION_V = "specs/missions/rigling_moses_section_v.yaml"
@@ -23,7 +23,6 @@ SPOTLIGHT = "specs/missions/one_stationary_spotlight.yaml"
 UAV = "specs/missions/uav_stim300.yaml"
 TIME, AZIMUTH = "collection.aperture_time", "platforms.receiver.azimuth"
 SENSOR = "platforms.receiver.motion_error.sensor.0"
-SVG = "{http://www.w3.org/2000/svg}"
 
 
 @pytest.fixture(autouse=True)
@@ -42,24 +41,10 @@ def reported(
     return file.read_text(encoding="utf-8")
 
 
-def drawing(run, tmp_path: Path, mission: str, *sweeps: str) -> ElementTree.Element:
+def drawing(run, tmp_path: Path, mission: str, *sweeps: str) -> Drawing:
     """The drawing beside a Markdown report."""
     reported(run, tmp_path, mission, *sweeps, suffix=".md")
-    return ElementTree.parse(tmp_path / "r.assets" / "1-study.svg").getroot()
-
-
-def points(svg: ElementTree.Element, style: str) -> list[tuple[float, float]]:
-    """Points of the widest line of a style; those of a legend are short."""
-    paths = [path.get("d", "") for path in svg.iter(f"{SVG}path") if path.get("class") == style]
-    lines = [[(float(x), float(y)) for x, y in re.findall(r"([\d.-]+) ([\d.-]+)", path)] for path in paths]
-    return max(lines, key=lambda line: max(x for x, _ in line) - min(x for x, _ in line))
-
-
-def boxes(svg: ElementTree.Element, style: str) -> list[tuple[float, float, float, float]]:
-    """Rectangles of a style: left, top, right, bottom; that of a legend is the last one of a path of its own."""
-    found = [path.get("d", "") for path in svg.iter(f"{SVG}path") if path.get("class") == style]
-    pattern = r"M([\d.-]+) ([\d.-]+)H([\d.-]+)V([\d.-]+)"
-    return [tuple(map(float, box)) for box in re.findall(pattern, found[0])]  # type: ignore[misc]
+    return Drawing((tmp_path / "r.assets" / "1-study.svg").read_bytes())
 
 
 def test_the_section_says_what_was_asked_and_what_was_found(run, tmp_path: Path) -> None:
@@ -108,15 +93,15 @@ def test_its_command_gives_the_same_cases(run, tmp_path: Path, mission, sweeps, 
 def test_curves_are_where_their_numbers_are(run, tmp_path: Path) -> None:
     """The curve crosses the limit at 1.748 s, within the curvature of steps of 0.05 s."""
     svg = drawing(run, tmp_path, SECTION_V, f"{TIME}=1:2s:21")
-    curve = points(svg, "row0")
-    (left, limit), (right, same) = points(svg, "limit")
+    curve = svg.line("row0")
+    (left, limit), (right, same) = svg.line("limit")
     assert limit == same
     assert (curve[0][0], curve[-1][0]) == (left, right)
     (below, above) = next((a, b) for a, b in pairwise(curve) if a[1] >= limit > b[1])
     x = below[0] + (below[1] - limit) / (below[1] - above[1]) * (above[0] - below[0])
     assert 1 + (x - left) / (right - left) == pytest.approx(1.7481, abs=1e-3)
     # The status changes half way between the last value that complies and the next.
-    (fail,) = boxes(svg, "is-fail")
+    (fail,) = svg.boxes("is-fail")
     assert 1 + (fail[0] - left) / (right - left) == pytest.approx(1.725, abs=1e-3)
     assert fail[2] == right
 
@@ -129,16 +114,16 @@ def test_a_map_has_each_case_in_its_place(run, tmp_path: Path) -> None:
     lines = [line for line in table.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
     status = np.array([case["status"] for case in csv.DictReader(lines)]).reshape(13, 5)
     weights = np.outer([0.5, *[1] * 11, 0.5], [0.5, 1, 1, 1, 0.5]) / 48
-    frame = points(svg, "frame")
+    frame = svg.line("frame")
     area = (max(x for x, _ in frame) - min(x for x, _ in frame)) * (
         max(y for _, y in frame) - min(y for _, y in frame)
     )
     assert len(np.unique(status)) > 2
     for name in np.unique(status):
-        drawn = sum((right - left) * (bottom - top) for left, top, right, bottom in boxes(svg, f"is-{name}"))
+        drawn = sum((right - left) * (bottom - top) for left, top, right, bottom in svg.boxes(f"is-{name}"))
         assert drawn / area == pytest.approx(weights[status == name].sum(), rel=1e-3), name
     # More aperture time is further up, and fails.
-    assert min(box[1] for box in boxes(svg, "is-fail")) < min(box[1] for box in boxes(svg, "is-pass"))
+    assert min(box[1] for box in svg.boxes("is-fail")) < min(box[1] for box in svg.boxes("is-pass"))
 
 
 def test_words_have_bars(run, tmp_path: Path) -> None:
@@ -146,11 +131,10 @@ def test_words_have_bars(run, tmp_path: Path) -> None:
     text = (ROOT / UAV).read_text(encoding="utf-8")
     mission.write_text(re.sub(r"(?m)^ +location_error:.*\n", "", text), encoding="utf-8")
     svg = drawing(run, tmp_path, str(mission), f"{SENSOR}=stim300,adis16405,adis16488")
-    texts = ["".join(text.itertext()) for text in svg.iter(f"{SVG}text")]
+    texts = svg.texts
     assert [text for text in texts if re.fullmatch("stim300|adis.*", text)] == ["stim300", "adis16405", "adis16488"]
-    line = next(path.get("d", "") for path in svg.iter(f"{SVG}path") if path.get("class") == "limit")
-    limit = float(line[1:].split()[0])
-    ends = {name: boxes(svg, f"bar is-{name}")[0][2] for name in ("pass", "warn", "fail")}
+    limit = svg.lines("limit")[0][0][0]
+    ends = {name: svg.boxes(f"bar is-{name}")[0][2] for name in ("pass", "warn", "fail")}
     assert ends["pass"] < ends["warn"] < limit < ends["fail"]
     assert {"131 %", "this mission"} <= set(texts)
 

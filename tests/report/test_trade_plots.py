@@ -1,14 +1,17 @@
 """Plots of a sweep: what they show, as arrays of made-up cases, and that a file of each kind is one."""
 
 import math
+import re
+from io import BytesIO
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from matplotlib.colors import to_rgb
+from matplotlib.image import imread
 
 from bisar_budget.design.cases import grid
 from bisar_budget.design.quantities import QuestionError
@@ -16,11 +19,24 @@ from bisar_budget.design.swept import Column, Part, Swept
 from bisar_budget.faults import SetValue
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.load import load_mission
+from bisar_budget.mission.model import Mission
 from bisar_budget.mission.tree import read_tree
-from bisar_budget.report.drawing import trade_plot
-from bisar_budget.report.drawing.trades import Gathered, Trade, borders, check_plot, regions, rows_that_matter, runs
+from bisar_budget.report.drawing.figure import drawing_file
+from bisar_budget.report.drawing.svg import text_width
+from bisar_budget.report.drawing.trade_drawing import head_of, trade_drawing
+from bisar_budget.report.drawing.trades import (
+    Gathered,
+    Trade,
+    borders,
+    check_plot,
+    regions,
+    rows_that_matter,
+    runs,
+    thinned,
+)
 from bisar_budget.report.tables.described import Described
 from tests.conftest import ROOT
+from tests.drawing import SVG, Drawing
 
 FILE = ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml"
 MISSION = load_mission(str(FILE))
@@ -51,14 +67,20 @@ def trade(*texts: str, column: str | None = None, is_polar: bool = False) -> Tra
     return gathered.trade(is_polar=is_polar)
 
 
-def drawn(shown: Trade, *, is_polar: bool = False, rows: dict[str, Any] | None = None) -> Any:
-    """The panel of a figure."""
-    return trade_plot.figure(shown, rows or {}, MISSION, is_polar=is_polar).axes[0]
+def drawn(
+    shown: Trade, *, is_polar: bool = False, rows: dict[str, Any] | None = None, mission: Mission = MISSION
+) -> Drawing:
+    """The drawing that `sweep --plot` writes."""
+    seen_from_above = mission.geometry if is_polar else None
+    above = head_of(shown, mission, is_polar=is_polar)
+    return Drawing(trade_drawing(shown, rows or {}, "m", "t", "d", above=above, seen_from_above=seen_from_above))
 
 
-def texts_of(panel: Any) -> str:
-    legend = panel.get_legend() or panel.figure.legends[0]
-    return " ".join([*(text.get_text() for text in panel.texts), *(text.get_text() for text in legend.get_texts())])
+def uses(drawing: Drawing, style: str) -> list[float]:
+    """Utilizations of a curve, by the line of the limit and the bottom of the frame. [%]"""
+    (_, limit), _ = drawing.line("limit")
+    bottom = drawing.frame[3]
+    return [100 * (bottom - y) / (bottom - limit) for _, y in drawing.line(style)]
 
 
 class TestWhatIsDrawn:
@@ -118,7 +140,7 @@ class TestWhatIsDrawn:
         rows = np.random.default_rng(seed).choice(["a", "b"], (first, second)).astype(object)
         for region in regions(rows):
             assert rows[region.place] == region.row
-            assert 1 <= region.size[0] <= first + 2  # of 700 each third is looked at
+            assert 1 <= region.size[0] <= first
             assert 1 <= region.size[1] <= second
 
     def test_borders_are_between_cells(self) -> None:
@@ -128,54 +150,66 @@ class TestWhatIsDrawn:
 
 
 class TestPlots:
-    """Figures, by what Matplotlib was told to draw."""
+    """Drawings, by what stands where."""
 
     def test_curves_with_their_limit(self) -> None:
         shown = trade(f"{TIME}=0.5:2.5s:5")
-        panel = drawn(shown, rows={"receiver.velocity.x": np.linspace(0.1, 0.5, 5)})
-        assert panel.get_xlabel() == f"{TIME} [s]"
-        assert panel.get_ylabel() == "utilization [%]"
-        lines = {line.get_label(): line.get_ydata() for line in panel.lines}
-        assert lines["worst row"].tolist() == [50, 100, 150, 200, 250]
-        assert lines["receiver.velocity.x"] == pytest.approx([10, 20, 30, 40, 50])
-        assert list(lines["limit"]) == [100, 100]
-        assert panel.get_title(loc="left") == "Rigling & Moses, Section V"
-        assert {"fail", "pass", "limit"} <= set(texts_of(panel).split())
+        drawing = drawn(shown, rows={"receiver.velocity.x": np.linspace(0.1, 0.5, 5)})
+        assert {f"{TIME} [s]", "utilization [%]", "worst row", "receiver.velocity.x"} <= set(drawing.texts)
+        assert uses(drawing, "worst") == pytest.approx([50, 100, 150, 200, 250], abs=0.02)
+        assert uses(drawing, "row0") == pytest.approx([10, 20, 30, 40, 50], abs=0.02)
+        assert drawing.texts[0] == "Rigling & Moses, Section V"
+        assert {"fail", "pass", "limit"} <= set(drawing.texts)
+        assert [drawing.within(dot)[0] for dot in drawing.circles("dot0")] == pytest.approx([0, 0.25, 0.5, 0.75, 1])
 
     def test_what_is_far_above_its_limit_is_drawn_in_equal_ratios(self) -> None:
-        assert drawn(trade(f"{TIME}=0.5:2.5s:5")).get_yscale() == "linear"
-        assert drawn(trade(f"{TIME}=0.5:25s:5")).get_yscale() == "log"
+        assert drawn(trade(f"{TIME}=0.5:2.5s:5")).place("0")
+        drawing = drawn(trade(f"{TIME}=0.5:25s:5"))
+        assert "0" not in drawing.texts
+        heights = [drawing.place(number)[1] for number in ("100", "200", "500", "1000")]
+        steps = [math.log(2), math.log(2.5), math.log(2)]
+        assert -np.diff(heights) / steps == pytest.approx([-np.diff(heights)[0] / steps[0]] * 3, rel=1e-3)
 
     def test_a_column_over_one_key(self) -> None:
-        panel = drawn(trade(f"{TIME}=0.5:2.5s:5", column="utilization"))
-        assert panel.get_ylabel() == "utilization"
-        assert panel.lines[0].get_ydata().tolist() == [0.5, 1, 1.5, 2, 2.5]
+        drawing = drawn(trade(f"{TIME}=0.5:2.5s:5", column="utilization"))
+        assert {"utilization", "0.5", "1", "1.5", "2", "2.5"} <= set(drawing.texts)
+        assert "limit" not in drawing.texts
+        parts = [drawing.within(point)[1] for point in drawing.line("row0")]
+        assert np.diff(parts) == pytest.approx([parts[1] - parts[0]] * 4, abs=1e-3)
+        assert parts[0] < 0.1 < 0.9 < parts[-1]
+
+    def test_a_curve_of_many_values_keeps_what_is_seen(self) -> None:
+        """One value among 100 000 stands out: the curve goes there, and has no more points than a drawing shows."""
+        shown = trade(f"{TIME}=0.5:0.6s:100000")
+        shown.values["utilization"][77_777] = 0.9
+        drawing = drawn(shown)
+        assert max(uses(drawing, "worst")) == pytest.approx(90, abs=0.02)
+        assert len(drawing.line("worst")) < 5000
+        assert drawing.circles("dot0") == []
 
     def test_a_map_of_statuses_names_what_binds(self) -> None:
-        panel = drawn(trade(f"{TIME}=0.1:3s:30", f"{AZIMUTH}=0:90deg:10"))
-        assert (panel.get_xlabel(), panel.get_ylabel()) == (f"{TIME} [s]", f"{AZIMUTH} [deg]")
-        assert (panel.get_xlim(), panel.get_ylim()) == ((0.1, 3), (0, 90))
-        shown = texts_of(panel)
-        assert {"first", "second", "fail", "pass"} <= set(shown.split())
-        assert "utilization 100 %" in shown
-        (label,) = [text for text in panel.texts if text.get_text() == "second"]
-        assert 2.05 < label.get_position()[0] < 3
+        drawing = drawn(trade(f"{TIME}=0.1:3s:30", f"{AZIMUTH}=0:90deg:10"))
+        assert {f"{TIME} [s]", f"{AZIMUTH} [deg]"} <= set(drawing.texts)
+        assert {"first", "second", "fail", "pass", "utilization 100 %"} <= set(drawing.texts)
+        assert 2.05 < 0.1 + 2.9 * drawing.within(drawing.place("second"))[0] < 3
+        lowest, highest = drawing.place("0"), drawing.place("80")
+        assert drawing.within(lowest)[1] == pytest.approx(0, abs=0.02)
+        assert drawing.within(highest)[1] == pytest.approx(8 / 9, abs=0.02)
 
     def test_the_line_of_100_percent_is_where_it_is(self) -> None:
         """Utilization is the time in seconds: the line is at 1 s."""
-        panel = drawn(trade(f"{TIME}=0.55:3.05s:26", f"{AZIMUTH}=0:90deg:10"))
-        (contour,) = [one for one in panel.collections if type(one).__name__ == "QuadContourSet"]
-        (path,) = contour.get_paths()
-        assert path.vertices[:, 0] == pytest.approx(1, rel=2e-3)  # a step of 10 %, in logarithms
+        drawing = drawn(trade(f"{TIME}=0.55:3.05s:26", f"{AZIMUTH}=0:90deg:10"))
+        places = [0.55 + 2.5 * drawing.within(point)[0] for point in drawing.lines("border")[0]]
+        assert places == pytest.approx([1] * 18, rel=2e-3)  # a step of 10 %, in logarithms
 
     def test_the_line_leaves_out_what_is_not_evaluated(self) -> None:
         """In the midst of what fails, one case has a low utilization because the row above its limit has none."""
         shown = trade(f"{TIME}=2.0:2.8s:9", f"{AZIMUTH}=0:90deg:10")
         shown.values["utilization"][4, 5] = 0.02
         shown.values["status"][4, 5] = "fail"
-        assert "100 %" in texts_of(drawn(shown))
+        assert "utilization 100 %" in drawn(shown).texts
         shown.values["status"][4, 5] = "not_evaluated"
-        assert "100 %" not in texts_of(drawn(shown))
+        assert "utilization 100 %" not in drawn(shown).texts
 
     @pytest.mark.parametrize("is_polar", [False, True])
     def test_words_above_a_map_leave_its_room(self, is_polar: bool) -> None:
@@ -183,98 +217,180 @@ class TestPlots:
         words = "speed: 30 m/s, motion_azimuth: 90 deg, " * 20
         mission = MISSION._replace(name=words, changes=(SetValue("platforms.receiver", words),))
         shown = trade(f"{AZIMUTH}=0:360deg:37", f"{TIME}=1:5s:5", is_polar=is_polar)
-        figure = trade_plot.figure(shown, {}, mission, is_polar=is_polar)
-        figure.draw_without_rendering()
-        panel = figure.axes[0]
-        assert panel.get_window_extent().height > 0.5 * figure.bbox.height
-        assert panel.title.get_window_extent().x1 < figure.bbox.x1
+        drawing = drawn(shown, is_polar=is_polar, mission=mission)
+        _, top, _, bottom = drawing.frame
+        width, height = (float(drawing.root.get(side, "")) for side in ("width", "height"))
+        assert bottom - top > 0.5 * height
+        for line in drawing.texts[:5]:
+            x, y = drawing.place(line)
+            assert x + text_width(line) < width
+            assert y < top
 
     def test_a_map_without_a_limit_says_none(self) -> None:
-        assert "100 %" not in texts_of(drawn(trade(f"{TIME}=0.1:0.9s:9", f"{AZIMUTH}=0:90deg:10")))
+        assert "utilization 100 %" not in drawn(trade(f"{TIME}=0.1:0.9s:9", f"{AZIMUTH}=0:90deg:10")).texts
 
     def test_a_heat_map(self) -> None:
-        figure = trade_plot.figure(
-            trade(f"{TIME}=0.1:3s:30", f"{AZIMUTH}=0:90deg:10", column="utilization"), {}, MISSION, is_polar=False
-        )
-        _, bar = figure.axes
-        assert bar.get_ylabel() == "utilization"
+        drawing = drawn(trade(f"{TIME}=0.1:3s:30", f"{AZIMUTH}=0:90deg:10", column="utilization"))
+        assert {"utilization", "0.5", "1", "1.5", "2", "2.5", "3"} <= set(drawing.texts)
+        # The lowest is in the first colour at the left, the highest in the last at the right.
+        left, _, right, _ = drawing.frame
+        assert drawing.boxes("heat0")[0][0] == left
+        assert drawing.boxes("heat47")[0][2] == right
+        assert "first" not in drawing.texts
+
+    def test_a_heat_map_in_equal_ratios(self) -> None:
+        drawing = drawn(trade(f"{TIME}=0.1:30s:30:log", f"{AZIMUTH}=0:90deg:10", column="utilization"))
+        _, top, right, bottom = drawing.frame
+        places = {text.findtext("{*}tspan"): text for text in drawing.root if float(text.get("x", 0)) > right}
+        low, high = (float(places[number].get("y", "")) for number in ("0.2", "20"))
+        assert low - high == pytest.approx((bottom - top) * math.log(100) / math.log(300), abs=0.1)
+
+    def test_a_map_of_more_cases_than_pixels(self) -> None:
+        """It has the first and the last of each key, and no more cells than are seen."""
+        shown = thinned(trade(f"{TIME}=0.1:3s:1001", f"{AZIMUTH}=0:90deg:10"))
+        assert shown.values["status"].shape == (500, 10)
+        assert (shown.axes[0].values[0], shown.axes[0].values[-1]) == (0.1, 3)
+        assert shown.values["utilization"][:, 3] == pytest.approx(shown.axes[0].values)
 
     def test_words_side_by_side(self) -> None:
-        """Nothing is between two words: bars, and the status of each on all of its room."""
+        """Nothing is between two words: a bar for each in the colour of its status, on it the rows."""
         shown = trade(f"{TIME}=0.5,1.5s")
         axis = shown.axes[0]._replace(words=("one", "[two, three]"), values=np.arange(2.0), unit="", key="a.b")
         shown = shown._replace(axes=(axis,))
-        panel = drawn(shown, rows={"receiver.velocity.x": np.array([0.1, 0.2])})
-        assert [tick.get_text() for tick in panel.get_xticklabels()] == ["one", "[two, three]"]
-        assert panel.get_xlim() == (-0.5, 1.5)
-        assert [bar.get_height() for bar in panel.containers[0]] == [50, 150]
-        (line,) = [line for line in panel.lines if line.get_label() == "receiver.velocity.x"]
-        assert (line.get_linewidth(), line.get_marker()) == (0, "o")
+        drawing = drawn(shown, rows={"receiver.velocity.x": np.array([0.1, 0.2])})
+        assert {"one", "[two, three]", "a.b", "receiver.velocity.x", "50 %", "150 %"} <= set(drawing.texts)
+        limit, left = drawing.lines("limit")[0][0][0], drawing.frame[0]
+        ends = [drawing.boxes(f"bar is-{name}")[0][2] for name in ("pass", "fail")]
+        assert [(end - left) / (limit - left) for end in ends] == pytest.approx([0.5, 1.5], abs=1e-3)
+        dots = [(x - left) / (limit - left) for x, _ in drawing.circles("dot0")][:2]
+        assert dots == pytest.approx([0.1, 0.2], abs=1e-3)
         assert [(run.low, run.high) for run in runs(axis, shown.values["status"])] == [(-0.5, 0.5), (0.5, 1.5)]
 
-    def test_a_curve_for_each_word(self) -> None:
-        shown = trade(f"{TIME}=0.5:2.5s:5", "allocation.model=published,full")
-        shown.values["utilization"][:, 1] *= 2
-        panel = drawn(shown)
-        lines = {line.get_label(): list(line.get_ydata()) for line in panel.lines}
-        assert lines["published"] == [50, 100, 150, 200, 250]
-        assert lines["full"] == [100, 200, 300, 400, 500]
-        assert lines["limit"] == [100, 100]
-        assert panel.get_xlabel() == f"{TIME} [s]"
-        assert "full" in texts_of(panel)
-        assert "published model" not in texts_of(panel)  # none decides for all
+    def test_a_column_of_words(self) -> None:
+        """Bars from 0, to both sides."""
+        shown = trade(f"{TIME}=0.5,1.5s", column="utilization")
+        axis = shown.axes[0]._replace(words=("a", "b"), values=np.arange(2.0))
+        shown = shown._replace(axes=(axis,))
+        shown.values["utilization"][1] = -0.25
+        drawing = drawn(shown)
+        ((zero, _, right, _),) = drawing.boxes("bar is-pass")
+        ((left, _, end, _),) = drawing.boxes("bar is-fail")
+        assert zero == end
+        assert (right - zero) / (zero - left) == pytest.approx(2, abs=0.01)
+        assert {"0.5", "−0.25"} <= set(drawing.texts)
+        assert "limit" not in drawing.texts
+
+    @pytest.mark.parametrize("column", [None, "utilization"])
+    def test_a_curve_for_each_word(self, column: str | None) -> None:
+        shown = trade(f"{TIME}=0.5:2.5s:5", "allocation.model=published,full", column=column)
+        shown.values["utilization"][:, 1] *= 0.5
+        drawing = drawn(shown)
+        assert {"published", "full", f"{TIME} [s]"} <= set(drawing.texts)
+        assert not any("published model" in text for text in drawing.texts)  # none decides for all
+        if column is None:
+            assert uses(drawing, "row0") == pytest.approx([50, 100, 150, 200, 250], abs=0.02)
+            assert uses(drawing, "row1") == pytest.approx([25, 50, 75, 100, 125], abs=0.02)
+        else:
+            assert "utilization" in drawing.texts
+            assert "limit" not in drawing.texts
 
     def test_many_words_are_an_axis_of_a_map(self) -> None:
         words = ",".join(str(number) for number in range(2, 11))
-        panel = drawn(trade(f"{TIME}=0.5:2.5s:5", f"collection.pulses={words}"))
-        assert [tick.get_text() for tick in panel.get_yticklabels()] == words.split(",")
-        assert panel.get_ylim() == (8.5, -0.5)  # the first above
-        assert "100 %" not in texts_of(panel)  # no line can go between words
+        drawing = drawn(trade(f"{TIME}=0.5:2.5s:5", f"collection.pulses={words}"))
+        names = [drawing.place(word)[1] for word in words.split(",") if drawing.texts.count(word) == 1]
+        assert len(names) == 8  # 2 is a time too
+        assert names == sorted(names)  # the first above
+        assert "utilization 100 %" not in drawing.texts  # no line can go between words
 
     def test_words_by_words_have_their_utilization_in_each_cell(self) -> None:
         shown = trade(f"{TIME}=0.5,1.5s", "allocation.model=published,full")
         axis = shown.axes[0]._replace(words=("a", "b"), values=np.arange(2.0))
-        panel = drawn(shown._replace(axes=(axis, shown.axes[1])))
-        assert [text.get_text() for text in panel.texts[1:]] == ["50 %\nfirst"] * 2 + ["150 %\nfirst"] * 2
+        texts = drawn(shown._replace(axes=(axis, shown.axes[1]))).texts
+        assert [text for text in texts if text.endswith(" %") or text == "first"] == ["50 %", "first"] * 2 + [
+            "150 %",
+            "first",
+        ] * 2
 
     def test_a_polar_map_counts_azimuths_from_east(self) -> None:
         shown = trade(f"{AZIMUTH}=0:360deg:37", "platforms.receiver.slant_range=1:5km:5", is_polar=True)
-        panel = drawn(shown, is_polar=True)
-        assert panel.get_theta_offset() == 0
-        assert panel.get_theta_direction() == 1
-        assert panel.get_rmin() == 0
-        assert panel.get_rmax() == 5
-        (mesh,) = [one for one in panel.collections if type(one).__name__ == "QuadMesh"]
-        around = mesh.get_coordinates()[0, :, 0]
-        assert (around[0], around[-1]) == pytest.approx((0, 2 * math.pi))
-        (mark,) = [line for line in panel.lines if line.get_label() == "direction of the transmitter"]
-        assert float(mark.get_xdata()[0]) == 0  # Section V: due east
+        drawing = drawn(shown, is_polar=True)
+        left, top, right, bottom = drawing.frame
+        x, y = (left + right) / 2, (top + bottom) / 2
+        assert drawing.place("east")[0] > right
+        assert drawing.place("north")[1] < top
+        assert drawing.place("west")[0] < left
+        assert drawing.place("south")[1] > bottom
+        radii = [math.hypot(u - x, v - y) for u, v in drawing.line("is-fail curved")]
+        # Cells from the first range, 1 of 5 km, to the last, all round.
+        assert (min(radii), max(radii)) == pytest.approx(((right - left) / 10, (right - left) / 2), rel=1e-3)
+        assert "direction of the transmitter" in drawing.texts
+        mark = drawing.lines("solid transmitter")[0]
+        assert np.mean(mark, axis=0)[0] == pytest.approx(right, abs=4)  # Section V: due east
+        assert np.mean(mark, axis=0)[1] == pytest.approx(y, abs=0.1)
+
+    def test_a_quarter_of_a_polar_map_is_where_it_is(self) -> None:
+        """From 90 to 180 deg: between north and west, and the radius is the time."""
+        shown = trade(f"{AZIMUTH}=90:180deg:10", f"{TIME}=0.5:4s:8", is_polar=True)
+        shown.values["status"][:] = "pass"
+        shown.values["status"][0, -1] = "fail"  # north, at the rim
+        drawing = drawn(shown, is_polar=True)
+        left, top, right, bottom = drawing.frame
+        x, y = (left + right) / 2, (top + bottom) / 2
+        assert all(u <= x + 0.1 and v <= y + 0.1 for u, v in drawing.line("is-pass curved"))
+        directions = [math.degrees(math.atan2(y - v, u - x)) for u, v in drawing.line("is-fail curved")]
+        assert (min(directions), max(directions)) == pytest.approx((90, 95), abs=0.1)
+        radii = [math.hypot(u - x, v - y) / (right - x) for u, v in drawing.line("is-fail curved")]
+        assert (min(radii), max(radii)) == pytest.approx((3.75 / 4, 1), abs=1e-3)
 
     def test_what_stands_over_the_scene_is_in_the_middle_of_a_polar_map(self) -> None:
         """Seen from above, a high elevation is near the scene, a low one far out."""
         shown = trade(f"{AZIMUTH}=0:360deg:37", "platforms.receiver.elevation=10:80deg:8", is_polar=True)
-        panel = drawn(shown, is_polar=True)
-        assert panel.get_ylim() == pytest.approx((90, 10))
-        (mark,) = [line for line in panel.lines if line.get_label() == "direction of the transmitter"]
-        assert mark.get_ydata() == pytest.approx(10)
+        drawing = drawn(shown, is_polar=True)
+        left, _, right, _ = drawing.frame
+        middle = (left + right) / 2
+        along = [abs(drawing.place(number)[0] - middle) for number in ("80", "60", "40", "20")]
+        assert along == sorted(along)
+        assert along[3] / along[0] == pytest.approx(7, rel=1e-3)
+        assert np.mean(drawing.lines("solid transmitter")[0], axis=0)[0] == pytest.approx(right, abs=4)
 
     def test_cases_without_a_mission(self) -> None:
         shown = trade(f"{AZIMUTH}=-90:90deg:19", f"{TIME}=1:2s:3")
         assert shown.statuses == ["error", "fail", "pass"]
-        assert "no such mission" in texts_of(drawn(shown))
+        assert "no such mission" in drawn(shown).texts
 
     def test_every_status_has_its_colour(self) -> None:
-        fills = trade_plot._fills(list(STATUS))
-        assert len(set(fills.values())) == len(fills)
+        shown = trade(f"{TIME}=0.5:2.5s:9", f"{AZIMUTH}=0:90deg:2")
+        shown.values["status"].ravel()[: len(STATUS)] = list(STATUS)
+        style = drawn(shown).root.findtext(f"{SVG}style") or ""
+        fills = re.findall(r" \.is-[a-z_]+\{(fill:[^}]+)\}", style)
+        assert len(set(fills)) == len(fills) == len(STATUS)
 
-    @pytest.mark.parametrize(("kind", "start"), [("png", b"\x89PNG"), ("pdf", b"%PDF"), ("svg", b"<?xml")])
+    @pytest.mark.parametrize(("kind", "start"), [("png", b"\x89PNG"), ("pdf", b"%PDF"), ("svg", b"<svg")])
     def test_a_file_of_each_kind(self, kind: str, start: bytes) -> None:
         shown = trade(f"{TIME}=0.1:3s:30", f"{AZIMUTH}=0:90deg:10")
-        file = trade_plot.drawn(shown, {}, MISSION, kind, is_polar=False)
+        drawing = trade_drawing(shown, {}, "m", "t", "d", above=head_of(shown, MISSION, is_polar=False))
+        file = drawing_file(drawing, kind)
         assert file.startswith(start)
-        assert file == trade_plot.drawn(shown, {}, MISSION, kind, is_polar=False)
-        if kind == "svg":
-            assert ElementTree.fromstring(file).tag == "{http://www.w3.org/2000/svg}svg"
+        assert file == drawing_file(drawing, kind)
+
+    def test_a_picture_has_what_the_drawing_has(self) -> None:
+        """Pixels of a PNG: a status where the SVG has its rectangle, in the same colour, and the line of 100 %."""
+        shown = trade(f"{TIME}=0.1:3s:30", f"{AZIMUTH}=0:90deg:10")
+        document = trade_drawing(shown, {}, "m", "t", "d")
+        drawing = Drawing(document)
+        picture = imread(BytesIO(drawing_file(document, "png")))
+        assert picture.shape[:2] == tuple(2 * float(drawing.root.get(side, "")) for side in ("height", "width"))
+        style = drawing.root.findtext(f"{SVG}style") or ""
+        for name in ("fail", "pass"):
+            (colour, opacity), *_ = re.findall(
+                rf"\.is-{name}\{{fill:var\(--\w+,(#\w+)\);fill-opacity:([\d.]+)", style
+            )
+            expected = 1 + float(opacity) * (np.array(to_rgb(colour)) - 1)
+            left, top, right, bottom = drawing.boxes(f"is-{name}")[0]
+            pixel = picture[int(top + bottom), int(left + right) - (40 if name == "pass" else -40), :3]
+            assert pixel == pytest.approx(expected, abs=2 / 255)
+        (x, y), (_, v), *_ = drawing.lines("border")[0]
+        assert picture[round(y + v), round(2 * x), :3].max() < 0.4
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.status import STATUS
 from bisar_budget.findings.trade import Axis, Trade, TradeStudy
 from bisar_budget.report.compliance.view import Picture, Stretch, Studied, StudyPart
-from bisar_budget.report.drawing.study_drawing import study_drawing
+from bisar_budget.report.drawing.trade_drawing import trade_drawing
 from bisar_budget.report.drawing.trades import per_word
 from bisar_budget.report.words.sentences import BINDING_WORDS, percent
 
@@ -33,7 +33,7 @@ def written(found: MissionFindings, study: TradeStudy, file: str) -> Studied:
     said += [f"{one.name}: {one.complying} of {one.cases} comply" for one in parts]
     description = f"{question} {counts} {'; '.join(said[:_MOST])}{' ...' if len(said) > _MOST else '.'}"
     title = f"Trade study: {' and '.join(axis.key for axis in trade.axes)}"
-    drawing = study_drawing(study, found.file, f"{title}, {found.name}", description)
+    drawing = trade_drawing(trade, study.rows, found.file, f"{title}, {found.name}", description)
     by_word = per_word(trade)
     return Studied(
         question=question,

@@ -7,7 +7,8 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from bisar_budget.geometry import PlatformState, norm
-from bisar_budget.report.drawing.svg import Box, Canvas, DrawnLabel, Point, axis_number, round_step, text_width, ticks
+from bisar_budget.report.drawing.axes import axis_number, outline, round_step, ticks
+from bisar_budget.report.drawing.svg import Box, Canvas, DrawnLabel, Point, text_width
 from bisar_budget.units import format_quantity
 
 Place = tuple[float, float]  # in the plane that is drawn: to the right, up [m]
@@ -205,13 +206,13 @@ def _axes(canvas: Canvas, panel: _Panel, view: View) -> None:
     middle = (frame.left + frame.right) / 2
     canvas.text((middle, frame.bottom + 28), [f"{view.axes[0]} [{name}]"], "axis", "middle")
     canvas.upright_text((11, (frame.top + frame.bottom) / 2), f"{view.axes[1]} [{name}]", "axis")
-    _frame(canvas, frame)
+    outline(canvas, frame, "grid")
 
 
 def _outline(canvas: Canvas, panel: _Panel) -> None:
     """Frame of an enlargement, with a bar for its scale."""
     frame = panel.frame
-    _frame(canvas, frame)
+    outline(canvas, frame, "grid")
     length = round_step(40 / panel.scale)
     right, y = frame.right - 10, frame.top + 22
     left = right - length * panel.scale
@@ -219,16 +220,6 @@ def _outline(canvas: Canvas, panel: _Panel) -> None:
         canvas.polyline(line, "line")
     canvas.text(((left + right) / 2, y - 6), [format_quantity(length, "m")], "axis", "middle")
     canvas.obstacles.append(Box(left - 4, frame.top, frame.right, y + 4))
-
-
-def _frame(canvas: Canvas, frame: Box) -> None:
-    corners = [
-        (frame.left, frame.top),
-        (frame.right, frame.top),
-        (frame.right, frame.bottom),
-        (frame.left, frame.bottom),
-    ]
-    canvas.polyline([*corners, corners[0]], "grid", is_obstacle=False)
 
 
 def _draw_panel(canvas: Canvas, panel: _Panel, view: View, is_detail: bool, enlarged: _Panel | None) -> None:

@@ -6,18 +6,21 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from bisar_budget.findings.images import FLOOR_DB, ImageEvidence, PointImage, Verdict
-from bisar_budget.report.drawing.svg import Box, Canvas, Point, axis_number, round_step, ticks
+from bisar_budget.report.drawing.axes import Scale, axis_number, grid, legend, line_entry, outline, x_axis, y_axis
+from bisar_budget.report.drawing.svg import Box, Canvas
 from bisar_budget.units import format_limit, format_quantity
 
 _WIDTH, _HEIGHT = 520.0, 190.0  # px, of the drawing and of one panel
-_AXIS, _EDGE = (46.0, 34.0), 8.0  # px, beside and below a panel for its axes; elsewhere
-_KEY = 40.0  # px above a panel, for its title and its curves' names
-_TOP_DB, _STEP_DB = 0.0, 10.0
+_LEFT, _EDGE, _TITLE = 46.0, 8.0, 22.0  # px beside and above a panel
+WITHOUT_ERROR, WITH_ERRORS, FOCUSED = "line dotted", "line receiver dashed", "line transmitter"  # styles
 
 
-class _DrawnCurve(NamedTuple):
+class Curve(NamedTuple):
+    """A cut along y′ [m], in dB of the peak without error, and how it is drawn."""
+
     name: str
-    levels: tuple[float, ...]
+    places: Sequence[float]
+    levels: Sequence[float]
     style: str
 
 
@@ -38,24 +41,29 @@ def impulse_response_cuts(evidence: ImageEvidence) -> str:
     canvas = Canvas()
     at_limit = evidence.at_limit
     curves = [
-        _DrawnCurve("at the limit", at_limit.cut_db, "line transmitter"),
-        _DrawnCurve("without error", at_limit.error_free_db, "line dotted"),  # last, so that none covers it
+        _curve("at the limit", at_limit.cut_db, at_limit.step_m, FOCUSED),
+        _curve("without error", at_limit.error_free_db, at_limit.step_m, WITHOUT_ERROR),  # last: none covers it
     ]
-    bottom = _panel(canvas, 0.0, at_limit.step_m, _at_limit(verdict), curves)
+    bottom = cut_panel(canvas, 0.0, _WIDTH, _HEIGHT, _at_limit(verdict), curves)
     before, after = evidence.before_autofocus, evidence.after_autofocus
     if before and after:
         curves = [
-            _DrawnCurve("before autofocus", before.cut_db, "line receiver dashed"),
-            _DrawnCurve("after", after.cut_db, "line transmitter"),
-            _DrawnCurve("without error", before.error_free_db, "line dotted"),
+            _curve("before autofocus", before.cut_db, before.step_m, WITH_ERRORS),
+            _curve("after", after.cut_db, after.step_m, FOCUSED),
+            _curve("without error", before.error_free_db, before.step_m, WITHOUT_ERROR),
         ]
-        bottom = _panel(canvas, bottom + 12, before.step_m, _with_autofocus(verdict), curves)
+        bottom = cut_panel(canvas, bottom + 8, _WIDTH, _HEIGHT, _with_autofocus(verdict), curves)
     description = (
         "Power along y′, across the bistatic look direction, over the peak of the response without error. "
         + " ".join(numbers_in_words(evidence))
     )
     key = f"cuts {evidence.file} {verdict.id}"
     return canvas.document((_WIDTH, bottom + 4), key, f"Cross-range cuts: {verdict.id}", description)
+
+
+def _curve(name: str, levels: Sequence[float], step_m: float, style: str) -> Curve:
+    middle = len(levels) // 2
+    return Curve(name, [(index - middle) * step_m for index in range(len(levels))], levels, style)
 
 
 def numbers_in_words(evidence: ImageEvidence) -> Iterator[str]:
@@ -130,40 +138,18 @@ def _phase(value: float | None) -> str:
     return "unknown" if value is None else f"{value:.3f} rad"
 
 
-def _panel(canvas: Canvas, top: float, step_m: float, title: str, curves: Sequence[_DrawnCurve]) -> float:
-    """Draw one panel, its title and key above, and return where it ends. [px]"""
-    frame = Box(_AXIS[0], top + _KEY, _WIDTH - _EDGE, top + _KEY + _HEIGHT)
-    half = (len(curves[0].levels) // 2) * step_m
-    width, height = frame.right - frame.left, frame.bottom - frame.top
-
-    def pixel(place: float, level: float) -> Point:
-        return (
-            frame.left + (place + half) / (2 * half) * width,
-            frame.top + (_TOP_DB - level) / (_TOP_DB - FLOOR_DB) * height,
-        )
-
+def cut_panel(canvas: Canvas, top: float, width: float, height: float, title: str, curves: Sequence[Curve]) -> float:
+    """Draw cuts on one panel, its title above, and return where it ends. [px]"""
+    frame = Box(_LEFT, top + _TITLE, width - _EDGE, top + _TITLE + height)
+    places = [place for curve in curves for place in curve.places]
+    across = Scale(min(places), max(places), frame.left, frame.right)
+    up = Scale(FLOOR_DB, max(0.0, *(max(curve.levels) for curve in curves)), frame.bottom, frame.top)
     canvas.text((frame.left, top + 14), [title], "small")
-    _key(canvas, (frame.left, top + 30), curves)
-    for value in ticks(-half, half, round_step(2 * half * 64 / width)):
-        x, _ = pixel(value, 0.0)
-        canvas.polyline([(x, frame.top), (x, frame.bottom)], "grid")
-        canvas.text((x, frame.bottom + 13), [axis_number(value)], "axis", "middle")
-    for level in ticks(FLOOR_DB, _TOP_DB, _STEP_DB):
-        _, y = pixel(0.0, level)
-        canvas.polyline([(frame.left, y), (frame.right, y)], "grid")
-        canvas.text((frame.left - 5, y + 3.5), [axis_number(level)], "axis", "end")
-    canvas.text(((frame.left + frame.right) / 2, frame.bottom + 28), ["y′ [m]"], "axis", "middle")
-    canvas.upright_text((11, (frame.top + frame.bottom) / 2), "power [dB]", "axis")
+    outline(canvas, frame, "grid")
+    grid(canvas, frame, across, up)
+    y_axis(canvas, frame, up, "power [dB]")
+    bottom = x_axis(canvas, frame, across, "y′ [m]")
     for curve in curves:
-        middle = len(curve.levels) // 2
-        points = [pixel((index - middle) * step_m, level) for index, level in enumerate(curve.levels)]
+        points = [(across.at(place), up.at(level)) for place, level in zip(curve.places, curve.levels, strict=True)]
         canvas.polyline(points, curve.style, frame)
-    return frame.bottom + _AXIS[1]
-
-
-def _key(canvas: Canvas, at: Point, curves: Sequence[_DrawnCurve]) -> None:
-    x, y = at
-    for curve in curves:
-        canvas.polyline([(x, y - 4), (x + 28, y - 4)], curve.style)
-        canvas.text((x + 33, y), [curve.name], "small")
-        x += 150
+    return legend(canvas, bottom, width, [line_entry(canvas, curve.name, curve.style) for curve in curves])

@@ -1,17 +1,20 @@
 """Figures 3 to 7 of Rigling & Moses for a mission of one's own: drawn, saved, and said in a few lines."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from io import BytesIO
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.faults import SetValue, changes_words, printable
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
-from bisar_budget.report.drawing.figure import BETTER, GRID, WORSE, figure_file, new_figure
+from bisar_budget.report.drawing.evidence_drawings import FOCUSED, WITH_ERRORS, WITHOUT_ERROR, Curve, cut_panel
+from bisar_budget.report.drawing.figure import drawing_file, figure_file, new_figure, paint
 from bisar_budget.report.drawing.point_figures import FLOOR_DB, ImagePanel, Limits, Sheet, rotated_back, sheet
+from bisar_budget.report.drawing.svg import Canvas
 from bisar_budget.report.words.layout import wrapped
 from bisar_budget.simulate.impulse_response import ImpulseResponse
 from bisar_budget.simulate.phase_history import Floats
@@ -19,13 +22,10 @@ from bisar_budget.simulate.point import PointImages
 
 _RESTORED_DB = 1.0  # below the error-free peak; a focused response is within a fraction of it
 _EQUAL = 8.0  # an image that is not longer for its width than this has equal scales
+_MARKED, _GRID = "#c1502e", "#dddddd"  # of lines that approximate or mark, of a grid
 _NOT_FORMED = "#3a3a3a"  # beside a patch that is narrower than the panel
 _TRUE, _AT = "#5fd3f3", "#7CFC9A"
-_CUT_STYLES: tuple[Mapping[str, Any], ...] = (
-    {"color": "#888888", "lw": 3},
-    {"color": WORSE},
-    {"color": BETTER, "ls": "--"},
-)
+_CUT_SIZE = (300.0, 170.0)  # px of the drawing of the cuts, of its frame
 
 
 def drawn(images: PointImages, title: str, kind: str) -> bytes:
@@ -48,10 +48,9 @@ def figure(drawn: Sheet, title: str) -> Any:
         for style, label in (
             (_stands(_TRUE), "where the target stands"),
             (_put(_AT), "where (25) puts it"),
-            ({"ls": "none", "marker": "o", "color": WORSE, "ms": 5}, "points of (29)"),
+            ({"ls": "none", "marker": "o", "color": _MARKED, "ms": 5}, "points of (29)"),
         )
     ]
-    key.add_artist(key.legend(handles=panels[0, 3].lines, loc="upper center", fontsize=10, frameon=False))
     key.legend(handles=marks, loc="lower center", facecolor=_NOT_FORMED, labelcolor="white", fontsize=10)
     page.suptitle(printable(title), parse_math=False)  # a name is no formula
     return page
@@ -59,11 +58,11 @@ def figure(drawn: Sheet, title: str) -> Any:
 
 def drawn_panel(name: str, drawn: Sheet) -> bytes:
     """Draw a single panel, small, for a page, as a PNG file; `name` is one of `PANELS`."""
+    if name == "cuts":
+        return drawing_file(_cuts_drawing(drawn), "png", dpi=112)
     page = new_figure(figsize=(4.4, 3.6))
     panel = page.subplots()
     artist = PANELS[name](panel, drawn)
-    if name == "cuts":
-        panel.legend(fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.06), frameon=False)  # above the data
     if artist is not None:
         page.colorbar(artist, ax=panel, pad=0.02).set_label("dB to the error-free peak")
     return figure_file(page, "png", dpi=80)
@@ -196,13 +195,13 @@ def _peak_and_width(response: ImpulseResponse | None, clean: ImpulseResponse | N
 def _range_error(panel: Any, drawn: Sheet) -> None:
     panel.plot(drawn.slow_time, drawn.range_error_mm, color="black")
     for segment in drawn.segments:
-        panel.plot(*segment.T, "--", color=WORSE)
+        panel.plot(*segment.T, "--", color=_MARKED)
     panel.set(title="Fig. 3: range error, three segments", xlabel="slow time [s]", ylabel="range error [mm]")
-    panel.grid(color=GRID, lw=0.5)
+    panel.grid(color=_GRID, lw=0.5)
 
 
 def _points(panel: Any, drawn: Sheet) -> None:
-    panel.plot(*drawn.points.T, "o-", color=WORSE, zorder=3)
+    panel.plot(*drawn.points.T, "o-", color=_MARKED, zorder=3)
     panel.plot(0, 0, **_stands("#1b7fa3"))
     panel.plot(*drawn.points[1], **_put("#2a8f4f"))
     panel.set(title=f"Fig. 4: points of the segments, (29)\nby {drawn.points_by}", xlabel="x [m]", ylabel="y [m]")
@@ -215,7 +214,7 @@ def _points(panel: Any, drawn: Sheet) -> None:
     half = 0.65 * max(float((high - low).max()), span)
     (x, y) = (low + high) / 2
     panel.set(xlim=(x - half, x + half), ylim=(y - half, y + half), aspect="equal")
-    panel.grid(color=GRID, lw=0.5)
+    panel.grid(color=_GRID, lw=0.5)
 
 
 def _image(panel: Any, picture: ImagePanel, *, with_points: bool = False) -> Any:
@@ -239,7 +238,7 @@ def _image(panel: Any, picture: ImagePanel, *, with_points: bool = False) -> Any
     panel.set(xlim=(left, right), ylim=(bottom, top), facecolor=_NOT_FORMED)
     if with_points:
         for three in picture.points:
-            panel.plot(*three.T, "o-", color=WORSE, ms=4, lw=0.8)
+            panel.plot(*three.T, "o-", color=_MARKED, ms=4, lw=0.8)
     panel.plot(*picture.shown_places.T, **_put(_AT))
     panel.plot(*picture.true_places.T, **_stands(_TRUE))
     for true in picture.true_places:
@@ -279,14 +278,20 @@ def _point_to(panel: Any, place: Floats, middle: Floats, color: str) -> None:
     panel.annotate("", tuple(tip), tuple(start), "axes fraction", "axes fraction", arrowprops=arrow)
 
 
+def _cuts_drawing(drawn: Sheet) -> str:
+    """The cross-range cuts, as a report draws them."""
+    canvas = Canvas()
+    styles = (WITHOUT_ERROR, WITH_ERRORS, FOCUSED)
+    curves = [
+        Curve(cut.label, cut.place.tolist(), cut.level_db.tolist(), style)
+        for cut, style in zip(drawn.cuts, styles, strict=True)
+    ]
+    bottom = cut_panel(canvas, 0.0, *_CUT_SIZE, "Cross-range cuts", [*curves[1:], curves[0]])
+    return canvas.document((_CUT_SIZE[0], bottom + 4), "cuts", "Cross-range cuts", "Power along y′.")
+
+
 def _cuts(panel: Any, drawn: Sheet) -> None:
-    for cut, style in zip(drawn.cuts, _CUT_STYLES, strict=True):
-        panel.plot(cut.place, cut.level_db, label=cut.label, **style)
-    places = [cut.place for cut in drawn.cuts]
-    panel.set(xlabel="y′ [m]", ylabel="dB to the error-free peak", ylim=(-40, 2))
-    panel.set(xlim=(min(float(one.min()) for one in places), max(float(one.max()) for one in places)))
-    panel.grid(color=GRID, lw=0.5)
-    panel.set_title("Cross-range cuts")
+    paint(panel, ElementTree.fromstring(_cuts_drawing(drawn)))
 
 
 PANELS: dict[str, Callable[[Any, Sheet], Any]] = {

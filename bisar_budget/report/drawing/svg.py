@@ -27,7 +27,8 @@ STYLE = (
     "svg.drawing .small,svg.drawing .axis{font-size:10.5px;fill:var(--muted,#595f66)}"
     "svg.drawing .name{font-weight:600}"
     "svg.drawing .sub{font-size:9px}"
-    "svg.drawing :is(.line,.transmitter,.receiver){fill:none;stroke:var(--ink,#222);stroke-width:1.4}"
+    "svg.drawing .line,svg.drawing .transmitter,svg.drawing .receiver"
+    "{fill:none;stroke:var(--ink,#222);stroke-width:1.4}"
     "svg.drawing .transmitter{stroke:var(--transmitter,#1f5fa8)}"
     "svg.drawing .receiver{stroke:var(--receiver,#a8471a)}"
     "svg.drawing .path{stroke-width:4;stroke-opacity:.45;stroke-linecap:round}"
@@ -126,10 +127,15 @@ class Canvas:
             if is_obstacle:
                 self.segments += pairwise(run)
 
+    def polygons(self, shapes: Iterable[Sequence[Point]], style: str) -> None:
+        """Draw many filled or hollow shapes as one."""
+        data = "".join("M" + "L".join(f"{_number(x)} {_number(y)}" for x, y in points) + "Z" for points in shapes)
+        if data:
+            self._elements.append(f'<path class="{style}" d="{data}"/>')
+
     def polygon(self, points: Sequence[Point], style: str, is_obstacle: bool = True) -> None:
         """Draw a filled or hollow shape."""
-        data = "M" + "L".join(f"{_number(x)} {_number(y)}" for x, y in points) + "Z"
-        self._elements.append(f'<path class="{style}" d="{data}"/>')
+        self.polygons([points], style)
         if is_obstacle:
             xs, ys = zip(*points, strict=True)
             self.obstacles.append(Box(min(xs), min(ys), max(xs), max(ys)))
@@ -314,24 +320,3 @@ def _number(value: float) -> str:
     """A coordinate to a hundredth of a pixel, without trailing zeros; never -0."""
     text = f"{value:.2f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text
-
-
-def axis_number(value: float) -> str:
-    """Number at an axis, with a minus sign."""
-    return f"{value + 0.0:.6g}".replace("-", "−")
-
-
-def ticks(lower: float, upper: float, step: float) -> Iterable[float]:
-    """Multiples of a step from one value to another."""
-    first, last = math.ceil(lower / step - 1e-9), math.floor(upper / step + 1e-9)
-    return [index * step for index in range(first, last + 1)]
-
-
-_LEAST = 1e-9  # of a step: what is drawn may all be at one place
-
-
-def round_step(least: float) -> float:
-    """Smallest of 1, 2, 5 times a power of ten that is not below a value."""
-    least = max(least, _LEAST)
-    power = 10.0 ** math.floor(math.log10(least))
-    return next(factor * power for factor in (1, 2, 5, 10) if factor * power >= least * (1 - 1e-9))

@@ -3,62 +3,59 @@
 All bars are for the same part: 1 % of a number, of a radian, of a power, of the smaller slant range.
 """
 
-from typing import Any
-
 from bisar_budget.design.slopes import EVEN, Sensitivity, Slope
 from bisar_budget.faults import changes_words, printable
-from bisar_budget.report.drawing.figure import (
-    BETTER,
-    GRID,
-    PALE_BETTER,
-    PALE_WORSE,
-    WORSE,
-    figure_file,
-    new_figure,
-)
+from bisar_budget.report.drawing.axes import Scale, box_entry, grid, head, legend, short, x_axis
+from bisar_budget.report.drawing.figure import drawing_file
+from bisar_budget.report.drawing.svg import Box, Canvas, text_width
 from bisar_budget.report.words.sentences import percent
 
 MOST = 20  # bars
-_ROW = 0.28  # inch
-_GREYS, _SIZES = ("#444444", "#c4c4c4"), ("larger", "smaller")
+_WIDTH, _EDGE, _MOST_LEFT = 860.0, 12.0, 580.0  # px, of the drawing, at its right, for the names of numbers
+_ROW, _HALF = 22.0, 8.0  # px for a number, half of its bar
+_STYLE = (
+    "svg.drawing .worse{fill:var(--receiver,#a8471a)}svg.drawing .better{fill:var(--transmitter,#1f5fa8)}"
+    "svg.drawing .bar{fill:var(--muted,#595f66)}svg.drawing .pale{fill-opacity:.4}"
+)
+_PARTS = {"larger": "", "smaller": " pale"}  # what a number becomes, and how its bar is drawn
 
 
 def tornado(found: Sensitivity, kind: str) -> bytes:
     """Draw the numbers with the largest effects, as a `png`, `svg` or `pdf` file."""
-    return figure_file(figure(found), kind)
+    return drawing_file(tornado_drawing(found), kind)
 
 
-def figure(found: Sensitivity) -> Any:
-    """Lay the bars on a Matplotlib figure.
+def tornado_drawing(found: Sensitivity) -> str:
+    """Draw the bars as SVG.
 
-    Dark is what a larger number does, light what a smaller one does; both are the same slope.
+    Strong is what a larger number does, pale what a smaller one does; both are the same slope.
     """
+    canvas = Canvas()
     shown = found.shown[:MOST]
-    page = new_figure(figsize=(9.5, 2.0 + _ROW * max(len(shown), 3)))
-    panel = page.subplots()
-    for place, slope in enumerate(shown):
-        change = 100 * slope.even_effect
-        dark, pale = (WORSE, PALE_BETTER) if change > 0 else (BETTER, PALE_WORSE)
-        panel.barh([place, place], [change, -change], color=[dark, pale], height=0.72, lw=0, zorder=2)
-    panel.set_yticks(range(len(shown)), [_label(slope) for slope in shown], fontsize=9, parse_math=False)
-    panel.invert_yaxis()
-    panel.axvline(0, color="black", lw=0.8, zorder=3)
-    panel.grid(axis="x", color=GRID, lw=0.5, zorder=0)
-    panel.set_axisbelow(True)
-    panel.tick_params(axis="y", length=0)
-    for side in ("top", "left", "right"):
-        panel.spines[side].set_visible(False)
-    panel.set_xlabel(f"change of the utilization, {percent(found.asked)} now [percentage points]")
+    name = printable(f"{found.name} {changes_words(found.changes)}".rstrip())
+    what = printable(f"row {found.row}" if found.row else f"worst utilization: {found.worst_row}")
+    top = head(canvas, [short(name, _WIDTH), what, f"change of the utilization, {percent(found.asked)} now"])
+    labels = [short(_label(slope), 1.1 * _MOST_LEFT) for slope in shown]
+    left = min(0.9 * max(map(text_width, labels), default=0.0) + 16, _MOST_LEFT)
+    frame = Box(left, top, _WIDTH - _EDGE, top + _ROW * max(len(shown), 1))
+    reach = 105 * max((abs(slope.even_effect) for slope in shown), default=0.0) or 1.0
+    along = Scale(-reach, reach, frame.left, frame.right)
+    grid(canvas, frame, along, None)
+    zero, middle = along.at(0.0), top + _ROW / 2 + 4
+    for place, (slope, label) in enumerate(zip(shown, labels, strict=True)):
+        y, change = top + _ROW * (place + 0.5), 100 * slope.even_effect
+        for part, value in (("larger", change), ("smaller", -change)):
+            start, end = sorted((zero, along.at(value)))
+            bar = Box(start, y - _HALF, end, y + _HALF)
+            canvas.boxes([bar], ("worse" if value > 0 else "better") + _PARTS[part])
+        canvas.text((frame.left - 6, y + 4), [label], "axis", "end")
+    canvas.lines([((zero, frame.top), (zero, frame.bottom))], "line")
     if not shown:
-        panel.text(0.5, 0.5, "no number changes it", transform=panel.transAxes, ha="center")
-    from matplotlib.patches import Patch  # after `new_figure`: it sees to the settings of a user
-
-    named = [Patch(color=grey, label=f"the number is {size}") for grey, size in zip(_GREYS, _SIZES, strict=True)]
-    panel.legend(handles=named, loc="lower right", fontsize=9, frameon=False)
-    what = f"row {found.row}" if found.row else f"worst utilization: {found.worst_row}"
-    name = f"{found.name} {changes_words(found.changes)}".rstrip()
-    page.suptitle(f"{printable(name)}\n{printable(what)}", fontsize=11, parse_math=False)
-    return page
+        canvas.text((zero, middle), ["no number changes it"], "", "middle")
+    bottom = x_axis(canvas, frame, along, "percentage points")
+    entries = [box_entry(canvas, f"the number is {part}", f"bar{style}") for part, style in _PARTS.items()]
+    bottom = legend(canvas, bottom, _WIDTH, entries)
+    return canvas.document((_WIDTH, bottom + 4), f"tornado {found.name}", f"Sensitivity: {name}", what, _STYLE)
 
 
 def _label(slope: Slope) -> str:

@@ -1,6 +1,6 @@
-"""What a plot of a sweep shows, as arrays: no more than Matplotlib is given to draw."""
+"""What a drawing of a sweep shows, as arrays."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -12,12 +12,13 @@ from bisar_budget.design.quantities import Number, QuestionError, Varied
 from bisar_budget.design.swept import Part, Values
 from bisar_budget.findings.trade import Axis, Trade
 from bisar_budget.mission.bounds import DIRECTION
+from bisar_budget.report.drawing.svg import Point
 from bisar_budget.report.tables.described import Described
 
 MAX_CASES = 4_000_000  # of a plot: more than a screen has pixels
 ROWS = 7  # curves, at most
 _LABELLED = 0.02  # of a map: a smaller region has no name
-_FINEST = 300  # cells along a map, for the place of a name
+_FINEST = 500  # cells along a map: a drawing has no more pixels
 _WIDE = 8.0  # a span of values above this is drawn in equal ratios
 _NEEDED = ("status", "worst_row", "utilization")
 
@@ -146,6 +147,17 @@ def rows_that_matter(trade: Trade) -> tuple[str, ...]:
     return tuple(str(row) for row in rows[np.argsort(-counts, kind="stable")][:ROWS])
 
 
+def uses_of_rows(trade: Trade, gathered: Callable[[Sequence[str]], Gathered]) -> Mapping[str, Floats]:
+    """Utilizations of the rows that matter over the one key that varies, none of another sweep.
+
+    `gathered` sweeps again, with some columns.
+    """
+    if len(trade.axes) != 1 or trade.column or not (rows := rows_that_matter(trade)):
+        return {}
+    values = gathered([f"{row}.utilization" for row in rows]).trade().values
+    return {row: values[f"{row}.utilization"] for row in rows}
+
+
 class Run(NamedTuple):
     """Neighbouring values with one status, from edge to edge."""
 
@@ -175,45 +187,47 @@ class MapRegion(NamedTuple):
     size: tuple[int, int]
 
 
+def thinned(trade: Trade) -> Trade:
+    """A sweep over two keys with no more values than a drawing shows, the first and the last among them."""
+    picks = [
+        np.arange(size) if axis.words else np.unique(np.linspace(0, size - 1, min(size, _FINEST)).round().astype(int))
+        for axis, size in zip(trade.axes, trade.values["status"].shape, strict=True)
+    ]
+    axes = tuple(axis._replace(values=axis.values[pick]) for axis, pick in zip(trade.axes, picks, strict=True))
+    return trade._replace(axes=axes, values={name: values[np.ix_(*picks)] for name, values in trade.values.items()})
+
+
 def regions(rows: NDArray[Any]) -> list[MapRegion]:
     """Find the regions of a map that are large enough for a name, which stands where it is farthest from others.
 
     `rows` is (n, m); places are indices of it.
     """
-    strides = [max(1, -(-size // _FINEST)) for size in rows.shape]
-    thin = rows[:: strides[0], :: strides[1]]
-    seen = thin == ""
+    seen = rows == ""
     found = []
     for first, second in np.argwhere(~seen).tolist():
         if seen[first, second]:
             continue
-        one = _connected(thin == thin[first, second], (first, second))
-        seen |= one
-        if one.mean() >= _LABELLED:
+        cells = _connected(rows, seen, (first, second))
+        if len(cells) >= _LABELLED * rows.size:
+            one = np.zeros(rows.shape, bool)
+            one[tuple(np.transpose(cells))] = True
             place = _innermost(one)
             along = (_run(one[:, place[1]], place[0]), _run(one[place[0]], place[1]))
-            found.append(
-                MapRegion(
-                    str(thin[first, second]),
-                    (place[0] * strides[0], place[1] * strides[1]),
-                    (along[0] * strides[0], along[1] * strides[1]),
-                )
-            )
+            found.append(MapRegion(str(rows[first, second]), place, along))
     return found
 
 
-def _connected(mask: NDArray[np.bool_], start: tuple[int, int]) -> NDArray[np.bool_]:
-    """Cells of a mask that hang together with one of them, side by side."""
-    found = np.zeros_like(mask)
-    found[start] = True
-    front = [start]
-    while front:
-        first, second = front.pop()
+def _connected(rows: NDArray[Any], seen: NDArray[np.bool_], start: tuple[int, int]) -> list[tuple[int, int]]:
+    """Cells of one row that hang together with a first one, side by side; they are seen then."""
+    cells = [start]
+    seen[start] = True
+    for first, second in cells:  # it grows
         for cell in ((first - 1, second), (first + 1, second), (first, second - 1), (first, second + 1)):
-            if 0 <= cell[0] < mask.shape[0] and 0 <= cell[1] < mask.shape[1] and mask[cell] and not found[cell]:
-                found[cell] = True
-                front.append(cell)
-    return found
+            is_inside = 0 <= cell[0] < rows.shape[0] and 0 <= cell[1] < rows.shape[1]
+            if is_inside and not seen[cell] and rows[cell] == rows[start]:
+                seen[cell] = True
+                cells.append(cell)
+    return cells
 
 
 def _innermost(mask: NDArray[np.bool_]) -> tuple[int, int]:
@@ -246,3 +260,35 @@ def borders(rows: NDArray[Any], first: Floats, second: Floats) -> Floats:
     i, j = np.nonzero(rows[:, 1:] != rows[:, :-1])
     lines.append(np.stack([np.stack([first[i], second[j + 1]], -1), np.stack([first[i + 1], second[j + 1]], -1)], 1))
     return np.concatenate(lines)
+
+
+def level_lines(levels: Floats, x: Floats, y: Floats) -> list[tuple[Point, Point]]:
+    """Lines on which a grid of numbers is 0, linear between its points; none where a corner has no number.
+
+    `levels` is (n, m) at places `x` (n,) and `y` (m,). Of a saddle the mean of its corners decides.
+    """
+    found: list[tuple[Point, Point]] = []
+    is_finite = np.isfinite(levels)
+    whole = is_finite[1:, 1:] & is_finite[:-1, 1:] & is_finite[1:, :-1] & is_finite[:-1, :-1]
+    signs = levels > 0
+    first = signs[:-1, :-1]
+    mixed = whole & ~((signs[1:, 1:] == first) & (signs[1:, :-1] == first) & (signs[:-1, 1:] == first))
+    for i, j in np.argwhere(mixed).tolist():
+        corners = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)]
+        crossed: list[Point] = []
+        for one, other in pairwise([*corners, corners[0]]):
+            a, b = float(levels[one]), float(levels[other])
+            if (a > 0) != (b > 0):
+                part = a / (a - b)
+                crossed.append(
+                    (
+                        float(x[one[0]] + part * (x[other[0]] - x[one[0]])),
+                        float(y[one[1]] + part * (y[other[1]] - y[one[1]])),
+                    )
+                )
+        if len(crossed) == 4:  # a saddle: which corners hang together
+            middle = sum(float(levels[corner]) for corner in corners) / 4
+            if (middle > 0) != (levels[i, j] > 0):
+                crossed = [*crossed[1:], crossed[0]]
+        found += [(crossed[place], crossed[place + 1]) for place in range(0, len(crossed), 2)]
+    return found
