@@ -17,7 +17,7 @@ import pytest
 
 pytest.importorskip("pyarrow")
 
-from bisar_budget.cluster.parts_folder import PartsError, PartsFolder, manifest_of, mark_of
+from bisar_budget.cluster.parts_folder import ClusterError, PartsFolder, manifest_of, mark_of
 from bisar_budget.design.cases import grid
 from bisar_budget.design.quantities import tree_of
 from bisar_budget.design.sweep import Asked
@@ -80,7 +80,7 @@ def test_only_whole_parts_of_the_sweep_are_there(tmp_path: Path) -> None:
     again = PartsFolder(str(tmp_path), {"a": 1}, is_resumed=True)
     again.find(range(0, 60, 10), lambda start: start + 10)
     assert again.done == {0}
-    with pytest.raises(PartsError, match=r"part-000000000010.parquet cannot be read"):
+    with pytest.raises(ClusterError, match=r"part-000000000010.parquet cannot be read"):
         list(again.parts([0, 10]))
 
 
@@ -92,7 +92,7 @@ def test_a_bit_that_flipped_on_a_disk_is_seen(tmp_path: Path) -> None:
     data = bytearray(file.read_bytes())
     data[len(data) // 2] ^= 1
     file.write_bytes(data)
-    with pytest.raises(PartsError, match=r"part-000000000000.parquet cannot be read"):
+    with pytest.raises(ClusterError, match=r"part-000000000000.parquet cannot be read"):
         list(folder.parts([0]))
 
 
@@ -106,7 +106,7 @@ def test_pipes_and_devices_are_no_parts(tmp_path: Path) -> None:
     (tmp_path / "manifest.json").unlink()
     (tmp_path / "manifest.json").symlink_to("/dev/zero")
     folder.close()
-    with pytest.raises(PartsError, match="is no manifest of parts"):
+    with pytest.raises(ClusterError, match="is no manifest of parts"):
         PartsFolder(str(tmp_path), {"a": 1}, is_resumed=True)
 
 
