@@ -56,7 +56,7 @@ def question_of(asked: Asked, chunks: Chunks) -> Question:
         "the cases were": f"{asked.cases.count} of {', '.join(swept.varied)}",
         "the hash of the values of the cases was": _hash_of(asked.cases)[:16],
         "the size of the parts was": str(chunks.size),
-        "the columns were": ", ".join(column.heading for column in swept.columns),
+        "the columns were": ", ".join(column.name for column in swept.columns),
     }
 
 

@@ -13,7 +13,7 @@ import re
 import signal
 import socket
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from itertools import islice
 from multiprocessing import resource_tracker
@@ -77,6 +77,7 @@ def connected(address: str, patience: float, tell: Callable[[str], None]) -> "It
             said = f"no answer within {_CONNECTION:g} s" if isinstance(error, TimeoutError) else _first_line(error)
             raise ClusterError(f"--scheduler {address}: cannot be reached: {said}") from None
         ends.callback(_close, client, 2)
+        client.loop.asyncio_loop.set_exception_handler(lambda *_: None)  # it would write of what is given up
         workers = Workers(client, address, patience, tell)
         workers.look()
         workers.check_versions()
@@ -213,26 +214,21 @@ class Workers:
                     future.add_done_callback(finished.put)
                 if not pending:
                     return
-                done = []
                 with suppress(Empty):
-                    done.append(finished.get(timeout=max(next_look - monotonic(), 0.05)))
-                done += [finished.get_nowait() for _ in range(finished.qsize())]
-                for future, found in zip(done, self._fetched(done, about, pending), strict=True):
+                    future = finished.get(timeout=max(next_look - monotonic(), 0.05))
+                    try:  # Dask makes again what a worker took with it between done and fetched
+                        found = future.result(timeout=max(self.patience, _LOOK))
+                    except Exception as error:
+                        if future.status == "error":
+                            raise _why(future.exception(), about(pending[future.key][1])) from None
+                        if not isinstance(error, TimeoutError):  # cancelled, with the connection
+                            raise self._gone() from error
+                        finished.put(future)
+                        continue
                     yield pending.pop(future.key)[1], found
         finally:
             with suppress(Exception):
                 self.client.cancel([shared, *(future for future, _ in pending.values())])
-
-    def _fetched(self, done: list[Any], about: Callable[[Any], str], pending: Mapping[str, Any]) -> list[Any]:
-        """Fetch what is done; Dask makes again what a worker took with it between done and fetched."""
-        try:
-            found: list[Any] = self.client.gather(done) if done else []
-        except Exception as error:
-            for future in done:
-                if future.status == "error":
-                    raise _why(future.exception(), about(pending[future.key][1])) from None
-            raise self._gone() from error  # futures are cancelled with the connection
-        return found
 
     def _gone(self) -> ClusterError:
         return ClusterError(f"--scheduler {self.address}: went away")

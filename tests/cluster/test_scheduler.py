@@ -212,6 +212,9 @@ class Future:
     def __init__(self, error: BaseException) -> None:
         self.error = error
 
+    def result(self, timeout: float) -> None:
+        raise self.error
+
     def exception(self) -> BaseException:
         return self.error
 
@@ -230,9 +233,6 @@ class Client:
 
     def submit(self, *arguments: Any, **options: Any) -> Future:
         return Future(self.error)
-
-    def gather(self, futures: list[Future]) -> None:
-        raise futures[0].error
 
     def cancel(self, futures: list[Future]) -> None:
         self.is_cancelled = True
@@ -319,8 +319,8 @@ def test_workers_that_all_went_away_are_given_up(cluster: Cluster, tmp_path: Pat
     assert said.splitlines() == [
         f"{cluster.address} has no worker; waiting 2 s for one.",
         f"{output}.parts keeps {done} of {PARTS} parts; the same command with --resume goes on from there.",
-        f"Error: --scheduler {cluster.address}: had no worker for 2 s; accepted: a scheduler that has one (dask worker "
-        f"{cluster.address} starts one), or a longer --scheduler-timeout",
+        f"Error: --scheduler {cluster.address}: had no worker for 2 s; accepted: a scheduler that has one (dask "
+        f"worker {cluster.address} starts one), or a longer --scheduler-timeout",
     ]
     assert run(*ASKED, "-o", str(output), "--resume", "--jobs", "1").exit_code == 0
     assert output.read_bytes() == expected
