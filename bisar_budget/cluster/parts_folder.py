@@ -84,6 +84,9 @@ def parts_folder(path: str, question: Question, chunks: Chunks, *, is_resumed: b
         try:
             os.makedirs(path, exist_ok=True)
             lock = locked(os.path.realpath(path))
+            left = [name for name in os.listdir(path) if name.startswith(".part-") and lock is not None]
+            for name in left:  # a command that was killed was writing it
+                os.unlink(os.path.join(path, name))
             folder = PartsFolder(path, question)
             folder.find(chunks, is_resumed)
         except BlockingIOError:
@@ -163,14 +166,16 @@ class PartsFolder:
             file = self._file(start)
             try:
                 table = pq.ParquetFile(file, page_checksum_verification=True).read(use_threads=False)
-            except (OSError, pa.ArrowException) as error:
+                values = {name: table.column(name).to_numpy() for name in table.column_names}
+                part = Part(start, start + table.num_rows, values, int(table.schema.metadata[b"by_case"]))
+            except (OSError, KeyError, ValueError, pa.ArrowException) as error:
                 if getattr(error, "errno", None) is None:  # what it holds is at fault, not the system
                     self.done.discard(start)
-                    os.unlink(file)
+                    with suppress(OSError):
+                        os.unlink(file)
                 said = f"{file} cannot be read: {error}; the same command with --resume goes on"
                 raise ClusterError(said) from None
-            values = {name: table.column(name).to_numpy() for name in table.column_names}
-            yield Part(start, start + table.num_rows, values, int(table.schema.metadata[b"by_case"]))
+            yield part
 
     def remove(self) -> None:
         """Take away what is done with; what else somebody put there stays."""
