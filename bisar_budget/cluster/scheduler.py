@@ -32,6 +32,7 @@ _LOCAL = re.compile(r"local:([1-9]\d{0,2})", re.ASCII)
 _ACCEPTED = "accepted: tcp://HOST:PORT, tls://HOST:PORT, or local:N for N processes here"
 _CONNECTION = 5.0  # s for a connection
 _LOOK = 5.0  # s between two looks at who works
+_FETCH = 20.0  # s for what came of a block; then it is looked who works
 _AHEAD = 4  # blocks for each thread of a worker that are given out at once
 _LEAST_AHEAD = 32
 
@@ -72,7 +73,7 @@ def connected(address: str, patience: float, tell: Callable[[str], None]) -> "It
             if not local:
                 _greet(address)
             cluster = _local_cluster(int(local[1]), ends) if local else address
-            client = Client(cluster, timeout=_CONNECTION, set_as_default=False)
+            client: Any = Client(cluster, timeout=_CONNECTION, set_as_default=False)
         except Exception as error:
             said = f"no answer within {_CONNECTION:g} s" if isinstance(error, TimeoutError) else _first_line(error)
             raise ClusterError(f"--scheduler {address}: cannot be reached: {said}") from None
@@ -94,11 +95,15 @@ def _local_cluster(count: int, ends: ExitStack) -> Any:
             threads_per_worker=1,
             dashboard_address="127.0.0.1:0",  # a port of its own: without one all would want 8787
             silence_logs=logging.CRITICAL + 1,
-            # A terminal sends Ctrl-C to every process; the command is who ends workers.
-            preload=["import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"],
+            preload=[__name__],
         )
         ends.callback(_close, cluster, 10)
     return cluster
+
+
+def dask_setup(worker: object) -> None:
+    """Leave Ctrl-C, which a terminal sends to every process, to the command; Dask calls this in workers of here."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 @contextmanager
@@ -208,7 +213,8 @@ class Workers:
                 if monotonic() >= next_look:
                     self.look()
                     next_look = monotonic() + _LOOK
-                for block in islice(left, max(_LEAST_AHEAD, _AHEAD * self.threads) - len(pending)):
+                ahead = max(_LEAST_AHEAD, _AHEAD * self.threads)
+                for block in islice(left, max(0, ahead - len(pending))):
                     future = self.client.submit(_called, __version__, function, shared, block, pure=False)
                     pending[future.key] = future, block
                     future.add_done_callback(finished.put)
@@ -217,7 +223,7 @@ class Workers:
                 with suppress(Empty):
                     future = finished.get(timeout=max(next_look - monotonic(), 0.05))
                     try:  # Dask makes again what a worker took with it between done and fetched
-                        found = future.result(timeout=max(self.patience, _LOOK))
+                        found = future.result(timeout=_FETCH)
                     except Exception as error:
                         if future.status == "error":
                             raise _why(future.exception(), about(pending[future.key][1])) from None
