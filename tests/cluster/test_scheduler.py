@@ -265,6 +265,27 @@ def test_what_ended_every_worker_that_had_it_is_said() -> None:
         list(workers.mapped(part_of, None, [(64, 99)], "cases {0[0]} to {0[1]}".format))
 
 
+def test_a_cluster_may_shrink(monkeypatch: pytest.MonkeyPatch) -> None:
+    """More is given out then than would be given to those who are left."""
+    monkeypatch.setattr(scheduler, "_LOOK", 0.0)
+    sizes = iter([100])
+
+    class Done(Future):
+        def result(self, timeout: float) -> None:
+            self.fetched = True
+
+    def submit(*arguments: Any, **options: Any) -> Future:
+        future = Done(ValueError())
+        future.key = str(id(future))
+        return future
+
+    client = Client(ValueError())
+    monkeypatch.setattr(client, "nthreads", lambda: {"tcp://a:1": next(sizes, 1)})
+    monkeypatch.setattr(client, "submit", submit)
+    mapped = Workers(client, "tcp://a:0", 30, pytest.fail).mapped
+    assert [block for block, _ in mapped(part_of, None, range(500), str)] == list(range(500))
+
+
 def test_a_scheduler_without_workers_is_given_up(run, tmp_path: Path) -> None:
     """It was waited for without end."""
     from distributed import LocalCluster
