@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from datetime import date
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -23,7 +24,9 @@ from bisar_budget.cli import cli
 from bisar_budget.cluster import scheduler
 from bisar_budget.cluster.parts_folder import ClusterError
 from bisar_budget.cluster.scheduler import UnlikeWorkerError, Workers
-from bisar_budget.design.sweep import part_of
+from bisar_budget.design.cases import grid
+from bisar_budget.design.quantities import tree_of
+from bisar_budget.design.sweep import Asked, Chunks, part_of
 from bisar_budget.mission.load import load_mission
 from bisar_budget.verify.limits import verify_mission
 from tests.cluster.conftest import Cluster, free_port, wait_until
@@ -238,20 +241,25 @@ class Client:
         self.is_cancelled = True
 
 
+def asked() -> Asked:
+    mission = load_mission(MISSION)
+    return Asked(mission, grid(tree_of(mission), [f"{TIME}=1:2s:1000"]), today=date(2026, 1, 1))
+
+
 @pytest.mark.parametrize(
     ("error", "kind", "said"),
     [
-        (ValueError("a matrix\nis singular"), RuntimeError, "^cases 64 to 128, on a worker: ValueError: a matrix$"),
+        (ValueError("a matrix\nis singular"), RuntimeError, "^cases 64 to 127, on a worker: ValueError: a matrix$"),
         (ModuleNotFoundError("No module named 'x'"), ClusterError, "on a worker: ModuleNotFoundError: No module"),
-        (UnlikeWorkerError("worker w has another"), ClusterError, "^cases 64 to 128: worker w has another$"),
-        (UnlikeWorkerError("worker w cannot use"), ClusterError, "^cases 64 to 128: worker w cannot use$"),
+        (UnlikeWorkerError("worker w has another"), ClusterError, "^cases 64 to 127: worker w has another$"),
+        (UnlikeWorkerError("worker w cannot use"), ClusterError, "^cases 64 to 127: worker w cannot use$"),
     ],
 )
 def test_what_a_worker_raises_is_said_once(error: BaseException, kind: type[Exception], said: str) -> None:
     client = Client(error)
     workers = Workers(client, "tcp://a:0", 30, pytest.fail)
     with pytest.raises(kind, match=said):
-        list(workers.mapped(part_of, None, [(64, 128)], "cases {0[0]} to {0[1]}".format))
+        list(asked().shared_out(Chunks(1000, 64, True), [64], 1, workers.mapped))
     assert workers.threads == 3
     assert client.is_cancelled
 
@@ -262,7 +270,7 @@ def test_what_ended_every_worker_that_had_it_is_said() -> None:
     error = KilledWorker("chunk", SimpleNamespace(address="tcp://b:1"), 3)
     workers = Workers(Client(error), "tcp://a:0", 30, pytest.fail)
     with pytest.raises(ClusterError, match=r"^cases 64 to 99 ended 4 workers, the last of them tcp://b:1, as when"):
-        list(workers.mapped(part_of, None, [(64, 99)], "cases {0[0]} to {0[1]}".format))
+        list(asked().shared_out(Chunks(100, 64, True), [64], 1, workers.mapped))
 
 
 def test_a_cluster_may_shrink(monkeypatch: pytest.MonkeyPatch) -> None:
