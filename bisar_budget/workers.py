@@ -1,19 +1,30 @@
-"""Worker processes that end when the command does, whatever ends it."""
+"""Long work: how far it is, who shares it, and worker processes that end when the command does, whatever ends it."""
 
 import os
 import signal
 import threading
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import active_children, get_context, parent_process
 from multiprocessing.connection import wait
+from typing import Any
 
 from bisar_budget.faults import WorkerLostError
 
+Progress = Callable[[int, int], None]  # is told how much is done, and how much there is in all
+
+# Has others call a function with what is common and each block; gives each block with what came of it, in any order.
+# The last argument says of a block what it is, for messages.
+MapBlocks = Callable[[Callable[[Any, Any], Any], Any, Iterable[Any], Callable[[Any], str]], Iterator[tuple[Any, Any]]]
+
 _PATIENCE = 10.0  # s for the pool's own thread, which ends as soon as its workers have
+
+
+def unseen(done: int, total: int) -> None:
+    """Progress that nobody looks at."""
 
 
 @contextmanager

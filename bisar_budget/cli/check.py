@@ -15,6 +15,7 @@ from bisar_budget.cli.outside import DAY_OF_RUN, day, day_origin, origin_of, out
 from bisar_budget.cli.streams import (
     EXIT_BROKEN,
     FILE,
+    PATIENCE,
     SET,
     ParamType,
     complain,
@@ -191,6 +192,7 @@ class _Draws(ParamType[int]):
     help="Draw on the workers of a Dask scheduler, tcp://HOST:PORT, or on local:N processes of its own. The result "
     "is the same.",
 )
+@PATIENCE
 @click.option(
     "--sweep",
     "swept",
@@ -236,6 +238,7 @@ def check(
     draws: int | None,
     seed: int | None,
     scheduler: str | None,
+    patience: int,
     swept: Sequence[str],
     quiet: bool,
     all_rows: bool,
@@ -300,7 +303,7 @@ def check(
     else:
         from bisar_budget.cli.draws import drawn_by
 
-        with drawn_by(scheduler, draws, seed, len(files)) as drawn:
+        with drawn_by(scheduler, patience, draws, seed, len(files)) as drawn:
             report = check_all(files, judged_on, model, verifying, illustrated, drawn, changes, from_outside)
         shown_day = _given_day(today) or (judged_on if _has_waivers(report.missions) else None)
         if swept:

@@ -2,13 +2,15 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from time import perf_counter
 from typing import TYPE_CHECKING
 
 import click
 
-from bisar_budget.cli.streams import complain, fail
-from bisar_budget.cli.waiting import LONG, lasting, progress_bar
+from bisar_budget.cli.keeping import workers_of
+from bisar_budget.cli.streams import complain
+from bisar_budget.cli.waiting import LONG, lasting, watched
 from bisar_budget.constants import MAX_DRAWS, MAX_DRAWS_HERE
 from bisar_budget.faults import printable
 
@@ -34,24 +36,22 @@ def check_draws(draws: int | None, scheduler: str | None) -> None:
 
 
 @contextmanager
-def drawn_by(scheduler: str | None, draws: int | None, seed: int | None, files: int) -> "Iterator[Draws | None]":
+def drawn_by(
+    scheduler: str | None, patience: int, draws: int | None, seed: int | None, files: int
+) -> "Iterator[Draws | None]":
     """Say who makes the draws of so many files, the workers of a scheduler at hand; None where none are asked for."""
     if draws is None:
         yield None
         return
     from bisar_budget.budget.fleet import MANY, Draws
-    from bisar_budget.monte_carlo.draws import in_turn
+    from bisar_budget.monte_carlo.draws import in_turn, shared_out
 
-    if scheduler is None:  # files that processes share out draw for themselves
-        yield Draws(draws, seed, None if files >= MANY else _Watched(in_turn, lambda: 1))
-        return
-    from bisar_budget.cluster.scheduler import ClusterError, connected
-
-    try:
-        with connected(scheduler, complain) as workers:
-            yield Draws(draws, seed, _Watched(workers.drawn, lambda: workers.threads))
-    except ClusterError as error:
-        fail(str(error))
+    with workers_of(scheduler, patience) as workers:
+        if workers is not None:
+            share = partial(shared_out, mapped=workers.mapped)
+            yield Draws(draws, seed, _Watched(share, lambda: workers.threads))
+        else:  # files that processes share out draw for themselves
+            yield Draws(draws, seed, None if files >= MANY else _Watched(in_turn, lambda: 1))
 
 
 class _Watched:
@@ -67,10 +67,12 @@ class _Watched:
             seconds = _seconds(drawing) / max(self._threads(), 1)
             if seconds > LONG:
                 complain(f"{drawing.draws:,} draws of {printable(drawing.name)} will take about {lasting(seconds)}.")
-        with progress_bar(drawing.draws, "Drawing errors") as bar:
+        done = 0
+        with watched("Drawing errors", drawing.draws) as progress:
             for piece, tally in self._make(drawing):
                 yield piece, tally
-                bar.update(piece.stop - piece.start)
+                done += piece.stop - piece.start
+                progress(done, drawing.draws)
 
 
 def _seconds(drawing: "Drawing") -> float:

@@ -7,7 +7,7 @@ import click
 
 from bisar_budget.cli.streams import FILE, SET, complain, deliver, fail, load_all, spare, write_file
 from bisar_budget.cli.verify import faster
-from bisar_budget.cli.waiting import FORMING, foretell, progress_bar
+from bisar_budget.cli.waiting import FORMING, foretell, watched
 from bisar_budget.faults import changes_words, printable
 
 if TYPE_CHECKING:
@@ -83,11 +83,7 @@ def simulate(
     from bisar_budget.simulate.point import SimulationError, simulate_point
 
     try:
-        with progress_bar(1, FORMING) as bar:
-
-            def progress(done: int, work: int) -> None:
-                bar.length = work
-                bar.update(done)
+        with watched(FORMING) as progress:
 
             def foreseen(seconds: float) -> None:
                 foretell(

@@ -24,7 +24,7 @@ from bisar_budget.cli.streams import (
     spare,
     wants_color,
 )
-from bisar_budget.cli.waiting import FORMING, foretell, progress_bar, watched_checks
+from bisar_budget.cli.waiting import FORMING, foretell, watched, watched_checks
 
 if TYPE_CHECKING:
     from bisar_budget.design.compared import Comparison
@@ -137,5 +137,5 @@ def _imaged(mission: "Mission", found: "Solution | Comparison", model: str | Non
     if asked is None:
         return found
     foretell(asked.seconds, f"Forming the images of {asked.row}", "without --verify none is formed" + faster())
-    with progress_bar(1, FORMING) as bar:
-        return found._replace(imaged=imaged(asked, lambda row_id: bar.update(1)))
+    with watched(FORMING) as progress:
+        return found._replace(imaged=imaged(asked, progress))

@@ -104,6 +104,16 @@ DATE = click.option(
     help="Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC).",
 )
 
+PATIENCE = click.option(
+    "--scheduler-timeout",
+    "patience",
+    type=click.IntRange(min=1),
+    default=30,
+    show_default=True,
+    metavar="SECONDS",
+    help="How long a scheduler may have no worker before it is given up.",
+)
+
 
 def expand(patterns: Iterable[str]) -> list[str]:
     """Expand the glob patterns that the shell left; a pattern without a match stays and fails to load.

@@ -7,7 +7,7 @@ import click
 
 from bisar_budget import __version__
 from bisar_budget.cli.streams import fail
-from bisar_budget.cli.waiting import progress_bar
+from bisar_budget.cli.waiting import watched
 from bisar_budget.design.cases import Grid, grid
 from bisar_budget.design.quantities import QuestionError, tree_of
 from bisar_budget.design.sweep import sweep
@@ -47,14 +47,21 @@ def with_studies(
         except QuestionError as error:
             fail(f"{mission.file}: {error}")
     result: list[MissionFindings | UnusableMission] = []
-    with progress_bar(sum(cases.count for cases in asked.values()), "Checking cases") as bar:
+    done, total = 0, sum(cases.count for cases in asked.values())
+    with watched("Checking cases", total) as progress:
+
+        def advance(cases: int) -> None:
+            nonlocal done
+            done += cases
+            progress(done, total)
+
         for found in missions:
             if isinstance(found, UnusableMission):
                 result.append(found)
                 continue
             mission = found.analysed().mission
             try:
-                study = _study(mission, asked[mission.file], texts, model, today, bar.update)
+                study = _study(mission, asked[mission.file], texts, model, today, advance)
             except QuestionError as error:
                 fail(f"{mission.file}: {error}")
             result.append(found._replace(study=study))

@@ -18,6 +18,7 @@ from bisar_budget.cli.streams import (
     EXIT_BROKEN,
     FILE,
     MODEL,
+    PATIENCE,
     SET,
     complain,
     deliver_parts,
@@ -27,19 +28,18 @@ from bisar_budget.cli.streams import (
     spare,
     write_file,
 )
-from bisar_budget.cli.waiting import LONG, lasting, progress_bar
+from bisar_budget.cli.waiting import LONG, lasting, watched
 from bisar_budget.faults import printable
 from bisar_budget.resources import cores
 
 if TYPE_CHECKING:
-    from click._termui_impl import ProgressBar
-
     from bisar_budget.design.cases import Cases
     from bisar_budget.design.swept import Part, Swept
     from bisar_budget.faults import SetValue
     from bisar_budget.findings.requirement import Override
     from bisar_budget.mission.model import Mission
     from bisar_budget.report.drawing.trades import Gathered
+    from bisar_budget.workers import Progress
 
 MAX_CASES = 100_000_000  # that are started without being asked twice: tens of gigabytes
 _MANY = 20_000  # cases from which on it is measured how long they will take
@@ -96,6 +96,7 @@ _PLOTS, _TABLES = (".svg", ".png", ".pdf"), (".csv", ".parquet", ".nc")
     help="Check on the workers of a Dask scheduler, tcp://HOST:PORT, or on local:N processes of its own. Parts are "
     "kept in the folder FILE.parts of -o FILE, and joined to FILE at the end.",
 )
+@PATIENCE
 @click.option(
     "--resume",
     "is_resumed",
@@ -118,6 +119,7 @@ def sweep(
     today: datetime | None,
     jobs: int | None,
     scheduler: str | None,
+    patience: int,
     is_resumed: bool,
     force: bool,
 ) -> None:
@@ -135,8 +137,7 @@ def sweep(
         raise click.UsageError("--sample draws from the ranges of --vary; --cases has cases of its own.")
     spare([mission, *([cases_file] if cases_file else [])], [output, plot])
     from bisar_budget.budget.overrides import overrides
-    from bisar_budget.cluster.parts_folder import PartsError
-    from bisar_budget.cluster.scheduler import ClusterError
+    from bisar_budget.cluster.parts_folder import ClusterError
     from bisar_budget.design.cases import TableError
     from bisar_budget.design.quantities import QuestionError
     from bisar_budget.report.drawing.trades import check_plot
@@ -149,7 +150,7 @@ def sweep(
             check_plot(cases, is_polar=is_polar)
         judged_on = day(today)
         said = overrides(loaded, outside(today), judged_on)
-        with keeping(output, scheduler, is_resumed, jobs or cores()) as kept:
+        with keeping(output, scheduler, patience, is_resumed, jobs or cores()) as kept:
             run = _Run(loaded, cases, columns, model, judged_on, jobs or cores(), kept, said)
             run.foresee(force)
             run.write(output, plot, plot_column, is_polar)
@@ -160,7 +161,7 @@ def sweep(
         sys.exit(2)
     except (QuestionError, MissingTablesError) as error:
         fail(f"{mission}: {error}")
-    except (PartsError, ClusterError) as error:
+    except ClusterError as error:
         fail(str(error))
 
 
@@ -246,7 +247,8 @@ class _Run:
             before = seconds
         # Arrays take their time for few cases too, but not once more for each part of the cases.
         each = max((seconds - before) / (tried - tried / _LARGER), seconds / tried / 10)
-        threads = self.kept.threads if self.kept and self.kept.workers else min(self.jobs, cores())
+        workers = self.kept.workers if self.kept else None
+        threads = workers.threads if workers else min(self.jobs, cores())
         sharing = threads if alone > tried / 2 else 1  # processes: arrays are faster alone
         return each * self.cases.count / sharing
 
@@ -276,8 +278,8 @@ class _Run:
                 from bisar_budget.report.drawing.trades import Gathered
 
                 gathered = Gathered(described, column=plot_column)
-            with progress_bar(self.cases.count, "Writing" if self.kept else "Checking cases") as bar:
-                parts = self._counted(swept.parts, bar, gathered)
+            with watched("Writing" if self.kept else "Checking cases", self.cases.count) as progress:
+                parts = self._counted(swept.parts, progress, gathered)
                 if writer is not None:
                     with replacing(str(output)) as name:
                         writer.write(described, parts, name)
@@ -294,10 +296,12 @@ class _Run:
         """The sweep, with its parts kept where that is asked for."""
         if self.kept is None:
             return nullcontext(self.swept(self.cases, columns))
-        return self.kept.swept(self.mission, self.cases, columns, self.model, self.day)
+        from bisar_budget.design.sweep import Asked
+
+        return self.kept.swept(Asked(self.mission, self.cases, columns=columns, model=self.model, today=self.day))
 
     def _counted(
-        self, parts: "Iterator[Part]", bar: "ProgressBar[int]", gathered: "Gathered | None"
+        self, parts: "Iterator[Part]", progress: "Progress", gathered: "Gathered | None"
     ) -> "Iterator[Part]":
         """Hand the parts on, and take what is counted or drawn."""
         from bisar_budget.findings.status import STATUS
@@ -314,7 +318,7 @@ class _Run:
             if gathered is not None:
                 gathered.add(part)
             yield part
-            bar.update(part.stop - part.start)
+            progress(self.done, self.cases.count)
 
     def _draw(self, plot: str, gathered: "Gathered", is_polar: bool) -> None:
         """Draw what was gathered; over one key also the rows that are the worst somewhere."""

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING
 import click
 
 from bisar_budget import __version__
+from bisar_budget.cli.keeping import workers_of
 from bisar_budget.cli.streams import (
     EXIT_BROKEN,
     EXIT_USAGE,
     FILE,
     OUTPUT,
+    PATIENCE,
     SET,
     TEXT_OR_JSON,
     complain,
@@ -22,11 +24,12 @@ from bisar_budget.cli.streams import (
     spare,
     wants_color,
 )
-from bisar_budget.cli.waiting import FORMING, foretell, progress_bar
+from bisar_budget.cli.waiting import FORMING, foretell, watched
 from bisar_budget.faults import printable
 from bisar_budget.resources import cores
 
 if TYPE_CHECKING:
+    from bisar_budget.cluster.scheduler import Workers
     from bisar_budget.faults import SetValue
     from bisar_budget.findings.images import VerifiedMission
     from bisar_budget.mission.model import Mission
@@ -44,6 +47,12 @@ if TYPE_CHECKING:
     metavar="N",
     help="Processes to use; default: the number of cores, or 1 with the extra `fast`, which uses all cores itself.",
 )
+@click.option(
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Form them on the workers of a Dask scheduler, tcp://HOST:PORT, or on local:N processes of its own.",
+)
+@PATIENCE
 def verify(
     missions: Sequence[str],
     only: str,
@@ -51,6 +60,8 @@ def verify(
     output: str | None,
     changes: "tuple[SetValue, ...]",
     jobs: int | None,
+    scheduler: str | None,
+    patience: int,
 ) -> None:
     """Form images at the limits and measure whether they are true.
 
@@ -66,11 +77,13 @@ def verify(
     files = expand(missions)
     spare(files, [output])
     loaded = load_all(files, changes=changes)
+    with workers_of(scheduler, patience) as workers:
+        images = verify_all(loaded, only, jobs, workers)
     verified = [
         found._replace(
             overrides=overrides(mission._replace(waivers=()), NOTHING_OUTSIDE, date.min)
         )  # images waive nothing
-        for mission, found in zip(loaded, verify_all(loaded, only, jobs), strict=True)
+        for mission, found in zip(loaded, images, strict=True)
     ]
     if format_name == "json":
         text = verification.as_json(__version__, verified)
@@ -85,8 +98,10 @@ def verify(
     sys.exit(EXIT_BROKEN if any(mission.status == "fail" for mission in verified) else 0)
 
 
-def verify_all(missions: "Sequence[Mission]", only: str, jobs: int | None) -> "list[VerifiedMission]":
-    """Verify missions, with a progress bar where somebody watches."""
+def verify_all(
+    missions: "Sequence[Mission]", only: str, jobs: int | None, workers: "Workers | None" = None
+) -> "list[VerifiedMission]":
+    """Verify missions in processes here, or on workers of a scheduler; a bar shows it, where somebody watches."""
     from bisar_budget.findings.row import where_ids_are
     from bisar_budget.simulate.image_formation import is_compiled
     from bisar_budget.verify.limits import rows_to_verify, seconds_to_verify, verify_mission
@@ -97,11 +112,23 @@ def verify_all(missions: "Sequence[Mission]", only: str, jobs: int | None) -> "l
         raise click.UsageError(
             f"--only {printable(only)}: no row with a limit matches, nothing was verified; {listed}."
         )
-    jobs = jobs or (1 if is_compiled() else cores())
+    jobs = workers.threads if workers else jobs or (1 if is_compiled() else cores())
     seconds = sum(seconds_to_verify(mission, only, jobs) for mission in missions)
-    foretell(seconds, f"Forming the images of {total} rows", "--only looks at some of them" + faster(jobs))
-    with progress_bar(total, FORMING) as bar:
-        return [verify_mission(mission, only, jobs, lambda row_id: bar.update(1)) for mission in missions]
+    foretell(
+        seconds,
+        f"Forming the images of {total} rows",
+        "--only looks at some of them" + faster(None if workers else jobs),
+    )
+    found: list[VerifiedMission] = []
+    with watched(FORMING, total) as progress:
+        for mission in missions:
+            before = sum(len(one.rows) for one in found)
+
+            def formed(done: int, _: int, before: int = before) -> None:
+                progress(before + done, total)
+
+            found.append(verify_mission(mission, only, jobs, formed, workers.mapped if workers else None))
+    return found
 
 
 def faster(jobs: int | None = None) -> str:

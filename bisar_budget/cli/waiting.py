@@ -1,7 +1,7 @@
 """What takes long: said before, and seen to go on."""
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from io import StringIO
 from time import monotonic
@@ -13,7 +13,7 @@ from bisar_budget.cli.streams import complain
 from bisar_budget.faults import printable
 
 if TYPE_CHECKING:
-    from click._termui_impl import ProgressBar
+    from bisar_budget.workers import Progress
 
 LONG = 60.0  # s; what takes longer is announced
 FORMING = "Forming images"  # label of a bar
@@ -34,21 +34,29 @@ def foretell(seconds: float, doing: str, advice: str) -> None:
         complain(f"{doing} will take about {lasting(seconds)}; {advice}.")
 
 
-def progress_bar(total: int, label: str) -> "ProgressBar[int]":
-    """Bar with the time left on standard error, where somebody watches."""
-    watched = sys.stderr is not None and sys.stderr.isatty()
-    return click.progressbar(length=total, label=label, file=sys.stderr if watched else StringIO())
+@contextmanager
+def watched(label: str, total: int = 1, done: int = 0) -> "Iterator[Progress]":
+    """Give what takes how far long work is; a bar with the time left shows it, where somebody watches."""
+    seen = sys.stderr is not None and sys.stderr.isatty()
+    with click.progressbar(length=total, label=label, file=sys.stderr if seen else StringIO()) as bar:
+
+        def progress(done: int, total: int) -> None:
+            bar.length = total
+            bar.update(done - bar.pos)
+
+        progress(done, total)
+        yield progress
 
 
 @contextmanager
-def watched_checks(name: str) -> Iterator[Callable[[int, int], None]]:
+def watched_checks(name: str) -> "Iterator[Progress]":
     """Give what takes how many checks of a mission are done, and how many there will be.
 
     The second tells how long all will take: the first imports what it needs. A bar shows them after a moment.
     """
     began = monotonic()
     with ExitStack() as ends:
-        bars: list[ProgressBar[int]] = []
+        shown: list[Progress] = []
         since, calls = began, 0
 
         def progress(done: int, total: int) -> None:
@@ -59,10 +67,10 @@ def watched_checks(name: str) -> Iterator[Callable[[int, int], None]]:
                 doing = f"Checking {printable(name)} for {left} values or more"
                 foretell((now - since) * left, doing, "fewer declared errors and --model published take less")
             since = now
-            if not bars:
+            if not shown:
                 if now - began < _MOMENT:
                     return
-                bars.append(ends.enter_context(progress_bar(total, "Checking values")))
-            bars[0].update(done - bars[0].pos)
+                shown.append(ends.enter_context(watched("Checking values", total)))
+            shown[0](done, total)
 
         yield progress

@@ -1,78 +1,62 @@
-"""Parts of a sweep that are done: a folder with one Parquet file for each chunk and a manifest of what they are of.
+"""Parts of a sweep that are done: a Parquet data set, one file for each block of cases, of one question.
 
-Each file is written beside its name and renamed, so that what is there is whole. Values are those of the engine, in
-SI: what is asked for is written from them in the end, as from parts that come from processes.
+Each file says in its metadata which question it answers, and is written beside its name and renamed: what is there is
+whole. Values are those of the engine, in SI; the table that was asked for is written from them in the end.
 """
 
 import io
 import json
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import suppress
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from hashlib import sha256
-from typing import Any
+from importlib import import_module
 
 import numpy as np
 
 from bisar_budget import __version__
 from bisar_budget.design.cases import Cases, CaseTable, Grid
 from bisar_budget.design.sweep import Asked, Chunks
-from bisar_budget.design.swept import Part, Values
+from bisar_budget.design.swept import Part
 from bisar_budget.faults import changes_words
-from bisar_budget.memory import OF_TABLES, hold_room
-from bisar_budget.mission.named import Named
-from bisar_budget.resources import UnreadableError, content, locked
+from bisar_budget.memory import hold_room
+from bisar_budget.resources import locked
 
-FORMAT = "bisar-budget/sweep-parts/1"
-_MANIFEST = "manifest.json"
-_LARGEST_MANIFEST = 16 << 20  # bytes; names of rows and keys take a hundredth
-_WORDS = {
-    "format": "the form of the parts",
-    "version": "the version of bisar-budget",
-    "mission_sha256": "the hash of the mission file",
-    "named_sha256": "the hash of what the mission names",
-    "set": "--set",
-    "model": "the model that decides",
-    "date": "--date",
-    "cases": "the cases",
-    "chunks": "the size of the parts",
-    "columns": "the columns",
-}
+Question = Mapping[str, str]
+_NAME = re.compile(r"part-\d{12}\.parquet", re.ASCII)
 
 
-class PartsError(Exception):
-    """A folder of parts that cannot be used; the message says why, and what can be done."""
+class ClusterError(Exception):
+    """Workers, or a folder of parts, that cannot be used; the message says why, and what can be done."""
 
 
-def check_library() -> None:
-    """Raise a `PartsError` where parts cannot be written, a `MemoryError` where there is no room for that."""
-    hold_room(OF_TABLES, "--resume")
+def check_libraries(option: str, room: int, extra: str, *modules: str) -> None:
+    """Refuse an option without its libraries; a `MemoryError` says that there is no room for them. [B]"""
+    hold_room(room, option)
     try:
-        import pyarrow  # noqa: F401
-    except ImportError:
-        raise PartsError(
-            "--resume needs pyarrow, which is not installed; pip install 'bisar-budget[tables]' brings it"
-        ) from None
+        for module in modules:
+            import_module(module)
+    except ImportError as error:
+        said = f"{option} needs {error.name}, which is not installed; pip install 'bisar-budget[{extra}]' brings it"
+        raise ClusterError(said) from None
 
 
-def manifest_of(asked: Asked, chunks: Chunks, named: Named) -> dict[str, Any]:
-    """Say what decides the values of the parts: parts of equal manifests can be mixed."""
-    question, mission = asked.question, asked.engine.mission
-    swept = asked.swept(iter(()))
+def question_of(asked: Asked, chunks: Chunks) -> Question:
+    """All that decides the values of parts, by the words that a message has for it: equal ones can be mixed."""
+    question, swept = asked.travelling, asked.swept(iter(()))
+    waives = bool(asked.engine.mission.waivers)  # the day decides about waivers alone
     return {
-        "format": FORMAT,
-        "version": __version__,
-        "mission": swept.mission_name,
-        "mission_sha256": swept.mission_sha256,
-        "named_sha256": named.sha256,
-        "set": changes_words(question.changes),
-        "model": mission.gating_model,
-        "date": question.today.isoformat() if mission.waivers else "",  # the day decides about waivers alone
-        "cases": {"count": asked.cases.count, "keys": list(swept.varied), "sha256": _hash_of(asked.cases)},
-        "chunks": chunks.size,
-        "columns": [
-            {"name": column.name, "unit": column.unit, "description": column.words} for column in swept.columns
-        ],
+        "the version of bisar-budget was": __version__,
+        "the hash of the mission file was": swept.mission_sha256[:16],
+        "the hash of what the mission names was": question.named.sha256[:16] if question.named else "",
+        "--set was": changes_words(question.changes),
+        "the model that decides was": asked.engine.mission.gating_model,
+        "--date was": question.today.isoformat() if waives else "",
+        "the cases were": f"{asked.cases.count} of {', '.join(swept.varied)}",
+        "the hash of the values of the cases was": _hash_of(asked.cases)[:16],
+        "the size of the parts was": str(chunks.size),
+        "the columns were": ", ".join(column.name for column in swept.columns),
     }
 
 
@@ -80,226 +64,131 @@ def _hash_of(cases: Cases) -> str:
     """SHA-256 of what the cases are made from: the values of each key."""
     whole = sha256(repr((type(cases).__name__, cases.shape, cases.count)).encode())
     for values in cases.axes if isinstance(cases, Grid) else cases.columns if isinstance(cases, CaseTable) else ():
-        if values.dtype == object:  # words
-            whole.update(json.dumps(values.tolist()).encode())
-        else:
-            whole.update(np.ascontiguousarray(values, "<f8").tobytes())
+        is_words = values.dtype == object
+        whole.update(json.dumps(values.tolist()).encode() if is_words else np.ascontiguousarray(values, "<f8").data)
     return whole.hexdigest()
 
 
-def mark_of(manifest: Mapping[str, Any]) -> str:
-    """What a file says to be one of a manifest."""
-    return sha256(json.dumps(manifest, sort_keys=True).encode()).hexdigest()
-
-
-def encoded(part: Part, mark: str) -> bytes:
-    """Write a part as Parquet; texts as dictionaries, NaN as it is."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    arrays = [
-        pa.array(values, pa.string()).dictionary_encode() if values.dtype == object else pa.array(values)
-        for values in part.values.values()
-    ]
-    said = {"sweep": mark, "start": str(part.start), "stop": str(part.stop), "by_case": str(part.by_case)}
-    table = pa.Table.from_arrays(arrays, names=list(part.values)).replace_schema_metadata(said)
-    buffer = io.BytesIO()
-    pq.write_table(table, buffer, write_page_checksum=True)
-    return buffer.getvalue()
-
-
-class PartsFolder:
-    """The parts of one sweep; `done` are the first cases of those that are there. One command at a time has it.
-
-    Parameters
-    ----------
-    path : str
-        The folder.
-    manifest : dict
-        What its parts are of.
-    is_resumed : bool
-        Go on from what is there; else nothing may be there.
+@contextmanager
+def parts_folder(path: str, question: Question, chunks: Chunks, *, is_resumed: bool) -> "Iterator[PartsFolder]":
+    """Give a folder to this command alone, to go on from what is there or, where not `is_resumed`, to begin in.
 
     Raises
     ------
-    PartsError
-        Parts are there and should not be, or are of another sweep; the folder cannot be written, or another command
-        has it.
+    ClusterError
+        Parts are there and should not be, or are of another question; the folder cannot be written, or another
+        command has it.
     """
-
-    def __init__(self, path: str, manifest: Mapping[str, Any], *, is_resumed: bool) -> None:
-        self.path, self.mark, self.done = path, mark_of(manifest), set[int]()
+    lock = None
+    try:
         try:
             os.makedirs(path, exist_ok=True)
-            self._lock = locked(os.path.realpath(path))
+            lock = locked(os.path.realpath(path))
+            left = [name for name in os.listdir(path) if name.startswith(".part-") and lock is not None]
+            for name in left:  # a command that was killed was writing it
+                os.unlink(os.path.join(path, name))
+            folder = PartsFolder(path, question)
+            folder.find(chunks, is_resumed)
         except BlockingIOError:
-            raise PartsError(f"another command works on {path}; accepted: wait for it, or another output") from None
+            raise ClusterError(f"another command works on {path}; accepted: wait for it, or another output") from None
         except OSError as error:
-            raise PartsError(f"cannot write {path}: {error.strerror or error}") from None
-        try:
-            self._begin(manifest, is_resumed)
-        except OSError as error:
-            self.close()
-            raise PartsError(f"cannot write {path}: {error.strerror or error}") from None
-        except BaseException:
-            self.close()
-            raise
+            raise ClusterError(f"cannot write {path}: {error.strerror or error}") from None
+        yield folder
+    finally:
+        if lock is not None:
+            os.close(lock)
 
-    def _begin(self, manifest: Mapping[str, Any], is_resumed: bool) -> None:
-        """Hold what is there to the manifest, or write it; remove what a command that was killed was writing."""
-        if self._lock is not None:
-            for name in os.listdir(self.path):
-                if name.startswith((".part-", f".{_MANIFEST}.")):
-                    os.unlink(self._file(name))
-        there = self._manifest()
-        if there is not None and not is_resumed:
-            raise PartsError(
-                f"{self.path} has parts of a sweep that was not finished; accepted: --resume to go on from them, "
-                "or remove the folder"
-            )
-        if there is not None and mark_of(there) != self.mark:
-            raise PartsError(f"{self.path} is of another sweep: {_differences(there, manifest)}")
-        if there is None:
-            self._write(_MANIFEST, (json.dumps(manifest, indent=2) + "\n").encode())
 
-    def __enter__(self) -> "PartsFolder":
-        """Keep the folder to this command."""
-        return self
+class PartsFolder:
+    """The parts of one question; `done` are the first cases of those that are there and whole."""
 
-    def __exit__(self, *_: object) -> None:
-        """Let another command have it."""
-        self.close()
+    def __init__(self, path: str, question: Question) -> None:
+        self.path, self.question, self.done = path, question, set[int]()
 
-    def close(self) -> None:
-        """Let another command have the folder."""
-        if self._lock is not None:
-            os.close(self._lock)
-            self._lock = None
-
-    def _manifest(self) -> dict[str, Any] | None:
-        try:
-            found = json.loads(content(self._file(_MANIFEST), _LARGEST_MANIFEST))
-        except UnreadableError as error:
-            if error.is_missing:
-                return None
-            found = None
-        except (ValueError, RecursionError):
-            found = None
-        if not isinstance(found, dict):
-            raise PartsError(f"{self._file(_MANIFEST)} is no manifest of parts; accepted: remove the folder")
-        return found
-
-    def find(self, starts: Iterable[int], stop: Callable[[int], int]) -> None:
-        """Look which parts are there, whole and of this sweep."""
-        for start in starts:
-            if self._is_there(start, stop(start)):
+    def find(self, chunks: Chunks, is_resumed: bool) -> None:
+        """Look which parts are there; refuses those of another question, and all where none should be there."""
+        other: Question | None = None
+        for name in filter(_NAME.fullmatch, os.listdir(self.path)):
+            if not is_resumed:
+                raise ClusterError(
+                    f"{self.path} has parts of a sweep that was not finished; accepted: --resume to go on from them, "
+                    "or remove the folder"
+                )
+            start = int(name[5:17])
+            question, of, rows = self._said(start)
+            if question != self.question:
+                other = other if question is None else question
+            elif start in chunks.starts and (of, rows) == (start, chunks.stop(start) - start):
                 self.done.add(start)
+        if other is not None and not self.done:
+            raise ClusterError(f"{self.path} is of another sweep: {_differences(other, self.question)}")
 
-    def _is_there(self, start: int, stop: int) -> bool:
+    def _said(self, start: int) -> tuple[Question | None, int, int]:
+        """What a part answers, its first case and how many it has; no question where it cannot be read."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        if not os.path.isfile(self._file(_name(start))):  # a pipe would be waited for, and a device never ends
-            return False
-        try:
-            found = pq.read_metadata(self._file(_name(start)))
-        except (OSError, pa.ArrowException):  # there is none, or a machine stopped before its disk had it
-            return False
-        said = found.metadata or {}
-        wanted = {b"sweep": self.mark, b"start": str(start), b"stop": str(stop)}
-        is_of_this = all(said.get(name) == value.encode() for name, value in wanted.items())
-        return is_of_this and found.num_rows == stop - start
+        with suppress(OSError, TypeError, ValueError, pa.ArrowException):  # a machine stopped before its disk had it
+            if os.path.isfile(self._file(start)):  # a pipe would be waited for, and a device never ends
+                found = pq.read_metadata(self._file(start))
+                said = found.metadata or {}
+                return dict(json.loads(said.get(b"question", b"{}"))), int(said.get(b"start", -1)), found.num_rows
+        return None, 0, 0
 
     def put(self, part: Part) -> None:
-        """Keep a part; a `PartsError` says that it cannot be written."""
-        self.put_encoded(part.start, encoded(part, self.mark))
+        """Keep a part; a `ClusterError` says that it cannot be written."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
 
-    def put_encoded(self, start: int, data: bytes) -> None:
-        """Keep the part that begins at a case, as `encoded` writes it."""
-        try:
-            self._write(_name(start), data)
-        except OSError as error:
-            raise PartsError(f"cannot write {self.path}: {error.strerror or error}") from None
-        self.done.add(start)
-
-    def _write(self, name: str, data: bytes) -> None:
-        temporary = self._file(f".{name}.{os.getpid()}")
+        said = {"question": json.dumps(self.question), "start": str(part.start), "by_case": str(part.by_case)}
+        kinds = {name: pa.string() if values.dtype == object else None for name, values in part.values.items()}
+        table = pa.table({name: pa.array(values, kinds[name]) for name, values in part.values.items()})
+        buffer = io.BytesIO()
+        pq.write_table(table.replace_schema_metadata(said), buffer, write_page_checksum=True)
+        temporary = os.path.join(self.path, f".part-{os.getpid()}")
         try:
             with open(temporary, "wb") as file:
-                file.write(data)
-            os.replace(temporary, self._file(name))
-        except BaseException:
+                file.write(buffer.getbuffer())
+            os.replace(temporary, self._file(part.start))
+        except OSError as error:
+            raise ClusterError(f"cannot write {self.path}: {error.strerror or error}") from None
+        finally:
             with suppress(OSError):
                 os.unlink(temporary)
-            raise
+        self.done.add(part.start)
 
     def parts(self, starts: Iterable[int]) -> Iterator[Part]:
-        """Read parts in this order.
-
-        Raises
-        ------
-        PartsError
-            One cannot be read.
-        """
+        """Read parts in this order; a `ClusterError` says that one cannot be read, and then it is not kept."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
         for start in starts:
-            file = self._file(_name(start))
+            file = self._file(start)
             try:
                 table = pq.ParquetFile(file, page_checksum_verification=True).read(use_threads=False)
-            except (OSError, pa.ArrowException) as error:
-                raise PartsError(f"{file} cannot be read: {error}; the same command with --resume goes on") from None
-            said = table.schema.metadata
-            values = {name: _values(table.column(name)) for name in table.column_names}
-            yield Part(int(said[b"start"]), int(said[b"stop"]), values, int(said[b"by_case"]))
+                values = {name: table.column(name).to_numpy() for name in table.column_names}
+                part = Part(start, start + table.num_rows, values, int(table.schema.metadata[b"by_case"]))
+            except (OSError, KeyError, ValueError, pa.ArrowException) as error:
+                if getattr(error, "errno", None) is None:  # what it holds is at fault, not the system
+                    self.done.discard(start)
+                    with suppress(OSError):
+                        os.unlink(file)
+                said = f"{file} cannot be read: {error}; the same command with --resume goes on"
+                raise ClusterError(said) from None
+            yield part
 
     def remove(self) -> None:
         """Take away what is done with; what else somebody put there stays."""
         with suppress(OSError):
             for name in os.listdir(self.path):
-                if name == _MANIFEST or name.startswith(("part-", ".part-")):
-                    os.unlink(self._file(name))
+                if name.startswith(("part-", ".part-")):
+                    os.unlink(os.path.join(self.path, name))
             os.rmdir(self.path)
 
-    def _file(self, name: str) -> str:
-        return os.path.join(self.path, name)
+    def _file(self, start: int) -> str:
+        return os.path.join(self.path, f"part-{start:012d}.parquet")
 
 
-def _name(start: int) -> str:
-    return f"part-{start:012d}.parquet"
-
-
-def _values(column: Any) -> Values:
-    column = column.combine_chunks()
-    if not hasattr(column, "dictionary"):
-        found: Values = column.to_numpy()
-        return found
-    words = np.array([*column.dictionary.to_pylist(), ""], object)[:-1]  # texts alone would be made a str array
-    texts: Values = words[column.indices.to_numpy()]
-    return texts
-
-
-def _differences(there: Mapping[str, Any], here: Mapping[str, Any]) -> str:
-    said = []
-    for name, words in _WORDS.items():
-        if there.get(name) == here[name]:
-            continue
-        old, new = (_shown(name, manifest.get(name)) for manifest in (there, here))
-        if old == new:  # of cases and columns not everything is said
-            said.append(f"{words} are others of the same names")
-        else:
-            said.append(f"{words} {'were' if name in ('cases', 'columns') else 'was'} {old}, and now {new}")
-    return "; ".join(said) or "its manifest is another"
-
-
-def _shown(name: str, value: Any) -> str:
-    if not value:
-        return "not there"
-    if name.endswith("sha256"):
-        return f"{value[:12]}..."
-    if name == "cases" and isinstance(value, dict):
-        return f"{value.get('count')} of {', '.join(map(str, value.get('keys', ())))}"
-    if name == "columns" and isinstance(value, list):
-        return ", ".join(str(column.get("name")) for column in value if isinstance(column, dict))
-    return str(value)
+def _differences(there: Question, here: Question) -> str:
+    said = ((words, there.get(words) or "not there", new or "not there") for words, new in here.items())
+    return "; ".join(f"{words} {old}, and now {new}" for words, old, new in said if old != new)

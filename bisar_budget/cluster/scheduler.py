@@ -1,8 +1,8 @@
-"""The workers of a Dask scheduler, which check the chunks of a sweep, or make pieces of draws.
+"""The workers of a Dask scheduler, which call a function with what is common and with each of many blocks.
 
-A worker gets what all of them are about once: the question of a sweep with the mission and all that it names, or what
-is drawn. Then it gets the cases of each chunk, or which draws to make. Dask gives the chunks of a worker that is lost
-to others. A worker needs bisar-budget of the same version, nothing else.
+A block is some cases of a sweep, some draws of a Monte Carlo, or a row to verify. What is common, such as the mission
+with all that it names, goes to a worker once. Dask gives the blocks of a worker that is lost to others. A worker
+needs bisar-budget of the same version, nothing else.
 """
 
 import asyncio
@@ -13,125 +13,112 @@ import re
 import signal
 import socket
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
+from itertools import islice
+from multiprocessing import resource_tracker
 from queue import Empty, SimpleQueue
 from time import monotonic
-from typing import Any, NamedTuple
+from typing import Any
 from urllib.parse import urlsplit
 
 from bisar_budget import __version__
-from bisar_budget.cluster.parts_folder import encoded
-from bisar_budget.design.sweep import Asked, Chunks, Question, part_of
+from bisar_budget.cluster.parts_folder import ClusterError, check_libraries
 from bisar_budget.faults import MissionError, printable
-from bisar_budget.memory import OF_CLUSTER, hold_room
-from bisar_budget.monte_carlo.draws import Drawer, Drawing, DrawsPiece, Tally
+from bisar_budget.memory import OF_CLUSTER
 
 _ADDRESS = re.compile(r"(?:tcp|tls)://\S+:\d{1,5}", re.ASCII)
 _LOCAL = re.compile(r"local:([1-9]\d{0,2})", re.ASCII)
 _ACCEPTED = "accepted: tcp://HOST:PORT, tls://HOST:PORT, or local:N for N processes here"
-_PATIENCE = 5.0  # s for a connection
+_CONNECTION = 5.0  # s for a connection
 _LOOK = 5.0  # s between two looks at who works
-_AHEAD = 4  # chunks for each thread of a worker that are given out at once
+_FETCH = 20.0  # s for what came of a block; then it is looked who works
+_AHEAD = 4  # blocks for each thread of a worker that are given out at once
 _LEAST_AHEAD = 32
 
 
-class _Task(NamedTuple):
-    """One that a worker gets: `name` is the caller's, `about` that in messages."""
-
-    name: Any
-    about: str
-    arguments: tuple[Any, ...]
-
-
-class ClusterError(Exception):
-    """Workers that cannot be used; the message says why, and what can be done."""
-
-
-def check_address(address: str) -> None:
-    """Refuse what is no address of a scheduler, or a scheduler without its libraries, by a `ClusterError`.
-
-    A `MemoryError` says that there is no room for them.
-    """
-    if not (_ADDRESS.fullmatch(address) or _LOCAL.fullmatch(address)):
-        raise ClusterError(f"--scheduler {printable(address)}: is no scheduler; {_ACCEPTED}")
-    hold_room(OF_CLUSTER, "--scheduler")
-    try:
-        import distributed  # noqa: F401
-        import pyarrow  # noqa: F401
-    except ImportError as error:
-        raise ClusterError(
-            f"--scheduler needs {error.name}, which is not installed; pip install 'bisar-budget[cluster]' brings it"
-        ) from None
+class UnlikeWorkerError(Exception):
+    """A worker that is not like the one who asks; the message says which, and what it lacks."""
 
 
 @contextmanager
-def connected(address: str, tell: Callable[[str], None]) -> "Iterator[Workers]":
+def connected(address: str, patience: float, tell: Callable[[str], None]) -> "Iterator[Workers]":
     """Give the workers of a scheduler; `local:N` starts N here, and ends them.
 
     Parameters
     ----------
     address : str
-        One that `check_address` takes.
+        Of a scheduler.
+    patience : float
+        How long it may have no worker before it is given up. [s]
     tell : callable
         Takes what somebody who waits should know.
 
     Raises
     ------
     ClusterError
-        The scheduler cannot be reached, or a worker has another version of bisar-budget.
+        It cannot be reached, has no worker, or one with another version of bisar-budget; a `MemoryError` says that
+        there is no room for its libraries.
     """
-    check_address(address)
-    with _silence(), ExitStack() as ends:
+    local = _LOCAL.fullmatch(address)
+    if not (local or _ADDRESS.fullmatch(address)):
+        raise ClusterError(f"--scheduler {printable(address)}: is no scheduler; {_ACCEPTED}")
+    check_libraries("--scheduler", OF_CLUSTER, "cluster", "distributed", "pyarrow")
+    from distributed import Client
+
+    with ExitStack() as ends:
+        ends.callback(logging.disable, logging.root.manager.disable)
+        logging.disable(logging.CRITICAL)  # what matters of what Dask logs is said here
         try:
-            client = _client(address, ends)
+            if not local:
+                _greet(address)
+            cluster = _local_cluster(int(local[1]), ends) if local else address
+            client: Any = Client(cluster, timeout=_CONNECTION, set_as_default=False)
         except Exception as error:
-            said = f"no answer within {_PATIENCE:g} s" if isinstance(error, TimeoutError) else _first_line(error)
+            said = f"no answer within {_CONNECTION:g} s" if isinstance(error, TimeoutError) else _first_line(error)
             raise ClusterError(f"--scheduler {address}: cannot be reached: {said}") from None
-        workers = Workers(client, address, tell)
+        ends.callback(_close, client, 2)
+        client.loop.asyncio_loop.set_exception_handler(lambda *_: None)  # it would write of what is given up
+        workers = Workers(client, address, patience, tell)
+        workers.look()
         workers.check_versions()
         yield workers
 
 
-def _client(address: str, ends: ExitStack) -> Any:
-    """Connect; `ends` closes what is opened here."""
-    from distributed import Client, LocalCluster
+def _local_cluster(count: int, ends: ExitStack) -> Any:
+    """Start a scheduler and workers here; `ends` closes them."""
+    from distributed import LocalCluster
 
-    cluster = None
-    if match := _LOCAL.fullmatch(address):
-        with _interrupts_later():
-            cluster = LocalCluster(
-                n_workers=int(match[1]),
-                threads_per_worker=1,
-                dashboard_address="127.0.0.1:0",  # a port of its own: without one all would want 8787
-                silence_logs=logging.CRITICAL + 1,
-                preload=["bisar_budget.cluster.local_worker"],
-            )
-            ends.callback(_close, cluster, 10)
-    else:
-        _greet(address)
-    client = Client(cluster or address, timeout=_PATIENCE, set_as_default=False)
-    ends.callback(_close, client, 2)
-    return client
+    with _interrupts_later():
+        cluster = LocalCluster(
+            n_workers=count,
+            threads_per_worker=1,
+            dashboard_address="127.0.0.1:0",  # a port of its own: without one all would want 8787
+            silence_logs=logging.CRITICAL + 1,
+            preload=[__name__],
+        )
+        ends.callback(_close, cluster, 10)
+    return cluster
+
+
+def dask_setup(worker: object) -> None:
+    """Leave Ctrl-C, which a terminal sends to every process, to the command; Dask calls this in workers of here."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 @contextmanager
 def _interrupts_later() -> Iterator[None]:
     """Hold Ctrl-C back while workers are started: half of a cluster cannot be closed.
 
-    A terminal sends it to them too. They and the thread that starts them have it blocked from the beginning, before
-    they could ignore it.
+    Workers, and the thread that starts them, have it blocked from the beginning, before they could ignore it.
     """
-    before = signal.getsignal(signal.SIGINT)
-    if threading.current_thread() is not threading.main_thread() or before is None:
+    if threading.current_thread() is not threading.main_thread():
         yield
         return
     held: list[int] = []
-    signal.signal(signal.SIGINT, lambda number, _: held.append(number))
-    can_block = hasattr(signal, "pthread_sigmask")
+    before = signal.signal(signal.SIGINT, lambda number, _: held.append(number)) or signal.SIG_DFL
+    can_block = hasattr(signal, "pthread_sigmask")  # Windows cannot
     if can_block:
-        from multiprocessing import resource_tracker
-
         resource_tracker.ensure_running()  # else that thread would: it unblocks the signal there
         mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -149,51 +136,50 @@ def _close(opened: Any, seconds: float) -> None:
         opened.close(timeout=seconds)
 
 
-@contextmanager
-def _silence() -> Iterator[None]:
-    """Keep what Dask logs to oneself: what matters of it is said here."""
-    before = logging.root.manager.disable
-    logging.disable(logging.CRITICAL)
-    try:
-        yield
-    finally:
-        logging.disable(before)
-
-
 def _greet(address: str) -> None:
-    """Raise what is wrong with an address before a client tries it, which takes longer and knows less.
-
-    Of what answers otherwise than Dask does, its client may take some bytes for the length of a message.
-    """
+    """Raise what is wrong with an address before a client tries it, which takes longer and knows less."""
     from distributed.core import rpc
     from distributed.security import Security
 
     url = urlsplit(address)
-    socket.create_connection((url.hostname or "", url.port or 0), timeout=_PATIENCE).close()
+    socket.create_connection((url.hostname or "", url.port or 0), timeout=_CONNECTION).close()
 
     async def identity() -> Any:
         secured = Security().get_connection_args("client")
-        async with rpc(address, timeout=_PATIENCE, connection_args=secured) as scheduler:
-            return await asyncio.wait_for(scheduler.identity(), _PATIENCE)
+        async with rpc(address, timeout=_CONNECTION, connection_args=secured) as scheduler:
+            return await asyncio.wait_for(scheduler.identity(), _CONNECTION)
 
     try:
         kind = asyncio.run(identity())["type"]
-    except MemoryError:
-        kind = ""
+    except MemoryError:  # the first bytes of a web server were taken for the length of a message
+        raise OSError("what answers is no Dask scheduler") from None
     if kind != "Scheduler":
-        raise OSError(f"a Dask {kind.lower()} answers, no scheduler" if kind else "what answers is no Dask scheduler")
+        raise OSError(f"a Dask {kind.lower()} answers, no scheduler")
 
 
 class Workers:
     """What works for a scheduler; `threads` of it at the last look."""
 
-    def __init__(self, client: Any, address: str, tell: Callable[[str], None]) -> None:
-        self.client, self.address, self.tell = client, address, tell
-        self.threads = self._threads()
-        self._is_told = False
+    def __init__(self, client: Any, address: str, patience: float, tell: Callable[[str], None]) -> None:
+        self.client, self.address, self.patience, self.tell, self.threads = client, address, patience, tell, 0
 
-    def _threads(self) -> int:
-        return sum(self.client.nthreads().values())
+    def look(self) -> None:
+        """Look who works; where nobody does, wait for a worker, and raise a `ClusterError` where none comes."""
+        with suppress(Exception):  # a scheduler that is gone: the blocks say so
+            self.threads = sum(self.client.nthreads().values())
+        if self.threads:
+            return
+        self.tell(f"{self.address} has no worker; waiting {self.patience:g} s for one.")
+        try:
+            self.client.wait_for_workers(1, timeout=self.patience)
+        except TimeoutError:
+            raise ClusterError(
+                f"--scheduler {self.address}: had no worker for {self.patience:g} s; accepted: a scheduler that has "
+                f"one (dask worker {self.address} starts one), or a longer --scheduler-timeout"
+            ) from None
+        except Exception:
+            raise self._gone() from None
+        self.threads = sum(self.client.nthreads().values())
 
     def check_versions(self) -> None:
         """Refuse workers that have another version of bisar-budget, or none."""
@@ -201,149 +187,90 @@ class Workers:
         found = self.client.run(pydoc.locate, "bisar_budget.__version__", on_error="return")
         for worker, version in sorted(found.items()):
             if version != __version__:
-                raise ClusterError(self._unlike(worker, version))
+                raise ClusterError(f"--scheduler {self.address}: {_unlike(worker, version, __version__)}")
 
-    def _unlike(self, worker: str, version: object) -> str:
-        has = f"bisar-budget {version}" if isinstance(version, str) else "no bisar-budget that can be imported"
-        return f"--scheduler {self.address}: worker {worker} has {has}; accepted: {__version__}, as here"
-
-    def shared_out(
-        self, asked: Asked, chunks: Chunks, starts: Sequence[int], mark: str
-    ) -> Iterator[tuple[int, bytes]]:
-        """Check the chunks that begin at `starts`; gives each, encoded, when it is done, in any order.
-
-        Faults are those of `_done`.
-        """
-        tasks = (
-            _Task(start, f"cases {start} to {chunks.stop(start) - 1}", (mark, *asked.sent(chunks, start)))
-            for start in starts
-        )
-        return self._done(checked, asked.question, tasks)
-
-    def drawn(self, drawing: Drawing) -> Iterator[tuple[DrawsPiece, Tally]]:
-        """Make all pieces of the draws; gives each when it is done, in any order. Faults are those of `_done`."""
-        tasks = (
-            _Task(piece, f"draws {piece.start} to {piece.stop - 1} of {printable(drawing.name)}", (piece,))
-            for piece in drawing.pieces()
-        )
-        return self._done(tallied, drawing, tasks)
-
-    def _done(
-        self, function: Callable[..., Any], common: object, tasks: Iterable[_Task]
+    def mapped(
+        self, function: Callable[[Any, Any], Any], common: Any, blocks: Iterable[Any], about: Callable[[Any], str]
     ) -> Iterator[tuple[Any, Any]]:
-        """Have workers call a function with what is common, the version, and the arguments of each task.
+        """Have workers call `function(common, block)`; gives each block with what came of it, in any order.
 
-        Gives the name of each task, and what came of it.
+        `about` says of a block what it is, for messages. Few blocks are given out ahead.
 
         Raises
         ------
         ClusterError
-            The scheduler went away, a task ended every worker that had it, or a worker cannot do it.
+            The scheduler went away, or all workers; a block ended every worker that had it, or one cannot do it.
         RuntimeError
             The function raised; says what and where.
         """
         finished: SimpleQueue[Any] = SimpleQueue()
         # A task gives what is common, not the client: Dask makes it again where a worker that has it is lost.
         shared = self.client.submit(pickle.loads, pickle.dumps(common), pure=False)
-        pending: dict[str, tuple[Any, _Task]] = {}
-        left, next_look = iter(tasks), 0.0
+        pending: dict[str, tuple[Any, Any]] = {}
+        left, next_look = iter(blocks), 0.0
         try:
             while True:
                 if monotonic() >= next_look:
-                    ahead, next_look = self._look(), monotonic() + _LOOK
-                while len(pending) < ahead and (task := next(left, None)) is not None:
-                    future = self.client.submit(function, shared, __version__, *task.arguments, pure=False)
-                    pending[future.key] = future, task
+                    self.look()
+                    next_look = monotonic() + _LOOK
+                ahead = max(_LEAST_AHEAD, _AHEAD * self.threads)
+                for block in islice(left, max(0, ahead - len(pending))):
+                    future = self.client.submit(_called, __version__, function, shared, block, pure=False)
+                    pending[future.key] = future, block
                     future.add_done_callback(finished.put)
                 if not pending:
                     return
-                done = _taken(finished, max(next_look - monotonic(), 0.05))
-                for future, data in zip(done, self._fetched(done, pending), strict=True):
-                    yield pending.pop(future.key)[1].name, data
+                with suppress(Empty):
+                    future = finished.get(timeout=max(next_look - monotonic(), 0.05))
+                    try:  # Dask makes again what a worker took with it between done and fetched
+                        found = future.result(timeout=_FETCH)
+                    except Exception as error:
+                        if future.status == "error":
+                            raise _why(future.exception(), about(pending[future.key][1])) from None
+                        if not isinstance(error, TimeoutError):  # cancelled, with the connection
+                            raise self._gone() from error
+                        finished.put(future)
+                        continue
+                    yield pending.pop(future.key)[1], found
         finally:
             with suppress(Exception):
                 self.client.cancel([shared, *(future for future, _ in pending.values())])
 
-    def _look(self) -> int:
-        """Chunks to give out at once; says it where nobody works."""
-        with suppress(Exception):  # a scheduler that is gone: the chunks say so
-            self.threads = self._threads()
-        if not self.threads and not self._is_told:
-            self.tell(f"{self.address} has no worker; waiting for one.")
-        self._is_told = not self.threads
-        return max(_LEAST_AHEAD, _AHEAD * self.threads)
-
-    def _fetched(self, done: list[Any], pending: Mapping[str, tuple[Any, _Task]]) -> list[Any]:
-        """Fetch what is done; Dask makes again what a worker took with it between done and fetched."""
-        try:
-            data: list[Any] = self.client.gather(done) if done else []
-        except Exception as error:
-            for future in done:
-                if future.status in ("error", "cancelled"):
-                    raise self._why(future, pending[future.key][1].about) from None
-            raise self._gone() from error
-        return data
-
     def _gone(self) -> ClusterError:
         return ClusterError(f"--scheduler {self.address}: went away")
 
-    def _why(self, future: Any, about: str) -> Exception:
-        from distributed.scheduler import KilledWorker
 
-        if future.status == "cancelled":  # with the connection
-            return self._gone()
-        error = future.exception()
-        if isinstance(error, UnlikeWorkerError):
-            said = error.args[0]
-            return ClusterError(self._unlike(*said) if isinstance(said, tuple) else f"{about}: {said}")
-        if isinstance(error, KilledWorker):
-            return ClusterError(
-                f"{about} ended {error.allowed_failures + 1} workers, the last of them {error.last_worker.address}, "
-                "as when memory runs out"
-            )
-        said = f"{about}, on a worker: {type(error).__name__}: {_first_line(error)}"
-        if isinstance(error, ImportError | MemoryError):
-            return ClusterError(said)
-        return RuntimeError(said)
+def _called(version: str, function: Callable[[Any, Any], Any], common: Any, block: Any) -> Any:
+    """Do a block on a worker; one that came after the others were asked may have another version."""
+    from distributed import get_worker
 
-
-class UnlikeWorkerError(Exception):
-    """A worker that is not like the one who asks: its address and version, or what it cannot do."""
-
-
-def checked(question: Question, version: str, mark: str, start: int, stop: int, values: Mapping[str, Any]) -> bytes:
-    """Check a chunk of cases on a worker."""
-    here = _like(version)
+    here = get_worker().address
+    if version != __version__:
+        raise UnlikeWorkerError(_unlike(here, __version__, version))
     try:
-        return encoded(part_of(question, start, stop, values), mark)
+        return function(common, block)
     except MissionError as error:
         raise UnlikeWorkerError(f"worker {here} cannot use the mission: {'; '.join(error.lines())}") from None
 
 
-def tallied(drawing: Drawing, version: str, piece: DrawsPiece) -> Tally:
-    """Make a piece of draws on a worker."""
-    _like(version)
-    return Drawer(drawing).tally(piece)
+def _unlike(worker: str, found: object, version: str) -> str:
+    has = f"bisar-budget {found}" if isinstance(found, str) else "no bisar-budget that can be imported"
+    return f"worker {worker} has {has}; accepted: {version}, as here"
 
 
-def _like(version: str) -> str:
-    """Address of the worker; raises where it came after the others were asked, with another version."""
-    from distributed import get_worker
+def _why(error: BaseException, about: str) -> Exception:
+    """What a block that failed is said to have failed by."""
+    from distributed.scheduler import KilledWorker
 
-    here: str = get_worker().address
-    if version != __version__:
-        raise UnlikeWorkerError((here, __version__))
-    return here
-
-
-def _taken(finished: "SimpleQueue[Any]", seconds: float) -> list[Any]:
-    """What is finished; waits for the first of it."""
-    done: list[Any] = []
-    with suppress(Empty):
-        done.append(finished.get(timeout=seconds))
-        while True:
-            done.append(finished.get_nowait())
-    return done
+    if isinstance(error, UnlikeWorkerError):
+        return ClusterError(f"{about}: {error}")
+    if isinstance(error, KilledWorker):
+        last = error.last_worker.address
+        return ClusterError(
+            f"{about} ended {error.allowed_failures + 1} workers, the last of them {last}, as when memory runs out"
+        )
+    said = f"{about}, on a worker: {type(error).__name__}: {_first_line(error)}"
+    return ClusterError(said) if isinstance(error, ImportError | MemoryError) else RuntimeError(said)
 
 
 def _first_line(error: BaseException) -> str:

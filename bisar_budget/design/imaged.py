@@ -1,6 +1,5 @@
 """The solution of a design question, imaged: whether the row that binds there is at a true limit."""
 
-from collections.abc import Callable
 from glob import escape
 from typing import NamedTuple
 
@@ -12,6 +11,7 @@ from bisar_budget.design.variation import Variation
 from bisar_budget.faults import SetValue
 from bisar_budget.mission.model import Mission
 from bisar_budget.verify.limits import rows_to_verify, seconds_to_verify, verify_mission
+from bisar_budget.workers import Progress, unseen
 
 
 class ToImage(NamedTuple):
@@ -60,7 +60,7 @@ def to_image(mission: Mission, solution: Solution | Comparison, model: str | Non
     return ToImage(variation.read([SetValue(solution.key, text)]), row, text)
 
 
-def imaged(asked: ToImage, progress: Callable[[str], None] = lambda row_id: None) -> Imaged:
+def imaged(asked: ToImage, progress: Progress = unseen) -> Imaged:
     """Form the images at the limit of the row that binds, and say whether it is true."""
     only = escape(asked.row)
     if not rows_to_verify(asked.mission, only):

@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from datetime import date
 from typing import NamedTuple
 
@@ -17,6 +17,7 @@ from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.parts import taken_figures
+from bisar_budget.workers import Progress, unseen
 
 _BREAKS = ("fail",)
 _NOTHING = 1e-9  # of a utilization: what rounding leaves of a check
@@ -28,7 +29,7 @@ def sensitivity(
     row: str | None = None,
     model: str | None = None,
     today: date,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress = unseen,
 ) -> Sensitivity:
     """Find what each number that a mission file states, or takes from a part, does to the worst utilization.
 
@@ -73,8 +74,7 @@ def sensitivity(
     slopes, unchanging = [], []
     for done, number in enumerate(numbers, 1):
         slope = _Differences(variation, base, number, row, today).slope(at_file)
-        if progress is not None:
-            progress(done, len(numbers))
+        progress(done, len(numbers))
         if isinstance(slope, Skipped):
             skipped.append(slope)
         elif max(abs(slope.change), abs(slope.row_change or 0.0)) <= _NOTHING * max(

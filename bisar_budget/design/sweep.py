@@ -7,9 +7,9 @@ words are those of one mission. Memory does not grow with the number of cases.
 
 import math
 from collections import deque
-from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from datetime import date
-from functools import lru_cache, partial
+from functools import cached_property, lru_cache, partial
 from hashlib import sha256
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
@@ -34,7 +34,7 @@ from bisar_budget.findings.status import RANK, STATUS
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.named import Named, named_by
-from bisar_budget.workers import worker_pool
+from bisar_budget.workers import MapBlocks, Progress, unseen, worker_pool
 
 if TYPE_CHECKING:
     from concurrent.futures import Future
@@ -44,12 +44,7 @@ _MANY = 8  # parts, from which processes of their own are worth their start
 _TOGETHER = 8192  # cases of a part: their arrays stay in a processor's cache
 _FEW = 64  # cases of a part where each is checked by itself
 
-Progress = Callable[[int, int], None]
-
-
-def unseen(done: int, of: int) -> None:
-    """Progress that nobody looks at."""
-
+Block = tuple[int, int, Mapping[str, Any]]  # first case, the one after the last, values of each key
 
 GEOMETRY = (
     Column("range_resolution", "m", "Peak to first null along the bistatic look direction, on the ground."),
@@ -144,10 +139,7 @@ def sweep(
 
 
 class Asked:
-    """The cases of a mission that a sweep is about, in chunks; arguments and faults are those of `sweep`.
-
-    `named` is what the mission names where processes that check cases do not have it.
-    """
+    """The cases of a mission that a sweep is about, in chunks; arguments and faults are those of `sweep`."""
 
     def __init__(
         self,
@@ -157,16 +149,13 @@ class Asked:
         columns: Sequence[str] = (),
         model: str | None = None,
         today: date,
-        named: Named | None = None,
     ) -> None:
         choices = tuple(one.key for one in cases.varied if isinstance(one, Choices))
         keys = tuple(one.key for one in cases.varied if one.key not in choices)
         if model is not None and "allocation.model" in choices:
             raise QuestionError("allocation.model: --model stands in for it; accepted: one of the two")
         each = tuple(dict.fromkeys(columns))  # Parquet could not be read with a column twice
-        self.question = Question(
-            mission.data, mission.file, mission.changes, keys, each, model, today, choices, named
-        )
+        self.question = Question(mission.data, mission.file, mission.changes, keys, each, model, today, choices)
         self.mission, self.cases, self.engine = mission, cases, Engine(self.question, mission)
         missions = [self.engine.mission, *self._chosen()]
         self.columns = tuple(self._columns(missions) if columns else ())
@@ -248,30 +237,42 @@ class Asked:
         values = {one.key: np.concatenate([each[one.key] for each in some]) for one in cases.varied}
         return self.engine.part(0, _FEW, values).by_case / _FEW
 
-    def shared_out(self, chunks: "Chunks", starts: Sequence[int], jobs: int) -> Iterator[Part]:
+    @cached_property
+    def travelling(self) -> "Question":
+        """The question with all that the mission names: other processes see what this one saw."""
+        words = [SetValue(one.key, word) for one, chosen in words_of(self.cases) for word in chosen]
+        return self.question._replace(named=named_by(self.mission, words))
+
+    def shared_out(
+        self, chunks: "Chunks", starts: Sequence[int], jobs: int, mapped: MapBlocks | None = None
+    ) -> Iterator[Part]:
         """Check the chunks that begin at `starts`, in their order; processes share out what is checked case by case.
 
-        What arrays hold takes less time than to send it from one process to another.
+        What arrays hold takes less time than to send it from one process to another. Where `mapped` has others do it,
+        they do all, and parts come in any order.
         """
+        if mapped is not None:
+            blocks = (self.block(chunks, start) for start in starts)
+            for _, part in mapped(
+                part_of, self.travelling, blocks, lambda block: f"cases {block[0]} to {block[1] - 1}"
+            ):
+                yield part
+            return
         if not chunks.is_slow or jobs == 1 or len(starts) < _MANY:
             for start in starts:
-                yield self.engine.part(*self.sent(chunks, start))
+                yield self.engine.part(*self.block(chunks, start))
             return
-        question = self.question
-        if question.named is None:  # the processes shall see what this one saw
-            words = [SetValue(one.key, word) for one, chosen in words_of(self.cases) for word in chosen]
-            question = question._replace(named=named_by(self.mission, words)[1])
         with worker_pool(jobs, "spawn") as pool:
             waiting: deque[Future[Part]] = deque()
             for start in starts:
-                waiting.append(pool.submit(part_of, question, *self.sent(chunks, start)))
+                waiting.append(pool.submit(part_of, self.travelling, self.block(chunks, start)))
                 if len(waiting) > 3 * jobs:  # none is far ahead of what has been asked for
                     yield waiting.popleft().result()
             while waiting:
                 yield waiting.popleft().result()
 
-    def sent(self, chunks: "Chunks", start: int) -> tuple[int, int, Mapping[str, Any]]:
-        """What `part_of` takes of a chunk besides the question."""
+    def block(self, chunks: "Chunks", start: int) -> Block:
+        """The chunk that begins at a case: what `part_of` takes besides the question."""
         stop = chunks.stop(start)
         return start, stop, self.cases.values(start, stop)
 
@@ -325,9 +326,9 @@ def _engine(question: Question) -> "Engine":
     return Engine(question, parse(question.data, question.file, question.model, changes=question.changes))
 
 
-def part_of(question: Question, start: int, stop: int, values: Mapping[str, Any]) -> Part:
-    """Check a chunk of cases in a process that knows nothing else; it keeps the last question."""
-    return _engine(question).part(start, stop, values)
+def part_of(question: Question, block: Block) -> Part:
+    """Check a block of cases in a process that knows nothing else; it keeps the last question."""
+    return _engine(question).part(*block)
 
 
 class Engine:

@@ -18,41 +18,24 @@ class Named(NamedTuple):
 
     def parse(self, data: bytes, file: str, model: str | None = None, *, changes: Sequence[SetValue] = ()) -> Mission:
         """Read a mission that names nothing else; arguments and faults are those of `parse_mission`."""
-        paths = dict(self.paths)
         parts = {name: (of, content) for name, of, content in self.parts}
-        return parse_mission(data, file, model, paths.__getitem__, changes, parts.__getitem__)
+        return parse_mission(data, file, model, dict(self.paths).__getitem__, changes, parts.__getitem__)
 
     @property
     def sha256(self) -> str:
         """Hash of all names and contents; empty where nothing is named."""
-        if not (self.paths or self.parts):
-            return ""
-        whole = sha256()
-        for name, content in (*self.paths, *((name, content) for name, _, content in self.parts)):
-            for piece in (name.encode("utf-8", "surrogatepass"), content):
-                whole.update(sha256(piece).digest())
-        return whole.hexdigest()
+        parts = ((name, content) for name, _, content in self.parts)
+        each = [(name, sha256(content).hexdigest()) for name, content in (*self.paths, *parts)]
+        return sha256(ascii(each).encode()).hexdigest() if each else ""
 
 
-def named_by(mission: Mission, also: Sequence[SetValue] = ()) -> tuple[Mission, Named]:
-    """Read a mission anew, and all that it names.
-
-    Parameters
-    ----------
-    mission : Mission
-        As loaded.
-    also : sequence of SetValue
-        Values that the mission may get: what it names with each of them is read too.
-
-    Returns
-    -------
-    tuple of Mission and Named
-        The mission by what its files say now, and their content.
+def named_by(mission: Mission, also: Sequence[SetValue] = ()) -> Named:
+    """Read all that a mission names, and what it names with each of some values that it may get.
 
     Raises
     ------
     MissionError
-        A file has changed since, and is none that can be used.
+        A file has changed since the mission was loaded, and is none that can be used.
     """
     from bisar_budget.mission.parts import finder_of
     from bisar_budget.mission.paths import reader_of
@@ -71,9 +54,8 @@ def named_by(mission: Mission, also: Sequence[SetValue] = ()) -> tuple[Mission, 
         return parts[name]
 
     model = mission.allocation.model  # --model may stand in for one of the file that is none
-    again = parse_mission(mission.data, mission.file, model, beside, mission.changes, find)
+    parse_mission(mission.data, mission.file, model, beside, mission.changes, find)
     for change in also:
         with suppress(MissionError):  # there is none with it, which is said where it is asked for
             parse_mission(mission.data, mission.file, model, beside, (*mission.changes, change), find)
-    named = Named(tuple(sorted(paths.items())), tuple((name, *of) for name, of in sorted(parts.items())))
-    return again, named
+    return Named(tuple(sorted(paths.items())), tuple((name, *of) for name, of in sorted(parts.items())))

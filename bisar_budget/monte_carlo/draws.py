@@ -13,14 +13,18 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from fractions import Fraction
 from functools import cache
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.faults import printable
 from bisar_budget.memory import is_spacious
 from bisar_budget.monte_carlo.sums import ExactPaths, Sums, paths_of
 from bisar_budget.monte_carlo.variables import Floats, HeldSum, Variable
+
+if TYPE_CHECKING:
+    from bisar_budget.workers import MapBlocks
 
 # Draws held at once, the same for every number of draws: results depend on the seed alone. All that is summed are
 # a few megabytes and stay in a cache.
@@ -127,6 +131,17 @@ def in_turn(drawing: Drawing) -> Iterator[tuple[DrawsPiece, Tally]]:
     drawer = Drawer(drawing)
     for piece in drawing.pieces():
         yield piece, drawer.tally(piece)
+
+
+def shared_out(drawing: Drawing, mapped: "MapBlocks") -> Iterator[tuple[DrawsPiece, Tally]]:
+    """Have others draw the pieces; gives each when it is done, in any order."""
+    of = f"of {printable(drawing.name)}"
+    return mapped(tally_of, drawing, drawing.pieces(), lambda piece: f"draws {piece.start} to {piece.stop - 1} {of}")
+
+
+def tally_of(drawing: Drawing, piece: DrawsPiece) -> Tally:
+    """Draw a piece in a process that knows nothing else."""
+    return Drawer(drawing).tally(piece)
 
 
 class Drawer:

@@ -40,6 +40,7 @@ from bisar_budget.simulate.range_lines import Flown
 from bisar_budget.simulate.realisations import FlownErrors, flown_errors
 from bisar_budget.simulate.resampling import between
 from bisar_budget.simulate.targets import Target, Targets
+from bisar_budget.workers import Progress, unseen
 
 _MARGIN_CELLS = 16  # of the patch beyond the smear, each way
 _SAMPLES_PER_CELL = 3
@@ -177,7 +178,7 @@ class Plan(NamedTuple):
 
 def simulate_point(
     mission: Mission,
-    progress: Callable[[int, int], None] = lambda done, work: None,
+    progress: Progress = unseen,
     *,
     image_former: str = "backprojection",
     targets: Targets = A_POINT,
@@ -196,7 +197,7 @@ def simulate_point(
     mission : Mission
         As loaded.
     progress : callable
-        Told the pixels times pulses done since it was last told, and all there are.
+        Told how many pixels times pulses are done, and how many there are.
     image_former : str
         One of `IMAGE_FORMERS`. Polar format forms the rotated images; the one along (x, y) is backprojected then, as
         Figure 5 of the paper is by (4) and Figure 6 by (14).
@@ -276,8 +277,15 @@ def simulate_point(
             formed.samples[:] *= np.outer(taylor_window(plan.pulses), taylor_window(plan.frequencies))
         return formed
 
+    done = 0
+
     def image(by: Former, data: PhaseHistory, grid: Floats) -> Complexes:
-        return by.image(data, grid, lambda pixels: progress(plan.pulses * pixels, plan.work))
+        def told(pixels: int) -> None:
+            nonlocal done
+            done += plan.pulses * pixels
+            progress(done, plan.work)
+
+        return by.image(data, grid, told)
 
     standing = [(one.east, one.north) for one in targets.points]
     begun, few = time.perf_counter(), cell_centres(T, _FEW_PULSES)

@@ -1,7 +1,8 @@
 """Form images with each error set exactly at its limit, and measure whether the limit is true."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import nullcontext
 from fnmatch import fnmatchcase
 from functools import partial
 
@@ -12,6 +13,7 @@ from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.models import QUADRATIC
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.vibration_lines import lines_of
+from bisar_budget.faults import printable
 from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.model import Mission, Simulation
@@ -19,7 +21,7 @@ from bisar_budget.verify import duration, phase_cases
 from bisar_budget.verify import vibration_cases as vibration
 from bisar_budget.verify.location_case import location
 from bisar_budget.verify.study import Study
-from bisar_budget.workers import worker_pool
+from bisar_budget.workers import MapBlocks, Progress, unseen, worker_pool
 
 __all__ = ["Study", "rows_to_verify", "seconds_to_verify", "verify_mission"]
 
@@ -27,7 +29,11 @@ Case = Callable[[], Verdict]
 
 
 def verify_mission(
-    mission: Mission, only: str = "*", jobs: int = 1, progress: Callable[[str], None] = lambda row_id: None
+    mission: Mission,
+    only: str = "*",
+    jobs: int = 1,
+    progress: Progress = unseen,
+    mapped: MapBlocks | None = None,
 ) -> VerifiedMission:
     """Verify every limit of a mission whose row id matches a glob.
 
@@ -40,7 +46,9 @@ def verify_mission(
     jobs : int
         Processes; the verdicts do not depend on it.
     progress : callable
-        Told the id of each row that is done.
+        Told, after each row, how many are done, and how many there are.
+    mapped : callable, optional
+        Has others form the images instead of processes here.
 
     Returns
     -------
@@ -50,20 +58,23 @@ def verify_mission(
     mission = mission._replace(places={})  # the parser's marks cannot go to another process, and nobody asks here
     known = cases(Study(mission))
     wanted = [row_id for row_id in known if fnmatchcase(row_id, only)]
-    rows: list[Verdict] = []
-    if min(jobs, len(wanted)) <= 1:
-        for row_id in wanted:
-            rows.append(known[row_id]())
-            progress(row_id)
-    else:
-        with worker_pool(min(jobs, len(wanted)), "spawn") as pool:
-            for row in pool.map(partial(_verify_row, mission), wanted):
-                rows.append(row)
-                progress(row.id)
+    jobs = min(jobs, len(wanted))
+    with worker_pool(jobs, "spawn") if jobs > 1 and mapped is None else nullcontext() as pool:
+        found: Iterable[tuple[str, Verdict]]
+        if mapped is not None:
+            found = mapped(_verify_row, mission, wanted, f"{{}} of {printable(mission.name)}".format)
+        elif pool is not None:
+            found = zip(wanted, pool.map(partial(_verify_row, mission), wanted), strict=True)
+        else:
+            found = ((row_id, known[row_id]()) for row_id in wanted)
+        rows = {}
+        for row_id, verdict in found:
+            rows[row_id] = verdict
+            progress(len(rows), len(wanted))
     return VerifiedMission(
         file=mission.file,
         name=mission.name,
-        rows=tuple(rows),
+        rows=tuple(rows[row_id] for row_id in wanted),
         conditions=", ".join(_conditions(mission)),
         changes=mission.changes,
     )

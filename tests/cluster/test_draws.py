@@ -19,7 +19,7 @@ from bisar_budget.cli import draws as command
 from bisar_budget.cluster.scheduler import Workers, connected
 from bisar_budget.mission.load import load_mission
 from bisar_budget.monte_carlo import draws as drawing
-from bisar_budget.monte_carlo.draws import Drawing, in_turn, joined
+from bisar_budget.monte_carlo.draws import Drawing, in_turn, joined, shared_out
 from bisar_budget.monte_carlo.probability import monte_carlo
 from tests.cli.test_sweep import read_all
 from tests.cluster.conftest import Cluster, wait_until
@@ -61,8 +61,8 @@ def test_who_draws_does_not_matter(run, cluster: Cluster) -> None:
 def test_a_lost_worker_costs_only_its_draws(cluster: Cluster) -> None:
     drawn = drawing_of(DRONES, 60 << 15)
     pieces = []
-    with connected(cluster.address, pytest.fail) as workers:
-        for piece, tally in workers.drawn(drawn):
+    with connected(cluster.address, 30, pytest.fail) as workers:
+        for piece, tally in shared_out(drawn, workers.mapped):
             pieces.append((piece, tally))
             if len(pieces) == 3:
                 cluster.workers.pop().kill()
@@ -92,10 +92,10 @@ def children(pid: int) -> list[str]:
 
 @pytest.mark.usefixtures("short_chunks")
 def test_which_draws_failed_is_said() -> None:
-    workers = Workers(Client(ValueError("a matrix\nis singular")), "tcp://a:0", pytest.fail)
+    workers = Workers(Client(ValueError("a matrix\nis singular")), "tcp://a:0", 30, pytest.fail)
     said = r"^draws 0 to 29999 of Two drones with the same GNSS, on a worker: ValueError: a matrix$"
     with pytest.raises(RuntimeError, match=said):
-        list(workers.drawn(drawing_of(DRONES, 30_000)))
+        list(shared_out(drawing_of(DRONES, 30_000), workers.mapped))
 
 
 def test_what_cannot_be_shared_out(run, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,12 +1,11 @@
 """Parts that are kept: what is read is what was written, and parts of two sweeps are never mixed."""
 
 import errno
-import json
 import math
 import os
 import socket
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from datetime import date
 from pathlib import Path
@@ -17,19 +16,27 @@ import pytest
 
 pytest.importorskip("pyarrow")
 
-from bisar_budget.cluster.parts_folder import PartsError, PartsFolder, manifest_of, mark_of
+from bisar_budget import __version__
+from bisar_budget.cluster.parts_folder import ClusterError, PartsFolder, parts_folder, question_of
 from bisar_budget.design.cases import grid
 from bisar_budget.design.quantities import tree_of
-from bisar_budget.design.sweep import Asked
+from bisar_budget.design.sweep import Asked, Chunks
 from bisar_budget.design.swept import Part
 from bisar_budget.mission.load import load_mission
-from bisar_budget.mission.named import Named
 from tests.conftest import ROOT, mission_text
 
 SECTION_V = str(ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml")
 TIME = "collection.aperture_time"
 # 8192 cases, as many again, and the rest: the arrays hold them.
 ASKED = ("--vary", f"{TIME}=1:2s:17000", "--date", "2026-01-01")
+
+
+QUESTION = {"a was": "1"}
+CHUNKS = Chunks(60, 10, False)
+
+
+def new_folder(path: Path) -> PartsFolder:
+    return PartsFolder(str(path), QUESTION)
 
 
 def test_a_part_is_read_as_it_was_written(tmp_path: Path) -> None:
@@ -39,7 +46,7 @@ def test_a_part_is_read_as_it_was_written(tmp_path: Path) -> None:
         "b": np.array(["", "µ", "", 'a "b",\n', "µ"], object),
         "c": np.array([""] * 5, object),
     }
-    folder = PartsFolder(str(tmp_path / "p"), {"a": 1}, is_resumed=False)
+    folder = new_folder(tmp_path)
     folder.put(Part(10, 15, values, 3))
     (part,) = folder.parts([10])
     assert (part.start, part.stop, part.by_case, list(part.values)) == (10, 15, 3, ["a", "b", "c"])
@@ -49,69 +56,89 @@ def test_a_part_is_read_as_it_was_written(tmp_path: Path) -> None:
     assert part.values["c"].tolist() == values["c"].tolist()
 
 
-def test_words_of_cases_are_part_of_the_manifest() -> None:
+def test_words_of_cases_are_part_of_the_question() -> None:
     """Parts of other words are not mixed in."""
     mission = load_mission(SECTION_V)
 
-    def manifest(text: str) -> dict[str, Any]:
+    def question(text: str) -> Mapping[str, str]:
         asked = Asked(mission, grid(tree_of(mission), [text, f"{TIME}=1,2s"]), today=date(2026, 1, 1))
-        return manifest_of(asked, asked.chunks(), Named())
+        return question_of(asked, asked.chunks())
 
-    one, other = manifest("allocation.model=published,full"), manifest("allocation.model=full,published")
-    assert one["cases"]["keys"] == ["allocation.model", TIME]
-    assert mark_of(one) != mark_of(other)
-    assert mark_of(one) == mark_of(manifest("allocation.model=published,full"))
+    one, other = question("allocation.model=published,full"), question("allocation.model=full,published")
+    assert one["the cases were"] == f"4 of allocation.model, {TIME}"
+    assert one != other
+    assert one == question("allocation.model=published,full")
 
 
 def test_only_whole_parts_of_the_sweep_are_there(tmp_path: Path) -> None:
     def part(start: int, stop: int) -> Part:
         return Part(start, stop, {"a": np.zeros(stop - start)}, 0)
 
-    folder = PartsFolder(str(tmp_path), {"a": 1}, is_resumed=False)
-    for start in (0, 10, 20, 30):
+    folder = new_folder(tmp_path)
+    for start in (0, 10, 20, 30, 40):
         folder.put(part(start, start + 10))
     files = sorted(tmp_path.glob("part-*"))
     files[1].write_bytes(files[1].read_bytes()[:-9])  # a machine stopped
     folder.put(part(20, 25))  # not to where it should
-    other = PartsFolder(str(tmp_path / "other"), {"a": 2}, is_resumed=False)
+    other = PartsFolder(str(tmp_path / "other"), {"a was": "2"})
+    os.mkdir(other.path)
     other.put(part(30, 40))
     os.replace(tmp_path / "other" / files[3].name, files[3])
-    folder.close()
-    again = PartsFolder(str(tmp_path), {"a": 1}, is_resumed=True)
-    again.find(range(0, 60, 10), lambda start: start + 10)
-    assert again.done == {0}
-    with pytest.raises(PartsError, match=r"part-000000000010.parquet cannot be read"):
-        list(again.parts([0, 10]))
+    files[4].write_bytes(files[0].read_bytes())  # of other cases
+    folder.put(part(60, 70))  # of no cases
+    with parts_folder(str(tmp_path), QUESTION, CHUNKS, is_resumed=True) as again:
+        assert again.done == {0}
+        with pytest.raises(ClusterError, match=r"part-000000000010.parquet cannot be read"):
+            list(again.parts([0, 10]))
+
+
+def test_parts_of_an_earlier_form_are_refused(tmp_path: Path) -> None:
+    """They are somebody's work, and say of no question that they answer it."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    pq.write_table(pa.table({"a": [0.0] * 10}), tmp_path / "part-000000000000.parquet")
+    with (
+        pytest.raises(ClusterError, match="of another sweep: a was not there, and now 1"),
+        parts_folder(str(tmp_path), QUESTION, CHUNKS, is_resumed=True),
+    ):
+        pass
 
 
 def test_a_bit_that_flipped_on_a_disk_is_seen(tmp_path: Path) -> None:
-    """Its value went into the table."""
-    folder = PartsFolder(str(tmp_path), {"a": 1}, is_resumed=False)
+    """Its value went into the table; gone on with, the part was refused again and again."""
+    folder = new_folder(tmp_path)
     folder.put(Part(0, 2000, {"a": np.linspace(0, 1, 2000)}, 0))
     (file,) = tmp_path.glob("part-*")
     data = bytearray(file.read_bytes())
     data[len(data) // 2] ^= 1
     file.write_bytes(data)
-    with pytest.raises(PartsError, match=r"part-000000000000.parquet cannot be read"):
+    with pytest.raises(ClusterError, match=r"part-000000000000.parquet cannot be read"):
         list(folder.parts([0]))
+    assert not folder.done
+    assert not file.exists()  # and the next run makes it again
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs pipes and devices")
 def test_pipes_and_devices_are_no_parts(tmp_path: Path) -> None:
-    """A manifest without end took all memory, and a pipe was waited for."""
-    folder = PartsFolder(str(tmp_path), {"a": 1}, is_resumed=False)
+    """What has no end took all memory, and a pipe was waited for."""
     os.mkfifo(tmp_path / "part-000000000000.parquet")
-    folder.find([0], lambda start: start + 1)
-    assert not folder.done
-    (tmp_path / "manifest.json").unlink()
-    (tmp_path / "manifest.json").symlink_to("/dev/zero")
-    folder.close()
-    with pytest.raises(PartsError, match="is no manifest of parts"):
-        PartsFolder(str(tmp_path), {"a": 1}, is_resumed=True)
+    (tmp_path / "part-000000000010.parquet").symlink_to("/dev/zero")
+    (tmp_path / "part-000000000020.parquet").mkdir()
+    with parts_folder(str(tmp_path), QUESTION, CHUNKS, is_resumed=True) as folder:
+        assert not folder.done
+        for start in (0, 10):
+            folder.put(Part(start, start + 10, {"a": np.zeros(10)}, 0))
+        assert sum(part.stop - part.start for part in folder.parts([0, 10])) == 20
+        with pytest.raises(ClusterError, match=r"^cannot write .*: Is a directory$"):
+            folder.put(Part(20, 30, {"a": np.zeros(10)}, 0))
+    assert not list(tmp_path.glob(".part*"))
 
 
 def test_what_somebody_else_put_there_stays(tmp_path: Path) -> None:
-    folder = PartsFolder(str(tmp_path / "p"), {"a": 1}, is_resumed=False)
+    (tmp_path / "p").mkdir()
+    folder = new_folder(tmp_path / "p")
+    folder.put(Part(0, 1, {"a": np.zeros(1)}, 0))
     (tmp_path / "p" / "notes.txt").write_text("mine")
     folder.remove()
     assert [file.name for file in (tmp_path / "p").iterdir()] == ["notes.txt"]
@@ -150,9 +177,9 @@ def test_a_sweep_goes_on_with_what_is_not_done(run, ended, monkeypatch: pytest.M
     shared_out = Asked.shared_out
     left: list[int] = []
 
-    def watched(self: Asked, chunks: Any, starts: Any, jobs: int) -> Iterator[Part]:
+    def watched(self: Asked, chunks: Any, starts: Any, *arguments: Any) -> Iterator[Part]:
         left.extend(starts)
-        return shared_out(self, chunks, starts, jobs)
+        return shared_out(self, chunks, starts, *arguments)
 
     monkeypatch.setattr(Asked, "shared_out", watched)
     found = run("sweep", SECTION_V, *ASKED, "-o", str(output), "--resume")
@@ -233,7 +260,7 @@ def test_parts_are_not_lost_by_starting_anew(run, ended) -> None:
         (("--set", "radar.bandwidth=150MHz"), "--set was not there, and now --set radar.bandwidth=150MHz"),
         (("--model", "full"), "the model that decides was published, and now full"),
         (("--column", "receiver.velocity.x.margin"), "the columns were collection.aperture_time, range_resolution"),
-        (("--vary", f"{TIME}=1:3s:17000"), "the cases are others of the same names"),
+        (("--vary", f"{TIME}=1:3s:17000"), "the hash of the values of the cases was "),
         (("--vary", "radar.bandwidth=100,200 MHz"), f"was 17000 of {TIME}, and now 34000 of {TIME}, radar.bandwidth"),
     ],
 )
@@ -247,7 +274,9 @@ def test_parts_of_another_sweep_are_refused(run, ended, arguments: tuple[str, ..
     assert not output.exists()
 
 
-def test_parts_of_another_mission_version_or_form_are_refused(run, ended, tmp_path: Path) -> None:
+def test_parts_of_another_mission_or_version_are_refused(
+    run, ended, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     mission = tmp_path / "m.yaml"
     text = Path(SECTION_V).read_text(encoding="utf-8")
     mission.write_text(text, encoding="utf-8")
@@ -256,14 +285,9 @@ def test_parts_of_another_mission_version_or_form_are_refused(run, ended, tmp_pa
     mission.write_text(text.replace("300 MHz", "150 MHz"), encoding="utf-8")
     assert "another sweep: the hash of the mission file was " in run(*again).stderr
     mission.write_text(text, encoding="utf-8")
-    file = tmp_path / "t.csv.parts" / "manifest.json"
-    manifest = json.loads(file.read_text())
-    file.write_text(json.dumps({**manifest, "version": "0.0.1"}))
-    assert "another sweep: the version of bisar-budget was 0.0.1, and now " in run(*again).stderr
-    for broken in ("", "[1]", "{"):
-        file.write_text(broken)
-        assert "is no manifest of parts" in run(*again).stderr
-    file.write_text(json.dumps(manifest))
+    monkeypatch.setattr("bisar_budget.cluster.parts_folder.__version__", "9.9")
+    assert f"another sweep: the version of bisar-budget was {__version__}, and now 9.9\n" in run(*again).stderr
+    monkeypatch.undo()
     assert run(*again).exit_code == 0
 
 

@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from datetime import date
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -21,8 +22,13 @@ pytest.importorskip("pyarrow")
 from bisar_budget import __version__
 from bisar_budget.cli import cli
 from bisar_budget.cluster import scheduler
-from bisar_budget.cluster.scheduler import ClusterError, UnlikeWorkerError, Workers
-from bisar_budget.design.sweep import Chunks
+from bisar_budget.cluster.parts_folder import ClusterError
+from bisar_budget.cluster.scheduler import UnlikeWorkerError, Workers
+from bisar_budget.design.cases import grid
+from bisar_budget.design.quantities import tree_of
+from bisar_budget.design.sweep import Asked, Chunks, part_of
+from bisar_budget.mission.load import load_mission
+from bisar_budget.verify.limits import verify_mission
 from tests.cluster.conftest import Cluster, free_port, wait_until
 from tests.conftest import APART, ROOT, heed_signals
 
@@ -30,10 +36,10 @@ MISSION = str(ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml")
 AZIMUTH, TIME = "platforms.receiver.azimuth", "collection.aperture_time"
 # No array holds this column: each case is checked by itself, so that a part takes a tenth of a second.
 ASKED = (
-    *("sweep", MISSION, "--vary", f"{AZIMUTH}=40:60deg:40", "--vary", f"{TIME}=1:2s:16"),
+    *("sweep", MISSION, "--vary", f"{AZIMUTH}=40:60deg:40", "--vary", f"{TIME}=1:2s:32"),
     *("--column", "receiver.velocity.x.islr_db", "--date", "2026-01-01"),
 )
-PARTS = 10
+PARTS = 20
 
 
 @pytest.fixture(scope="module")
@@ -129,7 +135,7 @@ def test_a_worker_of_another_version_is_refused(cluster: Cluster, tmp_path: Path
     try:
         wait_until(lambda: cluster.joined() > there)
         with pytest.raises(ClusterError) as error:
-            scheduler.connected(cluster.address, pytest.fail).__enter__()
+            scheduler.connected(cluster.address, 30, pytest.fail).__enter__()
     finally:
         other.kill()
     assert str(error.value).endswith(f" has bisar-budget 0.0.1; accepted: {__version__}, as here")
@@ -159,7 +165,7 @@ def test_an_address_where_nobody_answers(run, tmp_path: Path) -> None:
 @pytest.mark.parametrize("answer", [b"HTTP/1.1 400 Bad Request\r\nContent-Type: text/html\r\n\r\n", b""])
 def test_something_else_answers(monkeypatch: pytest.MonkeyPatch, answer: bytes) -> None:
     """Dask takes the first bytes of a web server for the length of a message, and has no memory for it."""
-    monkeypatch.setattr(scheduler, "_PATIENCE", 0.5)
+    monkeypatch.setattr(scheduler, "_CONNECTION", 0.5)
 
     def reply(listening: socket.socket) -> None:
         while True:
@@ -175,7 +181,7 @@ def test_something_else_answers(monkeypatch: pytest.MonkeyPatch, answer: bytes) 
         answering = threading.Thread(target=reply, args=(listening,))
         answering.start()
         with pytest.raises(ClusterError, match=r"cannot be reached: (what answers is no Dask|no answer within)"):
-            scheduler.connected(f"tcp://127.0.0.1:{listening.getsockname()[1]}", pytest.fail).__enter__()
+            scheduler.connected(f"tcp://127.0.0.1:{listening.getsockname()[1]}", 30, pytest.fail).__enter__()
         listening.shutdown(socket.SHUT_RDWR)
         answering.join()
     for one in opened:
@@ -188,7 +194,7 @@ def test_a_worker_is_no_scheduler(cluster: Cluster) -> None:
     with Client(cluster.address, set_as_default=False) as client:
         worker = next(iter(client.nthreads()))
     with pytest.raises(ClusterError, match="cannot be reached: a Dask worker answers, no scheduler"):
-        scheduler.connected(worker, pytest.fail).__enter__()
+        scheduler.connected(worker, 30, pytest.fail).__enter__()
 
 
 def test_a_scheduler_needs_a_file_and_its_library(run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -209,6 +215,9 @@ class Future:
     def __init__(self, error: BaseException) -> None:
         self.error = error
 
+    def result(self, timeout: float) -> None:
+        raise self.error
+
     def exception(self) -> BaseException:
         return self.error
 
@@ -228,11 +237,13 @@ class Client:
     def submit(self, *arguments: Any, **options: Any) -> Future:
         return Future(self.error)
 
-    def gather(self, futures: list[Future]) -> None:
-        raise futures[0].error
-
     def cancel(self, futures: list[Future]) -> None:
         self.is_cancelled = True
+
+
+def asked() -> Asked:
+    mission = load_mission(MISSION)
+    return Asked(mission, grid(tree_of(mission), [f"{TIME}=1:2s:1000"]), today=date(2026, 1, 1))
 
 
 @pytest.mark.parametrize(
@@ -240,17 +251,16 @@ class Client:
     [
         (ValueError("a matrix\nis singular"), RuntimeError, "^cases 64 to 127, on a worker: ValueError: a matrix$"),
         (ModuleNotFoundError("No module named 'x'"), ClusterError, "on a worker: ModuleNotFoundError: No module"),
-        (UnlikeWorkerError(("tcp://c:1", "9.9")), ClusterError, "worker tcp://c:1 has bisar-budget 9.9; accepted: "),
+        (UnlikeWorkerError("worker w has another"), ClusterError, "^cases 64 to 127: worker w has another$"),
         (UnlikeWorkerError("worker w cannot use"), ClusterError, "^cases 64 to 127: worker w cannot use$"),
     ],
 )
 def test_what_a_worker_raises_is_said_once(error: BaseException, kind: type[Exception], said: str) -> None:
     client = Client(error)
-    workers = Workers(client, "tcp://a:0", pytest.fail)
-    assert workers.threads == 3
-    asked: Any = SimpleNamespace(question=None, sent=lambda chunks, start: (start, start + 64, {}))
+    workers = Workers(client, "tcp://a:0", 30, pytest.fail)
     with pytest.raises(kind, match=said):
-        list(workers.shared_out(asked, Chunks(1000, 64, True), [64], "mark"))
+        list(asked().shared_out(Chunks(1000, 64, True), [64], 1, workers.mapped))
+    assert workers.threads == 3
     assert client.is_cancelled
 
 
@@ -258,16 +268,101 @@ def test_what_ended_every_worker_that_had_it_is_said() -> None:
     from distributed.scheduler import KilledWorker
 
     error = KilledWorker("chunk", SimpleNamespace(address="tcp://b:1"), 3)
-    workers = Workers(Client(error), "tcp://a:0", pytest.fail)
-    asked: Any = SimpleNamespace(question=None, sent=lambda chunks, start: (start, start + 64, {}))
+    workers = Workers(Client(error), "tcp://a:0", 30, pytest.fail)
     with pytest.raises(ClusterError, match=r"^cases 64 to 99 ended 4 workers, the last of them tcp://b:1, as when"):
-        list(workers.shared_out(asked, Chunks(100, 64, True), [64], "mark"))
+        list(asked().shared_out(Chunks(100, 64, True), [64], 1, workers.mapped))
 
 
-def test_that_nobody_works_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_cluster_may_shrink(monkeypatch: pytest.MonkeyPatch) -> None:
+    """More is given out then than would be given to those who are left."""
+    monkeypatch.setattr(scheduler, "_LOOK", 0.0)
+    sizes = iter([100])
+
+    class Done(Future):
+        def result(self, timeout: float) -> None:
+            self.fetched = True
+
+    def submit(*arguments: Any, **options: Any) -> Future:
+        future = Done(ValueError())
+        future.key = str(id(future))
+        return future
+
     client = Client(ValueError())
-    monkeypatch.setattr(client, "nthreads", dict)
-    told: list[str] = []
-    workers = Workers(client, "tcp://a:0", told.append)
-    assert workers._look() == workers._look() == scheduler._LEAST_AHEAD
-    assert told == ["tcp://a:0 has no worker; waiting for one."]
+    monkeypatch.setattr(client, "nthreads", lambda: {"tcp://a:1": next(sizes, 1)})
+    monkeypatch.setattr(client, "submit", submit)
+    mapped = Workers(client, "tcp://a:0", 30, pytest.fail).mapped
+    assert [block for block, _ in mapped(part_of, None, range(500), str)] == list(range(500))
+
+
+def test_a_scheduler_without_workers_is_given_up(run, tmp_path: Path) -> None:
+    """It was waited for without end."""
+    from distributed import LocalCluster
+
+    output, said = tmp_path / "t.csv", []
+    with LocalCluster(n_workers=0, processes=False, dashboard_address="127.0.0.1:0", protocol="tcp") as empty:
+        address = empty.scheduler_address
+        more = ("--scheduler", address, "--scheduler-timeout", "1")
+        began = time.monotonic()
+        for arguments in ((*ASKED, "-o", str(output)), ("check", MISSION, "--monte-carlo", "9"), ("verify", MISSION)):
+            found = run(*arguments, *more)
+            assert (found.exit_code, found.stdout) == (2, "")
+            said.append(found.stderr)
+        assert time.monotonic() - began < 30
+    assert set(said) == {
+        f"{address} has no worker; waiting 1 s for one.\n"
+        f"Error: --scheduler {address}: had no worker for 1 s; accepted: a scheduler that has one (dask worker "
+        f"{address} starts one), or a longer --scheduler-timeout\n"
+    }
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_worker_that_comes_in_time_does_the_work(expected: bytes, run, tmp_path: Path) -> None:
+    from distributed import LocalCluster
+
+    output = tmp_path / "t.csv"
+    with LocalCluster(n_workers=0, processes=False, dashboard_address="127.0.0.1:0", protocol="tcp") as empty:
+        later = threading.Timer(2, empty.scale, (1,))
+        later.start()
+        found = run(*ASKED, "-o", str(output), "--scheduler", empty.scheduler_address)
+        later.join()
+    assert found.exit_code == 0, found.stderr
+    assert found.stderr.startswith(f"{empty.scheduler_address} has no worker; waiting 30 s for one.\n")
+    assert output.read_bytes() == expected
+
+
+def test_workers_that_all_went_away_are_given_up(cluster: Cluster, tmp_path: Path, expected: bytes, run) -> None:
+    """What is done stays, and can be gone on with."""
+    output = tmp_path / "t.csv"
+    with command("-o", str(output), "--scheduler", cluster.address, "--scheduler-timeout", "2") as process:
+        wait_until(lambda: kept(output) >= 2)
+        for worker in cluster.workers:
+            worker.kill()
+        code, said = ended(process)
+    lost = len(cluster.workers)
+    cluster.workers.clear()
+    for _ in range(lost):
+        cluster.replace_worker()
+    done = kept(output)
+    assert code == 2
+    assert 2 <= done < PARTS
+    assert said.splitlines() == [
+        f"{cluster.address} has no worker; waiting 2 s for one.",
+        f"{output}.parts keeps {done} of {PARTS} parts; the same command with --resume goes on from there.",
+        f"Error: --scheduler {cluster.address}: had no worker for 2 s; accepted: a scheduler that has one (dask "
+        f"worker {cluster.address} starts one), or a longer --scheduler-timeout",
+    ]
+    assert run(*ASKED, "-o", str(output), "--resume", "--jobs", "1").exit_code == 0
+    assert output.read_bytes() == expected
+
+
+def test_images_are_formed_on_workers(cluster: Cluster, run) -> None:
+    asked = ("verify", MISSION, "--only", "receiver.velocity.?")
+    alone, shared = run(*asked, "--jobs", "1"), run(*asked, "--scheduler", cluster.address)
+    assert (shared.exit_code, shared.stderr) == (alone.exit_code, "")
+    assert shared.stdout == alone.stdout
+
+
+def test_which_row_failed_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    mapped = Workers(Client(ValueError("a matrix")), "tcp://a:0", 30, pytest.fail).mapped
+    with pytest.raises(RuntimeError, match=r"^timing.quadratic of .*Section V.*, on a worker: ValueError: a matrix$"):
+        verify_mission(load_mission(MISSION), "timing.quadratic", mapped=mapped)

@@ -9,7 +9,7 @@ import pytest
 
 from bisar_budget.design.cases import grid, words_of
 from bisar_budget.design.quantities import tree_of
-from bisar_budget.design.sweep import Asked, Question, part_of
+from bisar_budget.design.sweep import Asked, part_of
 from bisar_budget.faults import SetValue
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.named import named_by
@@ -39,15 +39,15 @@ def test_cases_are_checked_without_the_files(missions: Path, name: str, paths: i
         text = text.replace("sensor: [stim300,", "sensor: [own.yaml,")
         assert "own.yaml" in text
         (missions / f"{name}.yaml").write_text(text, encoding="utf-8")
-    mission, named = named_by(load_mission(str(missions / f"{name}.yaml")))
+    mission = load_mission(str(missions / f"{name}.yaml"))
+    named = named_by(mission)
     assert (len(named.paths), len({of for of, _, _ in named.parts})) == (paths, parts)
     assert bool(named.sha256) == bool(paths or parts)
     cases = grid(tree_of(mission), ["radar.bandwidth=50,100 MHz"])
-    asked = Asked(mission, cases, today=date(2026, 1, 1), named=named)
+    asked = Asked(mission, cases, today=date(2026, 1, 1))
     (here,) = asked.swept(asked.shared_out(asked.chunks(), [0], 1)).parts
     shutil.rmtree(missions)
-    # As another process has it: equal, but nothing that this one has read is kept for it.
-    there = part_of(Question(*asked.question[:-1], named._replace()), 0, 2, cases.values(0, 2))
+    there = part_of(asked.question._replace(named=named), (0, 2, cases.values(0, 2)))
     assert "error" not in here.values["status"]
     for column, values in here.values.items():
         np.testing.assert_array_equal(there.values[column], values)
@@ -62,19 +62,20 @@ def test_what_the_words_of_a_sweep_name_is_taken_along(missions: Path) -> None:
         tree_of(loaded), ["platforms.receiver.motion_error.sensor.0=one.yaml,other.yaml", "radar.bandwidth=50MHz"]
     )
     words = [SetValue(one.key, word) for one, several in words_of(cases) for word in several]
-    mission, named = named_by(loaded, [*words, SetValue("radar.bandwidth", "1 s")])
+    named = named_by(loaded, [*words, SetValue("radar.bandwidth", "1 s")])
     assert {"one.yaml", "other.yaml"} < {name for name, _, _ in named.parts}
-    asked = Asked(mission, cases, today=date(2026, 1, 1), named=named)
+    asked = Asked(loaded, cases, today=date(2026, 1, 1))
+    assert asked.travelling.named == named
     shutil.rmtree(missions)
-    there = part_of(Question(*asked.question[:-1], named._replace()), 0, 2, cases.values(0, 2))
+    there = part_of(asked.question._replace(named=named), (0, 2, cases.values(0, 2)))
     assert "error" not in there.values["status"]
     assert there.values["utilization"][0] == there.values["utilization"][1] > 0
 
 
 def test_the_hash_is_of_every_name_and_content(missions: Path) -> None:
     file = missions / "sentinel1_aircraft_log.yaml"
-    before = named_by(load_mission(str(file)))[1]
-    assert named_by(load_mission(str(file)))[1].sha256 == before.sha256
+    before = named_by(load_mission(str(file)))
+    assert named_by(load_mission(str(file))).sha256 == before.sha256
     log = next(missions.glob("paths/*.csv"))
     log.write_bytes(log.read_bytes() + b"\n")
-    assert named_by(load_mission(str(file)))[1].sha256 != before.sha256
+    assert named_by(load_mission(str(file))).sha256 != before.sha256
