@@ -10,8 +10,8 @@ from bisar_budget.effects.correlation import Correlated, correlated_errors
 from bisar_budget.effects.effect import ErrorSource
 from bisar_budget.effects.exact_ranges import ExactRanges
 from bisar_budget.effects.models import Declared, FullModel, PublishedModel
-from bisar_budget.effects.slow_vibration import OwnPhase, slow_phases
 from bisar_budget.effects.sources import error_sources
+from bisar_budget.effects.vibration import OwnPhase, slow_phases
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission, has_instruments
 

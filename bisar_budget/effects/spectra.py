@@ -8,6 +8,7 @@ between two of them: only the ends of a piece are integrated one by one.
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -94,11 +95,16 @@ def _of_power_law(slope: float, low: Floats, high: Floats) -> Floats:
     has_edge = last > first
     until = np.where(has_edge, _EDGES[np.minimum(first, _EDGES.size - 1)], high)
     start = np.where(has_edge, _EDGES[last - 1], high)
-    between = np.concatenate(
-        (np.zeros((3, 1)), np.cumsum(_power_panels(slope, _EDGES[:-1], _EDGES[1:]), axis=1)), axis=1
-    )
+    between = _between_edges(slope)
     whole = np.where(has_edge, between[:, last - 1] - between[:, np.minimum(first, _EDGES.size - 1)], 0.0)
     return whole + _at_an_end(slope, low, until) + _at_an_end(slope, start, high)
+
+
+@lru_cache(maxsize=256)
+def _between_edges(slope: float) -> Floats:
+    """Parts of x^(−slope) from the first edge to each, (3, edges)."""
+    panels = _power_panels(slope, _EDGES[:-1], _EDGES[1:])
+    return np.concatenate((np.zeros((3, 1)), np.cumsum(panels, axis=1)), axis=1)
 
 
 def _at_an_end(slope: float, low: Floats, high: Floats) -> Floats:
@@ -111,7 +117,8 @@ def _at_an_end(slope: float, low: Floats, high: Floats) -> Floats:
         (~is_slow & ~is_fast, _power_panels),
     ):
         chosen = some & (low < high)
-        found[:, chosen] = of_panel(slope, low[chosen], high[chosen])
+        if chosen.any():
+            found[:, chosen] = of_panel(slope, low[chosen], high[chosen])
     return found
 
 

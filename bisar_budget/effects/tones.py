@@ -29,7 +29,7 @@ def gauss_markov(aperture_time: Any, correlation_time: Any) -> Parts:
     ratio = np.asarray(aperture_time / (2 * correlation_time))
     (slow,) = evaluators.gauss_markov_parts_slow(np.minimum(ratio, SLOW))
     fast = np.maximum(ratio, SLOW)
-    (exact,) = evaluators.gauss_markov_parts(fast, np.exp(-2 * fast))  # type: ignore[arg-type]
+    (exact,) = evaluators.gauss_markov_parts(fast, np.exp(-2 * fast))
     return Parts(*(np.where(ratio < SLOW, *both)[()] for both in zip(slow, exact, strict=True)))
 
 
