@@ -137,6 +137,7 @@ class _Check:
         total = self.array(self.mission.requirements.quadratic_phase_error)
         self.allocation = allocate(self.mission, (), {})._replace(qpe=self.split)
         self.gain = self.array(self.allocation.autofocus_gain)
+        self.swaying = Vibrations(self.judging, self.mission, self.errors.geometries, self.allocation)
         self.total = total
         owners = (*PLATFORMS, "clock", "mission")
         self.limits = {owner: self.array(self.split.of(owner) * total) * self.gain for owner in owners}
@@ -269,8 +270,7 @@ class _Check:
         if not self._vibrates and not any(what.kind == "vibration" for what in self.errors.shown.values()):
             return []
         found: dict[str, Judged] = {}
-        vibrations = Vibrations(self.judging, self.mission, self.errors.geometries, self.allocation, gating)
-        for one in vibrations.rows():
+        for one in self.swaying.rows(gating):
             what = one.judged.subject
             found[what.id] = found.get(what.id, Judged.of_none(what, self.cases)).where(one.is_there, one.judged)
         return list(found.values())

@@ -6,6 +6,7 @@ Rows are judged in arrays over cases, of a sweep or of a check, which is one cas
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -76,14 +77,11 @@ class VibrationRow:
 
 
 class Vibrations:
-    """What vibrates in many cases, and how it is judged by a model, `published` or `full`.
+    """What vibrates in many cases; numbers of the mission, its geometry and its allocation may be arrays (cases,)."""
 
-    Numbers of the mission, its geometry and its allocation may be arrays (cases,).
-    """
-
-    def __init__(self, judging: Judging, mission: Mission, geometry: Any, allocation: Allocation, model: str) -> None:
+    def __init__(self, judging: Judging, mission: Mission, geometry: Any, allocation: Allocation) -> None:
         self.judging, self.mission, self.geometry = judging, mission, geometry
-        self.allocation, self.model, self.array = allocation, model, judging.array
+        self.allocation, self.array = allocation, judging.array
         self.metric, self.tones = tone_limits(mission, allocation)
         self.noise = vibration_limits(mission, allocation, "islr")
         self.to_phase = 2 * math.pi / mission.radar.wavelength
@@ -96,34 +94,34 @@ class Vibrations:
     def _columns(self, numbers: Sequence[Any]) -> Floats:
         return np.array([self.array(number) for number in numbers]).reshape(-1, self.judging.cases)
 
-    def rows(self) -> Iterator[VibrationRow]:
-        """Every row about vibration, declared or not, in the order of the contract.
+    def rows(self, model: str) -> Iterator[VibrationRow]:
+        """Every row about vibration by a model, `published` or `full`, declared or not, in the order of the contract.
 
         A line that is slow in some cases only has a row of each kind.
         """
         everywhere = np.ones(self.judging.cases, dtype=bool)
-        both = self._of_both_platforms()
         for name in PLATFORMS:
             for index in range(self.count[name]):
                 is_slow = self.cycles[name][index] < SLOWEST
                 if is_slow.any():
                     yield self._slow(name, index, is_slow)
                 if not is_slow.all():
-                    yield self._line(name, index, ~is_slow, both[name][index])
+                    yield self._line(model, name, index, ~is_slow)
             if not self.count[name]:
                 what = subject(name, "vibration", "sinusoidal", entry=0)
-                yield self._row(what, self.metric, None, self.tones.get(name), everywhere)
+                yield self._row(model, what, self.metric, None, self.tones.get(name), everywhere)
             elif self.metric == "pslr":
-                yield from self._near_each_other(name)
+                yield from self._near_each_other(model, name)
             wideband = getattr(self.mission.platforms, name).motion_error.vibration.wideband
             rms = None
             if wideband is not None:
                 rms = self.array(counted(self.mission, name, wideband.rms, "islr", self.geometry))
             what = subject(name, "vibration", "wideband")
-            yield self._row(what, "islr", rms, self.noise.get(name), everywhere)
+            yield self._row(model, what, "islr", rms, self.noise.get(name), everywhere)
 
     def _row(
         self,
+        model: str,
         what: Subject,
         metric: str,
         declared: Floats | None,
@@ -135,9 +133,9 @@ class Vibrations:
     ) -> VibrationRow:
         allowable, is_over_other = None, np.zeros(self.judging.cases, dtype=bool)
         if limits is not None:
-            allowable = self.array(limits.by(self.model))
+            allowable = self.array(limits.by(model))
             if declared is not None and not self.mission.has_direct_path:  # which the published model does not know
-                by_other = limits.full if self.model == "published" else limits.published
+                by_other = limits.full if model == "published" else limits.published
                 is_over_other = declared > by_other * BOUND
         judged = self.judging.row(what, declared, allowable, doubt=doubt | is_over_other, is_info=limits is None)
         judged = judged._replace(cubic_rad=self.array(others.get("cubic", math.nan)))
@@ -148,9 +146,10 @@ class Vibrations:
         phase, cycles = self.to_phase * self.amplitudes[name][index], self.cycles[name][index]
         return np.asarray(phase * np.abs(tone(math.pi * cycles)[:2]))
 
-    def _line(self, name: str, index: int, is_there: Truths, both: Floats) -> VibrationRow:
+    def _line(self, model: str, name: str, index: int, is_there: Truths) -> VibrationRow:
         """A vibration from one cycle per aperture on: as its echoes, or, where ISLR holds it, the power they take."""
-        cycles, allowed = self.cycles[name][index], self.mission.requirements.cubic_phase_error
+        cycles, both = self.cycles[name][index], self._both[name][index]
+        allowed = self.mission.requirements.cubic_phase_error
         is_near = cycles < ECHO_CYCLES
         qpe = cubic = np.full(cycles.shape, math.nan)
         if is_near.any():
@@ -162,6 +161,7 @@ class Vibrations:
         required = self.mission.requirements.pslr
         is_over_both = np.zeros(is_there.shape, dtype=bool) if required is None else level > required + _ROUNDING_DB
         return self._row(
+            model,
             subject(name, "vibration", "sinusoidal", entry=index),
             self.metric,
             self.amplitudes[name][index],
@@ -207,16 +207,20 @@ class Vibrations:
             without_autofocus=without_autofocus,
         )
 
-    def _near_each_other(self, name: str) -> Iterator[VibrationRow]:
+    def _near_each_other(self, model: str, name: str) -> Iterator[VibrationRow]:
         """Lines so near each other that their echoes add: each time the one line that has an echo as high."""
-        groups = near_groups(self.cycles[name])
-        for index in range(groups.max() + 1):
-            members = groups == index
+        for index, (members, amplitude) in enumerate(self._near[name]):
             what = subject(name, "vibration", "sinusoidal.sum", entry=index)
-            amplitude = _together(self.amplitudes[name], self.cycles[name], members)
-            yield self._row(what, "pslr", amplitude, self.tones.get(name), members.any(axis=0), members=members)
+            is_there = np.asarray(members.any(axis=0))
+            yield self._row(model, what, "pslr", amplitude, self.tones.get(name), is_there, members=members)
 
-    def _of_both_platforms(self) -> dict[str, Floats]:
+    @cached_property
+    def _near(self) -> dict[str, list[tuple[Truths, Floats]]]:
+        """Lines near each other of each platform, and the amplitude of one line with an echo as high. [m]"""
+        return {name: list(_together(self.amplitudes[name], self.cycles[name])) for name in PLATFORMS}
+
+    @cached_property
+    def _both(self) -> dict[str, Floats]:
         """Peak phase that each line has together with near ones of the other platform. [rad]
 
         Their echoes add in the worst phases; NaN where there are none, or no amplitude, or nothing is required.
@@ -227,21 +231,20 @@ class Vibrations:
         )
         found = np.full(cycles.shape, math.nan)
         if self.mission.requirements.pslr is not None and all(self.count.values()):
-            groups = near_groups(cycles)
-            for index in range(groups.max() + 1):
-                members = groups == index
-                members &= members[:ours].any(axis=0) & members[ours:].any(axis=0)
-                phase = self.to_phase * _together(amplitudes, cycles, members)
-                found = np.where(members & (phase > 0), phase, found)
+            for members, amplitude in _together(amplitudes, cycles):
+                is_of_both = members[:ours].any(axis=0) & members[ours:].any(axis=0)
+                found = np.where(members & is_of_both & (amplitude > 0), self.to_phase * amplitude, found)
         return {PLATFORMS[0]: found[:ours], PLATFORMS[1]: found[ours:]}
 
 
-def _together(amplitudes: Floats, cycles: Floats, members: Truths) -> Floats:
-    """Amplitude of one line with an echo as high as the members have together; 0 where a case has none. [m]"""
-    found, some = np.zeros(members.shape[1]), np.flatnonzero(members.any(axis=0))
-    if some.size:
+def _together(amplitudes: Floats, cycles: Floats) -> Iterator[tuple[Truths, Floats]]:
+    """Lines near each other, and the amplitude of one line with an echo as high; 0 where a case has none. [m]"""
+    groups = near_groups(cycles)
+    for index in range(groups.max(initial=-1) + 1):
+        members = groups == index
+        found, some = np.zeros(members.shape[1]), np.flatnonzero(members.any(axis=0))
         found[some] = worst_phases(amplitudes[:, some], cycles[:, some], members[:, some]).amplitude
-    return found
+        yield members, found
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -298,7 +301,7 @@ def judged_pslr(judging: Judging, found: Sequence[Tone], required: Any) -> tuple
 def vibration_rows(mission: Mission, allocation: Allocation, model: str) -> Iterator[Row]:
     """Every row about vibration of one mission, by one of the two models."""
     judging = Judging(1, mission.allocation.warn_above)
-    for one in Vibrations(judging, mission, mission.geometry, allocation, model).rows():
+    for one in Vibrations(judging, mission, mission.geometry, allocation).rows(model):
         what = one.judged.subject
         error: MotionError = getattr(mission.platforms, what.owner).motion_error
         if one.is_slow:

@@ -91,10 +91,12 @@ def worst_phases(amplitudes: Any, cycles: Any, is_member: Truths | None = None) 
     sizes, places = sizes[order, here], places[order, here]
     if is_member is not None:  # where a case has fewer, lines without an amplitude beside the last
         is_one = np.isfinite(places)
-        sizes, places = (
-            np.where(is_one, sizes, 0.0),
-            np.where(is_one, places, np.where(is_one, places, 0.0).max(axis=0)),
-        )
+        sizes = np.where(is_one, sizes, 0.0)
+        places = np.where(is_one, places, np.where(is_one, places, 0.0).max(axis=0))
+    begins = np.flatnonzero(np.append(True, (places[1:] != places[:-1]).any(axis=1)))
+    sizes, places = np.add.reduceat(sizes, begins, axis=0), places[begins]  # lines of one frequency are one
+    if len(places) == 1:
+        return Worst(sizes[0].reshape(shape)[()], places[0].reshape(shape)[()])
     starts = np.sort(np.concatenate((places, (places[1:] + places[:-1]) / 2)), axis=0)
     starts = starts[np.append(True, (starts[1:] != starts[:-1]).any(axis=1))]
     if len(starts) > _SEARCHED:
