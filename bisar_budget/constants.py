@@ -6,7 +6,6 @@ STANDARD_GRAVITY = 9.80665  # m/s², exact (CGPM 1901); data sheets state accele
 # A utilization this far above 1 still passes: an error set exactly at its limit is at the limit,
 # whatever the last bit of a division says.
 UTILIZATION_TOLERANCE = 1e-9
-ALIKE = 1e-9  # of a utilization: errors along x and along y may bind alike, but for rounding
 
 # Components below this fraction of a vector's length are rounding (cos 90° is 6e-17), not geometry.
 ROUNDING = 1e-12

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.constants import ALIKE, UTILIZATION_TOLERANCE
+from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.findings.status import RANK, STATUS
 from bisar_budget.mission.model import Mission
@@ -178,8 +178,7 @@ def requirement_states(
         else:  # autofocus corrects a quadratic phase alone
             levels = np.where(levels == RANK["pass_with_autofocus"], RANK["pass"], levels)
         worst = levels.min(axis=0)
-        of_worst = np.where(levels == worst, used, -1.0)
-        decider = (of_worst >= of_worst.max(axis=0) * (1 - ALIKE)).argmax(axis=0)  # of rows alike the first
+        decider = np.where(levels == worst, used, -1.0).argmax(axis=0)
         utilization = np.take_along_axis(used, decider[None], axis=0)[0]
         is_unjudged = ~mine.any(axis=0)
         decider = np.where(is_unjudged, -1, decider)

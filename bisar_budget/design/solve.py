@@ -14,12 +14,11 @@ from itertools import pairwise
 import numpy as np
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.constants import ALIKE
 from bisar_budget.design.quantities import FACTOR, Number, QuestionError, Range, number_of, range_of, tree_of
 from bisar_budget.design.scaled import scaled
 from bisar_budget.design.solution import Crossing, Solution, State
 from bisar_budget.design.sweep import GEOMETRY, REASON, VERDICT, Engine, Progress, Question, unseen
-from bisar_budget.design.variation import Variation, breaking, hold_to_decisions, standing
+from bisar_budget.design.variation import ALIKE, Variation, breaking, hold_to_decisions, standing
 from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.mission.model import Mission

@@ -23,11 +23,11 @@ from bisar_budget.arrays.judged import check_arrays, statuses
 from bisar_budget.arrays.varied import varied
 from bisar_budget.budget.check import check_mission
 from bisar_budget.budget.judged_rows import REQUIREMENTS, Judged
-from bisar_budget.constants import ALIKE, SPEED_OF_LIGHT
+from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.design.cases import Cases, words_of
 from bisar_budget.design.quantities import Choices, Number, QuestionError, number_of, tree_of
 from bisar_budget.design.swept import Column, Part, Swept, Values
-from bisar_budget.design.variation import Variation, breaking, standing
+from bisar_budget.design.variation import ALIKE, Variation, breaking, standing
 from bisar_budget.faults import Fault, MissionError, SetValue, fault_words, shown
 from bisar_budget.findings.row import Row, unknown_id
 from bisar_budget.findings.status import RANK, STATUS

@@ -3,7 +3,6 @@
 from collections.abc import Container, Mapping, Sequence
 from typing import NamedTuple
 
-from bisar_budget.constants import ALIKE
 from bisar_budget.design.quantities import Number, QuestionError
 from bisar_budget.faults import SetValue
 from bisar_budget.findings.mission import MissionFindings
@@ -13,6 +12,8 @@ from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.named import Named
+
+ALIKE = 1e-9  # of a utilization: a common error along x and along y may bind alike, but for rounding
 
 
 class Variation:
