@@ -262,12 +262,9 @@ def judged_spurs(judging: Judging, mission: Mission, allocation: Allocation, mod
     metric, by_platform = tone_limits(mission, allocation)
     for spur in spurs_of(mission):
         what, phase = subject(spur.name, "oscillator", "spur", entry=spur.entry), judging.array(spur.phase)
-        limits = by_platform.get(spur.name)
+        limits, is_over_other = by_platform.get(spur.name), np.zeros(judging.cases, dtype=bool)
         if limits is None:
-            judged, is_over_other = (
-                judging.row(what, phase / 2, None, is_info=True),
-                np.zeros(phase.shape, dtype=bool),
-            )
+            judged = judging.row(what, phase / 2, None, is_info=True)
         else:
             limits = VibrationLimits(*(2 * math.pi / mission.radar.wavelength * limit for limit in limits))
             is_over_other = phase > (limits.full if model == "published" else limits.published) * BOUND

@@ -414,20 +414,16 @@ _OF_LINES = [
 def test_lines_that_are_near_each_other_in_some_cases(axes, requirements, model) -> None:
     """All that vibrates is in the arrays: no case is checked by itself."""
     changes = {**_LINES, "allocation.model": model, "platforms.receiver.oscillator": MASK}
-    text = mission_text()
     for one in filter(None, requirements.split(", ")):
         key, value = one.split(": ")
         changes[f"requirements.{key}"] = value
-    mission = parse_mission(text, "m.yaml", changes=[SetValue(*one) for one in changes.items()])
+    mission = parse_mission(mission_text(), "m.yaml", changes=[SetValue(*one) for one in changes.items()])
+    rows = {one.id for one in check_mission(mission, DAY).rows}  # a sweep knows the names of these
+    columns = [one for one in _OF_LINES if one.rpartition(".")[0] in rows]
     cases = grid(mission, **axes)
-    whole, by_case = swept(mission, cases, [one for one in _OF_LINES if _has(mission, one)])
+    whole, by_case = swept(mission, cases, columns)
     assert by_case == 0
-    assert_as_checked(mission, cases, whole, [one for one in _OF_LINES if one in whole])
-
-
-def _has(mission, column) -> bool:
-    """Whether a mission has a row, of which a sweep knows the name."""
-    return column.rpartition(".")[0] in {one.id for one in check_mission(mission, DAY).rows}
+    assert_as_checked(mission, cases, whole, columns)
 
 
 @pytest.mark.parametrize(
