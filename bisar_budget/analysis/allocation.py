@@ -4,8 +4,6 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
 from bisar_budget import evaluators
 from bisar_budget.effects.correlation import combined_phase, correlated_errors
 from bisar_budget.effects.effect import ErrorSource
@@ -57,7 +55,10 @@ class Allocation(NamedTuple):
     @property
     def autofocus_gain(self) -> Any:
         """Factor on QPE limits: π·N_pull over the total, never below 1 (Section VI; 4·N_pull for π/4)."""
-        return 1.0 if self.n_pull is None else np.maximum(1.0, evaluators.autofocus_gain(self.n_pull, self.qpe_total))
+        if self.n_pull is None:
+            return 1.0
+        gain = evaluators.autofocus_gain(self.n_pull, self.qpe_total)
+        return gain * (gain > 1) + 1.0 * (gain <= 1)  # the larger one, of arrays too
 
     def qpe_limit(self, owner: str) -> float:
         """QPE that an owner may use, before autofocus. [rad]"""

@@ -67,7 +67,10 @@ class Analysis:
     @cached_property
     def slow(self) -> list[OwnPhase]:
         """Phases of the declared vibrations below one cycle per aperture."""
-        return slow_phases(self.mission)
+        return [
+            one._replace(qpe_rad=float(one.qpe_rad), cubic_rad=float(one.cubic_rad), moves=float(one.moves))
+            for one in slow_phases(self.mission)
+        ]
 
     def own_phases(self, model: str) -> list[OwnPhase]:
         """Phases of what has no displacement of its own: slow vibrations, declared errors of sensors and clocks."""

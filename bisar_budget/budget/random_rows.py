@@ -43,7 +43,8 @@ class Limits(NamedTuple):
 def limits_for(mission: Mission, allocation: Allocation, owner: str, model: str, gain: float = 1.0) -> Limits:
     """What the errors of an owner are held to by a model; `gain` is that of autofocus."""
     spread = spread_limit(mission, allocation, owner, model)
-    return Limits(allocation.qpe_limit(owner) * gain, mission.requirements.cubic_phase_error, spread)
+    held = None if spread is None else float(spread)
+    return Limits(allocation.qpe_limit(owner) * gain, mission.requirements.cubic_phase_error, held)
 
 
 def sizes_at(effect: RandomEffect, limits: Limits) -> dict[str, float]:

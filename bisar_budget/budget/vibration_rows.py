@@ -298,7 +298,9 @@ def judged_pslr(judging: Judging, found: Sequence[Tone], required: Any) -> tuple
 def vibration_rows(mission: Mission, allocation: Allocation, model: str) -> Iterator[Row]:
     """Every row about vibration of one mission, by one of the two models."""
     judging = Judging(1, mission.allocation.warn_above)
-    for one in Vibrations(judging, mission, mission.geometry, allocation).rows(model):
+    with np.errstate(all="ignore"):
+        rows = list(Vibrations(judging, mission, mission.geometry, allocation).rows(model))
+    for one in rows:
         what = one.judged.subject
         error: MotionError = getattr(mission.platforms, what.owner).motion_error
         if one.is_slow:
@@ -426,7 +428,9 @@ def _slow_row(mission: Mission, allocation: Allocation, one: VibrationRow, error
 def spur_rows(mission: Mission, allocation: Allocation, model: str) -> Iterator[Row]:
     """Rows of the oscillators' tones of one mission. [dB of an echo to the response]"""
     other = "full" if model == "published" else "published"
-    for one in judged_spurs(Judging(1, mission.allocation.warn_above), mission, allocation, model):
+    with np.errstate(all="ignore"):
+        rows = list(judged_spurs(Judging(1, mission.allocation.warn_above), mission, allocation, model))
+    for one in rows:
         spur, limits, doubt = one.spur, one.limits, NOTHING
         oscillator: Oscillator = getattr(mission.platforms, spur.name).oscillator
         cycles, phase = spur.frequency * mission.collection.aperture_time, float(spur.phase)
