@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from bisar_budget import evaluators
 from bisar_budget.effects.correlation import combined_phase, correlated_errors
@@ -10,7 +10,7 @@ from bisar_budget.effects.effect import ErrorSource
 from bisar_budget.mission.model import MetricSplits, Mission, Shares
 
 if TYPE_CHECKING:
-    from bisar_budget.effects.slow_vibration import OwnPhase
+    from bisar_budget.effects.vibration import OwnPhase
 
 BALANCED_RANGE = (0.05, 0.95)  # neither platform is left without a budget
 
@@ -53,9 +53,12 @@ class Allocation(NamedTuple):
     n_pull_stated: float | None
 
     @property
-    def autofocus_gain(self) -> float:
+    def autofocus_gain(self) -> Any:
         """Factor on QPE limits: π·N_pull over the total, never below 1 (Section VI; 4·N_pull for π/4)."""
-        return 1.0 if self.n_pull is None else max(1.0, evaluators.autofocus_gain(self.n_pull, self.qpe_total))
+        if self.n_pull is None:
+            return 1.0
+        gain = evaluators.autofocus_gain(self.n_pull, self.qpe_total)
+        return gain * (gain > 1) + 1.0 * (gain <= 1)  # the larger one, of arrays too
 
     def qpe_limit(self, owner: str) -> float:
         """QPE that an owner may use, before autofocus. [rad]"""

@@ -10,8 +10,8 @@ from bisar_budget.effects.correlation import Correlated, correlated_errors
 from bisar_budget.effects.effect import ErrorSource
 from bisar_budget.effects.exact_ranges import ExactRanges
 from bisar_budget.effects.models import Declared, FullModel, PublishedModel
-from bisar_budget.effects.slow_vibration import OwnPhase, slow_phases
 from bisar_budget.effects.sources import error_sources
+from bisar_budget.effects.vibration import OwnPhase, slow_phases
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission, has_instruments
 
@@ -67,7 +67,10 @@ class Analysis:
     @cached_property
     def slow(self) -> list[OwnPhase]:
         """Phases of the declared vibrations below one cycle per aperture."""
-        return slow_phases(self.mission)
+        return [
+            one._replace(qpe_rad=float(one.qpe_rad), cubic_rad=float(one.cubic_rad), moves=float(one.moves))
+            for one in slow_phases(self.mission)
+        ]
 
     def own_phases(self, model: str) -> list[OwnPhase]:
         """Phases of what has no displacement of its own: slow vibrations, declared errors of sensors and clocks."""

@@ -12,6 +12,8 @@ response a share E lies within the first nulls, which an image counts as its mai
 import math
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.together import Together
@@ -21,7 +23,7 @@ from bisar_budget.effects.echoes import SLOWEST
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.models import CUBIC
 from bisar_budget.effects.subject import Subject, subject
-from bisar_budget.effects.vibration_lines import counted, lines_of
+from bisar_budget.effects.vibration import counted, lines_of
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
 
 CUBIC_POWER = 4 / 175  # of a cubic phase φ₃ at the edge: its Legendre part 2/5·φ₃, whose mean square is (4/25)/7·φ₃²
@@ -33,8 +35,9 @@ class Tone(NamedTuple):
     """A vibration, or a spur of an oscillator: peak phase [rad] and cycles per aperture."""
 
     subject: Subject
-    phase: float
-    cycles: float
+    phase: Any
+    cycles: Any
+    is_there: Any = True  # in which cases a vibration is fast enough
 
 
 class SpreadPhase(NamedTuple):
@@ -42,7 +45,7 @@ class SpreadPhase(NamedTuple):
 
     row_id: str
     owner: str
-    variance: float
+    variance: Any
 
 
 def mainlobe_energy(mission: Mission) -> float:
@@ -50,7 +53,7 @@ def mainlobe_energy(mission: Mission) -> float:
     return MAINLOBE_ENERGY[(mission.simulation or Simulation()).window]
 
 
-def spread_phase(ratio: Any, model: str, energy: float, xp: Any = math) -> Any:
+def spread_phase(ratio: Any, model: str, energy: float) -> Any:
     """Rms phase of noise that adds an ISLR, inverse of `islr_db`. [rad]
 
     Parameters
@@ -61,21 +64,19 @@ def spread_phase(ratio: Any, model: str, energy: float, xp: Any = math) -> Any:
         `published` for the paper's rule; any other is what an image shows.
     energy : float
         Share E, see `mainlobe_energy`.
-    xp : module
-        `math` for floats, `numpy` for arrays.
     """
-    return xp.sqrt(ratio if model == "published" else xp.log1p(ratio * energy))
+    return np.sqrt(ratio if model == "published" else np.log1p(ratio * energy))
 
 
-def islr_db(variance: Any, model: str, energy: float, xp: Any = math) -> Any:
+def islr_db(variance: Any, model: str, energy: float) -> Any:
     """ISLR that noise of a phase variance [rad²], above 0, adds: σ² by the paper's rule, else as an image shows. [dB]
 
     Parameters are those of `spread_phase`.
     """
     if model == "published":
-        return 10 * xp.log10(variance)
+        return 10 * np.log10(variance)
     # Of (exp(σ²) - 1)/E, without exp(σ²), which overflows.
-    return 10 / math.log(10) * (variance + xp.log(-xp.expm1(-variance)) - math.log(energy))
+    return 10 / math.log(10) * (variance + np.log(-np.expm1(-variance)) - math.log(energy))
 
 
 def shown_islr_db(mission: Mission, variance: float) -> float | None:
@@ -83,23 +84,28 @@ def shown_islr_db(mission: Mission, variance: float) -> float | None:
     return islr_db(variance, "full", mainlobe_energy(mission)) if variance else None
 
 
-def spread_limit(mission: Mission, allocation: Allocation, owner: str, model: str) -> float | None:
+def spread_limit(mission: Mission, allocation: Allocation, owner: str, model: str) -> Any:
     """Rms phase that an owner may spread, by the paper's rule or as an image shows it. [rad]"""
     if mission.requirements.islr is None:
         return None
-    whole: float = spread_phase(10 ** (mission.requirements.islr / 10), model, mainlobe_energy(mission))
-    return whole * math.sqrt(allocation.islr.of(owner))
+    whole = spread_phase(10 ** (np.asarray(mission.requirements.islr) / 10), model, mainlobe_energy(mission))
+    return whole * np.sqrt(allocation.islr.of(owner))
 
 
-def tones(mission: Mission) -> list[Tone]:
-    """List what makes paired echoes: declared vibrations from one cycle per aperture on, and spurs."""
+def tones(mission: Mission, geometry: Any = None) -> list[Tone]:
+    """List what makes paired echoes: declared vibrations from one cycle per aperture on, and spurs.
+
+    `geometry` is that of many cases, where numbers of the mission are arrays.
+    """
     T, found = mission.collection.aperture_time, []
     for name in PLATFORMS:
-        for index, line in enumerate(lines_of(mission, name)):
-            if line.frequency * T >= SLOWEST:
+        for index, line in enumerate(lines_of(mission, name, geometry)):
+            cycles = line.frequency * T
+            is_there = np.asarray(cycles >= SLOWEST)[()]
+            if np.any(is_there):
                 phase = 2 * math.pi * line.amplitude / mission.radar.wavelength
                 what = subject(name, "vibration", "sinusoidal", entry=index)
-                found.append(Tone(what, phase, line.frequency * T))
+                found.append(Tone(what, phase, cycles, is_there))
     if has_instruments(mission):
         for spur in spurs_of(mission):
             what = subject(spur.name, "oscillator", "spur", entry=spur.entry)
@@ -107,15 +113,21 @@ def tones(mission: Mission) -> list[Tone]:
     return found
 
 
-def noise(analysis: Analysis, model: str) -> list[SpreadPhase]:
-    """List what spreads beyond the cubic: wideband vibration, noise of sensors, phase noise, links."""
-    mission, found = analysis.mission, []
+def wideband_noise(mission: Mission, geometry: Any = None) -> list[SpreadPhase]:
+    """List what wideband vibration spreads."""
+    found = []
     for name in PLATFORMS:
         wideband = getattr(mission.platforms, name).motion_error.vibration.wideband
         if wideband is not None:
-            rms = counted(mission, name, wideband.rms, "islr")
+            rms = counted(mission, name, wideband.rms, "islr", geometry)
             variance = (2 * math.pi * rms / mission.radar.wavelength) ** 2
             found.append(SpreadPhase(subject(name, "vibration", "wideband").id, name, variance))
+    return found
+
+
+def noise(analysis: Analysis, model: str) -> list[SpreadPhase]:
+    """List what spreads beyond the cubic: wideband vibration, noise of sensors, phase noise, links."""
+    found = wideband_noise(analysis.mission)
     for one in analysis.random:
         if one.declared is not None and (one.subject.kind != "imu" or one.subject.axis in NOISE):
             found.append(SpreadPhase(one.id, one.owner, (one.effect(model).spread * one.declared) ** 2))

@@ -17,15 +17,17 @@ make none, see `slow_vibration`.
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from bisar_budget import evaluators
 from bisar_budget.analysis.allocation import Allocation, Split
 from bisar_budget.analysis.spread import Tone, mainlobe_energy, spread_phase
-from bisar_budget.effects.echoes import near_lines, worst_phases
+from bisar_budget.effects.echoes import near_groups, worst_phases
 from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.effects.models import CUBIC, QUADRATIC
-from bisar_budget.effects.slow_vibration import cubic_part, quadratic_part
+from bisar_budget.effects.vibration import cubic_part, quadratic_part
 from bisar_budget.mission.model import Mission
 
 LARGEST_ECHO = 2.0  # rad; beyond, echoes are above the response
@@ -34,32 +36,32 @@ LARGEST_ECHO = 2.0  # rad; beyond, echoes are above the response
 class VibrationLimits(NamedTuple):
     """What one platform may have, by the paper's rule and from first principles, 0 to peak or rms. [m]"""
 
-    published: float
-    full: float
+    published: Any
+    full: Any
 
-    def by(self, model: str) -> float:
+    def by(self, model: str) -> Any:
         """The limit that gates."""
-        return min(self) if model == "strictest" else self.full if model == "full" else self.published
+        return np.minimum(*self) if model == "strictest" else self.full if model == "full" else self.published
 
     @property
-    def margin_db(self) -> float:
+    def margin_db(self) -> Any:
         """How far the published rule stays inside first principles. [dB]"""
-        return 20 * math.log10(self.full / self.published)
+        return 20 * np.log10(self.full / self.published)
 
 
-def echo_level(phase: float) -> float:
+def echo_level(phase: Any) -> Any:
     """Amplitude of a paired echo over that of the response, J₁(φ)/J₀(φ), of a sinusoid of peak φ up to 2 rad."""
     j0, j1 = bessel(phase)
     return j1 / j0
 
 
-def bessel(phase: float) -> tuple[float, float]:
+def bessel(phase: Any) -> tuple[Any, Any]:
     """J₀(φ) and J₁(φ) of a phase φ up to 2 rad."""
     square, term, j0, j1 = -((phase / 2) ** 2), 1.0, 0.0, 0.0
     for k in range(1, 13):  # the series of both; the last terms are rounding
-        j0 += term
-        j1 += term / k
-        term *= square / (k * k)
+        j0 = j0 + term
+        j1 = j1 + term / k
+        term = term * square / (k * k)
     return j0, phase / 2 * j1
 
 
@@ -67,34 +69,59 @@ class Echo(NamedTuple):
     """Paired echo of a tone, or of tones near each other in the worst of their phases.
 
     One tone of the peak phase `phase` [rad] has an echo as high; `cycles` is its place, in cells from the response,
-    `level` its amplitude over that of the response.
+    `level` its amplitude over that of the response; `is_of` says which tones make it, (tones, ...).
     """
 
-    tones: tuple[Tone, ...]
-    phase: float
-    cycles: float
-    level: float
+    phase: Any
+    cycles: Any
+    level: Any
+    is_of: NDArray[np.bool_]
 
 
-def highest_echo(tones: Sequence[Tone]) -> Echo | None:
-    """Highest echo of all tones, each alone and those near each other together; None without any."""
-    groups = (*((index,) for index in range(len(tones))), *near_lines([one.cycles for one in tones]))
-    return max(
-        (_echo([tones[index] for index in group]) for group in groups), key=lambda one: one.level, default=None
+def level_of(phase: Any) -> Any:
+    """Amplitude of a paired echo over that of the response; half the phase beyond 2 rad."""
+    return np.where(phase <= LARGEST_ECHO, echo_level(np.minimum(phase, LARGEST_ECHO)), phase / 2)[()]
+
+
+def highest_echo(tones: Sequence[Tone], shape: tuple[int, ...] = ()) -> Echo | None:
+    """Highest echo of all tones, each alone and those near each other together; None without any.
+
+    `shape` is that of numbers of many cases, (cases,); where a case has no tone the level is 0.
+    """
+    if not tones:
+        return None
+    count = len(tones)
+    phases, cycles, is_there = (
+        np.array([np.broadcast_to(column, shape) for column in columns]).reshape(count, -1)
+        for columns in zip(*(one[1:] for one in tones), strict=True)
     )
+    phases = np.where(is_there, phases, 0.0)
+    number = near_groups(np.where(is_there, cycles, 0.0))
+    here = np.arange(phases.shape[1])
+    levels = level_of(phases)
+    largest = levels.argmax(axis=0)
+    phase, place, level = (column[largest, here] for column in (phases, cycles, levels))
+    is_of = np.arange(count)[:, None] == largest
+    for group in range(number.max() + 1):
+        members = number == group
+        some = np.flatnonzero(members.any(axis=0))
+        worst = worst_phases(phases[:, some], cycles[:, some], members[:, some])
+        height = level_of(worst.amplitude)
+        is_higher = height > level[some]
+        some = some[is_higher]
+        phase[some], place[some], level[some] = (one[is_higher] for one in (*worst, height))
+        is_of[:, some] = members[:, some]
+    phase, place, level = (one.reshape(shape)[()] for one in (phase, place, level))
+    return Echo(phase, place, level, is_of.reshape(count, *shape))
 
 
-def _echo(near: Sequence[Tone]) -> Echo:
-    phase, cycles = worst_phases([one.phase for one in near], [one.cycles for one in near])
-    return Echo(tuple(near), phase, cycles, echo_level(phase) if phase <= LARGEST_ECHO else phase / 2)
-
-
-def echo_phase(level: float) -> float:
+def echo_phase(level: Any) -> Any:
     """Peak phase of a sinusoid whose echoes have an amplitude of up to 1 times the response's. [rad]"""
-    phase = min(2 * level, 1.5)  # J₁/J₀ is above φ/2, convex, and 1 at 1.43: from here Newton's steps go down to it
+    # J₁/J₀ is above φ/2, convex, and 1 at 1.43: from here Newton's steps go down to it.
+    phase = np.minimum(2 * level, 1.5)
     for _ in range(8):
         reached = echo_level(phase)
-        phase -= (reached - level) / (1 - reached / phase + reached**2)
+        phase = phase - (reached - level) / (1 - reached / phase + reached**2)
     return phase
 
 
@@ -103,12 +130,12 @@ def vibration_limits(mission: Mission, allocation: Allocation, metric: str) -> d
     requirement_db = mission.requirements.pslr if metric == "pslr" else mission.requirements.islr
     if requirement_db is None:
         return {}
-    power = 10 ** (requirement_db / 10)  # -30 dB is 10⁻³: PSLR and ISLR are power ratios
+    power: Any = 10 ** (requirement_db / 10)  # -30 dB is 10⁻³: PSLR and ISLR are power ratios
     split = allocation.pslr if metric == "pslr" else allocation.islr
     wavelength = mission.radar.wavelength
 
     if metric == "pslr":
-        all_of_it, part = echo_phase(math.sqrt(power * (split.transmitter + split.receiver))), amplitude_share
+        all_of_it, part = echo_phase(np.sqrt(power * (split.transmitter + split.receiver))), amplitude_share
     else:
         all_of_it, part = spread_phase(power, "full", mainlobe_energy(mission)), power_share
     found = {}
@@ -133,35 +160,35 @@ def tone_limits(mission: Mission, allocation: Allocation) -> tuple[str, dict[str
     return "islr", {name: VibrationLimits(root * one.published, root * one.full) for name, one in rms.items()}
 
 
-def amplitude_share(split: Split, name: str) -> float:
+def amplitude_share(split: Split, name: str) -> Any:
     """Part of a platform in the amplitude of both: they sum to 1, in the ratio of the roots of power."""
     own, other = split.of(name), split.of(next(one for one in PLATFORMS if one != name))
     return evaluators.amplitude_share(own, other)
 
 
-def power_share(split: Split, name: str) -> float:
+def power_share(split: Split, name: str) -> Any:
     """Part of a platform in the rms phase: their squares are the shares of power."""
-    return math.sqrt(split.of(name))
+    return np.sqrt(split.of(name))
 
 
 class SlowLimits(NamedTuple):
     """Amplitudes at which a slow vibration reaches a platform's quadratic and the required cubic phase. [m]"""
 
-    quadratic: float
-    cubic: float | None
+    quadratic: Any
+    cubic: Any | None
 
     @property
-    def smallest(self) -> float:
+    def smallest(self) -> Any:
         """The one that gates."""
-        return self.quadratic if self.cubic is None else min(self.quadratic, self.cubic)
+        return self.quadratic if self.cubic is None else np.minimum(self.quadratic, self.cubic)
 
     @property
-    def binding(self) -> str:
-        """The requirement that sets it."""
-        return CUBIC if self.smallest < self.quadratic else QUADRATIC
+    def is_cubic(self) -> Any:
+        """Whether the cubic phase sets it."""
+        return self.smallest < self.quadratic
 
 
-def slow_limits(mission: Mission, allocation: Allocation, name: str, cycles: float) -> SlowLimits:
+def slow_limits(mission: Mission, allocation: Allocation, name: str, cycles: Any) -> SlowLimits:
     """Largest amplitude of a vibration below one cycle per aperture, in its worst phase.
 
     The quadratic phase is held to the platform's share, autofocus gain included; the cubic phase, where it is

@@ -10,20 +10,19 @@ from numpy.typing import NDArray
 from bisar_budget.analysis.allocation import Split, effective_n_pull
 from bisar_budget.arrays.collections import Floats
 from bisar_budget.arrays.declared import DeclaredErrors
-from bisar_budget.arrays.judgement import BOUND, CODE, Judging
-from bisar_budget.arrays.rows import Judged
 from bisar_budget.arrays.together import (
-    ManyOwnPhases,
     Phases,
     combined_displacement,
     combined_phase,
     largest_signed_sum,
     many_correlated,
 )
+from bisar_budget.budget.judged_rows import BOUND, CODE, Judged, Judging
 from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.subject import Subject, subject
+from bisar_budget.effects.vibration import OwnPhase
 
-Own = Sequence[ManyOwnPhases]
+Own = Sequence[OwnPhase]
 
 
 class Owed(NamedTuple):
@@ -46,12 +45,12 @@ class ManyTogether:
         members = [error for error in self.errors.stated if is_owed(error.subject.owner, owner, self.split)]
         own = [one for one in self.own if is_owed(one.owner, owner, self.split)]
         found = [(error.subject.id, self.errors.does(self.model, error).qpe) for error in members]
-        return self._with(found, own, [(one.row_id, one.qpe) for one in own])
+        return self._with(found, own, [(one.row_id, one.qpe_rad) for one in own])
 
     def all_cubics(self) -> Owed:
         """Cubic phases of motion, the clock, slow vibrations and sensors."""
         found = [(error.subject.id, self.errors.does(self.model, error).cubic) for error in self.motion]
-        return self._with(found, self.own, [(one.row_id, one.cubic) for one in self.own])
+        return self._with(found, self.own, [(one.row_id, one.cubic_rad) for one in self.own])
 
     def cubic_without_coverage(self, split: Split, owner: str) -> Floats:
         """Cubic phase of what counts against an owner's share, at the declared sigmas; as of `Together`. [rad]"""
@@ -61,7 +60,7 @@ class ManyTogether:
             for error in self.motion
             if is_owed(error.subject.owner, owner, split)
         ]
-        found += [(one.row_id, one.cubic / one.coverage) for one in self.own if is_owed(one.owner, owner, split)]
+        found += [(one.row_id, one.cubic_rad / one.coverage) for one in self.own if is_owed(one.owner, owner, split)]
         return self.errors.array(combined_phase(found, self.rule_of_all, self.groups))
 
     @property
@@ -70,8 +69,10 @@ class ManyTogether:
         return "rss" if self.rule == "each" else self.rule
 
     def _with(self, phases: Phases, own: Own, of_own: Phases) -> Owed:
-        is_there = [np.full(self.errors.cases, bool(phases)), *(one.is_there for one in own)]
-        return Owed([*phases, *of_own], np.any(is_there, axis=0))
+        is_there = np.full(self.errors.cases, bool(phases))
+        for one in own:
+            is_there |= one.is_there
+        return Owed([*phases, *of_own], is_there)
 
     def combined(self, phases: Phases, rule: str = "") -> Floats:
         """Combine phases by the mission's rule, or another; cases without any number are left out. [rad]"""

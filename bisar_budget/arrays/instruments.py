@@ -9,14 +9,14 @@ import numpy as np
 from bisar_budget import evaluators
 from bisar_budget.arrays.collections import Floats, Geometries, Vectors, axes_of, dot
 from bisar_budget.arrays.located import ManyExactRanges
-from bisar_budget.arrays.spectra import ManyParts, many_link_parts, many_parts, many_synchronized_parts
 from bisar_budget.arrays.varied import groups_alike
 from bisar_budget.constants import STANDARD_GRAVITY
 from bisar_budget.effects import random_errors as scalar
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillators import noise_of
+from bisar_budget.effects.spectra import link_parts, parts, synchronized_parts
 from bisar_budget.effects.subject import Subject, subject
-from bisar_budget.effects.tones import SLOW
+from bisar_budget.effects.tones import gauss_markov
 from bisar_budget.mission.instruments import GaussMarkov, Oscillator, Synchronization
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
@@ -147,24 +147,16 @@ def _of_position(mission: Mission, place: int, geometries: Geometries, sight: Ve
     for process in error.random:
         largest = _largest(process.sigma)
         moved = [_scaled(axis, size) for axis, size in zip(axes, _parts(process.sigma, largest), strict=True)]
-        parts = _gauss_markov(mission.collection.aperture_time, process.correlation_time)
+        found = gauss_markov(mission.collection.aperture_time, process.correlation_time)
         published, full = (
-            _effects(parts, k * _length([dot(by, one) for one in moved]), factor) for by in (path.look, sight)
+            _effects(found, k * _length([dot(by, one) for one in moved]), factor) for by in (path.look, sight)
         )
         yield ManyRandomErrors(subject(name, "random", process.name), "m", largest * factor, published, full)
 
 
-def _effects(parts: Sequence[Any], along: Any, factor: Any) -> ManyEffects:
-    quadratic, cubic, left = (along * np.sqrt(part) for part in parts)
+def _effects(found: Sequence[Any], along: Any, factor: Any) -> ManyEffects:
+    quadratic, cubic, left = (along * np.sqrt(part) for part in found)
     return ManyEffects(quadratic, cubic, left / factor)
-
-
-def _gauss_markov(aperture_time: Any, correlation_time: Any) -> Sequence[Floats]:
-    """Parts of a stationary process of variance 1; as `gauss_markov`."""
-    ratio = np.asarray(aperture_time / (2 * correlation_time))
-    (slow,) = evaluators.gauss_markov_parts_slow(np.minimum(ratio, SLOW))
-    (exact,) = evaluators.gauss_markov_parts(ratio, np.exp(-2 * ratio))  # type: ignore[arg-type]
-    return [np.where(ratio < SLOW, *both) for both in zip(slow, exact, strict=True)]
 
 
 # ---------------------------------------------------------------------- clocks
@@ -187,7 +179,7 @@ def _clock_noise(mission: Mission, cases: int) -> Iterator[ManyRandomErrors]:
         yield _of_link(sync, T, factor)
 
 
-def _parts_of(oscillator: Oscillator, interval: float | None, aperture_time: Floats) -> ManyParts:
+def _parts_of(oscillator: Oscillator, interval: float | None, aperture_time: Floats) -> Floats:
     """Parts of the phase of an oscillator at 1 Hz, or of what exchanged pulses leave of it: they grow as f₀²."""
     times, place = np.unique(aperture_time, return_inverse=True)
     spectra: dict[Any, list[int]] = {}
@@ -196,9 +188,7 @@ def _parts_of(oscillator: Oscillator, interval: float | None, aperture_time: Flo
     found = np.zeros((3, times.size))
     for pieces, some in spectra.items():
         of_them = times[some]
-        found[:, some] = (
-            many_parts(pieces, of_them) if interval is None else many_synchronized_parts(pieces, of_them, interval)
-        )
+        found[:, some] = parts(pieces, of_them) if interval is None else synchronized_parts(pieces, of_them, interval)
     return found[:, place]
 
 
@@ -209,7 +199,7 @@ def _of_link(sync: Synchronization, aperture_time: Floats, factor: Any) -> ManyR
     else:
         for interval, places in groups_alike(sync.interval, aperture_time.size):
             times, place = np.unique(aperture_time[places], return_inverse=True)
-            found[:, places] = many_link_parts(times, interval)[:, place]
+            found[:, places] = np.array(link_parts(times, interval))[:, place]
     quadratic, cubic, spread = np.sqrt(found)
     effect = ManyEffects(quadratic, cubic, spread / factor)
     return ManyRandomErrors(subject("clock", "synchronization"), "rad", sync.error * factor, effect, effect)

@@ -5,7 +5,7 @@ takes very many steps), the case is left out and says so.
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import date
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -13,25 +13,21 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget import evaluators
-from bisar_budget.analysis.allocation import Allocation, Split, allocate, effective_n_pull
-from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.allocation import allocate
+from bisar_budget.analysis.spread import tones
 from bisar_budget.arrays.aggregates import Aggregates, ManyTogether, is_owed
 from bisar_budget.arrays.collections import Geometries, norm
 from bisar_budget.arrays.declared import DeclaredErrors
 from bisar_budget.arrays.edge import HeldTogether, ManySceneEdges, many_scene_edges
 from bisar_budget.arrays.error_rows import ErrorRows
 from bisar_budget.arrays.instruments import many_random_errors
-from bisar_budget.arrays.judgement import BOUND, CODE, Judging
 from bisar_budget.arrays.random_rows import RandomRows
 from bisar_budget.arrays.rim import ManyScenePhases
-from bisar_budget.arrays.rows import Judged
-from bisar_budget.arrays.shares import is_balanced, shares_of
-from bisar_budget.arrays.together import ManyOwnPhases, combined_phase
-from bisar_budget.arrays.vibrating import judged_one_by_one, many_slow_phases, many_tones
+from bisar_budget.arrays.shares import shares_of
+from bisar_budget.arrays.together import combined_phase
 from bisar_budget.budget.input_doubt import declared_position_error, is_in_doubt, least_doubt
+from bisar_budget.budget.judged_rows import BOUND, CODE, Judged, Judging
 from bisar_budget.budget.orbit import FASTEST_FLIGHT
-from bisar_budget.budget.random_rows import pslr_row, spur_rows
 from bisar_budget.budget.required import DECLARATIONS, Missing, is_asked_for, missing_declarations
 from bisar_budget.budget.requirement_states import (
     KEYS,
@@ -43,12 +39,13 @@ from bisar_budget.budget.requirement_states import (
     status_of,
     untaken_effects,
 )
-from bisar_budget.budget.vibration_rows import vibration_rows
+from bisar_budget.budget.vibration_rows import Vibrations, judged_pslr, judged_spurs
 from bisar_budget.budget.waivers import is_waived
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.models import LOCATION
 from bisar_budget.effects.subject import Subject, subject
-from bisar_budget.findings.row import DECLARE, Row
+from bisar_budget.effects.vibration import OwnPhase, slow_phases
+from bisar_budget.findings.row import DECLARE
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.model import Mission
 
@@ -74,7 +71,6 @@ def check_arrays(
     nodes: int,
     geometries: Geometries,
     shown: Mapping[str, Subject],
-    one: Callable[[int], Mission],
     *,
     is_brief: bool,
 ) -> Checked:
@@ -94,37 +90,39 @@ def check_arrays(
         Of the mission.
     shown : mapping of str to Subject
         Rows, by id, of which the allowable is asked though nothing is declared.
-    one : callable
-        Gives the mission of one case, with its numbers.
     is_brief : bool
         Search for limits as a brief check does: in an order that finds the one that binds early.
     """
-    return _Check(DeclaredErrors(mission, cases, nodes, geometries, shown), today, one, is_brief).checked()
+    return _Check(DeclaredErrors(mission, cases, nodes, geometries, shown), today, is_brief).checked()
 
 
 class _Check:
-    def __init__(self, errors: DeclaredErrors, today: date, one: Callable[[int], Mission], is_brief: bool) -> None:
-        self.one, self.is_brief = one, is_brief
+    def __init__(self, errors: DeclaredErrors, today: date, is_brief: bool) -> None:
+        self.is_brief = is_brief
         platforms = [getattr(errors.mission.platforms, name) for name in PLATFORMS]
         self.vibrations = [platform.motion_error.vibration for platform in platforms]
-        has_lines = any(vibration.sinusoidal for vibration in self.vibrations)
-        self.slow = many_slow_phases(errors.cases, one) if has_lines else []
         self.errors, self.mission, self.cases, self.today = errors, errors.mission, errors.cases, today
         self.array, self.does, self.combine = errors.array, errors.does, errors.mission.allocation.combine
         self.judging = Judging(errors.cases, errors.mission.allocation.warn_above)
+        self.slow = [
+            one._replace(
+                qpe_rad=self.array(one.qpe_rad),
+                cubic_rad=self.array(one.cubic_rad),
+                moves=self.array(one.moves),
+                is_there=self.array(one.is_there) > 0,
+            )
+            for one in slow_phases(self.mission, errors.geometries)
+        ]
         self.random = many_random_errors(errors.mission, errors.geometries, errors.cases)
-        oscillators = [getattr(self.mission.platforms, name).oscillator for name in PLATFORMS]
-        self.has_spurs = any(oscillator is not None and oscillator.spurs for oscillator in oscillators)
-        self.tones = many_tones(errors.cases, one) if has_lines or self.has_spurs else {}
+        self.tones = tones(self.mission, errors.geometries)
         self.stated_random = [error for error in self.random if error.declared is not None]
 
-    def _own(self, model: str) -> list[ManyOwnPhases]:
+    def _own(self, model: str) -> list[OwnPhase]:
         """Phases of what has no displacement of its own: slow vibrations, declared errors of sensors and clocks."""
         found, factor = list(self.slow), self.mission.allocation.coverage_factor
         for error in self.stated_random:
             quadratic, cubic, _ = (self.array(part * error.declared) for part in error.effect(model))
-            always = np.ones(self.cases, dtype=bool)
-            found.append(ManyOwnPhases(error.subject.id, error.subject.owner, quadratic, cubic, always, factor))
+            found.append(OwnPhase(error.subject.id, error.subject.owner, quadratic, cubic, factor))
         return found
 
     def checked(self) -> Checked:
@@ -137,10 +135,9 @@ class _Check:
         own = {model: self._own(model) for model in MODELS}
         self.split = shares_of(self.errors, gates, [own[model] for model in gates])
         total = self.array(self.mission.requirements.quadratic_phase_error)
-        n_pull = effective_n_pull(self.mission)
-        self.gain = np.ones(self.cases)
-        if n_pull is not None:
-            self.gain = np.maximum(1.0, self.array(evaluators.autofocus_gain(n_pull, total)))  # type: ignore[arg-type]
+        self.allocation = allocate(self.mission, (), {})._replace(qpe=self.split)
+        self.gain = self.array(self.allocation.autofocus_gain)
+        self.swaying = Vibrations(self.judging, self.mission, self.errors.geometries, self.allocation)
         self.total = total
         owners = (*PLATFORMS, "clock", "mission")
         self.limits = {owner: self.array(self.split.of(owner) * total) * self.gain for owner in owners}
@@ -154,7 +151,7 @@ class _Check:
             self.random,
             self.limits,
             self.gain,
-            allocate(self.mission, (), {}).islr,
+            self.allocation,
             self.tones,
         )
         self.together = together
@@ -179,8 +176,10 @@ class _Check:
         untaken = untaken_effects(mission, self._effect_totals(gates))
         is_misplaced = np.any([self._is_misplaced(rows), *self._in_doubt.values()], axis=0)
         noise = [one.variance for model in gates for one in self.random_rows.noise(model)]
-        noise += list(self.tones.values()) if mission.requirements.pslr is None else []
-        has_noise = np.any([np.zeros(self.cases, bool), *(~np.isnan(one) for one in noise)], axis=0)
+        makes_noise = [~np.isnan(one) for one in noise]
+        if mission.requirements.pslr is None:
+            makes_noise += [np.broadcast_to(one.is_there, (self.cases,)) for one in self.tones]
+        has_noise = np.any([np.zeros(self.cases, bool), *makes_noise], axis=0)
         found, seen = [], []
         for row in rows:
             status = status_of(row.status, row.subject.id, ~np.isnan(row.allowable), untaken)
@@ -225,7 +224,7 @@ class _Check:
                 "spread": [
                     (one.row_id, np.sqrt(np.nan_to_num(one.variance))) for one in self.random_rows.noise(model)
                 ],
-                "tone": [(what.id, np.nan_to_num(phase)) for what, phase in self.tones.items()],
+                "tone": [(one.subject.id, self.array(one.is_there * one.phase)) for one in self.tones],
             }
             for kind, of_kind in parts.items():
                 groups = together.groups if kind == "cubic" else ()
@@ -270,33 +269,20 @@ class _Check:
         """Rows of vibrations, where one is declared or asked for."""
         if not self._vibrates and not any(what.kind == "vibration" for what in self.errors.shown.values()):
             return []
-        return self._one_by_one(lambda mission, allocation: vibration_rows(mission, allocation, gating))
-
-    def _one_by_one(self, rows_of: Callable[[Mission, Allocation], Iterable[Row]]) -> list[Judged]:
-        """Rows that follow from the wavelength, the aperture time, the lines of sight and the shares alone."""
-        balanced = [self.array(self.split.of(name)) for name in PLATFORMS] if is_balanced(self.mission) else []
-
-        def of_case(place: int) -> Iterable[Row]:
-            mission = self.one(place)
-            allocation = allocate(mission, (), {})
-            if balanced:
-                allocation = allocation._replace(qpe=Split(*(float(share[place]) for share in balanced)))
-            return rows_of(mission, allocation)
-
-        return judged_one_by_one(np.flatnonzero(~self.errors.is_left_out), self.cases, of_case)
+        found: dict[str, Judged] = {}
+        for one in self.swaying.rows(gating):
+            what = one.judged.subject
+            found[what.id] = found.get(what.id, Judged.of_none(what, self.cases)).where(one.is_there, one.judged)
+        return list(found.values())
 
     def _instruments(self, gating: str) -> Iterator[Judged]:
         """Rows of sensors and clocks, and of all that echoes and spreads together."""
         rows, needs = self.random_rows, self.mission.requirements
         yield from rows.rows(gating)
-        if self.has_spurs:
-            yield from self._one_by_one(lambda mission, allocation: spur_rows(Analysis(mission), gating, allocation))
+        for spur in judged_spurs(self.judging, self.mission, self.allocation, gating):
+            yield spur.judged
         if needs.pslr is not None:
-            if self.tones:
-                yield from self._one_by_one(lambda mission, _: pslr_row(mission, gating))
-            else:
-                level = self.array(needs.pslr)
-                yield self.judging.row(subject("mission", "pslr"), None, level)._replace(metric="pslr")
+            yield judged_pslr(self.judging, self.tones, needs.pslr)[0]
         together = self.together[gating]
         yield from rows.islr_rows(gating, lambda owner: together.cubic_without_coverage(rows.islr, owner))
 

@@ -6,23 +6,23 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from bisar_budget.analysis.allocation import Split
+from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.spread import (
     CUBIC_POWER,
     NOISE,
     SMALLEST_CUBIC_RAD,
+    SpreadPhase,
+    Tone,
     islr_db,
     mainlobe_energy,
-    spread_phase,
+    spread_limit,
+    wideband_noise,
 )
-from bisar_budget.arrays.collections import Floats, Geometries, axes_of, dot
+from bisar_budget.arrays.collections import Floats, Geometries
 from bisar_budget.arrays.instruments import ManyRandomErrors
-from bisar_budget.arrays.judgement import BOUND, Judging
-from bisar_budget.arrays.rows import REQUIREMENTS, Judged
-from bisar_budget.constants import ROUNDING
-from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.budget.judged_rows import BOUND, REQUIREMENTS, Judged, Judging
 from bisar_budget.effects.models import QUADRATIC
-from bisar_budget.effects.subject import Subject, subject
+from bisar_budget.effects.subject import subject
 from bisar_budget.mission.model import Mission
 
 _HELD = (QUADRATIC, "cubic_phase_error", "islr")  # requirements, in the order of what an error does
@@ -34,14 +34,6 @@ class Limits(NamedTuple):
     quadratic: Any
     cubic: Any
     spread: Any
-
-
-class Spreads(NamedTuple):
-    """A part that spreads: row id, owner and phase variance; NaN where it is not declared. [rad²]"""
-
-    row_id: str
-    owner: str
-    variance: Floats
 
 
 class RandomRows:
@@ -61,10 +53,10 @@ class RandomRows:
         Quadratic phase that each owner is held to, gain of autofocus included. [rad]
     gain : (cases,)
         Of autofocus.
-    islr : Split
-        Shares of the power that may spread.
-    tones : mapping of Subject to (cases,)
-        Peak phases of what makes echoes; NaN where one makes none. [rad]
+    allocation : Allocation
+        Shares of the budgets.
+    tones : sequence of Tone
+        What makes echoes.
     """
 
     def __init__(
@@ -75,11 +67,12 @@ class RandomRows:
         errors: Sequence[ManyRandomErrors],
         held: Mapping[str, Floats],
         gain: Floats,
-        islr: Split,
-        tones: Mapping[Subject, Floats],
+        allocation: Allocation,
+        tones: Sequence[Tone],
     ) -> None:
         self.judging, self.mission, self.geometries, self.errors = judging, mission, geometries, errors
-        self.held, self.gain, self.islr, self.tones = held, gain, islr, tones
+        self.held, self.gain, self.tones = held, gain, tones
+        self.allocation, self.islr = allocation, allocation.islr
 
     def rows(self, gating: str) -> Iterator[Judged]:
         """Rows of every error of a sensor or a clock, declared or not."""
@@ -87,19 +80,12 @@ class RandomRows:
         for error in self.errors:
             yield self._row(error, gating, other)
 
-    def _spread_limit(self, owner: str, model: str) -> Any:
-        """Rms phase that an owner may spread; as `spread_limit`. [rad]"""
-        if self.mission.requirements.islr is None:
-            return None
-        power = 10 ** (np.asarray(self.mission.requirements.islr) / 10)
-        return spread_phase(power, model, mainlobe_energy(self.mission), np) * np.sqrt(self.islr.of(owner))
-
     def _sizes(self, error: ManyRandomErrors, model: str) -> Floats:
         """Size at which an error reaches each requirement, (3, cases); infinite where it does not. [unit]"""
         limits = (
             self.held[error.subject.owner],
             self.mission.requirements.cubic_phase_error,
-            self._spread_limit(error.subject.owner, model),
+            spread_limit(self.mission, self.allocation, error.subject.owner, model),
         )
         array = self.judging.array
         quadratic, cubic, spread = error.effect(model)
@@ -138,7 +124,7 @@ class RandomRows:
                 quadratic_use=qpe / (limit * self.gain),
             )
         judged = judged._replace(binding=binding)
-        return _in_decibel(judged) if error.unit == "dB" else judged
+        return judged.in_decibel() if error.unit == "dB" else judged
 
     # ---------------------------------------------------------------- powers together
     def islr_rows(self, gating: str, cubic: Callable[[str], Floats]) -> Iterator[Judged]:
@@ -152,7 +138,12 @@ class RandomRows:
         other = "full" if gating == "published" else "published"
         spreads, array = self.noise(gating), self.judging.array
         if needs.pslr is None:
-            spreads += [Spreads(what.id, what.owner, phase**2 / 2) for what, phase in self.tones.items()]
+            spreads += [
+                SpreadPhase(
+                    one.subject.id, one.subject.owner, array(np.where(one.is_there, one.phase**2 / 2, math.nan))
+                )
+                for one in self.tones
+            ]
         is_vibration_alone = array(1.0) > 0
         for one in spreads:
             if not one.row_id.endswith("vibration.wideband"):
@@ -169,7 +160,9 @@ class RandomRows:
             phase = counted(owner)
             is_declared = np.any([phase > 0, *(~np.isnan(one) for one in members)], axis=0)
             variance = array(sum(np.nan_to_num(one) for one in members)) + CUBIC_POWER * phase**2
-            limit, by_other = (array(self._spread_limit(owner, model)) for model in (gating, other))
+            limit, by_other = (
+                array(spread_limit(self.mission, self.allocation, owner, model)) for model in (gating, other)
+            )
             rms, what = np.sqrt(variance), subject(owner, "islr")
             judged = self.judging.row(what, rms, limit, doubt=rms > by_other * BOUND)
             judged = judged.where(~is_declared, self.judging.row(what, None, limit))
@@ -181,45 +174,21 @@ class RandomRows:
         """Write rms phases as the ISLR that they add, by a model."""
         energy = mainlobe_energy(self.mission)
         declared, allowable = (
-            np.where(column > 0, islr_db(column**2, model, energy, np), math.nan)
+            np.where(column > 0, islr_db(column**2, model, energy), math.nan)
             for column in (row.declared, row.allowable)
         )
-        binding = np.full_like(row.binding, REQUIREMENTS.index("islr"))
-        return row._replace(declared=declared, allowable=allowable, binding=binding, metric="islr")
+        return row._replace(declared=declared, allowable=allowable).held_to("islr")
 
-    def noise(self, model: str) -> list[Spreads]:
+    def noise(self, model: str) -> list[SpreadPhase]:
         """Parts that spread beyond the cubic; as `noise` of `analysis.spread`."""
-        return [*self._of_vibration(), *self._of_errors(model)]
+        wideband = wideband_noise(self.mission, self.geometries)
+        return [
+            *(one._replace(variance=self.judging.array(one.variance)) for one in wideband),
+            *self._of_errors(model),
+        ]
 
-    def _of_errors(self, model: str) -> Iterator[Spreads]:
+    def _of_errors(self, model: str) -> Iterator[SpreadPhase]:
         for error in self.errors:
             if error.declared is not None and (error.subject.kind != "imu" or error.subject.axis in NOISE):
                 spread = self.judging.array(error.effect(model).spread * error.declared)
-                yield Spreads(error.subject.id, error.subject.owner, spread**2)
-
-    def _of_vibration(self) -> Iterator[Spreads]:
-        """What wideband vibration spreads, along the line of sight; as `along_line_of_sight`."""
-        mission = self.mission
-        sights = self.geometries.sights(has_direct_path=mission.has_direct_path)
-        for name, path, sight in zip(PLATFORMS, self.geometries.both, sights, strict=True):
-            wideband = getattr(mission.platforms, name).motion_error.vibration.wideband
-            if wideband is None:
-                continue
-            rms: Any = wideband.rms
-            if isinstance(rms, tuple):
-                along = [dot(axis, sight) for axis in axes_of(mission, name, path)]
-                floor = ROUNDING * np.sqrt(sum(one * one for one in along))
-                parts = [np.where(np.abs(one) > floor, one, 0.0) * size for one, size in zip(along, rms, strict=True)]
-                rms = np.sqrt(sum(part * part for part in parts))
-            elif mission.has_direct_path:
-                rms = rms * np.abs(dot(path.look, sight))
-            phase = self.judging.array(2 * math.pi * rms / mission.radar.wavelength)
-            yield Spreads(subject(name, "vibration", "wideband").id, name, phase**2)
-
-
-def _in_decibel(row: Judged) -> Judged:
-    """Write a row whose numbers are factors of amplitude in decibel; its utilization stays that of amplitudes."""
-    declared, allowable = (
-        np.where(column > 0, 20 * np.log10(column), math.nan) for column in (row.declared, row.allowable)
-    )
-    return row._replace(declared=declared, allowable=allowable)
+                yield SpreadPhase(error.subject.id, error.subject.owner, spread**2)

@@ -8,7 +8,8 @@ import numpy as np
 from bisar_budget.analysis.allocation import BALANCED_RANGE, EQUAL, Split, allocate
 from bisar_budget.arrays.collections import Floats
 from bisar_budget.arrays.declared import DeclaredErrors
-from bisar_budget.arrays.together import ManyOwnPhases, combined_phase, many_correlated
+from bisar_budget.arrays.together import combined_phase, many_correlated
+from bisar_budget.effects.vibration import OwnPhase
 from bisar_budget.mission.model import MetricSplits, Mission
 
 
@@ -18,7 +19,7 @@ def is_balanced(mission: Mission) -> bool:
     return (split.quadratic_phase_error if isinstance(split, MetricSplits) else split) == "balanced"
 
 
-def shares_of(errors: DeclaredErrors, models: Sequence[str], own: Sequence[Sequence[ManyOwnPhases]]) -> Split:
+def shares_of(errors: DeclaredErrors, models: Sequence[str], own: Sequence[Sequence[OwnPhase]]) -> Split:
     """Divide the budget for the phase; `balanced` shares are arrays.
 
     Parameters
@@ -27,7 +28,7 @@ def shares_of(errors: DeclaredErrors, models: Sequence[str], own: Sequence[Seque
         Of the cases.
     models : sequence of str
         Those that gate.
-    own : sequence of sequences of ManyOwnPhases
+    own : sequence of sequences of OwnPhase
         Phases of what displaces nothing, by each of these models.
     """
     mission = errors.mission
@@ -41,7 +42,7 @@ def shares_of(errors: DeclaredErrors, models: Sequence[str], own: Sequence[Seque
             if EQUAL.includes(error.subject.owner, owner)
         ]
         members += [
-            (of_one[0].row_id, _largest([one.qpe for one in of_one]))
+            (of_one[0].row_id, _largest([one.qpe_rad for one in of_one]))
             for of_one in zip(*own, strict=True)
             if EQUAL.includes(of_one[0].owner, owner)
         ]

@@ -14,21 +14,6 @@ Phases = Sequence[tuple[str, Floats]]  # by row id, signed [rad]
 Moves = Mapping[str, tuple[Floats, Floats]]  # by row id, east and north [m]
 
 
-class ManyOwnPhases(NamedTuple):
-    """Phases that count in sums and displace nothing by themselves, (cases,); as `OwnPhase`. [rad]
-
-    A vibration is there, and its phases are not 0, only in the cases in which it is slow.
-    """
-
-    row_id: str
-    owner: str
-    qpe: Floats
-    cubic: Floats
-    is_there: NDArray[np.bool_]
-    coverage: Any = 1.0  # the factor that both phases have in them
-    moves: Any = 0.0  # the most by which it displaces the image [m]
-
-
 class ManyCorrelated(NamedTuple):
     """The six errors of a covariance, by the ids of their rows, and their correlations (6, 6); as `Correlated`."""
 

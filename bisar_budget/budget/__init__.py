@@ -8,6 +8,7 @@ __all__ = [
     "error_rows",
     "fleet",
     "input_doubt",
+    "judged_rows",
     "orbit",
     "overrides",
     "pull_in",

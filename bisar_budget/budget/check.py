@@ -17,10 +17,10 @@ from bisar_budget.budget.model_doubt import model_doubt
 from bisar_budget.budget.orbit import straight_orbits
 from bisar_budget.budget.overrides import NOTHING_OUTSIDE, Outside, overrides
 from bisar_budget.budget.pull_in import pull_in_caps
-from bisar_budget.budget.random_rows import islr_rows, pslr_row, random_rows, spur_rows
+from bisar_budget.budget.random_rows import islr_rows, random_rows
 from bisar_budget.budget.required import declared_kinds, with_required
 from bisar_budget.budget.requirement_table import judged_requirements
-from bisar_budget.budget.vibration_rows import vibration_rows
+from bisar_budget.budget.vibration_rows import pslr_row, spur_rows, vibration_rows
 from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
 from bisar_budget.effects.correlation import unused_correlations
 from bisar_budget.effects.effect import PLATFORMS, override_notes
@@ -150,7 +150,7 @@ def _instrument_rows(analysis: Analysis, gating: str, allocation: Allocation) ->
     """Rows of sensors and clocks, and of all that echoes and spreads together."""
     return [
         *random_rows(analysis, gating, allocation),
-        *spur_rows(analysis, gating, allocation),
+        *spur_rows(analysis.mission, allocation, gating),
         *pslr_row(analysis.mission, gating),
         *islr_rows(analysis, gating, allocation),
     ]

@@ -18,20 +18,14 @@ from bisar_budget.analysis.spread import (
     shown_islr_db,
     spread_limit,
     spread_powers,
-    tones,
 )
-from bisar_budget.analysis.vibration_limits import highest_echo, tone_limits
 from bisar_budget.budget.judgement import judged
 from bisar_budget.budget.pull_in import caps, needed_sentence
-from bisar_budget.budget.vibration_rows import ECHO_CYCLES
 from bisar_budget.constants import UTILIZATION_TOLERANCE
-from bisar_budget.effects.clocks import spurs_of
-from bisar_budget.effects.effect import override_notes
 from bisar_budget.effects.models import CUBIC, QUADRATIC
 from bisar_budget.effects.random_errors import RandomEffect, RandomError
 from bisar_budget.effects.subject import subject
 from bisar_budget.findings.row import Row
-from bisar_budget.mission.instruments import Oscillator
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import NOTHING, Note
 
@@ -49,7 +43,8 @@ class Limits(NamedTuple):
 def limits_for(mission: Mission, allocation: Allocation, owner: str, model: str, gain: float = 1.0) -> Limits:
     """What the errors of an owner are held to by a model; `gain` is that of autofocus."""
     spread = spread_limit(mission, allocation, owner, model)
-    return Limits(allocation.qpe_limit(owner) * gain, mission.requirements.cubic_phase_error, spread)
+    held = None if spread is None else float(spread)
+    return Limits(allocation.qpe_limit(owner) * gain, mission.requirements.cubic_phase_error, held)
 
 
 def sizes_at(effect: RandomEffect, limits: Limits) -> dict[str, float]:
@@ -182,56 +177,6 @@ def _doubt(mission: Mission, other: str, effect: RandomEffect, limits: Limits, s
     return phrases.other_model_fails(other, effect.cubic * size, limits.cubic or 0.0, "rad", "cubic phase")
 
 
-# ---------------------------------------------------------------------- tones
-def spur_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterator[Row]:
-    """Rows of the oscillators' tones, which make paired echoes as vibrations do. [dB of an echo to the response]"""
-    mission = analysis.mission
-    metric, limits = tone_limits(mission, allocation)
-    other = "full" if gating == "published" else "published"
-    k = 2 * math.pi / mission.radar.wavelength
-    for spur in spurs_of(mission):
-        oscillator: Oscillator = getattr(mission.platforms, spur.name).oscillator
-        cycles = spur.frequency * mission.collection.aperture_time
-        allowed = limits.get(spur.name)
-        over = doubt = NOTHING
-        not_evaluated, missing = NOTHING, NOTHING if allowed else phrases.no_requirement_of("pslr")
-        if allowed is not None:
-            limit, by_other = k * allowed.by(gating), k * allowed.by(other)
-            over = phrases.echoes_over(_echo(spur.phase), _echo(limit))
-            if spur.phase > by_other * (1 + UTILIZATION_TOLERANCE):
-                doubt = phrases.other_model_allows(other, _echo(by_other), "dB")
-            if metric == "pslr" and cycles < ECHO_CYCLES:
-                not_evaluated = phrases.echoes_on_the_mainlobe(cycles, ECHO_CYCLES)
-        row = judged(
-            mission,
-            subject=subject(spur.name, "oscillator", "spur", entry=spur.entry),
-            metric=metric,
-            unit="dB",
-            declared=spur.phase / 2,  # amplitude of an echo over that of the response
-            allowable=None if allowed is None else limit / 2,
-            path=("platforms", spur.name, "oscillator", "spurs"),
-            equation="first principles" if gating == "full" else "Section V, sinusoidal",
-            no_limit=missing,
-            not_evaluated=not_evaluated,
-            info=missing,
-            over=over,
-            doubt=doubt,
-            limits=(None, None) if allowed is None else (k * allowed.published / 2, k * allowed.full / 2),
-            evidence=oscillator.source,
-            notes=(
-                phrases.tone_lies(spur.frequency, cycles),
-                *override_notes(spur.name, oscillator.overridden, "frequency"),
-            ),
-        )
-        row = in_decibel(row._replace(model=gating))
-        yield row._replace(islr_db=shown_islr_db(mission, spur.phase**2 / 2)) if metric == ISLR else row
-
-
-def _echo(phase: float) -> float:
-    """Level of the echoes of a tone. [dB]"""
-    return 20 * math.log10(phase / 2)
-
-
 # ---------------------------------------------------------------------- powers together
 def islr_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterator[Row]:
     """Rows of what spreads in sum: for the mission, and for each owner unless only wideband vibration spreads."""
@@ -271,40 +216,6 @@ def islr_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterat
             limits=(limit, by_other) if gating == "published" else (by_other, limit),
         )
         yield _as_islr(row, shown_islr_db(mission, variance), gating, level)
-
-
-def pslr_row(mission: Mission, gating: str) -> Iterator[Row]:
-    """The highest echo that all tones make together, in the worst of their phases; where PSLR is required.
-
-    From first principles by both models: the shares of the paper's rule stay 3 dB inside it. Tones at most 2.5 cycles
-    per aperture apart raise each other's echo, whoever makes them.
-    """
-    required = mission.requirements.pslr
-    if required is None:
-        return
-    highest, allowed = highest_echo(tones(mission)), 10 ** (required / 20)
-    over = NOTHING
-    if highest is not None and highest.level > allowed:
-        largest = max(highest.tones, key=lambda one: one.phase)
-        over = phrases.echoes_together_over(_db(highest.level), required, largest.subject.id, len(highest.tones))
-    row = judged(
-        mission,
-        subject=subject("mission", "pslr"),
-        metric="pslr",
-        unit="dB",
-        declared=None if highest is None else highest.level,
-        allowable=allowed,
-        path=("requirements", "pslr"),
-        equation="first principles",
-        over=over,
-        limits=(allowed, allowed),
-    )
-    yield in_decibel(row._replace(binding_requirement="pslr", model=gating))
-
-
-def _db(amplitude: float) -> float:
-    """Level of an amplitude over that of the response. [dB]"""
-    return 20 * math.log10(amplitude)
 
 
 def _as_islr(row: Row, shown: float | None, gating: str, of_rms: Callable[[float], float]) -> Row:

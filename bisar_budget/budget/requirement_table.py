@@ -12,7 +12,7 @@ from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis, Model
 from bisar_budget.analysis.spread import islr_db, mainlobe_energy, noise, spread_limit, tones
 from bisar_budget.analysis.together import Phases, Together
-from bisar_budget.analysis.vibration_limits import LARGEST_ECHO, echo_level
+from bisar_budget.analysis.vibration_limits import level_of
 from bisar_budget.budget.input_doubt import InputDoubt
 from bisar_budget.budget.requirement_states import (
     KEYS,
@@ -298,5 +298,5 @@ def _sizes(row: Row, key: str, mission: Mission, allocation: Allocation) -> tupl
 
 
 def _echo_db(phase: float) -> float | None:
-    amplitude = echo_level(phase) if phase <= LARGEST_ECHO else phase / 2
+    amplitude = level_of(phase)
     return 20 * math.log10(amplitude) if amplitude else None

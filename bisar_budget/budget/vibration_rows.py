@@ -1,308 +1,491 @@
-"""Rows about vibration: each line of a platform, lines near each other, noise, and motion too slow for echoes."""
+"""Rows about what vibrates: each line of a platform, lines near each other, noise, spurs, and all echoes together.
+
+Rows are judged in arrays over cases, of a sweep or of a check, which is one case; a check then puts them into words.
+"""
 
 import math
 from collections.abc import Iterator, Sequence
-from functools import cache
-from typing import NamedTuple
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
-from bisar_budget.analysis.spread import shown_islr_db
+from bisar_budget.analysis.spread import Tone, shown_islr_db, tones
 from bisar_budget.analysis.vibration_limits import (
     LARGEST_ECHO,
+    Echo,
     VibrationLimits,
     echo_level,
+    highest_echo,
     slow_limits,
     tone_limits,
     vibration_limits,
 )
-from bisar_budget.budget.judgement import judged
+from bisar_budget.budget.judged_rows import BOUND, REQUIREMENTS, Floats, Judged, Judging
+from bisar_budget.budget.judgement import number, worded
 from bisar_budget.budget.pull_in import caps, needed_sentence
-from bisar_budget.constants import UTILIZATION_TOLERANCE
-from bisar_budget.effects.echoes import NEAR_CYCLES, SLOWEST, near_lines, worst_phases
-from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.clocks import Spur, spurs_of
+from bisar_budget.effects.echoes import NEAR_CYCLES, SLOWEST, near_groups, worst_phases
+from bisar_budget.effects.effect import PLATFORMS, override_notes
 from bisar_budget.effects.models import CUBIC, QUADRATIC
-from bisar_budget.effects.slow_vibration import cubic_part, quadratic_part
 from bisar_budget.effects.subject import Subject, subject
-from bisar_budget.effects.vibration_lines import Line, counted, lines_of, projected
-from bisar_budget.faults import KeyPath
+from bisar_budget.effects.tones import tone
+from bisar_budget.effects.vibration import counted, lines_of, projected
 from bisar_budget.findings.row import Row
+from bisar_budget.mission.instruments import Oscillator
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.units import format_quantity
 
 ECHO_CYCLES = 3.0  # per aperture; below, echoes lie beside the mainlobe and the motion is a quadratic phase as well
+_ROUNDING_DB = 1e-6  # by which a level may be above what is required
+
+Truths = NDArray[np.bool_]
 
 
-class VibrationCase(NamedTuple):
-    """One row to be judged: a line, lines near each other, or the noise of a platform.
+@dataclass(frozen=True, slots=True, eq=False)
+class VibrationRow:
+    """One row about vibration in many cases: a line, lines near each other, or the noise of a platform.
 
-    `declared` and the limits are along the line of sight [m]; `qpe` and `cubic` are the worst-phase quadratic and
-    cubic phases [rad], where the motion is slow enough to have them; `islr_db` is what noise adds [dB]. The texts are
-    those of a row.
+    `is_there` are the cases that have it, `members` the lines near each other. `qpe` and `cubic` are the
+    quadratic and cubic phases that a motion below three cycles per aperture has in its worst phase [rad]: where
+    it `is_slow` it is judged by them, else `is_over_phase` says that they break what they may. `is_over_other`
+    says that the model that does not gate fails it. `both` is the peak phase of one line with an echo as high as
+    those of near frequencies on both platforms [rad], `level` the level of that echo [dB], and `is_over_both`
+    says that it is too high.
     """
 
-    subject: Subject
-    metric: str
-    declared: float | None
-    limits: VibrationLimits | None
-    path: KeyPath
-    equation: str
-    missing: Note
-    doubt: Note
-    over: Note
-    evidence: str | None
-    notes: tuple[Note, ...]
-    qpe: float | None = None
-    cubic: float | None = None
-    islr_db: float | None = None
+    judged: Judged
+    is_there: Truths
+    limits: VibrationLimits | None = None
+    is_slow: bool = False
+    members: Truths | None = None
+    cycles: Any = math.nan
+    qpe: Any = math.nan
+    cubic: Any = math.nan
+    both: Any = math.nan
+    level: Any = math.nan
+    is_over_other: Any = False
+    is_over_phase: Any = False
+    is_over_both: Any = False
+    without_autofocus: Any = 0.0
 
 
+class Vibrations:
+    """What vibrates in many cases; numbers of the mission, its geometry and its allocation may be arrays (cases,)."""
+
+    def __init__(self, judging: Judging, mission: Mission, geometry: Any, allocation: Allocation) -> None:
+        self.judging, self.mission, self.geometry = judging, mission, geometry
+        self.allocation, self.array = allocation, judging.array
+        self.metric, self.tones = tone_limits(mission, allocation)
+        self.noise = vibration_limits(mission, allocation, "islr")
+        self.to_phase = 2 * math.pi / mission.radar.wavelength
+        lines = {name: lines_of(mission, name, geometry) for name in PLATFORMS}
+        self.count = {name: len(of_one) for name, of_one in lines.items()}
+        self.amplitudes = {name: self._columns([one.amplitude for one in of_one]) for name, of_one in lines.items()}
+        T = mission.collection.aperture_time
+        self.cycles = {name: self._columns([one.frequency * T for one in of_one]) for name, of_one in lines.items()}
+
+    def _columns(self, numbers: Sequence[Any]) -> Floats:
+        return np.array([self.array(number) for number in numbers]).reshape(-1, self.judging.cases)
+
+    def rows(self, model: str) -> Iterator[VibrationRow]:
+        """Every row about vibration by a model, `published` or `full`, declared or not, in the order of the contract.
+
+        A line that is slow in some cases only has a row of each kind.
+        """
+        everywhere = np.ones(self.judging.cases, dtype=bool)
+        for name in PLATFORMS:
+            for index in range(self.count[name]):
+                is_slow = self.cycles[name][index] < SLOWEST
+                if is_slow.any():
+                    yield self._slow(name, index, is_slow)
+                if not is_slow.all():
+                    yield self._line(model, name, index, ~is_slow)
+            if not self.count[name]:
+                what = subject(name, "vibration", "sinusoidal", entry=0)
+                yield self._row(model, what, self.metric, None, self.tones.get(name), everywhere)
+            elif self.metric == "pslr":
+                yield from self._near_each_other(model, name)
+            wideband = getattr(self.mission.platforms, name).motion_error.vibration.wideband
+            rms = None
+            if wideband is not None:
+                rms = self.array(counted(self.mission, name, wideband.rms, "islr", self.geometry))
+            what = subject(name, "vibration", "wideband")
+            yield self._row(model, what, "islr", rms, self.noise.get(name), everywhere)
+
+    def _row(
+        self,
+        model: str,
+        what: Subject,
+        metric: str,
+        declared: Floats | None,
+        limits: VibrationLimits | None,
+        is_there: Truths,
+        *,
+        doubt: Any = False,
+        **others: Any,
+    ) -> VibrationRow:
+        allowable, is_over_other = None, np.zeros(self.judging.cases, dtype=bool)
+        if limits is not None:
+            allowable = self.array(limits.by(model))
+            if declared is not None and not self.mission.has_direct_path:  # which the published model does not know
+                by_other = limits.full if model == "published" else limits.published
+                is_over_other = declared > by_other * BOUND
+        judged = self.judging.row(what, declared, allowable, doubt=doubt | is_over_other, is_info=limits is None)
+        judged = judged._replace(cubic_rad=self.array(others.get("cubic", math.nan)))
+        return VibrationRow(judged.held_to(metric), is_there, limits, is_over_other=is_over_other, **others)
+
+    def _phases(self, name: str, index: int) -> Floats:
+        """Quadratic and cubic phase of a line in its worst phase, (2, cases). [rad]"""
+        phase, cycles = self.to_phase * self.amplitudes[name][index], self.cycles[name][index]
+        return np.asarray(phase * np.abs(tone(math.pi * cycles)[:2]))
+
+    def _line(self, model: str, name: str, index: int, is_there: Truths) -> VibrationRow:
+        """A vibration from one cycle per aperture on: as its echoes, or, where ISLR holds it, the power they take."""
+        cycles, both = self.cycles[name][index], self._both[name][index]
+        allowed = self.mission.requirements.cubic_phase_error
+        is_near = cycles < ECHO_CYCLES
+        qpe = cubic = np.full(cycles.shape, math.nan)
+        if is_near.any():
+            qpe, cubic = np.where(is_near, self._phases(name, index), math.nan)
+        is_over_phase = qpe > self.allocation.qpe_limit(name) * self.allocation.autofocus_gain * BOUND
+        if allowed is not None:
+            is_over_phase |= cubic > allowed * BOUND
+        level = 20 * np.log10(echo_level(np.minimum(both, LARGEST_ECHO)))
+        required = self.mission.requirements.pslr
+        is_over_both = np.zeros(is_there.shape, dtype=bool) if required is None else level > required + _ROUNDING_DB
+        return self._row(
+            model,
+            subject(name, "vibration", "sinusoidal", entry=index),
+            self.metric,
+            self.amplitudes[name][index],
+            self.tones.get(name),
+            is_there,
+            doubt=is_over_phase | is_over_both,
+            cycles=cycles,
+            qpe=qpe,
+            cubic=cubic,
+            both=both,
+            level=level,
+            is_over_phase=is_over_phase,
+            is_over_both=is_over_both,
+        )
+
+    def _slow(self, name: str, index: int, is_there: Truths) -> VibrationRow:
+        """A vibration below one cycle per aperture: as the quadratic and cubic phase that it is."""
+        amplitude, cycles = self.amplitudes[name][index], self.cycles[name][index]
+        (qpe, cubic), limits = self._phases(name, index), slow_limits(self.mission, self.allocation, name, cycles)
+        without_autofocus = qpe / self.allocation.qpe_limit(name)
+        judged = self.judging.row(
+            subject(name, "vibration", "sinusoidal", entry=index),
+            amplitude,
+            self.array(limits.smallest),
+            without_autofocus=without_autofocus,
+            is_info=self.mission.allocation.combine != "each",
+        )
+        judged = judged._replace(
+            binding=np.where(limits.is_cubic, *map(REQUIREMENTS.index, (CUBIC, QUADRATIC))).astype(np.int8),
+            qpe_published_rad=qpe,
+            cubic_rad=cubic,
+            quadratic_use=amplitude / limits.quadratic,
+        )
+        same = VibrationLimits(limits.quadratic, limits.quadratic)
+        return VibrationRow(
+            judged,
+            is_there,
+            same,
+            is_slow=True,
+            cycles=cycles,
+            qpe=qpe,
+            cubic=cubic,
+            without_autofocus=without_autofocus,
+        )
+
+    def _near_each_other(self, model: str, name: str) -> Iterator[VibrationRow]:
+        """Lines so near each other that their echoes add: each time the one line that has an echo as high."""
+        for index, (members, amplitude) in enumerate(self._near[name]):
+            what = subject(name, "vibration", "sinusoidal.sum", entry=index)
+            is_there = np.asarray(members.any(axis=0))
+            yield self._row(model, what, "pslr", amplitude, self.tones.get(name), is_there, members=members)
+
+    @cached_property
+    def _near(self) -> dict[str, list[tuple[Truths, Floats]]]:
+        """Lines near each other of each platform, and the amplitude of one line with an echo as high. [m]"""
+        return {name: list(_together(self.amplitudes[name], self.cycles[name])) for name in PLATFORMS}
+
+    @cached_property
+    def _both(self) -> dict[str, Floats]:
+        """Peak phase that each line has together with near ones of the other platform. [rad]
+
+        Their echoes add in the worst phases; NaN where there are none, or no amplitude, or nothing is required.
+        """
+        ours = self.count[PLATFORMS[0]]
+        amplitudes, cycles = (
+            np.concatenate([of[name] for name in PLATFORMS]) for of in (self.amplitudes, self.cycles)
+        )
+        found = np.full(cycles.shape, math.nan)
+        if self.mission.requirements.pslr is not None and all(self.count.values()):
+            for members, amplitude in _together(amplitudes, cycles):
+                is_of_both = members[:ours].any(axis=0) & members[ours:].any(axis=0)
+                found = np.where(members & is_of_both & (amplitude > 0), self.to_phase * amplitude, found)
+        return {PLATFORMS[0]: found[:ours], PLATFORMS[1]: found[ours:]}
+
+
+def _together(amplitudes: Floats, cycles: Floats) -> Iterator[tuple[Truths, Floats]]:
+    """Lines near each other, and the amplitude of one line with an echo as high; 0 where a case has none. [m]"""
+    groups = near_groups(cycles)
+    for index in range(groups.max(initial=-1) + 1):
+        members = groups == index
+        found, some = np.zeros(members.shape[1]), np.flatnonzero(members.any(axis=0))
+        found[some] = worst_phases(amplitudes[:, some], cycles[:, some], members[:, some]).amplitude
+        yield members, found
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SpurRow:
+    """A tone of an oscillator in many cases, in decibel of an echo to the response; see `VibrationRow`."""
+
+    judged: Judged
+    spur: Spur
+    limits: VibrationLimits | None  # peak phases [rad]
+    is_over_other: Any = False
+
+
+def judged_spurs(judging: Judging, mission: Mission, allocation: Allocation, model: str) -> Iterator[SpurRow]:
+    """Judge the oscillators' tones by a model; they make paired echoes as vibrations do."""
+    metric, by_platform = tone_limits(mission, allocation)
+    for spur in spurs_of(mission):
+        what, phase = subject(spur.name, "oscillator", "spur", entry=spur.entry), judging.array(spur.phase)
+        limits, is_over_other = by_platform.get(spur.name), np.zeros(judging.cases, dtype=bool)
+        if limits is None:
+            judged = judging.row(what, phase / 2, None, is_info=True)
+        else:
+            limits = VibrationLimits(*(2 * math.pi / mission.radar.wavelength * limit for limit in limits))
+            is_over_other = phase > (limits.full if model == "published" else limits.published) * BOUND
+            is_near = spur.frequency * mission.collection.aperture_time < ECHO_CYCLES
+            judged = judging.row(  # the amplitude of an echo over that of the response
+                what,
+                phase / 2,
+                judging.array(limits.by(model) / 2),
+                doubt=is_over_other,
+                is_unknown=is_near & (metric == "pslr"),
+            )
+        yield SpurRow(judged.in_decibel().held_to(metric), spur, limits, is_over_other)
+
+
+def judged_pslr(judging: Judging, found: Sequence[Tone], required: Any) -> tuple[Judged, Echo | None]:
+    """Judge the highest echo that all tones make together, in the worst of their phases.
+
+    From first principles by both models: the shares of the paper's rule stay 3 dB inside it. Tones at most 2.5 cycles
+    per aperture apart raise each other's echo, whoever makes them.
+    """
+    highest, allowed = highest_echo(found, (judging.cases,)), judging.array(10 ** (np.asarray(required) / 20))
+    what = subject("mission", "pslr")
+    judged = judging.row(what, None, allowed)
+    if highest is not None:
+        is_declared = np.any([np.broadcast_to(one.is_there, (judging.cases,)) for one in found], axis=0)
+        judged = judged.where(is_declared, judging.row(what, highest.level, allowed))
+    return judged.in_decibel().held_to("pslr"), highest
+
+
+# ---------------------------------------------------------------------- in words
 def vibration_rows(mission: Mission, allocation: Allocation, model: str) -> Iterator[Row]:
-    """Every row about vibration, declared or not, in the order of the contract, by one of the two models."""
-    mission = mission._replace(allocation=mission.allocation._replace(model=model))
-    metric, sinusoidal = tone_limits(mission, allocation)
-    wideband = vibration_limits(mission, allocation, "islr")
-    T = mission.collection.aperture_time
-    lines = {name: lines_of(mission, name) for name in PLATFORMS}
-    joint = _of_both_platforms(mission, lines)
-    for name in PLATFORMS:
-        error: MotionError = getattr(mission.platforms, name).motion_error
-        for index, line in enumerate(lines[name] or (None,)):
-            if line is not None and line.frequency * T < SLOWEST:
-                yield _slow_row(mission, allocation, name, index, line)
-            else:
-                both = joint.get((name, index), _Together())
-                case = _line(mission, allocation, sinusoidal.get(name), name, index, line, both)
-                yield _row(mission, case if metric == "pslr" else _as_spread(mission, case), model)
-        near_each_other = near_lines([line.frequency * T for line in lines[name]]) if metric == "pslr" else ()
-        for index, members in enumerate(near_each_other):
-            near = [lines[name][member] for member in members]
-            yield _row(mission, _together(mission, sinusoidal.get(name), name, index, near, members), model)
-        yield _row(mission, _noise(mission, wideband.get(name), name, error), model)
+    """Every row about vibration of one mission, by one of the two models."""
+    judging = Judging(1, mission.allocation.warn_above)
+    with np.errstate(all="ignore"):
+        rows = list(Vibrations(judging, mission, mission.geometry, allocation).rows(model))
+    for one in rows:
+        what = one.judged.subject
+        error: MotionError = getattr(mission.platforms, what.owner).motion_error
+        if one.is_slow:
+            yield _slow_row(mission, allocation, one, error)
+        elif one.members is not None:
+            members = np.flatnonzero(one.members[:, 0]).tolist()
+            note = _lines_together(error, members, float(one.judged.declared[0]))
+            yield _row(mission, one, error, model, ("sinusoidal", members[0], "frequency"), (note,))
+        elif what.axis == "wideband":
+            wideband = error.vibration.wideband
+            seen = () if wideband is None else _seen(mission, one, error, wideband.rms)
+            yield _row(mission, one, error, model, ("wideband", "rms"), seen)
+        else:
+            yield _line_row(mission, allocation, one, error, model)
 
 
-def _as_spread(mission: Mission, case: VibrationCase) -> VibrationCase:
-    """A line where ISLR holds it: the power φ²/2 that its echoes take."""
-    over = phrases.share_of_power_over("islr", case.equation)
-    if case.declared is None:
-        return case._replace(metric="islr", over=over)
-    phase = 2 * math.pi * case.declared / mission.radar.wavelength
-    return case._replace(metric="islr", over=over, islr_db=shown_islr_db(mission, phase**2 / 2))
+def _line_row(mission: Mission, allocation: Allocation, one: VibrationRow, error: MotionError, model: str) -> Row:
+    owner, index = one.judged.subject.owner, one.judged.subject.entry or 0
+    key, lines = ("sinusoidal", index, "amplitude"), error.vibration.sinusoidal
+    if not lines:
+        return _row(mission, one, error, model, key)
+    doubt, more, required = NOTHING, list[Note](), mission.requirements.pslr
+    if required is not None and not math.isnan(one.both[0]):
+        (other,) = (platform for platform in PLATFORMS if platform != owner)
+        note = phrases.both_platforms_vibrate(
+            other, NEAR_CYCLES, float(one.level[0]), bool(one.both[0] > LARGEST_ECHO), required
+        )
+        more, doubt = [note], note if one.is_over_both[0] else NOTHING
+    if one.cycles[0] < ECHO_CYCLES:
+        limit = float(allocation.qpe_limit(owner) * allocation.autofocus_gain)
+        qpe, cubic, allowed = float(one.qpe[0]), float(one.cubic[0]), mission.requirements.cubic_phase_error
+        more.insert(0, phrases.slower_than_three_cycles(float(one.cycles[0]), qpe, limit, cubic, allowed))
+        if one.is_over_phase[0]:
+            doubt = phrases.phase_of_vibration_over(qpe, limit, cubic, allowed)
+    return _row(mission, one, error, model, key, _seen(mission, one, error, lines[index].amplitude), more, doubt)
 
 
-def _slow_row(mission: Mission, allocation: Allocation, name: str, index: int, line: Line) -> Row:
-    """Judge a vibration below one cycle per aperture as the quadratic and cubic phase that it is."""
-    error: MotionError = getattr(mission.platforms, name).motion_error
-    combine, gain = mission.allocation.combine, allocation.autofocus_gain
-    cycles = line.frequency * mission.collection.aperture_time
-    phase = 2 * math.pi * line.amplitude / mission.radar.wavelength
-    qpe, cubic = phase * quadratic_part(cycles), phase * cubic_part(cycles)
-    limits = slow_limits(mission, allocation, name, cycles)
-    limit = allocation.qpe_limit(name) * gain
-    if limits.binding == CUBIC:
+def _row(
+    mission: Mission,
+    one: VibrationRow,
+    error: MotionError,
+    model: str,
+    key: tuple[str | int, ...],
+    notes: Sequence[Note] = (),
+    more: Sequence[Note] = (),
+    doubt: Note = NOTHING,
+) -> Row:
+    """A row of echoes or noise: `notes` stand before what is said of its limit, `more` after it."""
+    what, metric, limits = one.judged.subject, one.judged.metric, one.limits
+    equation = f"Section V, {key[0]}" if model == "published" else "first principles"
+    missing, margin, islr = phrases.no_requirement_of(metric), None, None
+    if limits is not None:
+        margin = float(limits.margin_db)
+        notes = (*notes, phrases.published_rule_is_off(margin))
+        if one.is_over_other[0]:
+            other = "full" if model == "published" else "published"
+            doubt = phrases.other_model_allows(other, float(limits.by(other)), "m")
+    declared = float(one.judged.declared[0])
+    if metric == "islr" and not math.isnan(declared):
+        variance = (2 * math.pi * declared / mission.radar.wavelength) ** 2
+        islr = shown_islr_db(mission, variance if what.axis == "wideband" else variance / 2)
+    return worded(
+        mission,
+        one.judged,
+        unit="m",
+        path=("platforms", what.owner, "motion_error", "vibration", *key),
+        equation=equation,
+        over=phrases.share_of_power_over(metric, equation),
+        doubt=doubt,
+        no_limit=missing,
+        info=missing,
+        limits=(None, None) if limits is None else (number(limits.published), number(limits.full)),
+        qpe_full_rad=number(one.qpe),
+        islr_db=islr,
+        evidence=error.source,
+        remarks=(*notes, *more),
+        published_margin_db=margin,
+    )
+
+
+def _seen(mission: Mission, one: VibrationRow, error: MotionError, value: Any) -> tuple[Note, ...]:
+    return projected(mission, value, error, float(one.judged.declared[0]))
+
+
+def _lines_together(error: MotionError, members: Sequence[int], declared: float) -> Note:
+    shown = ", ".join(map(str, members[:5])) + (f" and {len(members) - 5} more" if len(members) > 5 else "")
+    frequencies = [error.vibration.sinusoidal[member].frequency for member in members]
+    ends = [format_quantity(end(frequencies), "Hz", 4) for end in (min, max)]
+    return phrases.lines_together(shown, " to ".join(dict.fromkeys(ends)), NEAR_CYCLES, declared)
+
+
+def _slow_row(mission: Mission, allocation: Allocation, one: VibrationRow, error: MotionError) -> Row:
+    what, limits, combine = one.judged.subject, one.limits, mission.allocation.combine
+    cycles, qpe, cubic = (float(column[0]) for column in (one.cycles, one.qpe, one.cubic))
+    is_cubic = REQUIREMENTS[one.judged.binding[0]] == CUBIC
+    if is_cubic:
         over = phrases.slow_cubic_phase_over(cubic, mission.requirements.cubic_phase_error or 0.0)
     else:
+        limit = float(allocation.qpe_limit(what.owner) * allocation.autofocus_gain)
         over = phrases.slow_quadratic_phase_over(qpe, limit)
         if qpe > limit:
-            over = over.then(needed_sentence(allocation.n_pull_needed(qpe, name), caps(mission)))
-    use = line.amplitude / limits.smallest
-    row = judged(
+            over = over.then(needed_sentence(allocation.n_pull_needed(qpe, what.owner), caps(mission)))
+    entry = what.entry or 0
+    return worded(
         mission,
-        subject=subject(name, "vibration", "sinusoidal", entry=index),
-        metric=QUADRATIC,
+        one.judged,
         unit="m",
-        declared=line.amplitude,
-        allowable=limits.smallest,
-        path=("platforms", name, "motion_error", "vibration", "sinusoidal", index, "amplitude"),
+        path=("platforms", what.owner, "motion_error", "vibration", "sinusoidal", entry, "amplitude"),
         equation="first principles",
-        gain=qpe / (limit / gain) / use if use else 1.0,  # a cubic phase has none
         over=over,
         info=NOTHING if combine == "each" else phrases.aggregate_decides(combine),
-        limits=(limits.quadratic, limits.quadratic),
-        qpe=qpe,
-        qpe_full=qpe,
+        without_autofocus=float(one.without_autofocus[0]),
+        limits=(None, None) if limits is None else (number(limits.published), number(limits.full)),
+        qpe_published_rad=qpe,
+        qpe_full_rad=qpe,
         evidence=error.source,
-        notes=(
-            *projected(mission, error.vibration.sinusoidal[index].amplitude, error, line.amplitude),
+        remarks=(
+            *_seen(mission, one, error, error.vibration.sinusoidal[entry].amplitude),
             phrases.slower_than_a_cycle(cycles, qpe, cubic),
         ),
+        binding_requirement=CUBIC if is_cubic else QUADRATIC,
     )
-    return row._replace(binding_requirement=limits.binding, cubic_rad=cubic)
 
 
-def _row(mission: Mission, case: VibrationCase, model: str) -> Row:
-    allowed = case.limits
-    row = judged(
+def spur_rows(mission: Mission, allocation: Allocation, model: str) -> Iterator[Row]:
+    """Rows of the oscillators' tones of one mission. [dB of an echo to the response]"""
+    other = "full" if model == "published" else "published"
+    with np.errstate(all="ignore"):
+        rows = list(judged_spurs(Judging(1, mission.allocation.warn_above), mission, allocation, model))
+    for one in rows:
+        spur, limits, doubt = one.spur, one.limits, NOTHING
+        oscillator: Oscillator = getattr(mission.platforms, spur.name).oscillator
+        cycles, phase = spur.frequency * mission.collection.aperture_time, float(spur.phase)
+        missing, over = phrases.no_requirement_of("pslr"), NOTHING
+        levels: tuple[float | None, float | None] = (None, None)
+        if limits is not None:
+            levels = (_echo(limits.published), _echo(limits.full))
+            over = phrases.echoes_over(_echo(phase), _echo(limits.by(model)))
+            if one.is_over_other[0]:
+                doubt = phrases.other_model_allows(other, _echo(limits.by(other)), "dB")
+        yield worded(
+            mission,
+            one.judged,
+            unit="dB",
+            path=("platforms", spur.name, "oscillator", "spurs"),
+            equation="first principles" if model == "full" else "Section V, sinusoidal",
+            over=over,
+            doubt=doubt,
+            no_limit=missing,
+            not_evaluated=phrases.echoes_on_the_mainlobe(cycles, ECHO_CYCLES),
+            info=missing,
+            limits=levels,
+            islr_db=shown_islr_db(mission, phase**2 / 2) if one.judged.metric == "islr" else None,
+            evidence=oscillator.source,
+            remarks=(
+                phrases.tone_lies(spur.frequency, cycles),
+                *override_notes(spur.name, oscillator.overridden, "frequency"),
+            ),
+            model=model,
+        )
+
+
+def _echo(phase: Any) -> float:
+    """Level of the echoes of a tone. [dB]"""
+    return 20 * math.log10(phase / 2)
+
+
+def pslr_row(mission: Mission, model: str) -> Iterator[Row]:
+    """The highest echo that all tones of one mission make together; where PSLR is required."""
+    required, over, found = mission.requirements.pslr, NOTHING, tones(mission)
+    if required is None:
+        return
+    judged, highest = judged_pslr(Judging(1, mission.allocation.warn_above), found, required)
+    if highest is not None:
+        makers = [one for one, is_in in zip(found, highest.is_of[:, 0], strict=True) if is_in]
+        largest = max(makers, key=lambda one: one.phase)
+        over = phrases.echoes_together_over(float(judged.declared[0]), required, largest.subject.id, len(makers))
+    yield worded(
         mission,
-        subject=case.subject,
-        metric=case.metric,
-        unit="m",
-        declared=case.declared,
-        allowable=None if allowed is None else allowed.by(model),
-        path=case.path,
-        equation=case.equation,
-        no_limit=case.missing,
-        info=case.missing,
-        over=case.over,
-        doubt=case.doubt,
-        limits=allowed or (None, None),
-        qpe_full=case.qpe,
-        evidence=case.evidence,
-        notes=case.notes,
-        published_margin_db=None if allowed is None else allowed.margin_db,
+        judged,
+        unit="dB",
+        path=("requirements", "pslr"),
+        equation="first principles",
+        over=over,
+        limits=(float(judged.allowable[0]), float(judged.allowable[0])),
+        binding_requirement="pslr",
+        model=model,
     )
-    if case.cubic is None and case.islr_db is None:
-        return row
-    return row._replace(cubic_rad=case.cubic, islr_db=case.islr_db)
-
-
-def _case(
-    mission: Mission,
-    allowed: VibrationLimits | None,
-    metric: str,
-    name: str,
-    axis: str,
-    entry: int | None,
-    *path: str | int,
-) -> VibrationCase:
-    """What every row of a platform's vibration has, before anything is declared."""
-    error: MotionError = getattr(mission.platforms, name).motion_error
-    case = _blank(subject(name, "vibration", axis, entry=entry), metric, path, mission.allocation.model)
-    if allowed is None and error.source is None:
-        return case
-    missing = NOTHING if allowed else case.missing
-    return case._replace(limits=allowed, missing=missing, evidence=error.source, notes=_margin(allowed))
-
-
-@cache
-def _blank(what_it_is: Subject, metric: str, path: KeyPath, model: str) -> VibrationCase:
-    """The row of a mission that says nothing of vibration."""
-    kind = "sinusoidal" if metric == "pslr" else "wideband"
-    missing = phrases.no_requirement_of(metric)
-    rule = f"Section V, {kind}" if model == "published" else "first principles"
-    return VibrationCase(
-        subject=what_it_is,
-        metric=metric,
-        declared=None,
-        limits=None,
-        path=("platforms", what_it_is.owner, "motion_error", "vibration", kind, *path),
-        equation=rule,
-        missing=missing,
-        doubt=NOTHING,
-        over=phrases.share_of_power_over(metric, rule),
-        evidence=None,
-        notes=(),
-    )
-
-
-def _line(
-    mission: Mission,
-    allocation: Allocation,
-    allowed: VibrationLimits | None,
-    name: str,
-    index: int,
-    line: Line | None,
-    both: "_Together",
-) -> VibrationCase:
-    error: MotionError = getattr(mission.platforms, name).motion_error
-    case = _case(mission, allowed, "pslr", name, "sinusoidal", index, index, "amplitude")
-    if line is None:
-        return case
-    case = _with_doubt(case._replace(declared=line.amplitude), mission)
-    notes = [*projected(mission, error.vibration.sinusoidal[index].amplitude, error, line.amplitude), *case.notes]
-    cycles = line.frequency * mission.collection.aperture_time
-    phase = 2 * math.pi * line.amplitude / mission.radar.wavelength
-    if cycles >= ECHO_CYCLES:
-        return case._replace(notes=(*notes, *both.notes), doubt=case.doubt or both.doubt)
-    qpe, cubic = phase * quadratic_part(cycles), phase * cubic_part(cycles)
-    limit = allocation.qpe_limit(name) * allocation.autofocus_gain
-    allowed_cubic = mission.requirements.cubic_phase_error
-    notes.append(phrases.slower_than_three_cycles(cycles, qpe, limit, cubic, allowed_cubic))
-    breaks_cubic = allowed_cubic is not None and cubic > allowed_cubic * (1 + UTILIZATION_TOLERANCE)
-    doubt = NOTHING
-    if breaks_cubic or qpe > limit * (1 + UTILIZATION_TOLERANCE):
-        doubt = phrases.phase_of_vibration_over(qpe, limit, cubic, allowed_cubic)
-    return case._replace(notes=(*notes, *both.notes), doubt=case.doubt or doubt or both.doubt, qpe=qpe, cubic=cubic)
-
-
-def _together(
-    mission: Mission,
-    allowed: VibrationLimits | None,
-    name: str,
-    index: int,
-    members: Sequence[Line],
-    numbers: Sequence[int],
-) -> VibrationCase:
-    """Lines of one platform so near each other that their echoes add: the one line that has an echo as high."""
-    T = mission.collection.aperture_time
-    shown = ", ".join(map(str, numbers[:5])) + (f" and {len(numbers) - 5} more" if len(numbers) > 5 else "")
-    case = _case(mission, allowed, "pslr", name, "sinusoidal.sum", index, numbers[0], "frequency")
-    declared = worst_phases([line.amplitude for line in members], [line.frequency * T for line in members]).amplitude
-    near = phrases.lines_together(shown, _band(members), NEAR_CYCLES, declared)
-    return _with_doubt(case._replace(declared=declared, notes=(near, *case.notes)), mission)
-
-
-def _band(lines: Sequence[Line]) -> str:
-    ends = [format_quantity(end(line.frequency for line in lines), "Hz", 4) for end in (min, max)]
-    return " to ".join(dict.fromkeys(ends))
-
-
-def _noise(mission: Mission, allowed: VibrationLimits | None, name: str, error: MotionError) -> VibrationCase:
-    wideband = error.vibration.wideband
-    case = _case(mission, allowed, "islr", name, "wideband", None, "rms")
-    if wideband is None:
-        return case
-    rms = counted(mission, name, wideband.rms, "islr")
-    notes = (*projected(mission, wideband.rms, error, rms), *case.notes)
-    variance = (2 * math.pi * rms / mission.radar.wavelength) ** 2
-    case = case._replace(declared=rms, notes=notes, islr_db=shown_islr_db(mission, variance))
-    return _with_doubt(case, mission)
-
-
-def _margin(allowed: VibrationLimits | None) -> tuple[Note, ...]:
-    """How far the published rule stays inside first principles, said of every limit."""
-    if allowed is None:
-        return ()
-    return (phrases.published_rule_is_off(allowed.margin_db),)
-
-
-def _with_doubt(case: VibrationCase, mission: Mission) -> VibrationCase:
-    """Say that the model that does not gate fails it; the published one does not know a direct path."""
-    if case.limits is None or case.declared is None or mission.has_direct_path:
-        return case
-    is_published = mission.allocation.model == "published"
-    other, limit = ("full", case.limits.full) if is_published else ("published", case.limits.published)
-    if case.declared <= limit * (1 + UTILIZATION_TOLERANCE):
-        return case
-    return case._replace(doubt=phrases.other_model_allows(other, limit, "m"))
-
-
-class _Together(NamedTuple):
-    notes: tuple[Note, ...] = ()
-    doubt: Note = NOTHING
-
-
-def _of_both_platforms(mission: Mission, lines: dict[str, list[Line]]) -> dict[tuple[str, int], _Together]:
-    """What both platforms make of near frequencies: echoes that in the worst phases add. By platform and line."""
-    requirement, T = mission.requirements.pslr, mission.collection.aperture_time
-    if requirement is None or not all(lines.values()):
-        return {}
-    known = [((name, index), line) for name in PLATFORMS for index, line in enumerate(lines[name])]
-    found = {}
-    for group in near_lines([line.frequency * T for _, line in known]):
-        members = [known[index] for index in group]
-        if len({name for (name, _), _ in members}) < 2:
-            continue
-        near = [line for _, line in members]
-        amplitude = worst_phases([line.amplitude for line in near], [line.frequency * T for line in near]).amplitude
-        phase = 2 * math.pi * amplitude / mission.radar.wavelength
-        if not phase:
-            continue
-        level = 20 * math.log10(echo_level(min(phase, LARGEST_ECHO)))
-        for (name, index), _ in members:
-            (other,) = (platform for platform in PLATFORMS if platform != name)
-            note = phrases.both_platforms_vibrate(other, NEAR_CYCLES, level, phase > LARGEST_ECHO, requirement)
-            found[name, index] = _Together((note,), note if level > requirement + 1e-6 else NOTHING)
-    return found

@@ -9,7 +9,7 @@ import math
 from collections import deque
 from collections.abc import Container, Iterator, Mapping, Sequence
 from datetime import date
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, lru_cache
 from hashlib import sha256
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
@@ -20,9 +20,9 @@ from bisar_budget.arrays import judged
 from bisar_budget.arrays.collections import Geometries, paths_of
 from bisar_budget.arrays.held import is_image, not_held
 from bisar_budget.arrays.judged import check_arrays, statuses
-from bisar_budget.arrays.rows import REQUIREMENTS, Judged
 from bisar_budget.arrays.varied import varied
 from bisar_budget.budget.check import check_mission
+from bisar_budget.budget.judged_rows import REQUIREMENTS, Judged
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.design.cases import Cases, words_of
 from bisar_budget.design.quantities import Choices, Number, QuestionError, number_of, tree_of
@@ -464,7 +464,6 @@ class Engine:
                 nodes,
                 geometries,
                 shown,
-                partial(self._one, found, some),
                 is_brief=self.is_brief,
             )
             rows = {row.subject.id: row for row in checked.rows}
@@ -498,13 +497,6 @@ class Engine:
             return "not_declared"
         row = judged.with_required([Judged.of_none(what, cases)], mission, geometries, cases)[-1]
         return judged.statuses(judged.waived(row, mission, self.question.today).status)
-
-    def _one(self, found: Mapping[str, Values], some: NDArray[Any], place: int) -> Mission:
-        """The mission of one case of some, with its numbers."""
-        mission = self.mission
-        for number in self.numbers:
-            mission = varied(mission, number.key, float(found[number.key][some[place]]))
-        return mission
 
     # ---------------------------------------------------------------- one by one
     def _by_itself(self, found: dict[str, Values], place: int) -> None:

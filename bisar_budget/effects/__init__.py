@@ -14,10 +14,9 @@ __all__ = [
     "pieces",
     "point_path",
     "random_errors",
-    "slow_vibration",
     "sources",
     "spectra",
     "subject",
     "tones",
-    "vibration_lines",
+    "vibration",
 ]

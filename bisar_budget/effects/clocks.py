@@ -2,7 +2,9 @@
 
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from bisar_budget import file_warnings, phrases
 from bisar_budget.effects.effect import PLATFORMS, override_notes
@@ -96,8 +98,8 @@ class Spur(NamedTuple):
     name: str
     entry: int
     frequency: float
-    phase: float
-    left: float
+    phase: Any
+    left: Any
 
 
 def spurs_of(mission: Mission) -> list[Spur]:
@@ -115,12 +117,12 @@ def spurs_of(mission: Mission) -> list[Spur]:
     return found
 
 
-def _left_of(frequency: float, mission: Mission) -> float:
+def _left_of(frequency: float, mission: Mission) -> Any:
     """Largest part of a tone that exchanged pulses leave, at its own frequency or at one that it is folded to."""
     sync = mission.synchronization
     if sync is None or sync.interval is None:
         return 1.0
-    nearest = round(frequency * sync.interval)
-    turns = [frequency * sync.interval - n for n in range(nearest - 1, nearest + 2) if n]
-    passed = [math.sqrt(held(2 * math.pi * turn)) for turn in (frequency * sync.interval, *turns)]
-    return max(1 - passed[0], *passed[1:])
+    turns = frequency * np.asarray(sync.interval)
+    images = [np.rint(turns) + n for n in (-1, 0, 1)]
+    passed = [np.where(image != 0, np.sqrt(held(2 * math.pi * (turns - image))), 0.0) for image in images]
+    return np.max([1 - np.sqrt(held(2 * math.pi * turns)), *passed], axis=0)

@@ -19,7 +19,7 @@ from bisar_budget.effects.effect import PLATFORMS, override_notes
 from bisar_budget.effects.exact_ranges import ExactRanges
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.tones import Parts, gauss_markov
-from bisar_budget.effects.vibration_lines import sight_of
+from bisar_budget.effects.vibration import sight_of
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import BistaticGeometry, PlatformState, Vector, dot
 from bisar_budget.mission.instruments import IMU_KINDS, GaussMarkov, Imu

@@ -1,27 +1,48 @@
 """Phase noise over an aperture: spectra as pieces of power laws, and what their integrals with a tone's parts give.
 
 Spectra are one-sided, of phase at the radar's centre frequency. [rad²/Hz] A data sheet's L(f) is half of one.
+
+In the angle x = πfT the edges of panels are the same for every aperture time T, and so is what a power law gives
+between two of them: only the ends of a piece are integrated one by one.
 """
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from functools import lru_cache
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from bisar_budget import evaluators
-from bisar_budget.effects.tones import Parts, held, tone
+from bisar_budget.effects.tones import Floats, Parts, held, tone
 
 _TURNS = 24  # half turns of a tone within the aperture that are followed one by one
-FAST = _TURNS * math.pi  # angle from which what turns with a tone is averaged
-FIRST = 0.1  # angle below which a tone's parts are their first powers, to 4e-4 of the 3 % that lie there
+_FAST = _TURNS * math.pi  # angle from which what turns with a tone is averaged
+_FIRST = 0.1  # angle below which a tone's parts are their first powers, to 4e-4 of the 3 % that lie there
 _OCTAVE = 2.0
-SAME = 1.000001  # of two edges, computed in two ways
-NOTHING = 1e-6  # of the first edge: nothing of a tone's parts is below
-FOLDED = 8  # intervals of sampling beyond which straight lines pass less than 1e-5 of a tone's power
-ALIASES = 3  # tones folded from so many rates away are counted one by one, those beyond by an integral
+_SAME = 1.000001  # of two edges, computed in two ways
+_NOTHING = 1e-6  # of the first edge: nothing of a tone's parts is below
+_FOLDED = 8  # intervals of sampling beyond which straight lines pass less than 1e-5 of a tone's power
+_ALIASES = 3  # tones folded from so many rates away are counted one by one, those beyond by an integral
 
 # Nodes and weights of Gauss and Legendre on 0 … 1.
-NODES = tuple((0.5 + 0.5 * node, weight) for node, weight in zip(*evaluators.LEGENDRE_FITS[6][:2], strict=True))
+_NODES, _WEIGHTS = (
+    (0.5 + 0.5 * np.array(evaluators.LEGENDRE_FITS[6][0]))[:, None],
+    np.array(evaluators.LEGENDRE_FITS[6][1])[:, None],
+)
+_MOST = 4096  # panels that are integrated at once
+
+
+def _tone_edges(aperture_time: float) -> list[float]:
+    """Frequencies between which a tone's parts are smooth. [Hz]"""
+    scale = math.pi * aperture_time
+    edges = [_FIRST / scale * _OCTAVE**n for n in range(4)]
+    return edges + [math.pi * n / scale for n in range(1, _TURNS + 1)]
+
+
+_EDGES = np.array(_tone_edges(1 / math.pi))  # angles
 
 
 class PowerLawPiece(NamedTuple):
@@ -44,86 +65,193 @@ class PowerLawPiece(NamedTuple):
         return float(self.density * (high**exponent - (low**exponent if low else 0.0)) / exponent)
 
 
-def parts(pieces: Sequence[PowerLawPiece], aperture_time: float) -> Parts:
+def parts(pieces: Sequence[PowerLawPiece], aperture_time: Any) -> Parts:
     """Integrate a spectrum with the parts of a tone, to 1e-4.
 
     Parameters
     ----------
     pieces : sequence of PowerLawPiece
         Of a one-sided spectrum. [rad²/Hz]
-    aperture_time : float
+    aperture_time : float or (cases,)
         [s]
     """
-    scale, total = math.pi * aperture_time, Parts(0.0, 0.0, 0.0)
+    scale = math.pi * np.atleast_1d(aperture_time)
+    total = np.zeros((3, *scale.shape))
     for piece in pieces:
-        for low, high in panels(piece.low, piece.high, tone_edges(aperture_time)):
-            if high * scale <= FIRST * SAME:
-                found = _slow(piece, low, high, scale)
-            elif low * scale >= FAST / SAME:
-                found = _fast(piece, low, high, scale)
-            else:
-                found = _panel(piece.at, low, high, scale)
-            total = total.plus(found)
-    return total
+        to_angle = piece.density * scale ** (piece.slope - 1)
+        total += to_angle * _of_power_law(piece.slope, piece.low * scale, piece.high * scale)
+    return _like(total, aperture_time)
 
 
-def synchronized_parts(pieces: Sequence[PowerLawPiece], aperture_time: float, interval: float) -> Parts:
+def _like(total: Floats, aperture_time: Any) -> Parts:
+    """Parts as numbers or as arrays, as the aperture times are."""
+    return Parts(*total) if np.ndim(aperture_time) else Parts(*total[:, 0].tolist())
+
+
+def _of_power_law(slope: float, low: Floats, high: Floats) -> Floats:
+    """Parts of x^(−slope) between two angles."""
+    first = np.searchsorted(_EDGES, low * _SAME, side="right")
+    last = np.searchsorted(_EDGES, high / _SAME, side="left")
+    has_edge = last > first
+    until = np.where(has_edge, _EDGES[np.minimum(first, _EDGES.size - 1)], high)
+    start = np.where(has_edge, _EDGES[last - 1], high)
+    between = _between_edges(slope)
+    whole = np.where(has_edge, between[:, last - 1] - between[:, np.minimum(first, _EDGES.size - 1)], 0.0)
+    return whole + _at_an_end(slope, low, until) + _at_an_end(slope, start, high)
+
+
+@lru_cache(maxsize=256)
+def _between_edges(slope: float) -> Floats:
+    """Parts of x^(−slope) from the first edge to each, (3, edges)."""
+    panels = _power_panels(slope, _EDGES[:-1], _EDGES[1:])
+    return np.concatenate((np.zeros((3, 1)), np.cumsum(panels, axis=1)), axis=1)
+
+
+def _at_an_end(slope: float, low: Floats, high: Floats) -> Floats:
+    """Parts of a panel at the end of a piece, which may be slow or fast; nothing of one without length."""
+    found = np.zeros((3, low.size))
+    is_slow, is_fast = high <= _FIRST * _SAME, low >= _FAST / _SAME
+    for some, of_panel in (
+        (is_slow, _slow),
+        (~is_slow & is_fast, _fast),
+        (~is_slow & ~is_fast, _power_panels),
+    ):
+        chosen = some & (low < high)
+        if chosen.any():
+            found[:, chosen] = of_panel(slope, low[chosen], high[chosen])
+    return found
+
+
+def _integral(exponent: float, low: Floats, high: Floats) -> Floats:
+    """Integral of x^exponent; `low` may be zero where it converges."""
+    power = exponent + 1
+    if abs(power) < 1e-9:
+        return np.asarray(np.log(high / low))
+    lower = np.where(low > 0, np.where(low > 0, low, 1.0) ** power, 0.0)
+    return np.asarray((high**power - lower) / power)
+
+
+def _slow(slope: float, low: Floats, high: Floats) -> Floats:
+    """Tones so slow that their parts are their first powers: x²/2, x³/6 and x⁸/99225."""
+    powers = ((4, 4), (6, 36), (8, 99225))
+    return np.array([_integral(power - slope, low, high) / divisor for power, divisor in powers])
+
+
+def _fast(slope: float, low: Floats, high: Floats) -> Floats:
+    """Tones so fast that what turns with them is averaged."""
+    (found,) = evaluators.tone_parts_fast(*(_integral(-power - slope, low, high) for power in (0, 2, 4, 6, 8)))  # type: ignore[arg-type]
+    return np.array(found)
+
+
+def _power_panels(slope: float, low: Floats, high: Floats) -> Floats:
+    """Parts of x^(−slope) over panels (n,), by their nodes."""
+    span = np.log(high / low)
+    x = low * np.exp(span * _NODES)
+    power = x**-slope * x * span * _WEIGHTS
+    return np.asarray((power * _squares(x)).sum(axis=1))
+
+
+def _squares(angle: Floats) -> Floats:
+    """Squares of the amplitudes of a tone, and the share of its power that is left, (3, …)."""
+    found = tone(angle)
+    found[:2] *= found[:2]
+    return found
+
+
+# ---------------------------------------------------------------------- synchronisation
+def synchronized_parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, interval: float) -> Parts:
     """The same of what synchronisation leaves: a phase less the straight lines between samples of it.
 
     Straight lines pass sinc²(f·T_s) of a tone, and fold every tone that is m/T_s away on it: of a spectrum S they
     leave S·(1 − sinc²)² + sinc⁴·Σ S(|f + m/T_s|), m ≠ 0. The lines begin anywhere in the interval.
     """
-    rate = 1 / interval
-    edges = [*exchange_edges(aperture_time, rate), *image_edges(pieces, rate)]
-    scale, total = math.pi * aperture_time, Parts(0.0, 0.0, 0.0)
-    beyond = [folded_from_beyond(piece, rate) for piece in pieces]
+    rate, times = 1 / interval, np.atleast_1d(aperture_time)
+    beyond = [_folded_from_beyond(piece, rate) for piece in pieces]
+    scale = math.pi * times
+    last = np.maximum(_FOLDED * rate, _FAST / scale)
+    edges = [[*_exchange_edges(T, rate), *_image_edges(pieces, rate)] for T in times.tolist()]
+    total = _over_panels(lambda f: _left(pieces, beyond, f, rate), edges, last, scale)
+    for piece in pieces:  # where straight lines pass nothing any more
+        to_angle = piece.density * scale ** (piece.slope - 1)
+        low, high = np.maximum(piece.low, last) * scale, piece.high * scale
+        some = piece.high > last
+        total[:, some] += to_angle[some] * _fast(piece.slope, low[some], high[some])
+    return _like(total, aperture_time)
 
-    def left(f: float) -> float:
-        return _left(pieces, beyond, f, rate)
 
-    last = max(FOLDED * rate, FAST / scale)
-    for low, high in panels(0.0, last, edges):
-        total = total.plus(_panel(left, low, high, scale))
-    # Where straight lines pass nothing any more.
-    for piece in pieces:
-        if piece.high > last:
-            total = total.plus(_fast(piece, max(piece.low, last), piece.high, scale))
+def link_parts(aperture_time: Any, interval: float) -> Parts:
+    """Parts of samples of variance 1 with straight lines between: one-sided 2·T_s·sinc⁴(f·T_s), ⅔ in all."""
+    rate, times = 1 / interval, np.atleast_1d(aperture_time)
+    edges = [_exchange_edges(T, rate) for T in times.tolist()]
+    last = np.full(times.shape, _FOLDED * rate)
+    total = _over_panels(lambda f: 2 * interval * held(2 * math.pi * f * interval), edges, last, math.pi * times)
+    return _like(total, aperture_time)
+
+
+def _over_panels(
+    density: Callable[[Floats], Floats], edges: Sequence[Sequence[float]], high: Floats, scale: Floats
+) -> Floats:
+    """Integrate a density with the parts of a tone from 0 Hz, between the edges of each case."""
+    panels = [
+        (low, top, place)
+        for place, (of_case, end) in enumerate(zip(edges, high.tolist(), strict=True))
+        for low, top in _panels(0.0, end, of_case)
+    ]
+    low, top, cases = (np.array(column) for column in zip(*panels, strict=True))
+    total = np.zeros((3, high.size))
+    for start in range(0, low.size, _MOST):
+        some = slice(start, start + _MOST)
+        found = _panels_of(density, low[some], top[some], scale[cases[some]])
+        for kept, part in zip(total, found, strict=True):
+            kept += np.bincount(cases[some], part, high.size)
     return total
 
 
-def _left(pieces: Sequence[PowerLawPiece], beyond: Sequence[float], f: float, rate: float) -> float:
-    """Spectrum that straight lines between samples leave. [rad²/Hz]"""
-    passed = held(2 * math.pi * f / rate)  # sinc⁴
-    nearest = round(f / rate)
+def _panels_of(density: Callable[[Floats], Floats], low: Floats, high: Floats, scale: Floats) -> Floats:
+    """Parts of panels (n,)."""
+    low = np.where(low > 0, low, high * _NOTHING)
+    span = np.log(high / low)
+    f = low * np.exp(span * _NODES)
+    angle = f * scale
+    fast = np.array(*evaluators.tone_parts_fast(1.0, *(angle**-power for power in (2, 4, 6, 8))))  # type: ignore[arg-type]
+    squares = np.where(low * scale >= _FAST / _SAME, fast, _squares(angle))
+    return np.asarray((density(f) * f * span * _WEIGHTS * squares).sum(axis=1))
+
+
+def _left(pieces: Sequence[PowerLawPiece], beyond: Sequence[float], f: Floats, rate: float) -> Floats:
+    """Spectrum that straight lines between samples leave [rad²/Hz]."""
+    passed, nearest = held(2 * math.pi * f / rate), np.rint(f / rate)
     start = f - nearest * rate
-    total = 0.0
+    total = np.zeros_like(f)
     for piece, far in zip(pieces, beyond, strict=True):
-        own, aliases = 0.0, far
-        for n in range(-ALIASES, ALIASES + 1):
-            at = abs(start + n * rate)
-            if piece.low <= at < piece.high:
-                if n == nearest:
-                    own = piece.at(at)
-                else:
-                    aliases += piece.at(at)
-        if abs(nearest) > ALIASES and piece.low <= f < piece.high:
-            own = piece.at(f)
-        total += own * (1 - math.sqrt(passed)) ** 2 + passed * aliases
+        own, aliases = np.zeros_like(f), np.full_like(f, far)
+        for n in range(-_ALIASES, _ALIASES + 1):
+            density = _at(piece, np.abs(start + n * rate))
+            own = np.where(nearest == n, density, own)
+            aliases = aliases + np.where(nearest == n, 0.0, density)
+        own = np.where(np.abs(nearest) > _ALIASES, _at(piece, f), own)
+        total += own * (1 - np.sqrt(passed)) ** 2 + passed * aliases
     return total
 
 
-def folded_from_beyond(piece: PowerLawPiece, rate: float) -> float:
+def _at(piece: PowerLawPiece, f: Floats) -> Floats:
+    """Density of a piece, 0 beside it. [rad²/Hz]"""
+    is_in: NDArray[Any] = (piece.low <= f) & (f < piece.high)
+    return np.where(is_in, piece.density * np.where(is_in, f, 1.0) ** -piece.slope, 0.0)
+
+
+def _folded_from_beyond(piece: PowerLawPiece, rate: float) -> float:
     """Sum of what is folded from farther away, as an integral; its first correction is that of the midpoint rule."""
-    low = max(piece.low, (ALIASES + 0.5) * rate)
+    low = max(piece.low, (_ALIASES + 0.5) * rate)
     if low >= piece.high:
         return 0.0
     rise = -piece.slope * piece.at(low) / low  # of the spectrum, at the integral's beginning
     return 2 * (piece.integral(low, piece.high) / rate + rise * rate / 24)
 
 
-def exchange_edges(aperture_time: float, rate: float) -> list[float]:
+def _exchange_edges(aperture_time: float, rate: float) -> list[float]:
     """Frequencies between which a tone's parts, and what straight lines pass, are smooth. [Hz]"""
-    edges = tone_edges(aperture_time) + [rate * n / 4 for n in range(1, 4 * FOLDED + 1)]
+    edges = _tone_edges(aperture_time) + [rate * n / 4 for n in range(1, 4 * _FOLDED + 1)]
     octave = _TURNS / aperture_time
     while octave < rate / 4:
         edges.append(octave)
@@ -131,73 +259,20 @@ def exchange_edges(aperture_time: float, rate: float) -> list[float]:
     return edges
 
 
-def image_edges(pieces: Sequence[PowerLawPiece], rate: float) -> list[float]:
+def _image_edges(pieces: Sequence[PowerLawPiece], rate: float) -> list[float]:
     """Frequencies at which pieces of a spectrum begin and end, and where images of it end. [Hz]"""
     end = max((piece.high for piece in pieces), default=0.0)  # an oscillator may be stated to have no noise
     edges = [edge for piece in pieces for edge in (piece.low, piece.high)]
-    return edges + [abs(n * rate + sign * end) for n in range(FOLDED + 1) for sign in (1, -1)]
+    return edges + [abs(n * rate + sign * end) for n in range(_FOLDED + 1) for sign in (1, -1)]
 
 
-def tone_edges(aperture_time: float) -> list[float]:
-    """Frequencies between which a tone's parts are smooth. [Hz]"""
-    scale = math.pi * aperture_time
-    edges = [FIRST / scale * _OCTAVE**n for n in range(4)]
-    return edges + [math.pi * n / scale for n in range(1, _TURNS + 1)]
-
-
-def panels(low: float, high: float, edges: Sequence[float]) -> Iterator[tuple[float, float]]:
+def _panels(low: float, high: float, edges: Sequence[float]) -> Iterator[tuple[float, float]]:
     """Neighbouring edges; of two that are the same, computed in two ways, one.
 
     Between the two a tone would be folded on 0 Hz, where a spectrum has no value.
     """
     kept = [low]
     for edge in sorted(edges):
-        if kept[-1] * SAME < edge < high / SAME:
+        if kept[-1] * _SAME < edge < high / _SAME:
             kept.append(edge)
     return pairwise([*kept, high])
-
-
-def _panel(density: Callable[[float], float], low: float, high: float, scale: float) -> Parts:
-    """Integrate between two edges, over logarithms: a panel may be long."""
-    quadratic = cubic = left = 0.0
-    low = low or high * NOTHING
-    is_fast, span = low * scale >= FAST / SAME, math.log(high / low)
-    for part, share in NODES:
-        f = low * math.exp(span * part)
-        angle = f * scale
-        if is_fast:
-            ((square, cube, rest),) = evaluators.tone_parts_fast(1.0, *(angle**-power for power in (2, 4, 6, 8)))
-        else:
-            square, cube, rest = tone(angle)
-            square, cube = square * square, cube * cube
-        power = density(f) * f * span * share
-        quadratic += power * square
-        cubic += power * cube
-        left += power * rest
-    return Parts(quadratic, cubic, left)
-
-
-def _slow(piece: PowerLawPiece, low: float, high: float, scale: float) -> Parts:
-    """Tones so slow that their parts are their first powers: x²/2, x³/6 and x⁸/99225."""
-    return Parts(
-        piece.integral(low, high, 4) * scale**4 / 4,
-        piece.integral(low, high, 6) * scale**6 / 36,
-        piece.integral(low, high, 8) * scale**8 / 99225,
-    )
-
-
-def _fast(piece: PowerLawPiece, low: float, high: float, scale: float) -> Parts:
-    """Tones so fast that what turns with them is averaged."""
-    powers = [piece.integral(low, high, -power) * scale**-power for power in (0, 2, 4, 6, 8)]
-    (found,) = evaluators.tone_parts_fast(*powers)
-    return Parts(*found)
-
-
-def link_parts(aperture_time: float, interval: float) -> Parts:
-    """Parts of samples of variance 1 with straight lines between: one-sided 2·T_s·sinc⁴(f·T_s), ⅔ in all."""
-    rate, scale = 1 / interval, math.pi * aperture_time
-    edges = exchange_edges(aperture_time, rate)
-    total = Parts(0.0, 0.0, 0.0)
-    for low, high in panels(0.0, FOLDED * rate, edges):
-        total = total.plus(_panel(lambda f: 2 * interval * held(2 * math.pi * f * interval), low, high, scale))
-    return total

@@ -1,9 +1,17 @@
-"""What a tone and a correlated process do over an aperture: quadratic phase, cubic phase, and what is left."""
+"""What a tone and a correlated process do over an aperture: quadratic phase, cubic phase, and what is left.
+
+Numbers and arrays of many cases alike.
+"""
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from bisar_budget import evaluators
+
+Floats = NDArray[np.float64]
 
 SLOW = 0.5  # angle, or ratio, below which terms cancel and a series is exact to 1e-8
 
@@ -11,38 +19,32 @@ SLOW = 0.5  # angle, or ratio, below which terms cancel and a series is exact to
 class Parts(NamedTuple):
     """Mean squares of a phase over the aperture [rad²]: quadratic, cubic, and what is left after the cubic."""
 
-    quadratic: float
-    cubic: float
-    left: float
-
-    def plus(self, other: "Parts") -> "Parts":
-        """Parts of two independent processes together."""
-        return Parts(self.quadratic + other.quadratic, self.cubic + other.cubic, self.left + other.left)
+    quadratic: Any
+    cubic: Any
+    left: Any
 
 
-def gauss_markov(aperture_time: float, correlation_time: float) -> Parts:
+def gauss_markov(aperture_time: Any, correlation_time: Any) -> Parts:
     """Parts of a stationary process of variance 1 and correlation exp(−|t|/τ_c)."""
-    ratio = aperture_time / (2 * correlation_time)
-    if ratio < SLOW:
-        (found,) = evaluators.gauss_markov_parts_slow(ratio)
-    else:
-        (found,) = evaluators.gauss_markov_parts(ratio, math.exp(-2 * ratio))
-    return Parts(*found)
+    ratio = np.asarray(aperture_time / (2 * correlation_time))
+    (slow,) = evaluators.gauss_markov_parts_slow(np.minimum(ratio, SLOW))
+    fast = np.maximum(ratio, SLOW)
+    (exact,) = evaluators.gauss_markov_parts(fast, np.exp(-2 * fast))
+    return Parts(*(np.where(ratio < SLOW, *both)[()] for both in zip(slow, exact, strict=True)))
 
 
-def tone(angle: float) -> tuple[float, float, float]:
+def tone(angle: Any) -> Floats:
     """Amplitudes of the quadratic and the cubic phase of a tone of amplitude 1, in its worst phase, and what is left.
 
-    `angle` is πfT; the last number is the share of its power beyond the cubic.
+    `angle` is πfT; the last of the three is the share of its power beyond the cubic.
     """
-    if angle < SLOW:
-        (found,) = evaluators.tone_parts_slow(angle)
-    else:
-        (found,) = evaluators.tone_parts(angle, math.sin(angle), math.cos(angle))
-    return found  # type: ignore[return-value]
+    angle = np.asarray(angle)
+    slow = np.array(*evaluators.tone_parts_slow(np.minimum(angle, SLOW)))  # type: ignore[arg-type]
+    fast = np.maximum(angle, SLOW)
+    exact = np.array(*evaluators.tone_parts(fast, np.sin(fast), np.cos(fast)))  # type: ignore[arg-type]
+    return np.where(angle < SLOW, slow, exact)
 
 
-def held(step: float) -> float:
+def held(step: Any) -> Any:
     """Spectrum of samples joined by straight lines, over that of white noise of their variance: sinc⁴."""
-    half = step / 2
-    return (math.sin(half) / half) ** 4 if half else 1.0
+    return np.sinc(step / (2 * math.pi)) ** 4

@@ -13,7 +13,7 @@ from bisar_budget.effects.correlation import correlated_errors, likely_error
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.exact_arrays import aperture_nodes
 from bisar_budget.effects.pieces import LinePiece, gradients_of, indicated_point
-from bisar_budget.effects.vibration_lines import counted, lines_of
+from bisar_budget.effects.vibration import counted, lines_of
 from bisar_budget.geometry import BistaticGeometry, GroundVector, Vector
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.mission.platforms import MotionError as DeclaredError

@@ -12,7 +12,7 @@ from bisar_budget.effects.echoes import SLOWEST
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.models import QUADRATIC
 from bisar_budget.effects.subject import Subject, subject
-from bisar_budget.effects.vibration_lines import lines_of
+from bisar_budget.effects.vibration import lines_of
 from bisar_budget.faults import printable
 from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.findings.row import Row

@@ -11,7 +11,7 @@ from bisar_budget.budget.collection_notes import COARSE_CELL_RAD, phase_across_a
 from bisar_budget.budget.pull_in import ROOM
 from bisar_budget.effects.effect import ErrorSource
 from bisar_budget.effects.models import CUBIC
-from bisar_budget.effects.vibration_lines import Line
+from bisar_budget.effects.vibration import Line
 from bisar_budget.findings.images import Verdict
 from bisar_budget.geometry import GroundVector
 from bisar_budget.phrases import Note

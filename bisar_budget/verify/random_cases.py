@@ -14,12 +14,11 @@ from bisar_budget.analysis.spread import islr_db, mainlobe_energy, shown_islr_db
 from bisar_budget.analysis.vibration_limits import echo_phase, highest_echo
 from bisar_budget.budget.random_rows import ISLR, held_effect, limits_for, sizes_at
 from bisar_budget.effects.clocks import Spur
-from bisar_budget.effects.echoes import sinc
 from bisar_budget.effects.exact_arrays import aperture_nodes
 from bisar_budget.effects.models import CUBIC
 from bisar_budget.effects.random_errors import RandomError
 from bisar_budget.effects.subject import Subject, subject
-from bisar_budget.effects.vibration_lines import sight_of
+from bisar_budget.effects.vibration import sight_of
 from bisar_budget.findings.images import Verdict
 from bisar_budget.mission.model import Simulation
 from bisar_budget.simulate.collection import Errors
@@ -77,13 +76,14 @@ def verify_pslr(study: Study) -> Verdict:
     required = study.mission.requirements.pslr or 0.0
     row_id = subject("mission", "pslr").id
     blank = Verdict(id=row_id, model=study.model, boundary_error=required, unit="dB", requirement_db=required)
-    highest = highest_echo(tones(study.mission))
+    found = tones(study.mission)
+    highest = highest_echo(found)
     if highest is None or not highest.phase:
         return blank._replace(reason=reasons.no_tone_declared())
     scale = echo_phase(10 ** (required / 20)) / highest.phase * study.collection.wavelength / (2 * math.pi)
     sinusoids: dict[str, tuple[PathSinusoid, ...]] = {}
-    for one in highest.tones:
-        turned = 0.0 if sinc(highest.cycles - one.cycles) >= 0 else math.pi
+    for one in [one for one, is_in in zip(found, highest.is_of, strict=True) if is_in]:
+        turned = 0.0 if np.sinc(highest.cycles - one.cycles) >= 0 else math.pi
         tone = PathSinusoid(scale * one.phase, one.cycles / study.collection.aperture_time, turned)
         sinusoids[one.subject.owner] = (*sinusoids.get(one.subject.owner, ()), tone)
     return echo(study.collection, blank, sinusoids, "the tones together in their worst phases")

@@ -13,11 +13,11 @@ import numpy as np
 
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.vibration_limits import vibration_limits
-from bisar_budget.effects.echoes import SLOWEST, near_lines, sinc, worst_phases
+from bisar_budget.effects.echoes import SLOWEST, near_lines, worst_phases
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.exact_arrays import direct_path_clock
 from bisar_budget.effects.subject import Subject, subject
-from bisar_budget.effects.vibration_lines import Line, lines_of
+from bisar_budget.effects.vibration import Line, lines_of
 from bisar_budget.findings.images import Verdict
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import Note
@@ -120,7 +120,7 @@ def _near(
         return blank._replace(reason=reasons.lines_without_amplitude())
     scale = limits[name] / worst.amplitude
     sinusoids = tuple(
-        PathSinusoid(scale * line.amplitude, line.frequency, 0.0 if sinc(worst.cycles - n) >= 0 else math.pi)
+        PathSinusoid(scale * line.amplitude, line.frequency, 0.0 if np.sinc(worst.cycles - n) >= 0 else math.pi)
         for line, n in zip(lines, cycles, strict=True)
     )
     return echo(collection, blank, {name: sinusoids}, "one platform's lines in their worst phases")

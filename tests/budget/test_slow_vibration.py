@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.effects.slow_vibration import slow_phases
+from bisar_budget.effects.vibration import slow_phases
 from bisar_budget.findings.mission import Report
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.report import FORMATS, Style, render

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from bisar_budget.analysis import vibration_limits as vibration
 from bisar_budget.analysis.allocation import Split
 from bisar_budget.budget.check import check_mission
-from bisar_budget.effects.slow_vibration import cubic_part, quadratic_part
-from bisar_budget.effects.vibration_lines import along_line_of_sight
+from bisar_budget.effects.vibration import along_line_of_sight, cubic_part, quadratic_part
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.platforms import MotionError

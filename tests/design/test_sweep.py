@@ -364,6 +364,68 @@ def test_a_slow_vibration_alone(rule) -> None:
     assert_as_checked(mission, cases, whole, columns)
 
 
+_LINES = {
+    "platforms.transmitter.motion_error.vibration": (
+        "{sinusoidal: [{amplitude: 20 um, frequency: 6 Hz}, {amplitude: [10 um, 5 um, 1 um], frequency: 6.3 Hz}]}"
+    ),
+    "platforms.receiver.motion_error.vibration": (
+        "{sinusoidal: [{amplitude: 30 um, frequency: 6.1 Hz}, {amplitude: 0 m, frequency: 20 Hz}], "
+        "wideband: {rms: [10 um, 20 um, 30 um]}}"
+    ),
+}
+_OF_LINES = [
+    f"{row_id}.{field}"
+    for row_id in (
+        "transmitter.vibration.sinusoidal.0",
+        "transmitter.vibration.sinusoidal.sum.0",
+        "receiver.vibration.sinusoidal.0",
+        "receiver.vibration.sinusoidal.sum.0",
+        "receiver.vibration.wideband",
+        "mission.pslr",
+        "mission.islr",
+    )
+    for field in ("status", "declared", "allowable", "utilization", "qpe_published_rad", "cubic_rad")
+]
+
+
+@pytest.mark.parametrize("model", ["published", "full", "strictest"])
+@pytest.mark.parametrize("requirements", ["pslr: -30 dB, islr: -20 dB", "islr: -25 dB, cubic_phase_error: 5 deg", ""])
+@pytest.mark.parametrize(
+    "axes",
+    [
+        # Slow, beside the mainlobe, and near the lines of either platform or of none.
+        {
+            "platforms__receiver__motion_error__vibration__sinusoidal__0__frequency": [
+                0.1,
+                0.3,
+                0.7,
+                5.9,
+                6.1,
+                19.8,
+                40,
+            ]
+        },
+        # Lines are near each other over a short aperture, apart over a long one, and slow over a very short one.
+        {"collection__aperture_time": [0.1, 0.16, 0.3, 2.0, 9.0, 15.0]},
+        {"platforms__transmitter__motion_error__vibration__sinusoidal__1__amplitude__0": [0.0, 1e-5, 1e-3]},
+    ],
+    ids=["frequency", "aperture", "amplitude"],
+)
+def test_lines_that_are_near_each_other_in_some_cases(axes, requirements, model) -> None:
+    """All that vibrates is in the arrays: no case is checked by itself."""
+    changes = {**_LINES, "allocation.model": model, "platforms.receiver.oscillator": MASK}
+    for one in filter(None, requirements.split(", ")):
+        key, value = one.split(": ")
+        changes[f"requirements.{key}"] = value
+    mission = parse_mission(mission_text(), "m.yaml", changes=[SetValue(*one) for one in changes.items()])
+    rows = {one.id for one in check_mission(mission, DAY).rows}  # a sweep knows the names of these
+    columns = [one for one in _OF_LINES if one.rpartition(".")[0] in rows]
+    cases = grid(mission, **axes)
+    whole, by_case = swept(mission, cases, columns)
+    assert by_case == 0
+    assert_as_checked(mission, cases, whole, columns)
+
+
 @pytest.mark.parametrize(
     "axes",
     [

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bisar_budget.effects.echoes import near_lines, worst_phases
+from bisar_budget.effects.echoes import near_groups, near_lines, worst_phases
 
 TIME = (np.arange(1024) + 0.5) / 1024 - 0.5
 
@@ -86,6 +86,27 @@ def test_groups_are_chains_of_lines_within_two_and_a_half_cycles(cycles: list[fl
         for other in fast:
             if one < other and abs(cycles[one] - cycles[other]) <= 2.5:
                 assert any({one, other} <= set(group) for group in groups)
+
+
+@pytest.mark.parametrize("count", [1, 2, 5, 9, 20])  # more than eight lines have more places than are searched
+def test_many_cases_at_once_are_each_case_alone(count: int) -> None:
+    rng = np.random.default_rng(count)
+    cycles = rng.uniform(0.5, 8, (count, 40))
+    cycles[:, 20:] = np.round(cycles[:, 20:])  # some have one frequency
+    sizes = rng.uniform(0, 1, cycles.shape)
+    groups = near_groups(cycles)
+    for case in range(40):
+        alone = near_lines(list(cycles[:, case]))
+        assert alone == [tuple(np.flatnonzero(groups[:, case] == one)) for one in range(groups[:, case].max() + 1)]
+    for members in (groups == 0, np.ones(cycles.shape, dtype=bool)):
+        some = np.flatnonzero(members.any(axis=0))
+        if not some.size:
+            continue
+        found = worst_phases(sizes[:, some], cycles[:, some], members[:, some])
+        for place, case in enumerate(some):
+            mine = members[:, case]
+            alone = worst_phases(sizes[mine, case], cycles[mine, case])
+            assert (found.amplitude[place], found.cycles[place]) == pytest.approx(alone, rel=1e-12)
 
 
 def test_a_thousand_lines_take_no_time() -> None:

@@ -13,7 +13,7 @@ from sympy import lambdify
 
 from bisar_budget import evaluators
 from bisar_budget.constants import STANDARD_GRAVITY
-from bisar_budget.effects.spectra import PowerLawPiece, link_parts, parts
+from bisar_budget.effects.spectra import PowerLawPiece, link_parts, parts, synchronized_parts
 from bisar_budget.effects.tones import gauss_markov, held, tone
 from bisar_budget.report.explain import formulas
 from bisar_budget.theory import random_errors, render
@@ -81,6 +81,24 @@ def test_a_piece_of_a_mask_is_integrated_to_1e_4(low: float, high: float, slope:
         for weight in ((7.5 * j[2]) ** 2, (17.5 * j[3]) ** 2, 1 - sum((2 * n + 1) * j[n] ** 2 for n in range(4)))
     ]
     assert found == pytest.approx(expected, rel=1e-4)
+
+
+def test_many_aperture_times_at_once_are_each_alone() -> None:
+    """Pieces from zero on, of each slope and ended below, within and beyond the panels; synchronised or not."""
+    times = np.array([0.01, 0.5, 5.0, 300.0])
+    pieces = [
+        PowerLawPiece(0.0, 0.3, 1.0, 4.0),
+        PowerLawPiece(0.3, 40.0, 2.0, 2.5),
+        PowerLawPiece(40.0, 1e3, 1.0, 0.0),
+    ]
+    for integrate in (
+        lambda T: parts(pieces, T),
+        lambda T: synchronized_parts(pieces, T, 0.1),
+        lambda T: link_parts(T, 0.1),
+        lambda T: gauss_markov(T, 2.0),
+    ):
+        alone = np.array([integrate(float(T)) for T in times]).T
+        assert np.array(integrate(times)) == pytest.approx(alone, rel=1e-12)
 
 
 def test_check_values_of_three_pairs_of_oscillators() -> None:

@@ -3,6 +3,8 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
+import numpy as np
+
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.spread import mainlobe_energy, spread_phase, spread_powers, tones
@@ -12,7 +14,6 @@ from bisar_budget.budget.random_rows import held_effect
 from bisar_budget.constants import STANDARD_GRAVITY
 from bisar_budget.effects.clocks import spurs_of
 from bisar_budget.effects.correlation import phase_parts
-from bisar_budget.effects.echoes import sinc
 from bisar_budget.effects.models import CUBIC, QUADRATIC
 from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.effects.random_errors import RandomEffect, RandomError
@@ -405,11 +406,14 @@ def explained_pslr(mission: Mission, row: Row) -> Iterator[Step]:
         width = max(len(one.subject.id) for one in found)
         listed = [f"{one.subject.id:<{width}}  {one.phase:.6g} rad, {one.cycles:.6g} cells" for one in found]
         yield from step("Tones: peak phase, and distance of their echoes from the response", *listed)
-        terms = " + ".join(f"{number(one.phase)}*{number(abs(sinc(echo.cycles - one.cycles)))}" for one in echo.tones)
-        title = (
-            f"Highest echo: at x = {number(echo.cycles)} cells, of {', '.join(one.subject.id for one in echo.tones)}"
+        together = [one for one, is_in in zip(found, echo.is_of, strict=True) if is_in]
+        terms = " + ".join(
+            f"{number(one.phase)}*{number(abs(np.sinc(echo.cycles - one.cycles)))}" for one in together
         )
-        if len(echo.tones) > 1:
+        title = (
+            f"Highest echo: at x = {number(echo.cycles)} cells, of {', '.join(one.subject.id for one in together)}"
+        )
+        if len(together) > 1:
             title += ", each φ·|sinc(x − f·T)| in the worst phases, sinc(x) = sin(πx)/(πx)"
         yield from step(title, Sum(f"φ = {terms} = {with_unit(echo.phase, 'rad')}"))
         yield from _echo_level(echo)

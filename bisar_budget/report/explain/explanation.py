@@ -3,6 +3,8 @@
 import math
 from collections.abc import Iterable, Iterator, Mapping
 
+import numpy as np
+
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.scene import ScenePhases, at
@@ -10,11 +12,10 @@ from bisar_budget.analysis.spread import mainlobe_energy
 from bisar_budget.analysis.together import Together
 from bisar_budget.analysis.vibration_limits import amplitude_share, echo_phase, slow_limits
 from bisar_budget.effects.correlation import displacement_parts, phase_parts
-from bisar_budget.effects.echoes import near_lines, sinc, worst_phases
+from bisar_budget.effects.echoes import near_lines, worst_phases
 from bisar_budget.effects.effect import ErrorSource, image_plane
 from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
-from bisar_budget.effects.slow_vibration import cubic_part, quadratic_part
-from bisar_budget.effects.vibration_lines import lines_of, sight_of
+from bisar_budget.effects.vibration import cubic_part, lines_of, quadratic_part, sight_of
 from bisar_budget.faults import KeyPath, changes_words, printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import JudgedRequirement
@@ -317,7 +318,7 @@ def _slow_vibration(mission: Mission, allocation: Allocation, row: Row, cycles: 
         lines = equation("by_cubic", "required*λ/(2*π*c)", values, limits.cubic, "m")
         yield from step("Allowable by requirements.cubic_phase_error", *lines)
         sizes["by_cubic"] = limits.cubic
-    smallest = "by_cubic" if limits.binding == CUBIC else "by_QPE"
+    smallest = "by_cubic" if limits.is_cubic else "by_QPE"
     yield from step("Allowable, the smallest", *equation("allowable", smallest, sizes, limits.smallest, "m"))
 
 
@@ -351,7 +352,7 @@ def _near_lines(mission: Mission, platform: str, index: int, total: float) -> It
     near = [lines[member] for member in members]
     worst = worst_phases([line.amplitude for line in near], [line.frequency * T for line in near])
     sizes = " + ".join(
-        f"{number(line.amplitude)}*{number(abs(sinc(worst.cycles - line.frequency * T)))}" for line in near
+        f"{number(line.amplitude)}*{number(abs(np.sinc(worst.cycles - line.frequency * T)))}" for line in near
     )
     entries = ", ".join(map(str, members))
     title = (
