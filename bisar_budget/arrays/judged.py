@@ -17,7 +17,7 @@ from bisar_budget import evaluators
 from bisar_budget.analysis.allocation import Allocation, Split, allocate, effective_n_pull
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.arrays.aggregates import Aggregates, ManyTogether, is_owed
-from bisar_budget.arrays.collections import Geometries, norm
+from bisar_budget.arrays.collections import Geometries
 from bisar_budget.arrays.declared import DeclaredErrors
 from bisar_budget.arrays.edge import HeldTogether, ManySceneEdges, many_scene_edges
 from bisar_budget.arrays.error_rows import ErrorRows
@@ -51,6 +51,7 @@ from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.findings.row import DECLARE, Row
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.model import Mission
+from bisar_budget.ranges.exact_ranges import norm
 
 MODELS = ("published", "full")
 _STATUSES = tuple(STATUS)

@@ -5,11 +5,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from bisar_budget.arrays.collections import Floats
 from bisar_budget.arrays.rows import Judged
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.effects.subject import Subject
 from bisar_budget.findings.status import RANK
+from bisar_budget.ranges.exact_ranges import Floats
 
 BOUND = 1 + UTILIZATION_TOLERANCE
 CODE = {name: np.int8(rank) for name, rank in RANK.items()}

@@ -15,7 +15,7 @@ from bisar_budget.analysis.spread import (
     mainlobe_energy,
     spread_phase,
 )
-from bisar_budget.arrays.collections import Floats, Geometries, axes_of, dot
+from bisar_budget.arrays.collections import Geometries, axes_of
 from bisar_budget.arrays.instruments import ManyRandomErrors
 from bisar_budget.arrays.judgement import BOUND, Judging
 from bisar_budget.arrays.rows import REQUIREMENTS, Judged
@@ -24,6 +24,7 @@ from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.models import QUADRATIC
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.mission.model import Mission
+from bisar_budget.ranges.exact_ranges import Floats, dot
 
 _HELD = (QUADRATIC, "cubic_phase_error", "islr")  # requirements, in the order of what an error does
 

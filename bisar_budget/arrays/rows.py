@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.arrays.collections import Floats
 from bisar_budget.effects.models import CUBIC, END_OF_IMAGE, LOCATION, QUADRATIC
 from bisar_budget.effects.subject import Subject
 from bisar_budget.findings.status import RANK
+from bisar_budget.ranges.exact_ranges import Floats
 
 REQUIREMENTS = (QUADRATIC, CUBIC, LOCATION, "pslr", "islr", END_OF_IMAGE)
 

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import evaluators
-from bisar_budget.arrays.collections import Floats
 from bisar_budget.effects import spectra as scalar
 from bisar_budget.effects.spectra import PowerLawPiece
 from bisar_budget.effects.tones import SLOW
+from bisar_budget.ranges.exact_ranges import Floats
 
 ManyParts = Floats  # (3, cases): mean squares as `Parts` has them [rad²]
 

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.analysis.spread import tones
-from bisar_budget.arrays.collections import Floats
 from bisar_budget.arrays.rows import REQUIREMENTS, Judged
 from bisar_budget.arrays.together import ManyOwnPhases
 from bisar_budget.effects.models import QUADRATIC
@@ -19,6 +18,7 @@ from bisar_budget.effects.subject import Subject
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import RANK
 from bisar_budget.mission.model import Mission
+from bisar_budget.ranges.exact_ranges import Floats
 
 
 def many_slow_phases(count: int, one: Callable[[int], Mission]) -> list[ManyOwnPhases]:
