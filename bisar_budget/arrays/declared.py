@@ -305,7 +305,11 @@ class DeclaredErrors:
 
     def _exactly(self, error: ManyErrors, found: Does, size: Floats, some: Places) -> None:
         """Put what exact ranges say into the cases that are too large for a first order."""
-        paths, lanes, sizes = self._paths_of(error), self._both(some), np.tile(np.abs(size), 2)
+        paths, lanes, sizes = (
+            self._paths_of(error),
+            np.concatenate((some, some + self.cases)),
+            np.tile(np.abs(size), 2),
+        )
         paths.to(lanes, sizes)
         by_sign = paths.known(lanes, sizes).reshape(6, 2, -1).swapaxes(0, 1)
         quadratics = self._quadratics.setdefault(error.subject.id, np.full((2, self.cases), math.nan))
@@ -327,10 +331,6 @@ class DeclaredErrors:
             per_unit = np.array([[self.array(part) for part in one] for one in both])
             self._paths[name] = PointPaths(self.exact, lanes, np.concatenate(per_unit, axis=1))
         return self._paths[name]
-
-    def _both(self, some: Places) -> Places:
-        """Lanes of some of the cases, of both signs."""
-        return np.concatenate((some, some + self.cases))
 
     def lanes(self, error: ManyErrors, sign: float = 1.0) -> Lanes:
         """A unit of an error, with a sign, in each case."""
@@ -366,11 +366,9 @@ class DeclaredErrors:
         """
         signed = {QUADRATIC: error.full.qpe, CUBIC: error.full.cubic}.get(requirement)
         slope = self.array(self.per_unit("full", error, LOCATION) if signed is None else signed)[some]
-        slopes = np.concatenate((slope, slope if signed is None else -slope))  # a length has no sign
-        held = Held(models.HELD[requirement], np.tile(limit[some], 2), slopes)
-        firsts, farthests = np.tile(first[some], 2), np.tile(farthest[some], 2)
-        found = self._paths_of(error).first_reaching(self._both(some), held, firsts, farthests)
-        return np.asarray(found.reshape(2, -1).min(axis=0))
+        held = Held(models.HELD[requirement], limit[some], slope)
+        both = (some, some + self.cases)
+        return self._paths_of(error).either_reaching(both, held, first[some], farthest[some])
 
     def ends_image(self, error: ManyErrors, size: Floats) -> Truths:
         """Whether allowables, as found, are where the image ends; as `FullModel.ends_image`."""

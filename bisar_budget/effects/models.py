@@ -335,18 +335,16 @@ class FullModel:
 
     def _smallest(self, searched: Sequence[tuple[ErrorSource, str, float, float, float]]) -> list[float | None]:
         """Search for sizes that reach limits, of errors from a first guess to the farthest, by both signs."""
-        lanes, rows, slopes, numbers = [], [], [], []
+        rows, numbers = [], []
         for source, requirement, limit, first, farthest in searched:
-            for sign in _SIGNS:
-                lanes.append(self._lane[source.id, sign])
-                rows.append(HELD[requirement])
-                signed = {QUADRATIC: sign * source.full.qpe, CUBIC: sign * source.full.cubic}.get(requirement)
-                slopes.append(_per_unit(source.full, self.plane, LOCATION) if signed is None else signed)
-                numbers.append((limit, first, farthest))
-        limits, firsts, farthests = np.array(numbers).T
-        held = Held(np.array(rows), limits, np.array(slopes))
-        found = self._paths.first_reaching(np.array(lanes), held, firsts, farthests)
-        return [size if math.isfinite(size) else None for size in found.reshape(-1, 2).min(axis=1).tolist()]
+            of_length = _per_unit(source.full, self.plane, LOCATION)
+            slope = {QUADRATIC: source.full.qpe, CUBIC: source.full.cubic}.get(requirement, of_length)
+            rows.append(HELD[requirement])
+            numbers.append((limit, slope, first, farthest))
+        limits, slopes, firsts, farthests = np.array(numbers).T
+        both = [np.array([self._lane[source.id, sign] for source, *_ in searched]) for sign in _SIGNS]
+        found = self._paths.either_reaching(both, Held(np.array(rows), limits, slopes), firsts, farthests)
+        return [size if math.isfinite(size) else None for size in found.tolist()]
 
 
 def lanes_of(exact: ExactRanges, source: ErrorSource, sign: float = 1.0) -> Lanes:

@@ -6,6 +6,7 @@ limit reached. All lanes take each step together; those that it does not concern
 """
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -109,7 +110,7 @@ class PointPaths:
     def _insert(self, index: Places, some: Places, point: Floats) -> None:
         """Note a known point before those that an index names."""
         if np.isfinite(self._sizes[some, -1]).any():  # the first needs few, most need one
-            more = np.full((len(self._sizes), 20, 6), math.inf)
+            more = np.full((len(self._sizes), 2 * self._sizes.shape[1], 6), math.inf)
             self._known = np.concatenate((self._known, more), axis=1)
             self._sizes = self._known[:, :, 0].copy()
         moves = np.flatnonzero(self._sizes[some, index] < math.inf)
@@ -194,6 +195,19 @@ class PointPaths:
         east, north = self.exact.way(self.lanes.of(some), known[0], (known[1], known[2]))
         (u, v), is_first = self._way[:, some], known[0] == 0
         return np.where(is_first, u, east), np.where(is_first, v, north)
+
+    def either_reaching(self, some: Sequence[Places], held: Held, first: Floats, farthest: Floats) -> Floats:
+        """Smallest size, of either sign, at which values reach limits; infinite: none up to the farthest.
+
+        `some` are the lanes of the positive sign, and of the other. The slope of what is held is that of the first.
+        """
+        smallest = np.full(first.shape, math.inf)
+        for lanes, sign in zip(some, (1.0, -1.0), strict=True):
+            slopes = np.where(held.row == WAY, 1.0, sign) * held.per_unit  # a length has no sign
+            found = self.first_reaching(lanes, held._replace(per_unit=slopes), first, farthest)
+            smallest, farthest = np.minimum(found, smallest), np.minimum(found, farthest)
+            first = np.minimum(first, farthest)
+        return smallest
 
     @np.errstate(all="ignore")
     def first_reaching(self, some: Places, held: Held, first: Floats, farthest: Floats) -> Floats:

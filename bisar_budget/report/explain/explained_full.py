@@ -63,7 +63,8 @@ def worse(analysis: Analysis, source: ErrorSource, size: float, which: int = _QU
     signs = [Left(analysis, source, signed) for signed in (size, -size)]
     if signs[0].is_small or not signs[1].ranges:
         return signs[0]
-    return max(signs, key=lambda left: abs(left.phase(which)) if left.ranges else math.inf)
+    stated, other = (abs(left.phase(which)) if left.ranges else math.inf for left in signs)
+    return signs[other > stated * (1 + ROUNDING)]
 
 
 def full_chain(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
