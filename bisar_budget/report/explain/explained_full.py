@@ -17,6 +17,7 @@ from bisar_budget.report.explain.formulas import Step, Sum, number, step, with_u
 
 RATES = ("m", "m/s", "m/s²", "m/s³")  # units of the range error's coefficients
 _, _, _QUADRATIC, _CUBIC = range(4)  # rows of a fit
+_ALIKE = 1e-6  # of a phase: by less, rounding decides which sign leaves more
 
 
 class Left:
@@ -64,7 +65,7 @@ def worse(analysis: Analysis, source: ErrorSource, size: float, which: int = _QU
     if signs[0].is_small or not signs[1].ranges:
         return signs[0]
     stated, other = (abs(left.phase(which)) if left.ranges else math.inf for left in signs)
-    return signs[other > stated * (1 + ROUNDING)]
+    return signs[other > stated * (1 + _ALIKE)]
 
 
 def full_chain(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
