@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 from bisar_budget.analysis.allocation import Allocation, allocate
 from bisar_budget.effects.correlation import Correlated, correlated_errors
 from bisar_budget.effects.effect import ErrorSource
-from bisar_budget.effects.exact_ranges import ExactRanges
 from bisar_budget.effects.models import Declared, FullModel, PublishedModel
-from bisar_budget.effects.sources import error_sources
+from bisar_budget.effects.sources import error_sources, exact_ranges
 from bisar_budget.effects.vibration import OwnPhase, slow_phases
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission, has_instruments
+from bisar_budget.ranges.exact_ranges import ExactRanges
 
 if TYPE_CHECKING:
     from bisar_budget.effects.random_errors import RandomError
@@ -42,13 +42,7 @@ class Analysis:
     @cached_property
     def exact(self) -> ExactRanges:
         """Exact ranges over the aperture."""
-        mission = self.mission
-        return ExactRanges(
-            self.geometry,
-            mission.radar.wavelength,
-            mission.collection.aperture_time,
-            has_direct_path=mission.has_direct_path,
-        )
+        return exact_ranges(self.mission, self.geometry)
 
     @cached_property
     def sources(self) -> list[ErrorSource]:
@@ -95,7 +89,7 @@ class Analysis:
     @cached_property
     def full(self) -> FullModel:
         """The full model."""
-        return FullModel(self.exact, self.geometry)
+        return FullModel(self.exact, self.geometry, self.sources)
 
     @cached_property
     def groups(self) -> Sequence[Correlated]:

@@ -14,8 +14,10 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
-from operator import add, mul
+from operator import add
 from typing import NamedTuple
+
+import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
@@ -23,10 +25,11 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT, UTILIZATION_TOLERANCE
 from bisar_budget.effects.combine import combine_phases
 from bisar_budget.effects.correlation import phase_parts
-from bisar_budget.effects.exact_ranges import ExactRanges, nodes_for
-from bisar_budget.effects.point_path import PointPath
+from bisar_budget.effects.models import lanes_of
 from bisar_budget.geometry import BistaticGeometry, GroundVector
 from bisar_budget.phrases import NOTHING, Note
+from bisar_budget.ranges.exact_ranges import ExactRanges, joined
+from bisar_budget.ranges.point_paths import PointPaths
 from bisar_budget.units import format_quantity
 
 RIM_POINTS = 16
@@ -89,8 +92,6 @@ class ScenePhases:
     def __init__(self, analysis: Analysis) -> None:
         mission = analysis.mission
         self.geometry, self.full = analysis.geometry, analysis.full
-        self.wavelength, self.T = mission.radar.wavelength, mission.collection.aperture_time
-        self.has_direct_path = mission.has_direct_path
         self.combine, self.groups = mission.allocation.combine, analysis.groups
         self.members = [source for source in analysis.stated if source.is_motion]
         self.sizes = [source.declared or 0.0 for source in self.members]
@@ -101,9 +102,10 @@ class ScenePhases:
             if size and not self.full.is_small(source, abs(size))
         ]
         self.nearest = min(self.geometry.transmitter.slant_range, self.geometry.receiver.slant_range)
-        self.count = nodes_for(self.geometry, self.T, has_direct_path=self.has_direct_path)
         self.nowhere = RimPlace(self.centre, 0.0, (0.0, 0.0))  # without an image
-        self.turn = math.copysign(1.0, analysis.exact.gradient_sine)
+        self.exact = analysis.exact
+        self.turn = math.copysign(1.0, self.exact.sine[0])
+        self.lanes = [lanes_of(self.exact, source) for source in self.members]
 
     def geometry_at(self, point: GroundVector) -> BistaticGeometry:
         """Both platforms as a point of the ground has them."""
@@ -113,55 +115,66 @@ class ScenePhases:
         )
         return BistaticGeometry(transmitter=transmitter, receiver=receiver)
 
-    def ranges_at(self, radius: float, azimuth: float) -> ExactRanges:
-        """Exact ranges of a point of the ground."""
-        return ExactRanges(
-            self.geometry,
-            self.wavelength,
-            self.T,
-            at(radius, azimuth),
-            self.count,
-            has_direct_path=self.has_direct_path,
-        )
+    def ranges_at(self, radius: float, azimuths: Sequence[float]) -> ExactRanges:
+        """Exact ranges of points of a circle on the ground, one a case."""
+        east, north = np.array([at(radius, azimuth) for azimuth in azimuths]).T
+        return self.exact.at(east, north, np.zeros(len(azimuths), dtype=int))
 
     def place(self, radius: float, azimuth: float) -> "RimPlace":
         """What there is at a point of the ground."""
-        return self.place_of(self.ranges_at(radius, azimuth))
+        return self.places(self.ranges_at(radius, [azimuth]))[0]
 
-    def place_of(self, there: ExactRanges) -> "RimPlace":
+    @np.errstate(all="ignore")  # a gradient vanishes, or both are parallel to the last digit
+    def places(self, there: ExactRanges) -> "list[RimPlace]":
         """What there is where exact ranges are taken."""
-        if there.nearest < NEAREST_M:
-            return self.nowhere
-        try:
-            sine = there.gradient_sine
-            phases = list(map(mul, there.quadratics_of(self.members), self.sizes))
-        except ZeroDivisionError:  # a gradient vanishes, or both are parallel to the last digit
-            return self.nowhere
-        clearances = (self.turn * sine / MIN_SINE, there.range_gradient / MIN_GROUND_GRADIENT)
-        return RimPlace(phases, self.combined(phases), clearances)
-
-    def differences(
-        self, radius: float, azimuth: float, exact: Sequence[int] | None = None, turns: list[float] | None = None
-    ) -> list[float]:
-        """Of each error, its phase there less that at the centre; by the worse sign of those taken exactly. [rad]
-
-        Exactly taken are all large ones, or some of the members, by their indices. `turns` is given what range and
-        Doppler gradients span where each of these leads, over what they span without it: 0 where there is no image.
-        """
-        there = self.ranges_at(radius, azimuth)
-        phases = self.place_of(there).phases
-        found = [away - centre for away, centre in zip(phases, self.centre, strict=True)]
-        for i in self.large if exact is None else exact:
-            source, of_both = self.members[i], []
-            per_unit = there.plane.displacement(there.effect_of(source), 1.0) or (0.0, 0.0)
-            for size in (self.sizes[i], -self.sizes[i]):
-                path = PointPath(there, source, math.copysign(1.0, size), per_unit)
-                here, away = self.full.at(source, size), path.to(abs(size))
-                of_both.append(math.inf if here is None or away is None else away.quadratic - here.quadratic)
-                if turns is not None:
-                    turns.append(0.0 if away is None else away.turn)
-            found[i] = math.copysign(max(map(abs, of_both)), found[i])
+        per_unit = np.array(there.quadratics_of(self.lanes))
+        phases = np.broadcast_to(per_unit.T, (there.half.size, len(self.lanes))) * self.sizes
+        clearances = np.array((self.turn * there.sine / MIN_SINE, there.range_gradient / MIN_GROUND_GRADIENT))
+        is_seen = (there.nearest >= NEAREST_M) & np.isfinite(clearances.sum(axis=0) + phases.sum(axis=1))
+        found = []
+        for is_there, of_errors, (sine, gradient) in zip(
+            is_seen.tolist(), phases.tolist(), clearances.T.tolist(), strict=True
+        ):
+            whole = RimPlace(of_errors, self.combined(of_errors), (sine, gradient)) if is_there else self.nowhere
+            found.append(whole)
         return found
+
+    def differences(self, radius: float, azimuth: float) -> list[float]:
+        """Of each error, its phase there less that at the centre; by the worse sign of the large ones. [rad]"""
+        return self.around(radius, [azimuth], self.large)[0][0]
+
+    def around(
+        self, radius: float, azimuths: Sequence[float], exact: Sequence[int]
+    ) -> list[tuple[list[float], float]]:
+        """The same at places of a circle, some of the members taken exactly, by their indices.
+
+        With what range and Doppler gradients span where these lead, over what they span without them, at least: 0
+        where there is no image.
+        """
+        there = self.ranges_at(radius, azimuths)
+        count = len(azimuths)
+        phases = np.array([place.phases for place in self.places(there)]) - self.centre
+        turns = np.ones(count)
+        if exact:
+            signs = (1.0, -1.0)
+            small = [there.effect(there.range_error(self.lanes[i])) for i in exact]
+            per_unit = [there.displacement(effect, sign) for effect in small for sign in signs]
+            lanes = joined([lanes_of(self.exact, self.members[i], sign) for i in exact for sign in signs])
+            lanes = lanes.of(np.repeat(np.arange(lanes.case.size), count))
+            lanes = replace(lanes, case=np.tile(np.arange(count), 2 * len(exact)))
+            paths = PointPaths(there, lanes, np.array(per_unit).swapaxes(0, 1).reshape(2, -1))
+            sizes = np.repeat(np.abs([self.sizes[i] for i in exact]), 2 * count)
+            every = np.arange(sizes.size)
+            paths.to(every, sizes)
+            known = paths.known(every, sizes).reshape(6, len(exact), 2, count)
+            turns = np.nan_to_num(known[5]).min(axis=(0, 1))
+            for i, away in zip(exact, known[3], strict=True):
+                here = [self.full.at(self.members[i], sign * abs(self.sizes[i])) for sign in signs]
+                centre = np.array([math.nan if one is None else one.quadratic for one in here])
+                differs = np.abs(away - centre[:, None])
+                worst = np.where(np.isnan(differs), math.inf, differs).max(axis=0)
+                phases[:, i] = np.copysign(worst, phases[:, i])
+        return list(zip(phases.tolist(), turns.tolist(), strict=True))
 
     def exactly(self, phases: Sequence[float]) -> list[float]:
         """Phases with what large errors have more at the centre than small ones, by the worse sign. [rad]"""
@@ -193,26 +206,23 @@ class ScenePhases:
         """
         seen: list[tuple[float, float]] = []  # least turn, and azimuth
 
-        def size_at(azimuth: float) -> float:
-            turns: list[float] = []
-            size = self.together(self.differences(radius, azimuth, bent, turns))
-            seen.append((min(turns, default=1.0), azimuth))
-            return size
+        def look(azimuths: Sequence[float]) -> tuple[float, float]:
+            found = self.around(radius, azimuths, bent)
+            seen.extend((turn, azimuth) for (_, turn), azimuth in zip(found, azimuths, strict=True))
+            return max((self.together(sizes), azimuth) for (sizes, _), azimuth in zip(found, azimuths, strict=True))
 
         arc = math.pi / RIM_POINTS
-        places = [rim.azimuth, *(2 * arc * place for place in range(RIM_POINTS))]
-        size, azimuth = max((size_at(place), place) for place in places)
+        size, azimuth = look([rim.azimuth, *(2 * arc * place for place in range(RIM_POINTS))])
         while arc > FINEST and math.isfinite(size):
-            sides = [(size_at(azimuth + step), azimuth + step) for step in (-arc, arc)]
-            if max(sides)[0] > size:
-                size, azimuth = max(sides)
+            side = look([azimuth - arc, azimuth + arc])
+            if side[0] > size:
+                size, azimuth = side
             else:
                 arc /= 4
         turn, lowest = min(seen)
         arc = math.pi / RIM_POINTS
         while math.isfinite(size) and turn < MAY_FOLD and arc > FINEST:
-            sides = [(size_at(lowest + step), lowest + step) for step in (-arc, arc)]
-            size, azimuth = max((size, azimuth), *sides)
+            size, azimuth = max((size, azimuth), look([lowest - arc, lowest + arc]))
             if min(seen)[0] < turn:
                 turn, lowest = min(seen)
             else:
@@ -223,9 +233,9 @@ class ScenePhases:
         """Which of the large errors differ otherwise than small ones do: seen at three places, two harmonics show."""
         found = set[int]()
         floor = max(FLOOR_RAD, SHARE * rim.difference)
-        for third in range(PROBES):
-            azimuth = rim.azimuth + 2 * math.pi * third / PROBES
-            small, exact = (self.differences(radius, azimuth, which) for which in ((), self.large))
+        thirds = [rim.azimuth + 2 * math.pi * third / PROBES for third in range(PROBES)]
+        both = (self.around(radius, thirds, which) for which in ((), self.large))
+        for (small, _), (exact, _) in zip(*both, strict=True):
             found |= {i for i in self.large if not abs(exact[i] - small[i]) <= floor}
         return sorted(found)
 
@@ -251,7 +261,7 @@ class ScenePhases:
         grows there as its inverse, in an arc that points of a circle may miss.
         """
         count = RIM_POINTS if radius <= WIDE * self.nearest else 2 * RIM_POINTS
-        places = [self.place(radius, 2 * math.pi * k / count) for k in range(count)]
+        places = self.places(self.ranges_at(radius, [2 * math.pi * k / count for k in range(count)]))
         phases = [place.phases for place in places]
 
         def size_at(azimuth: float) -> float:

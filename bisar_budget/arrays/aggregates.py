@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.analysis.allocation import Split, effective_n_pull
-from bisar_budget.arrays.collections import Floats
 from bisar_budget.arrays.declared import DeclaredErrors
 from bisar_budget.arrays.together import (
     Phases,
@@ -21,6 +20,7 @@ from bisar_budget.budget.judged_rows import BOUND, CODE, Judged, Judging
 from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.vibration import OwnPhase
+from bisar_budget.ranges.exact_ranges import Floats
 
 Own = Sequence[OwnPhase]
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.analysis import scene as scalar
-from bisar_budget.arrays.collections import Floats
+from bisar_budget.ranges.exact_ranges import Floats
 
 Places = NDArray[np.intp]
 HeightAt = Callable[[Floats, Places], Floats]  # heights at azimuths of the circles of some cases

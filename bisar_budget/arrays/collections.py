@@ -9,33 +9,19 @@ from itertools import zip_longest
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bisar_budget.constants import ROUNDING
-from bisar_budget.effects.exact_ranges import NODES
 from bisar_budget.geometry import FRAME_AXES, STILL
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import Platform
-
-Floats = NDArray[np.float64]
-Vectors = tuple[Any, Any, Any]  # three components, each an array or a float
+from bisar_budget.ranges.exact_ranges import NODES, Vectors, dot, norm
 
 _STRAIGHT: Vectors = (0.0, 0.0, 0.0)
-
-
-def dot(a: Vectors, b: Vectors) -> Any:
-    """Scalar product."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def cross(a: Vectors, b: Vectors) -> Vectors:
     """Vector product."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
-
-
-def norm(a: Vectors) -> Any:
-    """Length."""
-    return np.sqrt(dot(a, a))
 
 
 def _over(a: Vectors, length: Any) -> Vectors:
@@ -92,16 +78,6 @@ class Paths:
         """Bound of how much lower than at the midpoint it is within a time. [m]"""
         way = np.abs(self.velocity[2]) * duration_s + np.abs(self.acceleration[2]) * duration_s**2 / 2
         return way + sum(np.abs(bend[2]) * duration_s**power for power, bend in enumerate(self.bends, 3))
-
-    def at(self, times: Floats) -> Vectors:
-        """Positions at slow times (nodes, cases). [m]"""
-        found = []
-        for axis in range(3):
-            place = self.position[axis] + times * (self.velocity[axis] + times * self.acceleration[axis] / 2)
-            for power, bend in enumerate(self.bends, 3):
-                place = place + bend[axis] * times**power
-            found.append(np.broadcast_to(place, times.shape))
-        return (found[0], found[1], found[2])
 
     def frame(self, name: str) -> tuple[Vectors, Vectors, Vectors]:
         """Axes of a frame; not a number where a platform does not have it. `ric` needs the Earth."""

@@ -7,9 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bisar_budget import evaluators
-from bisar_budget.arrays.collections import Floats, Geometries, Vectors, angle_between_lines, axes_of
-from bisar_budget.arrays.followed import Held, ManyPointPaths, Places, Truths
-from bisar_budget.arrays.located import CourseAtNodes, Effects, ManyExactRanges
+from bisar_budget.arrays.collections import Geometries, angle_between_lines, axes_of
 from bisar_budget.arrays.together import squared
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, ROUNDING, SPEED_OF_LIGHT
 from bisar_budget.effects import models
@@ -19,6 +17,8 @@ from bisar_budget.effects.subject import MOTION, Subject, subject
 from bisar_budget.geometry import FRAME_AXES
 from bisar_budget.mission.covariance import Covariance
 from bisar_budget.mission.model import Mission
+from bisar_budget.ranges.exact_ranges import Effects, ExactRanges, Floats, Lanes, Places, Truths, Vectors, joined
+from bisar_budget.ranges.point_paths import Held, PointPaths
 
 SAFE = 1 + 1e-6  # nearer to a border of what forms an image, a case is checked by itself
 _AXES: tuple[Vectors, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -79,16 +79,19 @@ class DeclaredErrors:
     ) -> None:
         self.mission, self.cases, self.geometries, self.shown = mission, cases, geometries, shown
         self.is_left_out = np.zeros(cases, dtype=bool)
+        self.each = np.arange(cases)
         wavelength, T = mission.radar.wavelength, mission.collection.aperture_time
         self.has_direct_path = mission.has_direct_path
-        self.exact = ManyExactRanges.of(geometries, wavelength, T, nodes, cases, has_direct_path=self.has_direct_path)
+        self.exact = ExactRanges.of(
+            geometries.both, wavelength, T, nodes, cases, has_direct_path=self.has_direct_path
+        )
         self.plane = self._published_plane()
         self._limits_of_size()
         self.listed = list(self._errors())
         self.stated = [error for error in self.listed if error.declared is not None and not error.is_shown_again]
         self._known: dict[tuple[str, str], Does] = {}
         self._quadratics: dict[str, Floats] = {}
-        self._paths: dict[tuple[str, float], ManyPointPaths] = {}
+        self._paths: dict[str, PointPaths] = {}
 
     def array(self, value: Any) -> Floats:
         """One number for each case."""
@@ -195,7 +198,7 @@ class DeclaredErrors:
             value, what = getattr(self.mission.timing_error, term), subject("clock", "timing", term)
             if value is not None or what.id in self.shown:
                 declared = None if value is None else value * factor
-                full = self.exact.effect(self._clock_course(unit).at_nodes)
+                full = self.exact.effect(self._clock_course(unit))
                 yield ManyErrors(what, unit, declared, Effects._make(rows[power]), full, (), _NOWHERE)
 
     def _common(
@@ -302,11 +305,13 @@ class DeclaredErrors:
 
     def _exactly(self, error: ManyErrors, found: Does, size: Floats, some: Places) -> None:
         """Put what exact ranges say into the cases that are too large for a first order."""
-        by_sign = []
-        for sign in (1.0, -1.0):
-            path = self._path(error, sign)
-            path.to(some, np.abs(size))
-            by_sign.append(path.known(some, np.abs(size)))
+        paths, lanes, sizes = (
+            self._paths_of(error),
+            np.concatenate((some, some + self.cases)),
+            np.tile(np.abs(size), 2),
+        )
+        paths.to(lanes, sizes)
+        by_sign = paths.known(lanes, sizes).reshape(6, 2, -1).swapaxes(0, 1)
         quadratics = self._quadratics.setdefault(error.subject.id, np.full((2, self.cases), math.nan))
         quadratics[:, some] = by_sign[0][3], by_sign[1][3]
         ahead, back = np.where(size > 0, by_sign, by_sign[::-1])
@@ -317,25 +322,28 @@ class DeclaredErrors:
         for place, one in ((found.displacement, ahead), (found.opposite, back)):
             place[0][some], place[1][some] = np.where(is_gone, math.nan, one[1:3])
 
-    def _path(self, error: ManyErrors, sign: float) -> ManyPointPaths:
-        """The ways of the point by an error with one sign, which all that asks for them shares."""
-        key = (error.subject.id, sign)
-        if key not in self._paths:
-            per_unit = np.array([self.array(part) for part in self.exact.displacement(error.full, 1.0)])
-            self._paths[key] = ManyPointPaths(self.exact, self.course(error), sign, per_unit, self.is_left_out)
-        return self._paths[key]
+    def _paths_of(self, error: ManyErrors) -> PointPaths:
+        """The ways of the point by an error, which all that asks for them shares: positive sign first."""
+        name = error.subject.id
+        if name not in self._paths:
+            lanes = joined([self.lanes(error, sign) for sign in (1.0, -1.0)])
+            both = [self.exact.displacement(error.full, sign) for sign in (1.0, -1.0)]
+            per_unit = np.array([[self.array(part) for part in one] for one in both])
+            self._paths[name] = PointPaths(self.exact, lanes, np.concatenate(per_unit, axis=1))
+        return self._paths[name]
 
-    def course(self, error: ManyErrors) -> CourseAtNodes:
-        """A unit of an error at the nodes."""
-        if error.moves:
-            return CourseAtNodes(self.exact.powers[error.unit], error.unit, error.moves, error.direction)
-        return self._clock_course(error.unit)
+    def lanes(self, error: ManyErrors, sign: float = 1.0) -> Lanes:
+        """A unit of an error, with a sign, in each case."""
+        if not error.moves:
+            return Lanes(self.each, sign * self._clock_course(error.unit))
+        moves = (float(0 in error.moves), float(1 in error.moves))
+        return Lanes(self.each, sign * self.exact.powers[error.unit], moves, error.direction, error.unit)
 
-    def _clock_course(self, unit: str) -> CourseAtNodes:
-        """A unit of a clock error at the nodes; nothing where the direct path stands in for the clock."""
+    def _clock_course(self, unit: str) -> Floats:
+        """Range error of a unit of a clock error at the nodes; nothing where the direct path is the clock."""
         power = list(CLOCK_UNITS.values()).index(unit)
-        metres = SPEED_OF_LIGHT * self.exact.times**power
-        return CourseAtNodes(metres * 0.0 if self.has_direct_path else metres, unit)
+        metres: Floats = SPEED_OF_LIGHT * self.exact.times**power
+        return metres * 0.0 if self.has_direct_path else metres
 
     def doubts(self, model: str, is_over: Any) -> Any:
         """Where a model that does not gate casts a doubt; the published one does not know a direct path."""
@@ -347,8 +355,7 @@ class DeclaredErrors:
 
     def forget(self, error: ManyErrors) -> None:
         """Let go of the ways by an error that nobody will ask for again: they are large."""
-        for sign in (1.0, -1.0):
-            self._paths.pop((error.subject.id, sign), None)
+        self._paths.pop(error.subject.id, None)
 
     def first_reaching(
         self, error: ManyErrors, requirement: str, limit: Floats, first: Floats, farthest: Floats, some: Places
@@ -359,24 +366,16 @@ class DeclaredErrors:
         """
         signed = {QUADRATIC: error.full.qpe, CUBIC: error.full.cubic}.get(requirement)
         slope = self.array(self.per_unit("full", error, LOCATION) if signed is None else signed)[some]
-        limit, first, farthest = limit[some], first[some], farthest[some]
-        smallest = np.full(some.shape, math.inf)
-        for sign in (1.0, -1.0):
-            held = Held(requirement, limit, slope if signed is None else sign * slope)  # a length has no sign
-            found = self._path(error, sign).first_reaching(some, held, first, farthest)
-            is_found = np.isfinite(found)
-            smallest, farthest = (np.where(is_found, found, before) for before in (smallest, farthest))
-            first = np.minimum(first, smallest)
-        return smallest
+        held = Held(models.HELD[requirement], limit[some], slope)
+        both = (some, some + self.cases)
+        return self._paths_of(error).either_reaching(both, held, first[some], farthest[some])
 
     def ends_image(self, error: ManyErrors, size: Floats) -> Truths:
         """Whether allowables, as found, are where the image ends; as `FullModel.ends_image`."""
-        found = np.zeros(self.cases, dtype=bool)
-        for sign in (1.0, -1.0):
-            path = self._paths.get((error.subject.id, sign))
-            if path is not None:
-                found |= path.end == size
-        return found
+        paths = self._paths.get(error.subject.id)
+        if paths is None:
+            return np.zeros(self.cases, dtype=bool)
+        return np.asarray((paths.end.reshape(2, -1) == size).any(axis=0))
 
     def farthest(self, error: ManyErrors) -> Any:
         """Size beyond which an error is none of navigation; infinite: it has no effect whatever its size."""
@@ -384,7 +383,7 @@ class DeclaredErrors:
             return math.inf
         slant = [path.slant_range for path in (self.geometries.transmitter, self.geometries.receiver)]
         if not error.moves:
-            return models.FARTHEST * np.minimum(*slant) / np.abs(self.course(error).at_nodes).max(axis=0)
+            return models.FARTHEST * np.minimum(*slant) / np.abs(self._clock_course(error.unit)).max(axis=0)
         reached = [slant[place] for place in error.moves]
         return models.FARTHEST * (np.minimum(*reached) if len(reached) > 1 else reached[0]) / self.edge[error.unit]
 

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from bisar_budget.analysis import scene as scalar
 from bisar_budget.arrays.climbing import Heights, Places, crest
-from bisar_budget.arrays.collections import Floats
 from bisar_budget.arrays.rim import ManyScenePhases, Rims
 from bisar_budget.budget.judged_rows import BOUND
+from bisar_budget.ranges.exact_ranges import Floats
 
 
 class HeldTogether(NamedTuple):

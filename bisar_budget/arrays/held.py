@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.arrays.collections import Floats, Geometries, Paths, norm
+from bisar_budget.arrays.collections import Geometries, Paths
 from bisar_budget.arrays.declared import SAFE
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT
 from bisar_budget.effects.effect import PLATFORMS
@@ -19,6 +19,7 @@ from bisar_budget.mission.covariance import EIGENVALUE_TOLERANCE
 from bisar_budget.mission.instruments import RISE, STEEPEST
 from bisar_budget.mission.model import PLACE_KEYS, WHOLE, MetricSplits, Mission, Shares, flies_on_earth
 from bisar_budget.mission.platforms import BASELINE_PLACES, FARTHEST_BY, LEAST_BASELINE, MotionError, Platform
+from bisar_budget.ranges.exact_ranges import Floats, norm, positions
 
 
 def not_held(mission: Mission, keys: Mapping[str, bool]) -> str:
@@ -92,7 +93,7 @@ def is_image(mission: Mission, geometries: Geometries, cases: int) -> NDArray[np
 
 def _has_baseline(apart: Paths, half: Floats) -> NDArray[np.bool_]:
     """Whether there is a direct path to follow, with room to spare."""
-    least = norm(apart.at(half * np.linspace(-1, 1, BASELINE_PLACES)[:, None])).min(axis=0)
+    least = norm(positions(apart, half * np.linspace(-1, 1, BASELINE_PLACES)[:, None])).min(axis=0)
     return np.asarray(least > SAFE * np.maximum(LEAST_BASELINE, apart.travelled(half) / FARTHEST_BY))
 
 

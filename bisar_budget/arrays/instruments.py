@@ -7,8 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bisar_budget import evaluators
-from bisar_budget.arrays.collections import Floats, Geometries, Vectors, axes_of, dot
-from bisar_budget.arrays.located import ManyExactRanges
+from bisar_budget.arrays.collections import Geometries, axes_of
 from bisar_budget.arrays.varied import groups_alike
 from bisar_budget.constants import STANDARD_GRAVITY
 from bisar_budget.effects import random_errors as scalar
@@ -20,6 +19,7 @@ from bisar_budget.effects.tones import gauss_markov
 from bisar_budget.mission.instruments import GaussMarkov, Oscillator, Synchronization
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
+from bisar_budget.ranges.exact_ranges import ExactRanges, Floats, Vectors, dot
 
 
 class ManyEffects(NamedTuple):
@@ -50,8 +50,8 @@ def many_random_errors(mission: Mission, geometries: Geometries, cases: int) -> 
     sights = geometries.sights(has_direct_path=mission.has_direct_path)
     if any(getattr(mission.platforms, name).motion_error.imu for name in PLATFORMS):
         T = mission.collection.aperture_time
-        exact = ManyExactRanges.of(
-            geometries, mission.radar.wavelength, T, scalar.NODES, cases, has_direct_path=mission.has_direct_path
+        exact = ExactRanges.of(
+            geometries.both, mission.radar.wavelength, T, scalar.NODES, cases, has_direct_path=mission.has_direct_path
         )
         for place in (0, 1):
             found += _of_imu(mission, place, geometries, sights[place], exact)
@@ -64,7 +64,7 @@ def many_random_errors(mission: Mission, geometries: Geometries, cases: int) -> 
 
 # ---------------------------------------------------------------------- inertial sensors
 def _of_imu(
-    mission: Mission, place: int, geometries: Geometries, sight: Vectors, exact: ManyExactRanges
+    mission: Mission, place: int, geometries: Geometries, sight: Vectors, exact: ExactRanges
 ) -> Iterator[ManyRandomErrors]:
     name, path = PLATFORMS[place], geometries.both[place]
     error: MotionError = getattr(mission.platforms, name).motion_error
@@ -113,9 +113,7 @@ def _length(parts: Sequence[Any]) -> Any:
     return np.sqrt(sum(part * part for part in parts))
 
 
-def _over_aperture(
-    exact: ManyExactRanges, place: int, kind: str, directions: Sequence[Vectors]
-) -> tuple[Floats, Floats]:
+def _over_aperture(exact: ExactRanges, place: int, kind: str, directions: Sequence[Vectors]) -> tuple[Floats, Floats]:
     """Sigma of quadratic and of cubic phase of a unit over the exact paths [rad]; as `_over_aperture`.
 
     A covariance over the aperture is that over an aperture of 2 s, times a power of half the aperture time.

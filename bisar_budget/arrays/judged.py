@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from bisar_budget.analysis.allocation import allocate
 from bisar_budget.analysis.spread import tones
 from bisar_budget.arrays.aggregates import Aggregates, ManyTogether, is_owed
-from bisar_budget.arrays.collections import Geometries, norm
+from bisar_budget.arrays.collections import Geometries
 from bisar_budget.arrays.declared import DeclaredErrors
 from bisar_budget.arrays.edge import HeldTogether, ManySceneEdges, many_scene_edges
 from bisar_budget.arrays.error_rows import ErrorRows
@@ -48,6 +48,7 @@ from bisar_budget.effects.vibration import OwnPhase, slow_phases
 from bisar_budget.findings.row import DECLARE
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.model import Mission
+from bisar_budget.ranges.exact_ranges import norm
 
 MODELS = ("published", "full")
 _STATUSES = tuple(STATUS)

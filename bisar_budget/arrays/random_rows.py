@@ -18,12 +18,13 @@ from bisar_budget.analysis.spread import (
     spread_limit,
     wideband_noise,
 )
-from bisar_budget.arrays.collections import Floats, Geometries
+from bisar_budget.arrays.collections import Geometries
 from bisar_budget.arrays.instruments import ManyRandomErrors
 from bisar_budget.budget.judged_rows import BOUND, REQUIREMENTS, Judged, Judging
 from bisar_budget.effects.models import QUADRATIC
 from bisar_budget.effects.subject import subject
 from bisar_budget.mission.model import Mission
+from bisar_budget.ranges.exact_ranges import Floats
 
 _HELD = (QUADRATIC, "cubic_phase_error", "islr")  # requirements, in the order of what an error does
 

@@ -9,12 +9,11 @@ from numpy.typing import NDArray
 
 from bisar_budget.analysis import scene as scalar
 from bisar_budget.arrays.climbing import HeightAt, Heights, Places, Tops, climbed, joined, tops
-from bisar_budget.arrays.collections import Floats
 from bisar_budget.arrays.declared import DeclaredErrors
-from bisar_budget.arrays.followed import ManyPointPaths
-from bisar_budget.arrays.located import ManyExactRanges
 from bisar_budget.arrays.together import combined_phase, many_correlated
 from bisar_budget.constants import MIN_GROUND_GRADIENT
+from bisar_budget.ranges.exact_ranges import ExactRanges, Floats
+from bisar_budget.ranges.point_paths import PointPaths
 
 
 class RimPlaces(NamedTuple):
@@ -44,7 +43,7 @@ class ManyScenePhases:
         self.errors, self.exact, self.combine = errors, errors.exact, errors.mission.allocation.combine
         self.groups = many_correlated(errors.mission)
         self.members = [error for error in errors.stated if error.is_motion]
-        self.courses = [errors.course(error) for error in self.members]
+        self.lanes = [errors.lanes(error) for error in self.members]
         self.sizes: Floats = np.array([errors.array(error.declared) for error in self.members])
         of_all = zip(self.members, self.sizes, strict=True)
         self.centre: Floats = np.array([errors.array(error.full.qpe * size) for error, size in of_all])
@@ -53,7 +52,7 @@ class ManyScenePhases:
         self.nearest = errors.array(np.minimum(*slant_ranges))
         self.turn = np.copysign(1.0, self.exact.sine)
 
-    def ranges_at(self, radius: Floats, azimuth: Floats, of: Places) -> ManyExactRanges:
+    def ranges_at(self, radius: Floats, azimuth: Floats, of: Places) -> ExactRanges:
         """Exact ranges of points of the ground in the cases `of`."""
         return self.exact.at(radius * np.cos(azimuth), radius * np.sin(azimuth), of)
 
@@ -61,9 +60,9 @@ class ManyScenePhases:
         """What there is at points of the ground."""
         return self.place_of(self.ranges_at(radius, azimuth, of), of)
 
-    def place_of(self, there: ManyExactRanges, of: Places) -> RimPlaces:
+    def place_of(self, there: ExactRanges, of: Places) -> RimPlaces:
         """What there is where exact ranges are taken."""
-        per_unit = there.quadratics_of([course.of(of) for course in self.courses])
+        per_unit = there.quadratics_of([lanes.there(of) for lanes in self.lanes])
         phases = np.array(per_unit) * self.sizes[:, of]
         clearances = np.array(
             [self.turn[of] * there.sine / scalar.MIN_SINE, there.range_gradient / MIN_GROUND_GRADIENT]
@@ -97,18 +96,17 @@ class ManyScenePhases:
             some = np.flatnonzero(exact[i])
             if not some.size:
                 continue
-            course, size = self.courses[i].of(of), np.abs(self.sizes[i, of])
-            per_unit = np.array(there.displacement(there.effect(there.range_error(course)), 1.0))
-            lost, worst = np.zeros(of.size, dtype=bool), np.zeros(some.size)
+            size, worst = np.abs(self.sizes[i, of]), np.zeros(some.size)
             for sign, here in zip((1.0, -1.0), self.errors.quadratic_by_sign(error), strict=True):
-                path = ManyPointPaths(there, course, sign, per_unit, lost)
+                lanes = self.errors.lanes(error, sign).there(of)
+                per_unit = np.array(there.displacement(there.effect(there.range_error(lanes)), 1.0))
+                path = PointPaths(there, lanes, per_unit)
                 path.to(some, size[some])
                 away = path.known(some, size[some])
                 is_gone, differs = np.isnan(away[0]), np.abs(away[3] - here[of[some]])
                 worst = np.maximum(worst, np.where(np.isnan(differs), math.inf, differs))
                 if turns is not None:
                     turns[some] = np.minimum(turns[some], np.where(is_gone, 0.0, away[5]))
-            self.errors.is_left_out[of[lost]] = True
             found[i, some] = np.copysign(worst, found[i, some])
         return found
 

@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.arrays.collections import Floats
 from bisar_budget.effects.correlation import correlated_errors
 from bisar_budget.mission.model import Mission
+from bisar_budget.ranges.exact_ranges import Floats
 
 Phases = Sequence[tuple[str, Floats]]  # by row id, signed [rad]
 Moves = Mapping[str, tuple[Floats, Floats]]  # by row id, east and north [m]

@@ -32,4 +32,4 @@ def collection_notes(analysis: Analysis) -> Iterator[Note]:
 def phase_across_a_cell(analysis: Analysis) -> float:
     """Quadratic phase between points of the ground a range cell c/B apart. [rad]"""
     (by_constant, _), _ = analysis.exact.phases_per_term
-    return abs(by_constant) * SPEED_OF_LIGHT / analysis.mission.radar.bandwidth
+    return float(abs(by_constant[0])) * SPEED_OF_LIGHT / analysis.mission.radar.bandwidth

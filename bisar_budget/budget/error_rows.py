@@ -1,7 +1,7 @@
 """One row for each error: the largest size that every requirement allows, and what is declared against it."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from bisar_budget import phrases
@@ -48,18 +48,24 @@ def error_rows(analysis: Analysis, model: Model, other: Model, allocation: Alloc
     limits = {owner: allocation.qpe_limit(owner) * gain for owner in ("transmitter", "receiver", "clock", "mission")}
     # A terminal shows allowables of undeclared errors only where nothing else is there to show.
     is_brief = analysis.is_brief and bool(analysis.stated)
+    shown = [one for one in analysis.sources if not is_brief or (one.declared is not None and one.is_independent)]
+    held = [(source, limits[source.owner]) for source in shown]
+    allowed_of = dict(zip([source.id for source in shown], allowed_by(analysis, model, held), strict=True))
+    others_of: dict[str, Allowed] = {}
+    if not is_brief:
+        others_of = dict(zip(allowed_of, allowed_by(analysis, other, held), strict=True))
+    elif model.name == "published" and not analysis.is_bare:  # whether it holds is said beside the verdict
+        asked = [(source, QUADRATIC, limit, math.inf) for source, limit in held]
+        for source, *both in zip(shown, model.allowables(asked), other.allowables(asked), strict=True):
+            allowed_of[source.id] = allowed_of[source.id]._replace(quadratic=both[0])
+            others_of[source.id] = NOT_ASKED._replace(quadratic=both[1])
     for source in analysis.sources:
         limit = limits[source.owner]
         declared = None if source.declared is None else abs(source.declared)
-        if is_brief and (declared is None or not source.is_independent):
+        if source.id not in allowed_of:
             yield _unseen(analysis, model, source, declared)
             continue
-        allowed, allowed_other = allowed_by(analysis, model, source, limit), NOT_ASKED
-        if not is_brief:
-            allowed_other = allowed_by(analysis, other, source, limit)
-        elif model.name == "published" and not analysis.is_bare:  # whether it holds is said beside the verdict
-            allowed = allowed._replace(quadratic=model.allowable(source, QUADRATIC, limit))
-            allowed_other = NOT_ASKED._replace(quadratic=other.allowable(source, QUADRATIC, limit))
+        allowed, allowed_other = allowed_of[source.id], others_of.get(source.id, NOT_ASKED)
         published, full = (allowed, allowed_other) if model.name == "published" else (allowed_other, allowed)
         info = over = doubt = NOTHING
         notes = source.notes
@@ -120,27 +126,40 @@ def error_rows(analysis: Analysis, model: Model, other: Model, allocation: Alloc
         )
 
 
-def allowed_by(analysis: Analysis, model: Model, source: ErrorSource, limit: float) -> Allowed:
-    """How large an error may be by a model, its quadratic phase being held to a limit. [unit]"""
-    requirements = analysis.mission.requirements
-    held = [(QUADRATIC, limit)]
-    if source.is_motion:
-        others = ((CUBIC, requirements.cubic_phase_error), (LOCATION, requirements.location_error))
-        held += [(name, required) for name, required in others if required is not None]
-    if analysis.is_brief:  # the one that binds is likely to be found first, and nothing beyond it is searched
-        held.sort(key=lambda one: model.small(source, *one))
-    quadratic: float | None = None
-    smallest, binding = math.inf, None
-    for name, required in held:
-        is_whole = name == QUADRATIC and not analysis.is_brief
-        size = model.allowable(source, name, required, math.inf if is_whole else smallest)
-        if name == QUADRATIC:
-            quadratic = size
-        if size is not None and size < smallest:
-            smallest, binding = size, name
-    if binding is None:
-        return Allowed(quadratic, None, None)
-    return Allowed(quadratic, smallest, END_OF_IMAGE if model.ends_image(source, smallest) else binding)
+def allowed_by(analysis: Analysis, model: Model, sources: Sequence[tuple[ErrorSource, float]]) -> list[Allowed]:
+    """How large errors may be by a model, the quadratic phase of each being held to a limit. [unit]"""
+    requirements, is_brief = analysis.mission.requirements, analysis.is_brief
+    found = [Allowed(None, None, None) for _ in sources]
+    held: list[list[tuple[str, float]]] = []
+    for source, limit in sources:
+        of_it = [(QUADRATIC, limit)]
+        if source.is_motion:
+            others = ((CUBIC, requirements.cubic_phase_error), (LOCATION, requirements.location_error))
+            of_it += [(name, required) for name, required in others if required is not None]
+        if is_brief:  # the one that binds is likely to be found first, and nothing beyond it is searched
+            of_it.sort(key=lambda one, source=source: model.small(source, *one))  # type: ignore[misc]
+        held.append(of_it)
+    for turn in range(3):
+        places = [place for place, of_it in enumerate(held) if turn < len(of_it)]
+        asked = []
+        for place in places:
+            name, required = held[place][turn]
+            upto = found[place].smallest
+            if upto is None or (name == QUADRATIC and not is_brief):
+                upto = math.inf
+            asked.append((sources[place][0], name, required, upto))
+        for place, (_, name, *_), size in zip(places, asked, model.allowables(asked), strict=True):
+            one = found[place]
+            if name == QUADRATIC:
+                one = one._replace(quadratic=size)
+            if size is not None and (one.smallest is None or size < one.smallest):
+                one = one._replace(smallest=size, binding=name)
+            found[place] = one
+    for place, (source, _) in enumerate(sources):
+        smallest = found[place].smallest
+        if smallest is not None and model.ends_image(source, smallest):
+            found[place] = found[place]._replace(binding=END_OF_IMAGE)
+    return found
 
 
 def _over(

@@ -1,8 +1,10 @@
-"""What errors do by exact ranges, many at once: the arrays beside `exact_ranges.py`, with the same definition.
+"""What errors do by exact ranges, of paths sampled anywhere: for draws, and for the simulator.
+
+The definition is that of `ranges.exact_ranges`; what is found together here has no case and no lane.
 
 The response of a point lies where what remains of its range history has no constant and no linear part over the
 aperture, P₀ and P₁ of Legendre's polynomials. What remains then defocuses: 3/2 of the P₂ part is the quadratic phase
-at its edge, 5/2 of the P₃ part the cubic one. It loads NumPy: a check without Monte Carlo does not come here.
+at its edge, 5/2 of the P₃ part the cubic one.
 """
 
 import math

@@ -10,13 +10,14 @@ image adds.
 import math
 from collections.abc import Iterator, Sequence
 from functools import cache
-from operator import mul
 from typing import NamedTuple
+
+import numpy as np
 
 from bisar_budget import evaluators, phrases
 from bisar_budget.constants import ROUNDING, STANDARD_GRAVITY
 from bisar_budget.effects.effect import PLATFORMS, override_notes
-from bisar_budget.effects.exact_ranges import ExactRanges
+from bisar_budget.effects.sources import exact_ranges
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.tones import Parts, gauss_markov
 from bisar_budget.effects.vibration import sight_of
@@ -26,6 +27,7 @@ from bisar_budget.mission.instruments import IMU_KINDS, GaussMarkov, Imu
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import NOTHING, Note
+from bisar_budget.ranges.exact_ranges import ExactRanges
 
 IMU_UNITS = dict(zip(IMU_KINDS, ("m/s^2", "rad", "rad/s", "m/s/sqrt(s)", "rad/sqrt(s)"), strict=True))
 BY_GRAVITY = ("attitude", "gyro_bias", "angle_random_walk")
@@ -92,13 +94,7 @@ def random_errors(mission: Mission, geometry: BistaticGeometry) -> list[RandomEr
     found: list[RandomError] = []
     states = (geometry.transmitter, geometry.receiver)
     if any(getattr(mission.platforms, name).motion_error.imu for name in PLATFORMS):
-        exact = ExactRanges(
-            geometry,
-            mission.radar.wavelength,
-            mission.collection.aperture_time,
-            count=NODES,
-            has_direct_path=mission.has_direct_path,
-        )
+        exact = exact_ranges(mission, geometry, NODES)
         for name, state in zip(PLATFORMS, states, strict=True):
             found += _of_imu(mission, name, state, exact)
     for name, state in zip(PLATFORMS, states, strict=True):
@@ -161,23 +157,21 @@ def _over_aperture(
     exact: ExactRanges, name: str, kind: str, directions: Sequence[Vector]
 ) -> tuple[float, float, float]:
     """Sigma of quadratic and of cubic phase of a unit over the exact paths [rad], and their covariance. [rad²]"""
-    by_node = covariance_at_nodes(kind, exact.half)
-    sigmas = [math.sqrt(row[node]) for node, row in enumerate(by_node)]
+    by_node = np.array(covariance_at_nodes(kind, float(exact.half[0])))
+    sigmas = np.sqrt(np.diagonal(by_node))
     scale = STANDARD_GRAVITY if kind in BY_GRAVITY else 1.0
-    squares, sizes = [0.0, 0.0, 0.0], [0.0, 0.0]  # of both phases, and their product
+    squares, sizes = np.zeros((2, 2)), np.zeros(2)  # of both phases and their product
     for direction in directions:
-        along = [list(map(mul, weights, exact.along(name, direction))) for weights in exact.phase_weights]
-        spread = [[math.fsum(map(mul, row, weights)) for row in by_node] for weights in along]
-        for index, (first, second) in enumerate(((0, 0), (1, 1), (0, 1))):
-            squares[index] += math.fsum(map(mul, along[first], spread[second]))
-        for index, weights in enumerate(along):
-            sizes[index] += math.fsum(map(abs, map(mul, weights, sigmas))) ** 2
+        along = np.array([weights * exact.along(PLATFORMS.index(name), direction) for weights in exact.phase_weights])
+        weights = along[..., 0]  # (2, nodes)
+        squares += weights @ by_node @ weights.T
+        sizes += np.abs(weights * sigmas).sum(axis=1) ** 2
     # What is left of terms that cancel exactly is rounding, and would make a limit out of nothing.
     quadratic, cubic = (
         scale * math.sqrt(square) if square > CANCELS * size else 0.0
-        for square, size in zip(squares[:2], sizes, strict=True)
+        for square, size in zip(np.diagonal(squares).tolist(), sizes.tolist(), strict=True)
     )
-    return quadratic, cubic, scale**2 * squares[2] if quadratic and cubic else 0.0
+    return quadratic, cubic, scale**2 * float(squares[0, 1]) if quadratic and cubic else 0.0
 
 
 @cache

@@ -7,6 +7,9 @@ allowable.
 import math
 from collections.abc import Iterator
 from functools import cache
+from typing import Any
+
+import numpy as np
 
 from bisar_budget import evaluators, phrases
 from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
@@ -20,13 +23,13 @@ from bisar_budget.effects.effect import (
     ErrorSource,
     override_notes,
 )
-from bisar_budget.effects.exact_ranges import ExactRanges
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, PlatformState, Vector
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import NOTHING, Note
+from bisar_budget.ranges.exact_ranges import ExactRanges, nodes_for
 
 _AXES: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -36,21 +39,39 @@ def error_sources(
 ) -> list[ErrorSource]:
     """List every position, velocity, acceleration, clock and other error, declared or not, in a fixed order."""
     sources: list[ErrorSource] = []
-    exact = exact or ExactRanges(
-        geometry,
-        mission.radar.wavelength,
-        mission.collection.aperture_time,
-        has_direct_path=mission.has_direct_path,
-    )
-    full = exact.motion_effects()
+    full = _small_effects(exact or exact_ranges(mission, geometry))
     states = (geometry.transmitter, geometry.receiver)
-    for name, state in zip(PLATFORMS, states, strict=True):
-        sources += _motion(mission, name, state, full[name])
-    sources += _clock(mission, exact.clock_effects())
+    for name, state, of_platform in zip(PLATFORMS, states, (full[:9], full[9:18]), strict=True):
+        sources += _motion(mission, name, state, of_platform)
+    sources += _clock(mission, full[18:])
     sources += common_sources(mission, sources)
     sources += _terrain(mission, sources)
     sources += _other(mission)
     return sources
+
+
+def exact_ranges(mission: Mission, geometry: BistaticGeometry, count: int | None = None) -> ExactRanges:
+    """Exact ranges of a mission at its scene centre, at as many nodes as it needs, or a given number."""
+    T, is_heard = mission.collection.aperture_time, mission.has_direct_path
+    count = count or nodes_for(geometry, T, has_direct_path=is_heard)
+    paths = (geometry.transmitter, geometry.receiver)
+    return ExactRanges.of(paths, mission.radar.wavelength, T, count, has_direct_path=is_heard)
+
+
+def _small_effects(exact: ExactRanges) -> list[Effect]:
+    """Effects of small units: of each platform position, velocity, acceleration along x, y, z; of clock terms."""
+    at_nodes: list[Any] = []
+    times: Any = exact.times
+    for platform, (track, R) in enumerate(zip(exact.tracks, exact.ranges, strict=True)):
+        if exact.has_direct_path:
+            kinds: Any = evaluators.direct_motion(*track, R, *exact.heard_along[platform], times)
+        else:
+            kinds = evaluators.full_motion(*track, R, times)
+        at_nodes += [along for of_kind in kinds for along in of_kind]
+    silent = 0.0 if exact.has_direct_path else 1.0  # the direct path is the clock
+    at_nodes += [silent * SPEED_OF_LIGHT * exact.times**power for power in range(len(CLOCK_UNITS))]
+    effects = exact.effect(np.concatenate(at_nodes, axis=1))
+    return [Effect._make(one) for one in np.array(effects).T.tolist()]
 
 
 def _motion(mission: Mission, name: str, state: PlatformState, full_effects: list[Effect]) -> Iterator[ErrorSource]:

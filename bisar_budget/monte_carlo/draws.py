@@ -95,7 +95,7 @@ def drawing_of(
     analysis: Analysis, variables: Sequence[Variable], judged: Sequence[HeldSum], draws: int, seed: int
 ) -> Drawing:
     """Prepare draws of all variables; a sample decides whether they need exact ranges."""
-    paths, name = paths_of(analysis.exact), analysis.mission.name
+    paths, name = paths_of(analysis.exact, analysis.mission.radar.wavelength), analysis.mission.name
     drawing = Drawing(name, tuple(variables), tuple(judged), paths, draws, seed, False, CHUNK)
     is_exact = bool(variables and judged) and _needs_exact_ranges(drawing)
     drawn = tuple(variable for variable in variables if _counts(variable, judged, is_exact))

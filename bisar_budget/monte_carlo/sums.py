@@ -1,7 +1,4 @@
-"""What the errors of a block of draws do together: sums of effects, or exact ranges of the paths that they make.
-
-With `exact_arrays` the module of the budget that loads NumPy; `check` without `--monte-carlo` does not come here.
-"""
+"""What the errors of a block of draws do together: sums of effects, or exact ranges of the paths that they make."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -18,8 +15,8 @@ from bisar_budget.effects.exact_arrays import (
     projection,
     room_for,
 )
-from bisar_budget.effects.exact_ranges import ExactRanges
 from bisar_budget.monte_carlo.variables import Floats, HeldSum, Variable
+from bisar_budget.ranges.exact_ranges import ExactRanges
 
 _ORDER = {"m": 0, "m/s": 1, "m/s^2": 2}
 _CLOCK = {unit: power for power, unit in enumerate(CLOCK_UNITS.values())}
@@ -34,10 +31,10 @@ class ExactPaths(NamedTuple):
     has_direct_path: bool
 
 
-def paths_of(exact: ExactRanges) -> ExactPaths:
+def paths_of(exact: ExactRanges, wavelength_m: float) -> ExactPaths:
     """Take from the exact ranges of a mission what draws need."""
-    tracks = (np.array(exact.tracks[PLATFORMS[0]]), np.array(exact.tracks[PLATFORMS[1]]))
-    return ExactPaths(np.array(exact.times), tracks, exact.wavelength, exact.has_direct_path)
+    transmitter, receiver = (np.concatenate(track, axis=1) for track in exact.tracks)
+    return ExactPaths(exact.times[:, 0], (transmitter, receiver), wavelength_m, exact.has_direct_path)
 
 
 class Sums:

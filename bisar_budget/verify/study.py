@@ -84,7 +84,7 @@ class Study:
     def allowed(self, source: ErrorSource) -> Allowed:
         """Allowable of an error's row by all requirements, autofocus included, and which one binds."""
         limit = self.allocation.qpe_limit(source.owner) * self.allocation.autofocus_gain
-        found = [allowed_by(self.analysis, model, source, limit) for model in self.models]
+        found = [allowed_by(self.analysis, model, [(source, limit)])[0] for model in self.models]
         return min(found, key=lambda one: math.inf if one.smallest is None else one.smallest)
 
     def errors(self, source: ErrorSource, size: float) -> Errors:
@@ -204,7 +204,8 @@ class Study:
 
     def shared_lines(self, errors: Errors, effect: ExactEffect) -> int:
         """Lines on either side of the middle one that share its quadratic phase, or that the response walks over."""
-        per_line = abs(self.analysis.exact.phases_per_term[0][0]) * self.collection.range_cell / OVERSAMPLING
+        (by_constant, _), _ = self.analysis.exact.phases_per_term
+        per_line = float(abs(by_constant[0])) * self.collection.range_cell / OVERSAMPLING
         shared = int(min(_SHARED_RAD / per_line if per_line else 1e6, 1e6))
         return max(shared, round(self.spread(errors, effect).walk * OVERSAMPLING / 2))
 

@@ -1,4 +1,4 @@
-"""Exact ranges with and without an array library, on random missions: one definition, two functions."""
+"""Exact ranges of the check and of the simulator on random missions: one definition, two functions."""
 
 import math
 
@@ -8,7 +8,9 @@ import pytest
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.exact_arrays import aperture_nodes, direct_path_clock, exact_effects
+from bisar_budget.effects.models import lanes_of
 from bisar_budget.mission.load import parse_mission
+from bisar_budget.ranges.exact_ranges import Lanes
 from bisar_budget.simulate.exact import exact_effect
 from bisar_budget.simulate.phase_history import cell_centres
 from bisar_budget.verify.study import Study
@@ -34,7 +36,7 @@ def by_arrays(study: Study, source, sizes):
 
 @pytest.mark.parametrize("family", FAMILIES)
 @pytest.mark.parametrize("more", ["", DIRECT_PATH], ids=["clock", "direct path"])
-def test_scalars_and_arrays_agree(family: str, more: str) -> None:
+def test_check_and_simulator_agree(family: str, more: str) -> None:
     """Every error, at a hundredth and at a tenth of the largest that is one of navigation, both signs.
 
     As long as the image moves by less than a tenth of the nearest range: farther away a history may have two points.
@@ -111,9 +113,10 @@ def test_phases_have_no_rounding_of_the_ranges() -> None:
     """Errors a micrometre apart lie on a line; a range of 4e7 m in doubles is 4e-9 m off, which would be 1e-6 rad."""
     analysis = Analysis(parse_mission(family_text("geostationary_drone", 3)))
     source = next(one for one in analysis.sources if one.id == "transmitter.position.x")
-    near = analysis.exact.plane.displacement(source.full, 1.0)
-    found = [analysis.exact.phases([(source, 1 + part * 1e-6)], near) for part in range(10)]
-    phases = np.array([(one.quadratic, one.cubic) for one in found])
+    lanes = lanes_of(analysis.exact, source).of(np.zeros(10, dtype=int))
+    near = analysis.full.plane.displacement(source.full, 1.0)
+    found = analysis.exact.phases(lanes, 1 + np.arange(10) * 1e-6, near)
+    phases = np.array((found.quadratic, found.cubic)).T
     assert np.abs(phases[0]).max() > 1e-3
     line = phases[0] + np.linspace(0, 1, 10)[:, None] * (phases[-1] - phases[0])
     assert np.abs(phases - line).max() < 1e-10  # a second order of (1e-5)² of the phases
@@ -128,10 +131,7 @@ def test_a_point_that_meets_a_platform_has_no_image(part: float, is_found: bool)
         moving = {"slant_range": 9000, "azimuth": 1.2, "elevation": 0.6, "speed": 50, "motion_azimuth": 2.5}
         platforms = {"transmitter": still, "receiver": {**moving, "motion_error": {"velocity": 0.01}}}
         analysis = Analysis(parse_mission(mission_text(platforms=platforms)))
-        sources = {source.id: source for source in analysis.sources}
-        errors = [
-            (sources[f"transmitter.position.{axis}"], -part * size)
-            for axis, size in zip("xyz", position, strict=True)
-        ]
-        nobody = analysis.exact.phases(errors) is None
-        assert nobody != is_found
+        ones = np.ones((len(analysis.exact.times), 1))
+        lanes = Lanes(np.zeros(1, dtype=int), ones, moves=(1.0, 0.0), direction=position, unit="m")
+        found = analysis.exact.phases(lanes, np.array([-part]), (0.0, 0.0))
+        assert found.is_found[0] == is_found

@@ -18,6 +18,7 @@ FLOORS = [
     {"theory", "evaluators", "catalogue"},
     {"paths"},
     {"mission"},
+    {"ranges"},
     {"effects"},
     {"analysis"},
     {"findings"},

@@ -5,7 +5,7 @@ import pytest
 from sympy import Matrix, Rational, diff, simplify, sqrt
 
 from bisar_budget import evaluators
-from bisar_budget.effects.exact_ranges import ExactRanges
+from bisar_budget.effects.sources import exact_ranges
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.theory import differential_range as dr
 from bisar_budget.theory import full, published
@@ -146,7 +146,8 @@ def test_the_range_error_at_one_time_is_the_derivative_of_the_range() -> None:
 def test_the_series_of_the_table_is_what_the_nodes_give_over_a_short_aperture() -> None:
     """β̃₀ … β̃₃ of the derived table, put into numbers by SymPy, against the fit over an aperture of 0.2 s."""
     mission = parse_mission(mission_text(collection__aperture_time="0.2 s"))
-    exact = ExactRanges(mission.geometry, mission.radar.wavelength, 0.2)
+    exact = exact_ranges(mission, mission.geometry)
+    times, (x, y, z), ranges = exact.times[:, 0], exact.tracks[0], exact.ranges[0][:, 0]
     state = mission.geometry.transmitter
     values = dict(
         zip(
@@ -163,7 +164,7 @@ def test_the_series_of_the_table_is_what_the_nodes_give_over_a_short_aperture() 
         for symbols, numbers in zip(TRANSMITTER.look, looks, strict=True):
             beta = [term.subs(dict(zip(symbols, numbers, strict=True))) for term in beta]
         at_nodes = [full_motion[kind][axis] for full_motion in (
-            evaluators.full_motion(*place, R, t) for place, R, t in zip(
-                exact.tracks["transmitter"], exact.ranges["transmitter"], exact.times, strict=True))]  # fmt: skip
-        series = np.polynomial.polynomial.polyval(np.array(exact.times), [float(b) for b in beta])
+            evaluators.full_motion(*place, R, t)
+            for *place, R, t in zip(x[:, 0], y[:, 0], z[:, 0], ranges, times, strict=True))]  # fmt: skip
+        series = np.polynomial.polynomial.polyval(times, [float(b) for b in beta])
         assert np.array(at_nodes) == pytest.approx(series, abs=1e-9 * max(1.0, np.abs(series).max()))

@@ -10,13 +10,14 @@ from collections.abc import Iterator, Sequence
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import ROUNDING
 from bisar_budget.effects.effect import ErrorSource
-from bisar_budget.effects.exact_ranges import ExactRanges
 from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.geometry import GroundVector
+from bisar_budget.ranges.exact_ranges import ExactRanges
 from bisar_budget.report.explain.formulas import Step, Sum, number, step, with_unit
 
 RATES = ("m", "m/s", "m/s²", "m/s³")  # units of the range error's coefficients
 _, _, _QUADRATIC, _CUBIC = range(4)  # rows of a fit
+_ALIKE = 1e-6  # of a phase: by less, rounding decides which sign leaves more
 
 
 class Left:
@@ -25,33 +26,32 @@ class Left:
     def __init__(self, analysis: Analysis, source: ErrorSource, size: float) -> None:
         full = analysis.full
         self.exact: ExactRanges = analysis.exact
-        self.size = size
+        self.wavelength, self.size = analysis.mission.radar.wavelength, size
         self.place: GroundVector | None = full.plane.displacement(source.full, size)
         self.is_small = not source.is_motion or full.is_small(source, abs(size))
         if self.is_small:
-            self.ranges = self.exact.left_over_small(source, size)
+            self.ranges = full.left_over_small(source, size)
             return
         found = full.at(source, size)
         if found is None:
             self.place, self.ranges = None, []
             return
-        whole = abs(size) * max(map(abs, self.exact.range_error(source))) + math.hypot(*found.displacement)
+        whole = abs(size) * full.largest_range_error(source) + math.hypot(*found.displacement)
         east, north = _without_rounding(found.displacement, whole)
         self.place = (east, north)
-        self.ranges = _without_rounding(self.exact.left_over(source, size, found.displacement), whole)
+        self.ranges = _without_rounding(full.left_over(source, size, found.displacement), whole)
 
     def phase(self, which: int) -> float:
         """Quadratic or cubic phase at the aperture edge, signed. [rad]"""
-        return self.exact.k * math.fsum(w * m for w, m in zip(self.exact.fit[which], self.ranges, strict=True))
+        weights = self.exact.fit[which].tolist()
+        return float(self.exact.k[0]) * math.fsum(w * m for w, m in zip(weights, self.ranges, strict=True))
 
     def sum(self, symbol: str, which: int) -> Sum:
         """The sum that gives a phase."""
         terms = " + ".join(
-            f"{number(w)}*{number(m)}" for w, m in zip(self.exact.fit[which], self.ranges, strict=True)
+            f"{number(w)}*{number(m)}" for w, m in zip(self.exact.fit[which].tolist(), self.ranges, strict=True)
         )
-        return Sum(
-            f"{symbol} = 2*π/{number(self.exact.wavelength)}*({terms}) = {with_unit(self.phase(which), 'rad')}"
-        )
+        return Sum(f"{symbol} = 2*π/{number(self.wavelength)}*({terms}) = {with_unit(self.phase(which), 'rad')}")
 
 
 def _without_rounding(values: Sequence[float], whole: float) -> list[float]:
@@ -64,7 +64,8 @@ def worse(analysis: Analysis, source: ErrorSource, size: float, which: int = _QU
     signs = [Left(analysis, source, signed) for signed in (size, -size)]
     if signs[0].is_small or not signs[1].ranges:
         return signs[0]
-    return max(signs, key=lambda left: abs(left.phase(which)) if left.ranges else math.inf)
+    stated, other = (abs(left.phase(which)) if left.ranges else math.inf for left in signs)
+    return signs[other > stated * (1 + _ALIKE)]
 
 
 def full_chain(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
@@ -94,7 +95,7 @@ def full_chain(analysis: Analysis, source: ErrorSource, size: float, each: str) 
         f"Full model{each}{sign}: the ground point at which nothing is left of P₀ and P₁ over the aperture",
         *_placed(left),
     )
-    times = [node * analysis.exact.half for node in analysis.exact.nodes]
+    times = analysis.exact.times[:, 0].tolist()
     yield from step(
         f"Range error left there, {_left_of(analysis.exact)}, at the nodes of the fit",
         *(f"{time:+.6g} s: {metres:.6g} m" for time, metres in zip(times, left.ranges, strict=True)),

@@ -1,90 +1,90 @@
-"""Where one error takes the image of a point as it grows, in many cases: the arrays beside `effects.point_path`.
+"""Where errors take the image of a point as they grow, and the first size at which each reaches a limit.
 
-The search is that of the floats, step by step and from the same guesses, so that a case ends at the same numbers. All
-cases take each step together; those that it does not concern are left out of it.
+The point is followed from no error on. Where range and Doppler gradients become parallel there, its way ends:
+they span less than 2 % of what they span at the centre. No larger error has an image of the point, which counts as a
+limit reached. All lanes take each step together; those that it does not concern are left out of it.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bisar_budget.arrays.collections import Floats
-from bisar_budget.arrays.located import CourseAtNodes, ManyExactRanges
-from bisar_budget.effects import point_path as scalar
-from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
+from bisar_budget.ranges.exact_ranges import ExactRanges, Floats, Lanes, Places, Truths
 
-Places = NDArray[np.intp]
-Truths = NDArray[np.bool_]
+# Of what range and Doppler gradients span at the centre: with less a point has no image, they are parallel there.
+PARALLEL = 0.02
+STRAY = 0.15  # of a step; farther from where it led, a point is not the one that was followed
+STRAIGHT = 0.1  # of a displacement, by which it may be off a straight way
+FLOOR_M = 1e-3
+LEAST_STEP = 1e-3  # of the size: allowables are right to 1 %
+FINEST_STEP = 1e-6  # where the gradients stay apart, the way only turns
+OF_FOLD = 0.8  # of the way to where the gradients seem to become parallel, that one step makes
+SHORT = 0.1  # of the last step, below which that step says little of the way left
+FOLDS = 0.1  # of what the gradients span at the centre; a way that ends at more of it does not end in a fold
+CLOSE = 1e-5  # of a limit, where a search ends
+ALMOST = 0.002  # of a limit, from where a parabola leads to it
+CREST = 0.01  # of a limit: so little below it, the crest of a curve through few points may be above
+DEPARTS = 0.5  # of the limit: a value so far from a straight line may have been anywhere in between
+COARSE = 0.02  # of the size: within a shorter interval a curve is trusted
+STEPS = 40
 
-_MOST = 24  # known points of a case
-
-# Rows of a known point: size, east, north, quadratic, cubic, turn.
+# Rows of a known point: size, east, north, quadratic, cubic, turn. A limit holds a phase, or the way to the point.
+WAY, QUADRATIC, CUBIC = 1, 3, 4
 _NO_ERROR = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
-_VALUES: dict[str, Callable[[Floats], Floats]] = {
-    QUADRATIC: lambda known: known[3],
-    CUBIC: lambda known: known[4],
-    LOCATION: lambda known: np.hypot(known[1], known[2]),
-}
 
 
 class Held(NamedTuple):
-    """A requirement of some cases: its limit, and what a small unit of the error does, with the sign of the path."""
+    """What is held to a limit in lanes, WAY, QUADRATIC or CUBIC; the limit; what a small unit does of it, signed."""
 
-    requirement: str
+    row: Any  # one of all, or of each (lanes,)
     limit: Floats
     per_unit: Floats
 
     def of(self, some: Any) -> "Held":
-        """The same for some of the cases."""
-        return Held(self.requirement, self.limit[some], self.per_unit[some])
+        """The same for some of the lanes."""
+        return Held(self.row[some] if np.ndim(self.row) else self.row, self.limit[some], self.per_unit[some])
 
     def value(self, known: Floats) -> Floats:
-        """What is held to the limit, of known points, (6, cases); signed."""
-        return _VALUES[self.requirement](known)
+        """What is held to the limit, of known points, (6, lanes): a phase, signed [rad], or a way [m]."""
+        if np.ndim(self.row):
+            phase = np.where(self.row == QUADRATIC, known[QUADRATIC], known[CUBIC])
+            phase = np.where(self.row == WAY, np.hypot(known[1], known[2]), phase)
+        else:
+            phase = np.hypot(known[1], known[2]) if self.row == WAY else known[self.row]
+        return np.asarray(phase)
 
     def is_reached(self, known: Floats) -> Truths:
         """Whether a search that meets these points need not look farther."""
-        found: Truths = np.abs(self.value(known)) >= self.limit * (1 - scalar.CLOSE)
+        found: Truths = np.abs(self.value(known)) >= self.limit * (1 - CLOSE)
         return found
 
 
-class ManyPointPaths:
-    """The ways of the point by one error with one sign; as `PointPath`.
+class PointPaths:
+    """The ways of the point by errors, one a lane.
 
     Parameters
     ----------
-    exact : ManyExactRanges
+    exact : ExactRanges
         Of the cases.
-    error : CourseAtNodes
-        The error.
-    sign : float
-        ±1.
-    per_unit : (2, cases)
-        Displacement by a small unit of the error, without the sign. [m/unit]
-    is_lost : (cases,)
-        Grows by the cases that meet too many known points.
+    lanes : Lanes
+        The errors, each with its sign.
+    per_unit : (2, lanes)
+        Displacement by a small unit of each. [m/unit]
 
     Attributes
     ----------
-    end : (cases,)
+    end : (lanes,)
         Size from which there is no point; infinite where none is known.
     """
 
-    def __init__(
-        self,
-        exact: ManyExactRanges,
-        error: CourseAtNodes,
-        sign: float,
-        per_unit: Floats,
-        is_lost: Truths,
-    ) -> None:
-        self.exact, self.error, self.sign, self.is_lost = exact, error, sign, is_lost
-        self.end = np.full(is_lost.shape, math.inf)
-        self._way = sign * per_unit
-        self._known = np.full((is_lost.size, 2, 6), math.inf)  # by size; infinite where there is none
+    def __init__(self, exact: ExactRanges, lanes: Lanes, per_unit: Floats) -> None:
+        self.exact, self.lanes = exact, lanes
+        count = lanes.case.size
+        self.end = np.full(count, math.inf)
+        self._way = per_unit
+        self._known = np.full((count, 2, 6), math.inf)  # by size; infinite where there is none
         self._known[:, 0] = _NO_ERROR
         self._sizes = self._known[:, :, 0].copy()
 
@@ -108,42 +108,40 @@ class ManyPointPaths:
         return found
 
     def _insert(self, index: Places, some: Places, point: Floats) -> None:
-        """Note a known point before those that an index names; the cases that have too many are lost."""
-        if self._sizes.shape[1] < _MOST and np.isfinite(self._sizes[some, -1]).any():
-            more = np.full_like(self._known[:, : _MOST - self._sizes.shape[1]], math.inf)
+        """Note a known point before those that an index names."""
+        if np.isfinite(self._sizes[some, -1]).any():  # the first needs few, most need one
+            more = np.full((len(self._sizes), 2 * self._sizes.shape[1], 6), math.inf)
             self._known = np.concatenate((self._known, more), axis=1)
             self._sizes = self._known[:, :, 0].copy()
-        has_room = self._sizes[some, -1] == math.inf
-        self.is_lost[some[~has_room]] = True
-        index, some = index[has_room], some[has_room]
         moves = np.flatnonzero(self._sizes[some, index] < math.inf)
-        for place in range(self._sizes.shape[1] - 1, int(index[moves].min(initial=_MOST)), -1):
+        for place in range(self._sizes.shape[1] - 1, int(index[moves].min(initial=self._sizes.shape[1])), -1):
             later = some[moves[place > index[moves]]]
             self._known[later, place] = self._known[later, place - 1]
             self._sizes[later, place] = self._sizes[later, place - 1]
-        self._known[some, index] = point.T[has_room]
-        self._sizes[some, index] = point[0, has_room]
+        self._known[some, index] = point.T
+        self._sizes[some, index] = point[0]
 
+    @np.errstate(all="ignore")
     def to(self, some: Places, size: Floats, held: Held | None = None) -> None:
-        """Follow the point to a size in some cases, or to the first size met that reaches what is held."""
+        """Follow the point to a size in some lanes, or to the first size met that reaches what is held."""
         step, is_first_try = np.full(some.shape, math.inf), np.ones(some.shape, dtype=bool)
         while True:
             index = self._count(some, size)
             last = self._at(index - 1, some)
-            going = (last[0] != size) & (size < self.end[some]) & ~self.is_lost[some]
+            going = (last[0] != size) & (size < self.end[some])
             if not going.any():
                 return
             some, size, step, is_first_try = some[going], size[going], step[going], is_first_try[going]
             index, last, held = index[going], last[:, going], held and held.of(going)
             fold = self._to_fold(index, some, last)
-            to_fold = np.where(fold > scalar.FINEST_STEP * last[0], scalar.OF_FOLD * fold, math.inf)
+            to_fold = np.where(fold > FINEST_STEP * last[0], OF_FOLD * fold, math.inf)
             step = np.minimum(np.minimum(step, size - last[0]), to_fold)
             ahead = np.where(size - last[0] < 1.2 * step, size, last[0] + step)
             near, is_straight = self._guess(index, some, last, ahead, is_first_try)
-            found = self.exact.phases(self.error, self.sign * ahead, near, some)
+            found = self.exact.phases(self.lanes.of(some), ahead, near)
             point = np.array((ahead, *found[1:]))
             is_on = found.is_found & _is_on_the_way(last, point, near)
-            is_end = is_on & (np.abs(point[5]) < scalar.PARALLEL)
+            is_end = is_on & (np.abs(point[5]) < PARALLEL)
             self.end[some[is_end]] = _parallel_between(last, point)[is_end]
             is_on &= ~is_end
             self._insert(index[is_on], some[is_on], point[:, is_on])
@@ -152,8 +150,8 @@ class ManyPointPaths:
             is_again = ~is_on & ~is_end & is_straight
             is_shorter = ~is_on & ~is_end & ~is_straight
             step = np.where(is_on, 2 * step, np.where(is_shorter, step / 2, step))
-            is_fold = ~found.is_found & (np.abs(last[5]) < scalar.FOLDS) & (fold < scalar.LEAST_STEP * ahead)
-            is_over = is_shorter & (is_fold | (step < scalar.FINEST_STEP * ahead))
+            is_fold = ~found.is_found & (np.abs(last[5]) < FOLDS) & (fold < LEAST_STEP * ahead)
+            is_over = is_shorter & (is_fold | (step < FINEST_STEP * ahead))
             self.end[some[is_over]] = (last[0] + np.minimum(step, fold))[is_over]
             is_first_try = ~is_again
             if held is not None:
@@ -165,7 +163,7 @@ class ManyPointPaths:
         before = self._at(np.maximum(index - 2, 0), some)
         square, earlier, step = last[5] ** 2, before[5] ** 2, last[0] - before[0]
         fold = np.where(square < earlier, square * step / (earlier - square), math.inf)
-        return np.where((index > 1) & (fold > scalar.SHORT * step), fold, math.inf)
+        return np.where((index > 1) & (fold > SHORT * step), fold, math.inf)
 
     def _guess(
         self, index: Places, some: Places, last: Floats, size: Floats, is_first_try: Truths
@@ -174,7 +172,7 @@ class ManyPointPaths:
         u, v = self._way[:, some]
         bent = (last[1] - u * last[0], last[2] - v * last[0])
         part = np.where(last[0] > 0, (size / last[0]) ** 2, 0.0)
-        is_straight = is_first_try & (np.hypot(*bent) <= scalar.STRAIGHT * np.hypot(last[1], last[2]))
+        is_straight = is_first_try & (np.hypot(*bent) <= STRAIGHT * np.hypot(last[1], last[2]))
         east, north = u * size + bent[0] * part, v * size + bent[1] * part
         bends = np.flatnonzero(~is_straight)
         if bends.size:
@@ -194,17 +192,31 @@ class ManyPointPaths:
 
     def _way_at(self, some: Places, known: Floats) -> tuple[Floats, Floats]:
         """Where the point goes from known ones. [m/unit]"""
-        east, north = self.exact.way(self.error, self.sign * known[0], (known[1], known[2]), some)
+        east, north = self.exact.way(self.lanes.of(some), known[0], (known[1], known[2]))
         (u, v), is_first = self._way[:, some], known[0] == 0
-        return np.where(is_first, u, self.sign * east), np.where(is_first, v, self.sign * north)
+        return np.where(is_first, u, east), np.where(is_first, v, north)
 
+    def either_reaching(self, some: Sequence[Places], held: Held, first: Floats, farthest: Floats) -> Floats:
+        """Smallest size, of either sign, at which values reach limits; infinite: none up to the farthest.
+
+        `some` are the lanes of the positive sign, and of the other. The slope of what is held is that of the first.
+        """
+        smallest = np.full(first.shape, math.inf)
+        for lanes, sign in zip(some, (1.0, -1.0), strict=True):
+            slopes = np.where(held.row == WAY, 1.0, sign) * held.per_unit  # a length has no sign
+            found = self.first_reaching(lanes, held._replace(per_unit=slopes), first, farthest)
+            smallest, farthest = np.minimum(found, smallest), np.minimum(found, farthest)
+            first = np.minimum(first, farthest)
+        return smallest
+
+    @np.errstate(all="ignore")
     def first_reaching(self, some: Places, held: Held, first: Floats, farthest: Floats) -> Floats:
-        """First size at which a value reaches a limit in some cases; infinite: none up to the farthest."""
+        """First size at which a value reaches a limit in some lanes; infinite: none up to the farthest."""
         found = np.full(some.shape, math.inf)
         met = self._at(self._count(some, first), some)[0]
-        size = np.where(met <= (1 + scalar.ALMOST) * first, met, first)
-        place = np.arange(some.size)  # of the cases that still search
-        for _ in range(scalar.STEPS):
+        size = np.where(met <= (1 + ALMOST) * first, met, first)
+        place = np.arange(some.size)  # of the lanes that still search
+        for _ in range(STEPS):
             here, of, most = some[place], held.of(place), farthest[place]
             self.to(here, size, of)
             crossed = self._crossed(here, of, np.minimum(size, self.end[here]))
@@ -212,12 +224,12 @@ class ManyPointPaths:
             last = self._at(index, here)
             reached = np.abs(of.value(last))
             ahead = self._just_ahead(index, here, of, last)
-            is_almost = (reached > (1 - scalar.ALMOST) * of.limit) & (size < most)
+            is_almost = (reached > (1 - ALMOST) * of.limit) & (size < most)
             ahead = np.where(is_almost, ahead, math.inf)
             end = self.end[here]
             ends = np.where(np.isfinite(crossed), crossed, np.where(end <= size, end, ahead))
             found[place] = np.where(ends <= most, ends, math.inf)
-            going = ~(np.isfinite(ends) | (size >= most) | self.is_lost[here])
+            going = ~(np.isfinite(ends) | (size >= most))
             if not going.any():
                 return found
             place, size, most, reached = place[going], size[going], most[going], reached[going]
@@ -233,7 +245,7 @@ class ManyPointPaths:
         slope = (reached - np.abs(held.value(before))) / (last[0] - before[0])
         ahead = np.where(slope > 0, last[0] + (held.limit - reached) / slope, math.inf)
         ahead = np.where(index == 1, _on_parabola(held, last[0], reached), ahead)
-        is_sure = (last[0] <= ahead) & (ahead < (1 + 1.5 * scalar.ALMOST) * last[0]) & (last[5] > 0.5)
+        is_sure = (last[0] <= ahead) & (ahead < (1 + 1.5 * ALMOST) * last[0]) & (last[5] > 0.5)
         return np.where(is_sure, ahead, math.inf)
 
     def _crossed(self, some: Places, held: Held, upto: Floats) -> Floats:
@@ -242,7 +254,7 @@ class ManyPointPaths:
         place, index = np.arange(some.size), np.ones(some.shape, dtype=int)
         while place.size:
             high, of = self._at(index, some[place]), held.of(place)
-            is_known = (high[0] <= upto[place]) & ~self.is_lost[some[place]]
+            is_known = high[0] <= upto[place]
             is_enough = is_known & of.is_reached(high)
             reaches[place[is_enough]] = index[is_enough]
             going = is_known & ~is_enough
@@ -264,10 +276,10 @@ class ManyPointPaths:
         before = self._at(np.maximum(index - 2, 0), some)
         slope = np.where(index == 1, held.per_unit, _slope(held, before, low, high))
         last = np.where(np.isfinite(after[0]), _slope(held, low, high, after), 2 * (b - a) / width - slope)
-        is_wide = width > scalar.COARSE * high[0]
-        near = np.where(is_wide, held.limit * (1 - scalar.CREST), held.limit)
+        is_wide = width > COARSE * high[0]
+        near = np.where(is_wide, held.limit * (1 - CREST), held.limit)
         departs = np.abs(b - a - slope * width)
-        found = np.where(is_wide & (departs > scalar.DEPARTS * held.limit), low[0] + width / 2, math.nan)
+        found = np.where(is_wide & (departs > DEPARTS * held.limit), low[0] + width / 2, math.nan)
         for part in reversed(_crests(slope * width, b - a, last * width)):
             square, cube = part * part, part * part * part
             on_curve = a + slope * width * (part - 2 * square + cube) + last * width * (cube - square)
@@ -280,7 +292,7 @@ class ManyPointPaths:
         """Size at which the magnitude reaches the limit, in the intervals that end at known points."""
         found = np.full(some.shape, math.nan)
         place, low, high = np.arange(some.size), self._at(index - 1, some), self._at(index, some)
-        for step in range(scalar.STEPS):
+        for step in range(STEPS):
             of = held.of(place)
             a, b = np.abs(of.value(low)), np.abs(of.value(high))
             chord = (b - a) / (high[0] - low[0])
@@ -290,14 +302,14 @@ class ManyPointPaths:
             is_first = low[0] == 0
             bent = _on_parabola(of, high[0], b)
             size = np.where(is_first & np.isfinite(bent), bent, size)
-            is_close = b - of.limit < scalar.ALMOST * of.limit
+            is_close = b - of.limit < ALMOST * of.limit
             chord = chord + (chord - a / low[0]) * (high[0] - low[0]) / high[0]
             back = np.where(chord > 0, high[0] - (b - of.limit) / chord, 0.0)
             size = np.where(is_close & ~is_first, back, size)
-            is_narrow = high[0] - low[0] <= scalar.CLOSE * high[0]
-            ends = is_narrow | (is_close & (high[0] - size < 2 * scalar.ALMOST * high[0]))
+            is_narrow = high[0] - low[0] <= CLOSE * high[0]
+            ends = is_narrow | (is_close & (high[0] - size < 2 * ALMOST * high[0]))
             found[place[ends]] = np.where(is_narrow, low[0], size)[ends]
-            going = ~ends & ~self.is_lost[some[place]]
+            going = ~ends
             if not going.any():
                 return found
             place, low, high, size = place[going], low[:, going], high[:, going], size[going]
@@ -327,14 +339,14 @@ def _is_on_the_way(last: Floats, found: Floats, near: tuple[Floats, Floats]) -> 
     stray = np.hypot(found[1] - near[0], found[2] - near[1])
     led = np.hypot(near[0] - last[1], near[1] - last[2])
     led = np.maximum(np.hypot(found[1] - last[1], found[2] - last[2]), led)
-    is_on: Truths = stray <= scalar.STRAY * led + scalar.FLOOR_M
+    is_on: Truths = stray <= STRAY * led + FLOOR_M
     return is_on
 
 
 def _parallel_between(before: Floats, beyond: Floats) -> Floats:
     """Size between two at which gradients count as parallel; the square of what they span is linear."""
     square, less = before[5] ** 2, beyond[5] ** 2
-    found: Floats = before[0] + (beyond[0] - before[0]) * (square - scalar.PARALLEL**2) / (square - less)
+    found: Floats = before[0] + (beyond[0] - before[0]) * (square - PARALLEL**2) / (square - less)
     return found
 
 
@@ -347,7 +359,7 @@ def _slope(held: Held, before: Floats, at: Floats, after: Floats) -> Floats:
 
 
 def _crests(slope: Floats, rise: Floats, last: Floats) -> tuple[Floats, Floats]:
-    """Parts of intervals at which a cubic has no slope, as the floats have it; not finite where there is none."""
+    """Parts of intervals at which a cubic has no slope, not finite where there is none."""
     b, c = 3 * rise - 2 * slope - last, slope + last - 2 * rise
     far = -(b + np.copysign(np.sqrt(b * b - 3 * c * slope), b))
     return far / (3 * c), slope / far
