@@ -80,8 +80,8 @@ def test_noise_of_any_slope_shows_it_with_a_uniform_window_and_no_more_with_tayl
 def test_phase_and_level_are_inverses_of_floats_and_arrays(model: str, window: str) -> None:
     energy = MAINLOBE_ENERGY[window]
     levels = np.array([-60.0, -20.0, -3.0])
-    phases = spread_phase(10 ** (levels / 10), model, energy, np)
-    assert islr_db(phases**2, model, energy, np) == pytest.approx(levels, abs=1e-9)
+    phases = spread_phase(10 ** (levels / 10), model, energy)
+    assert islr_db(phases**2, model, energy) == pytest.approx(levels, abs=1e-9)
     for level, phase in zip(levels.tolist(), phases.tolist(), strict=True):
         assert spread_phase(10 ** (level / 10), model, energy) == pytest.approx(phase, rel=1e-14)
         assert islr_db(phase**2, model, energy) == pytest.approx(level, abs=1e-9)

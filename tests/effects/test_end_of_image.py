@@ -91,7 +91,7 @@ def by_arrays(mission: Mission, shown: Mapping[str, Subject], *, is_brief: bool)
     geometries = Geometries(paths_of(platforms.transmitter), paths_of(platforms.receiver))
     (nodes,) = geometries.nodes(np.array([mission.collection.aperture_time]), has_direct_path=mission.has_direct_path)
     with np.errstate(all="ignore"):
-        return check_arrays(mission, 1, TODAY, int(nodes), geometries, shown, lambda _: mission, is_brief=is_brief)
+        return check_arrays(mission, 1, TODAY, int(nodes), geometries, shown, is_brief=is_brief)
 
 
 @pytest.mark.parametrize("is_brief", [False, True])
