@@ -140,7 +140,7 @@ class ScenePhases:
         return found
 
     def differences(self, radius: float, azimuth: float) -> list[float]:
-        """Of each error, its phase there less that at the centre; by the worse sign of the large ones. [rad]"""
+        """Phase of each error there less that at the centre; by the worse sign of the large ones. [rad]"""
         return self.around(radius, [azimuth], self.large)[0][0]
 
     def around(

@@ -77,7 +77,7 @@ class VibrationRow:
 
 
 class Vibrations:
-    """What vibrates in many cases; numbers of the mission, its geometry and its allocation may be arrays (cases,)."""
+    """Vibrations in many cases; numbers of the mission, its geometry and its allocation may be arrays (cases,)."""
 
     def __init__(self, judging: Judging, mission: Mission, geometry: Any, allocation: Allocation) -> None:
         self.judging, self.mission, self.geometry = judging, mission, geometry

@@ -124,7 +124,7 @@ class PartsFolder:
             raise ClusterError(f"{self.path} is of another sweep: {_differences(other, self.question)}")
 
     def _said(self, start: int) -> tuple[Question | None, int, int]:
-        """What a part answers, its first case and how many it has; no question where it cannot be read."""
+        """Question that a part answers, its first case and how many it has; no question where it cannot be read."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 

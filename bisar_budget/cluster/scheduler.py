@@ -259,7 +259,7 @@ def _unlike(worker: str, found: object, version: str) -> str:
 
 
 def _why(error: BaseException, about: str) -> Exception:
-    """What a block that failed is said to have failed by."""
+    """Words for the fault of a block that failed."""
     from distributed.scheduler import KilledWorker
 
     if isinstance(error, UnlikeWorkerError):

@@ -1,4 +1,4 @@
-"""What errors do by exact ranges, of paths sampled anywhere: for draws, and for the simulator.
+"""Effects of errors by exact ranges, of paths sampled anywhere: for draws, and for the simulator.
 
 The definition is that of `ranges.exact_ranges`; what is found together here has no case and no lane.
 
