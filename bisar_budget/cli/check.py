@@ -15,6 +15,7 @@ from bisar_budget.cli.outside import DAY_OF_RUN, day, day_origin, origin_of, out
 from bisar_budget.cli.streams import (
     EXIT_BROKEN,
     FILE,
+    GATING_MODEL,
     PATIENCE,
     SET,
     ParamType,
@@ -159,7 +160,7 @@ class _Draws(ParamType[int]):
 @click.option(
     "--model",
     envvar="BISAR_BUDGET_MODEL",
-    type=click.Choice(["published", "full", "strictest"]),
+    type=GATING_MODEL,
     help="Model that decides, instead of the mission file's.",
 )
 @click.option(

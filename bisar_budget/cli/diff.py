@@ -16,6 +16,7 @@ from bisar_budget.cli.streams import (
     EXIT_BROKEN,
     EXIT_USAGE,
     FILE,
+    GATING_MODEL,
     OUTPUT,
     ParamType,
     complain,
@@ -219,7 +220,7 @@ def _compared(before: Sequence[_Read], after: Sequence[_Read], today: datetime |
 def _settings(files: "Files | None" = None) -> Mapping[str, Any]:
     """Settings of the project for the current folder: those that `check` takes here, now or in a revision."""
     from bisar_budget.resources import DISK
-    from bisar_budget.settings import SettingsError, project_settings
+    from bisar_budget.settings import TABLE, SettingsError, project_settings
 
     try:
         found = project_settings(os.getcwd(), files or DISK)
@@ -227,4 +228,10 @@ def _settings(files: "Files | None" = None) -> Mapping[str, Any]:
         raise click.UsageError(printable(str(error))) from None
     except OSError:  # somebody removed the current folder
         found = None
-    return found.values if found else {}
+    if found is None:
+        return {}
+    try:
+        GATING_MODEL.convert(found.values.get("model", "full"), None, None)
+    except click.UsageError as error:
+        raise click.UsageError(f"{printable(found.file)}: {TABLE}.model: {error.message}") from None
+    return found.values

@@ -92,9 +92,10 @@ TEXT_OR_JSON = click.option(
     help="Format of the output.",
 )
 
+GATING_MODEL = click.Choice(["published", "full", "strictest"])
 MODEL = click.option(
     "--model",
-    type=click.Choice(["published", "full", "strictest"]),
+    type=GATING_MODEL,
     help="Model that decides, instead of the mission file's.",
 )
 DATE = click.option(

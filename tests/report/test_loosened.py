@@ -405,6 +405,19 @@ class TestCommand:
             "loosened"
         ]
 
+    def test_settings_with_no_such_model_are_2(self, run, project: Path) -> None:
+        """A file without an `allocation` took the word as its model: a fault of the tool."""
+        mission = project / "missions" / "bare.yaml"
+        mission.write_text(mission_text().partition("allocation:")[0])
+        settings = project / "pyproject.toml"
+        settings.write_text(settings.read_text() + 'model = "foo"\n')
+        done = run("diff", mission, mission)
+        assert done.exit_code == 2
+        assert "tool.bisar-budget.model: 'foo' is not one of 'published', 'full', 'strictest'" in done.stderr
+        commit(project)
+        settings.write_text(settings.read_text().replace("foo", "full"))
+        assert run("diff", "missions/m.yaml", "--base", "HEAD").exit_code == 2
+
     def test_what_is_let_through_is_said(self, run, project: Path) -> None:
         mission = project / "missions" / "m.yaml"
         mission.write_text(mission.read_text() + "autofocus: { n_pull: 1 }\n")
