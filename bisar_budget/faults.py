@@ -138,7 +138,7 @@ class Problem(NamedTuple):
 
     @property
     def words(self) -> str:
-        """What is wrong, what is accepted, and the hint."""
+        """Words for all of it: the fault, what is accepted, and the hint."""
         return fault_words(self.problem, "", self.accepted, self.hint)
 
 

@@ -29,7 +29,7 @@ def limit() -> int | None:
 
 
 def limit_words() -> str:
-    """What the limit is, for a message; empty without one."""
+    """Words for the limit, for a message; empty without one."""
     allowed = limit()
     return "" if allowed is None else f"the system allows {allowed >> 20} MB (ulimit -v, ulimit -d)"
 

@@ -1,4 +1,4 @@
-"""What a tone and a correlated process do over an aperture: quadratic phase, cubic phase, and what is left.
+"""Effects of a tone and of a correlated process over an aperture: quadratic phase, cubic phase, and what is left.
 
 Numbers and arrays of many cases alike.
 """

@@ -51,7 +51,7 @@ def along_line_of_sight(value: Any, error: MotionError, state: Any, metric: str,
 
 
 def sight_of(mission: Mission, name: str, geometry: Any = None) -> Vector:
-    """What a metre of a platform's motion takes from the range, or from the range less the direct path. [-]"""
+    """Part of a metre of a platform's motion that the range loses, or the range less the direct path. [-]"""
     sights = (geometry or mission.geometry).sights(has_direct_path=mission.has_direct_path)
     found: Vector = sights[PLATFORMS.index(name)]
     return found

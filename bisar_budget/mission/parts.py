@@ -155,7 +155,7 @@ class PartError(Exception):
 
     @classmethod
     def of(cls, file: str, faults: Sequence[Fault]) -> "PartError":
-        """What is wrong with a file, a line for each fault."""
+        """Lines for the faults of a file, one each."""
         return cls(*MissionError(file, tuple(faults)).lines(), faults=faults)
 
     def __str__(self) -> str:
