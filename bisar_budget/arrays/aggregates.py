@@ -8,15 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.analysis.allocation import Split, effective_n_pull
-from bisar_budget.arrays.declared import DeclaredErrors
-from bisar_budget.arrays.together import (
+from bisar_budget.budget.judged_rows import BOUND, CODE, Judged, Judging
+from bisar_budget.effects.combined import (
     Phases,
     combined_displacement,
     combined_phase,
     largest_signed_sum,
     many_correlated,
 )
-from bisar_budget.budget.judged_rows import BOUND, CODE, Judged, Judging
+from bisar_budget.effects.declared import DeclaredErrors
 from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.vibration import OwnPhase

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.arrays.declared import DeclaredErrors, ManyErrors
 from bisar_budget.budget.judged_rows import BOUND, REQUIREMENTS, Judged, Judging
 from bisar_budget.effects import models
+from bisar_budget.effects.declared import DeclaredErrors, ManyErrors
 from bisar_budget.effects.models import CUBIC, END_OF_IMAGE, LOCATION, QUADRATIC
 from bisar_budget.ranges.exact_ranges import Floats
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.arrays.collections import Geometries, Paths
-from bisar_budget.arrays.declared import SAFE
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT
+from bisar_budget.effects.collections import Geometries, Paths
+from bisar_budget.effects.declared import SAFE
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.subject import MOTION
 from bisar_budget.geometry import STILL

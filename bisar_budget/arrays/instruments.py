@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bisar_budget import evaluators
-from bisar_budget.arrays.collections import Geometries, axes_of
 from bisar_budget.arrays.varied import groups_alike
 from bisar_budget.constants import STANDARD_GRAVITY
 from bisar_budget.effects import random_errors as scalar
+from bisar_budget.effects.collections import Geometries, axes_of
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.effects.spectra import link_parts, parts, synchronized_parts

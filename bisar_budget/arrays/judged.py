@@ -16,15 +16,12 @@ from numpy.typing import NDArray
 from bisar_budget.analysis.allocation import allocate
 from bisar_budget.analysis.spread import tones
 from bisar_budget.arrays.aggregates import Aggregates, ManyTogether, is_owed
-from bisar_budget.arrays.collections import Geometries
-from bisar_budget.arrays.declared import DeclaredErrors
 from bisar_budget.arrays.edge import HeldTogether, ManySceneEdges, many_scene_edges
 from bisar_budget.arrays.error_rows import ErrorRows
 from bisar_budget.arrays.instruments import many_random_errors
 from bisar_budget.arrays.random_rows import RandomRows
 from bisar_budget.arrays.rim import ManyScenePhases
 from bisar_budget.arrays.shares import shares_of
-from bisar_budget.arrays.together import combined_phase
 from bisar_budget.budget.input_doubt import declared_position_error, is_in_doubt, least_doubt
 from bisar_budget.budget.judged_rows import BOUND, CODE, Judged, Judging
 from bisar_budget.budget.orbit import FASTEST_FLIGHT
@@ -41,6 +38,9 @@ from bisar_budget.budget.requirement_states import (
 )
 from bisar_budget.budget.vibration_rows import Vibrations, judged_pslr, judged_spurs
 from bisar_budget.budget.waivers import is_waived
+from bisar_budget.effects.collections import Geometries
+from bisar_budget.effects.combined import combined_phase
+from bisar_budget.effects.declared import DeclaredErrors
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.models import LOCATION
 from bisar_budget.effects.subject import Subject, subject

@@ -18,9 +18,9 @@ from bisar_budget.analysis.spread import (
     spread_limit,
     wideband_noise,
 )
-from bisar_budget.arrays.collections import Geometries
 from bisar_budget.arrays.instruments import ManyRandomErrors
 from bisar_budget.budget.judged_rows import BOUND, REQUIREMENTS, Judged, Judging
+from bisar_budget.effects.collections import Geometries
 from bisar_budget.effects.models import QUADRATIC
 from bisar_budget.effects.subject import subject
 from bisar_budget.mission.model import Mission

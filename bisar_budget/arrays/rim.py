@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from bisar_budget.analysis import scene as scalar
 from bisar_budget.arrays.climbing import HeightAt, Heights, Places, Tops, climbed, joined, tops
-from bisar_budget.arrays.declared import DeclaredErrors
-from bisar_budget.arrays.together import combined_phase, many_correlated
 from bisar_budget.constants import MIN_GROUND_GRADIENT
+from bisar_budget.effects.combined import combined_phase, many_correlated
+from bisar_budget.effects.declared import DeclaredErrors
 from bisar_budget.ranges.exact_ranges import ExactRanges, Floats
 from bisar_budget.ranges.point_paths import PointPaths
 

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from bisar_budget.analysis.allocation import BALANCED_RANGE, EQUAL, Split, allocate
-from bisar_budget.arrays.declared import DeclaredErrors
-from bisar_budget.arrays.together import combined_phase, many_correlated
+from bisar_budget.effects.combined import combined_phase, many_correlated
+from bisar_budget.effects.declared import DeclaredErrors
 from bisar_budget.effects.vibration import OwnPhase
 from bisar_budget.mission.model import MetricSplits, Mission
 from bisar_budget.ranges.exact_ranges import Floats

@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.arrays import judged
-from bisar_budget.arrays.collections import Geometries, paths_of
 from bisar_budget.arrays.held import is_image, not_held
 from bisar_budget.arrays.judged import check_arrays, statuses
 from bisar_budget.arrays.varied import varied
@@ -28,6 +27,7 @@ from bisar_budget.design.cases import Cases, words_of
 from bisar_budget.design.quantities import Choices, Number, QuestionError, number_of, tree_of
 from bisar_budget.design.swept import Column, Part, Swept, Values
 from bisar_budget.design.variation import ALIKE, Variation, breaking, standing
+from bisar_budget.effects.collections import Geometries, paths_of
 from bisar_budget.faults import Fault, MissionError, SetValue, fault_words, shown
 from bisar_budget.findings.row import Row, unknown_id
 from bisar_budget.findings.status import RANK, STATUS

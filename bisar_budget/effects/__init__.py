@@ -3,8 +3,11 @@
 # What other rooms may use.
 __all__ = [
     "clocks",
+    "collections",
     "combine",
+    "combined",
     "correlation",
+    "declared",
     "echoes",
     "effect",
     "exact_arrays",

@@ -11,10 +11,10 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from bisar_budget.arrays.collections import Geometries, paths_of
 from bisar_budget.arrays.judged import Checked, check_arrays
 from bisar_budget.budget.check import check_mission
 from bisar_budget.budget.judged_rows import REQUIREMENTS
+from bisar_budget.effects.collections import Geometries, paths_of
 from bisar_budget.effects.models import END_OF_IMAGE, QUADRATIC
 from bisar_budget.effects.subject import Subject
 from bisar_budget.findings.mission import MissionFindings, Report

@@ -2,23 +2,25 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from bisar_budget import evaluators
-from bisar_budget.arrays.collections import Geometries, angle_between_lines, axes_of
-from bisar_budget.arrays.together import squared
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, ROUNDING, SPEED_OF_LIGHT
 from bisar_budget.effects import models
+from bisar_budget.effects.collections import Geometries, angle_between_lines, axes_of
+from bisar_budget.effects.combined import squared
 from bisar_budget.effects.effect import CLOCK_UNITS, MOTION_UNITS, PLATFORMS
 from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.subject import MOTION, Subject, subject
 from bisar_budget.geometry import FRAME_AXES
-from bisar_budget.mission.covariance import Covariance
 from bisar_budget.mission.model import Mission
 from bisar_budget.ranges.exact_ranges import Effects, ExactRanges, Floats, Lanes, Places, Truths, Vectors, joined
 from bisar_budget.ranges.point_paths import Held, PointPaths
+
+if TYPE_CHECKING:
+    from bisar_budget.mission.covariance import Covariance
 
 SAFE = 1 + 1e-6  # nearer to a border of what forms an image, a case is checked by itself
 _AXES: tuple[Vectors, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -400,7 +402,7 @@ def _along_scene_axis(
     return np.copysign(size, parts[0] + parts[1] + parts[2])
 
 
-def _along_covariance(covariance: Covariance, kind: str, direction: Sequence[Any]) -> Any:
+def _along_covariance(covariance: "Covariance", kind: str, direction: Sequence[Any]) -> Any:
     """Sigma of position or velocity error along a direction given in the frame's axes; as `Covariance.along`."""
     parts = [sigma * along for sigma, along in zip(covariance.of(kind), direction, strict=True)]
     return np.sqrt(squared(covariance.block(kind), parts))
