@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 from bisar_budget.analysis.allocation import Allocation, allocate
 from bisar_budget.effects.collections import Geometries, paths_of
@@ -11,14 +10,12 @@ from bisar_budget.effects.correlation import Correlated, correlated_errors
 from bisar_budget.effects.declared import DeclaredErrors
 from bisar_budget.effects.effect import ErrorSource
 from bisar_budget.effects.models import Declared, FullModel, PublishedModel
+from bisar_budget.effects.random_errors import RandomError, random_errors
 from bisar_budget.effects.sources import error_sources, exact_ranges
 from bisar_budget.effects.vibration import OwnPhase, slow_phases
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission, has_instruments
 from bisar_budget.ranges.exact_ranges import ExactRanges
-
-if TYPE_CHECKING:
-    from bisar_budget.effects.random_errors import RandomError
 
 Model = PublishedModel | FullModel
 
@@ -52,13 +49,9 @@ class Analysis:
         return error_sources(self.mission, self.geometry, self.exact)
 
     @cached_property
-    def random(self) -> "list[RandomError]":
+    def random(self) -> list[RandomError]:
         """Errors of sensors and clocks that the mission names."""
-        if not has_instruments(self.mission):
-            return []
-        from bisar_budget.effects.random_errors import random_errors
-
-        return random_errors(self.mission, self.geometry)
+        return random_errors(self.mission) if has_instruments(self.mission) else []
 
     @cached_property
     def errors(self) -> DeclaredErrors:

@@ -10,11 +10,12 @@ response a share E lies within the first nulls, which an image counts as its mai
 """
 
 import math
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from bisar_budget.analysis.allocation import Allocation
+from bisar_budget.analysis.allocation import Allocation, Split
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.together import Together
 from bisar_budget.constants import MAINLOBE_ENERGY
@@ -22,6 +23,7 @@ from bisar_budget.effects.clocks import spurs_of
 from bisar_budget.effects.echoes import SLOWEST
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.models import CUBIC
+from bisar_budget.effects.random_errors import RandomError
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.vibration import counted, lines_of
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
@@ -125,32 +127,53 @@ def wideband_noise(mission: Mission, geometry: Any = None) -> list[SpreadPhase]:
     return found
 
 
-def noise(analysis: Analysis, model: str) -> list[SpreadPhase]:
+def noise(mission: Mission, random: Sequence[RandomError], model: str, geometry: Any = None) -> list[SpreadPhase]:
     """List what spreads beyond the cubic: wideband vibration, noise of sensors, phase noise, links."""
-    found = wideband_noise(analysis.mission)
-    for one in analysis.random:
+    found = wideband_noise(mission, geometry)
+    for one in random:
         if one.declared is not None and (one.subject.kind != "imu" or one.subject.axis in NOISE):
             found.append(SpreadPhase(one.id, one.owner, (one.effect(model).spread * one.declared) ** 2))
     return found
 
 
-def spread_powers(analysis: Analysis, allocation: Allocation, owner: str, model: str) -> list[tuple[str, float]]:
-    """Row id and phase variance of what ISLR holds of an owner, for the mission of all. [rad²]
+def held_by_islr(
+    mission: Mission, random: Sequence[RandomError], echoes: Sequence[Tone], model: str, geometry: Any = None
+) -> list[SpreadPhase]:
+    """List noise, and the tones that no other requirement takes; not a number where a case does not have one."""
+    found = noise(mission, random, model, geometry)
+    if mission.requirements.pslr is None:
+        for one in echoes:
+            variance = np.where(one.is_there, one.phase**2 / 2, math.nan)[()]
+            found.append(SpreadPhase(one.subject.id, one.subject.owner, variance))
+    return found
 
-    Noise, and the tones and the cubic that no other requirement takes.
+
+def spread_powers(
+    mission: Mission, found: Sequence[SpreadPhase], split: Split, owner: str, cubic: Callable[[str], Any]
+) -> list[SpreadPhase]:
+    """Those of an owner, for the mission all, and the power of the cubic where nothing else holds it.
+
+    `cubic` is the cubic phase of an owner at one sigma [rad]; there is none where it is too small to show, or where
+    an error has no image.
     """
-    needs = analysis.mission.requirements
-    found = noise(analysis, model)
-    if needs.pslr is None:
-        found += [SpreadPhase(one.subject.id, one.subject.owner, one.phase**2 / 2) for one in tones(analysis.mission)]
-    powers = [
-        (one.row_id, one.variance)
-        for one in found
-        if owner == "mission" or allocation.islr.includes(one.owner, owner)
-    ]
-    if needs.cubic_phase_error is None:
-        together = Together(analysis, analysis.full if model == "full" else analysis.published)
-        cubic = together.cubic_without_coverage(allocation.islr, owner)
-        if SMALLEST_CUBIC_RAD < cubic < math.inf:
-            powers.append((subject("mission", CUBIC).id, CUBIC_POWER * cubic**2))
+    powers = [one for one in found if owner == "mission" or split.includes(one.owner, owner)]
+    if mission.requirements.cubic_phase_error is None:
+        phase = np.asarray(cubic(owner))
+        shows = (phase > SMALLEST_CUBIC_RAD) & np.isfinite(phase)
+        if shows.any():
+            variance = np.where(shows, CUBIC_POWER * phase**2, math.nan)[()]
+            powers.append(SpreadPhase(subject("mission", CUBIC).id, "mission", variance))
     return powers
+
+
+def declared_powers(analysis: Analysis, allocation: Allocation, owner: str, model: str) -> list[SpreadPhase]:
+    """What ISLR holds of an owner by what one mission declares."""
+    mission = analysis.mission
+    found = held_by_islr(mission, analysis.random, tones(mission), model)
+    return spread_powers(mission, found, allocation.islr, owner, cubic_at_one_sigma(analysis, allocation, model))
+
+
+def cubic_at_one_sigma(analysis: Analysis, allocation: Allocation, model: str) -> Callable[[str], float]:
+    """Cubic phase of each owner by a model, without coverage factor. [rad]"""
+    together = Together(analysis, analysis.full if model == "full" else analysis.published)
+    return lambda owner: together.cubic_without_coverage(allocation.islr, owner)

@@ -18,13 +18,12 @@ from bisar_budget.analysis.spread import tones
 from bisar_budget.arrays.aggregates import Aggregates, ManyTogether, is_owed
 from bisar_budget.arrays.edge import HeldTogether, ManySceneEdges, many_scene_edges
 from bisar_budget.arrays.error_rows import ErrorRows
-from bisar_budget.arrays.instruments import many_random_errors
-from bisar_budget.arrays.random_rows import RandomRows
 from bisar_budget.arrays.rim import ManyScenePhases
 from bisar_budget.arrays.shares import shares_of
 from bisar_budget.budget.input_doubt import declared_position_error, is_in_doubt, least_doubt
 from bisar_budget.budget.judged_rows import BOUND, CODE, Judged, Judging
 from bisar_budget.budget.orbit import FASTEST_FLIGHT
+from bisar_budget.budget.random_rows import RandomRows
 from bisar_budget.budget.required import DECLARATIONS, Missing, is_asked_for, missing_declarations
 from bisar_budget.budget.requirement_states import (
     KEYS,
@@ -43,6 +42,7 @@ from bisar_budget.effects.combined import combined_phase
 from bisar_budget.effects.declared import DeclaredErrors
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.models import LOCATION
+from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.vibration import OwnPhase, slow_phases
 from bisar_budget.findings.row import DECLARE
@@ -114,7 +114,7 @@ class _Check:
             )
             for one in slow_phases(self.mission, errors.geometries)
         ]
-        self.random = many_random_errors(errors.mission, errors.geometries, errors.cases)
+        self.random = random_errors(errors.mission, errors.geometries, errors.cases)
         self.tones = tones(self.mission, errors.geometries)
         self.stated_random = [error for error in self.random if error.declared is not None]
 
@@ -122,7 +122,7 @@ class _Check:
         """Phases of what has no displacement of its own: slow vibrations, declared errors of sensors and clocks."""
         found, factor = list(self.slow), self.mission.allocation.coverage_factor
         for error in self.stated_random:
-            quadratic, cubic, _ = (self.array(part * error.declared) for part in error.effect(model))
+            quadratic, cubic = (self.array(part * error.declared) for part in error.effect(model)[:2])
             found.append(OwnPhase(error.subject.id, error.subject.owner, quadratic, cubic, factor))
         return found
 
@@ -146,14 +146,7 @@ class _Check:
         self.error_rows = ErrorRows(self.judging, self.errors, self.limits, self.gain, is_brief=self.is_brief)
         self.aggregates = Aggregates(self.judging, self.errors, together, self.limits, self.gain)
         self.random_rows = RandomRows(
-            self.judging,
-            self.mission,
-            self.errors.geometries,
-            self.random,
-            self.limits,
-            self.gain,
-            self.allocation,
-            self.tones,
+            self.judging, self.mission, self.allocation, self.random, self.tones, self.errors.geometries
         )
         self.together = together
         by_model = [self._rows(model) for model in gates]
@@ -279,13 +272,16 @@ class _Check:
     def _instruments(self, gating: str) -> Iterator[Judged]:
         """Rows of sensors and clocks, and of all that echoes and spreads together."""
         rows, needs = self.random_rows, self.mission.requirements
-        yield from rows.rows(gating)
+        for error in rows.rows(gating):
+            yield error.judged
         for spur in judged_spurs(self.judging, self.mission, self.allocation, gating):
             yield spur.judged
         if needs.pslr is not None:
             yield judged_pslr(self.judging, self.tones, needs.pslr)[0]
         together = self.together[gating]
-        yield from rows.islr_rows(gating, lambda owner: together.cubic_without_coverage(rows.islr, owner))
+        split = self.allocation.islr
+        for whole in rows.islr_rows(gating, lambda owner: together.cubic_without_coverage(split, owner)):
+            yield whole.judged
 
     @cached_property
     def _edges(self) -> ManySceneEdges | None:

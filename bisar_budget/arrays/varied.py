@@ -1,10 +1,7 @@
-"""A mission in which some numbers are arrays, one element a case: how they come into it, and what is alike in it."""
+"""A mission in which some numbers are arrays, one element a case: how they come into it."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from bisar_budget import units
 from bisar_budget.mission.changes import parts_of
@@ -77,30 +74,3 @@ def _with_element(covariance: Covariance, parts: Sequence[str], number: Any) -> 
         for i, row in enumerate(covariance.correlation)
     ]
     return covariance._replace(correlation=tuple(rows))
-
-
-def groups_alike(value: Any, cases: int) -> Iterator[tuple[Any, NDArray[np.intp]]]:
-    """Tell apart the cases in which a value, or what is in it, differs: the value of each group, and its cases."""
-    arrays = list(_arrays_in(value))
-    if not arrays:
-        yield value, np.arange(cases)
-        return
-    rows, group = np.unique(np.stack(arrays, axis=1), axis=0, return_inverse=True)
-    for place, row in enumerate(rows.tolist()):
-        yield _with_numbers(value, iter(row)), np.flatnonzero(group.ravel() == place)
-
-
-def _arrays_in(value: Any) -> Iterator[Any]:
-    if isinstance(value, tuple):
-        for part in value:
-            yield from _arrays_in(part)
-    elif np.ndim(value):
-        yield value
-
-
-def _with_numbers(value: Any, numbers: Iterator[float]) -> Any:
-    """The same with numbers in the places of its arrays."""
-    if isinstance(value, tuple):
-        parts = [_with_numbers(part, numbers) for part in value]
-        return value._make(parts) if hasattr(value, "_make") else tuple(parts)
-    return next(numbers) if np.ndim(value) else value

@@ -24,6 +24,7 @@ from bisar_budget.budget.vibration_rows import pslr_row, spur_rows, vibration_ro
 from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
 from bisar_budget.effects.correlation import unused_correlations
 from bisar_budget.effects.effect import PLATFORMS, override_notes
+from bisar_budget.effects.oscillators import POOR_FIT
 from bisar_budget.effects.subject import subject
 from bisar_budget.faults import changes_words
 from bisar_budget.findings.mission import FileWarning, MissionFindings, Resolution
@@ -212,8 +213,9 @@ def _of_instruments(analysis: Analysis) -> Iterator[FileWarning]:
         line = mission.line(("synchronization", "interval"))
         yield FileWarning(line=line, message=file_warnings.exchanges_are_rare(T))
     for error in analysis.random:
-        if error.warning:
-            yield FileWarning(line=mission.line(error.path), message=error.warning)
+        if error.noise is not None and error.noise.misfit > POOR_FIT:
+            message = file_warnings.no_power_law_fits(f"platforms.{error.owner}.oscillator", error.noise.misfit)
+            yield FileWarning(line=mission.line(error.path), message=message)
         declared = error.subject.axis == "accelerometer_bias" and error.declared is not None
         if declared and getattr(mission.platforms, error.owner).motion_error.acceleration is not None:
             yield FileWarning(line=mission.line(error.path), message=file_warnings.stated_twice(error.owner))

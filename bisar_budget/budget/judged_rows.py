@@ -1,6 +1,7 @@
 """A row of the budget in many cases at once, and how it is judged; a check is one case."""
 
 import math
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -57,6 +58,26 @@ class Judged(NamedTuple):
             self.metric,
             self.is_of_declare,
         )
+
+    def apart(self, subjects: Sequence[Subject]) -> "Iterator[Judged]":
+        """The rows of a row that stands for so many, each of whose cases follow one another."""
+        cases = self.status.size // len(subjects)
+        for start, what in zip(range(0, self.status.size, cases), subjects, strict=True):
+            some = slice(start, start + cases)
+            yield Judged(
+                what,
+                self.status[some],
+                self.declared[some],
+                self.allowable[some],
+                self.utilization[some],
+                self.binding[some],
+                self.qpe_published_rad[some],
+                self.cubic_rad[some],
+                self.quadratic_use[some],
+                self.never_fails,
+                self.metric,
+                self.is_of_declare,
+            )
 
     def in_decibel(self) -> "Judged":
         """The row with its factors of amplitude in decibel; its utilization stays that of amplitudes."""

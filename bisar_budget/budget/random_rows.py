@@ -2,55 +2,68 @@
 
 Independent processes add their powers, whatever `allocation.combine` says of phases: what wideband vibration, noise
 of sensors and phase noise spread is held together to each platform's share of ISLR.
+
+Rows are judged in arrays over cases, of a sweep or of a check, which is one case; a check then puts them into words.
 """
 
 import math
-from collections.abc import Callable, Iterator
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.spread import (
     CUBIC_POWER,
+    SpreadPhase,
+    Tone,
+    cubic_at_one_sigma,
+    held_by_islr,
     islr_db,
     mainlobe_energy,
+    noise,
     shown_islr_db,
     spread_limit,
     spread_powers,
+    tones,
 )
-from bisar_budget.budget.judgement import judged
+from bisar_budget.budget.judged_rows import BOUND, CODE, REQUIREMENTS, Floats, Judged, Judging
+from bisar_budget.budget.judgement import worded
 from bisar_budget.budget.pull_in import caps, needed_sentence
-from bisar_budget.constants import UTILIZATION_TOLERANCE
+from bisar_budget.effects.effect import override_notes
 from bisar_budget.effects.models import CUBIC, QUADRATIC
-from bisar_budget.effects.random_errors import RandomEffect, RandomError
+from bisar_budget.effects.oscillators import POOR_FIT
+from bisar_budget.effects.random_errors import RandomEffect, RandomError, process_of
 from bisar_budget.effects.subject import subject
 from bisar_budget.findings.row import Row
+from bisar_budget.mission.instruments import Oscillator
 from bisar_budget.mission.model import Mission
+from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import NOTHING, Note
 
 ISLR = "islr"
+HELD = (QUADRATIC, CUBIC, ISLR)  # requirements, in the order of what an error does
+_GOOD_FIT = 0.005  # of an Allan deviation, up to which a power law needs no word
+
+Truths = NDArray[np.bool_]
 
 
 class Limits(NamedTuple):
     """What the errors of an owner are held to, each alone: quadratic and cubic phase, rms of what spreads. [rad]"""
 
-    quadratic: float
-    cubic: float | None
-    spread: float | None
+    quadratic: Any
+    cubic: Any
+    spread: Any
 
 
-def limits_for(mission: Mission, allocation: Allocation, owner: str, model: str, gain: float = 1.0) -> Limits:
+def limits_for(mission: Mission, allocation: Allocation, owner: str, model: str, gain: Any = 1.0) -> Limits:
     """What the errors of an owner are held to by a model; `gain` is that of autofocus."""
     spread = spread_limit(mission, allocation, owner, model)
-    held = None if spread is None else float(spread)
-    return Limits(allocation.qpe_limit(owner) * gain, mission.requirements.cubic_phase_error, held)
-
-
-def sizes_at(effect: RandomEffect, limits: Limits) -> dict[str, float]:
-    """Size at which an error reaches each requirement that it touches. [unit]"""
-    parts = zip((QUADRATIC, CUBIC, ISLR), effect[:3], limits, strict=True)
-    return {name: limit / per_unit for name, per_unit, limit in parts if per_unit and limit is not None}
+    return Limits(allocation.qpe_limit(owner) * gain, mission.requirements.cubic_phase_error, spread)
 
 
 def held_effect(mission: Mission, effect: RandomEffect) -> RandomEffect:
@@ -58,178 +71,330 @@ def held_effect(mission: Mission, effect: RandomEffect) -> RandomEffect:
     if mission.requirements.cubic_phase_error is not None:
         return effect
     cubic = effect.cubic / mission.allocation.coverage_factor
-    return effect._replace(spread=math.sqrt(effect.spread**2 + CUBIC_POWER * cubic**2))
+    return effect._replace(spread=np.sqrt(effect.spread**2 + CUBIC_POWER * cubic**2))
+
+
+def sizes_at(effect: RandomEffect, limits: Limits) -> list[Any]:
+    """Size at which an error reaches each requirement, in the order of `HELD`; infinite where it does not. [unit]"""
+    with np.errstate(all="ignore"):
+        return [
+            math.inf if limit is None else np.where(np.asarray(part) > 0, limit / np.asarray(part), math.inf)
+            for part, limit in zip(effect[:3], limits, strict=True)
+        ]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RandomRow:
+    """The row of one error in many cases.
+
+    `is_over_other` says that the model that does not gate fails it, `bound_by_other` by which of `HELD`.
+    """
+
+    judged: Judged
+    error: RandomError
+    is_over_other: Truths
+    bound_by_other: NDArray[np.intp]
+    without_autofocus: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class IslrRow:
+    """What spreads of one owner together, in many cases.
+
+    `is_there` are the cases that have the row; `variance` is that of the phase, and `limit` and `limit_of_other` the
+    rms phases that are allowed by the model that gates and the other one. [rad², rad]
+    """
+
+    judged: Judged
+    is_there: Truths
+    members: Sequence[SpreadPhase]
+    variance: Floats
+    limit: Floats
+    limit_of_other: Floats
+
+
+class RandomRows:
+    """Errors of sensors and clocks in many cases, and what spreads of them and of vibration.
+
+    Numbers of the mission and its allocation may be arrays (cases,); its geometry then is that of these cases.
+    """
+
+    def __init__(
+        self,
+        judging: Judging,
+        mission: Mission,
+        allocation: Allocation,
+        errors: Sequence[RandomError],
+        echoes: Sequence[Tone],
+        geometry: Any = None,
+    ) -> None:
+        self.judging, self.mission, self.allocation, self.geometry = judging, mission, allocation, geometry
+        self.errors, self.echoes = errors, echoes
+
+    def noise(self, model: str) -> list[SpreadPhase]:
+        """Parts that spread beyond the cubic."""
+        found = noise(self.mission, self.errors, model, self.geometry)
+        return [one._replace(variance=self.judging.array(one.variance)) for one in found]
+
+    def _table(self, values: Sequence[Any]) -> Floats:
+        """Numbers, or numbers of cases, as (values, cases)."""
+        found = np.empty((len(values), self.judging.cases))
+        for row, value in zip(found, values, strict=True):
+            row[:] = value
+        return found
+
+    def _effects(self, model: str) -> RandomEffect:
+        """Effects of a unit of each error, (errors, cases)."""
+        columns = zip(*(error.effect(model)[:3] for error in self.errors), strict=True)
+        return RandomEffect(*map(self._table, columns))
+
+    def _sizes(self, model: str, effects: RandomEffect) -> Floats:
+        """Size at which each error reaches each requirement, (requirements, errors, cases). [unit]"""
+        gain, owners = self.allocation.autofocus_gain, [error.owner for error in self.errors]
+        by_owner = {one: limits_for(self.mission, self.allocation, one, model, gain) for one in {*owners}}
+        columns = zip(*(by_owner[owner] for owner in owners), strict=True)
+        limits = Limits(*(None if column[0] is None else self._table(column) for column in columns))
+        sizes = np.full((len(HELD), len(owners), self.judging.cases), math.inf)
+        for row, size in zip(sizes, sizes_at(held_effect(self.mission, effects), limits), strict=True):
+            row[:] = size
+        return sizes
+
+    def rows(self, model: str) -> Iterator[RandomRow]:
+        """Rows of every error by a model, `published` or `full`, declared or not."""
+        if not self.errors:
+            return
+        other = "full" if model == "published" else "published"
+        mine, theirs = self._effects(model), self._effects(other)
+        sizes, sizes_of_other = self._sizes(model, mine), self._sizes(other, theirs)
+        declared = self._table([math.nan if one.declared is None else one.declared for one in self.errors])
+        allocation, smallest = self.allocation, sizes.min(axis=0)
+        gain = allocation.autofocus_gain
+        is_limited = np.isfinite(smallest)
+        binds = np.where(is_limited, sizes.argmin(axis=0), -1)
+        allowable = np.where(is_limited, smallest, math.nan)
+        qpe, limit = mine.quadratic * declared, self._table([allocation.qpe_limit(one.owner) for one in self.errors])
+        within = np.where(binds == 0, declared / allowable * gain, qpe / limit)
+        without_autofocus = np.where((gain > 1) & (qpe > 0) & is_limited, within, 0.0)
+        is_over_other = declared > sizes_of_other.min(axis=0) * BOUND
+        judged = self._judged(
+            declared,
+            allowable,
+            doubt=is_over_other,
+            without_autofocus=without_autofocus.ravel(),
+            is_info=self.mission.allocation.combine != "each",
+        )._replace(
+            binding=np.array([-1, *map(REQUIREMENTS.index, HELD)], np.int8)[binds + 1].ravel(),
+            qpe_published_rad=(qpe if model == "published" else theirs.quadratic * declared).ravel(),
+            cubic_rad=(mine.cubic * declared).ravel(),
+            quadratic_use=(qpe / (limit * gain)).ravel(),
+        )
+        rows = judged.apart([error.subject for error in self.errors])
+        columns = (is_over_other, sizes_of_other.argmin(axis=0), without_autofocus)
+        for row, error, *others in zip(rows, self.errors, *columns, strict=True):
+            yield RandomRow(row.in_decibel() if error.unit == "dB" else row, error, *others)
+
+    def _judged(self, declared: Floats, allowable: Floats, doubt: Truths, **of_row: Any) -> Judged:
+        """Judge rows (rows, cases) as one row that stands for all; what is not declared is not a number."""
+        warn_above = np.broadcast_to(self.judging.warn_above, declared.shape).ravel()
+        judged = Judging(declared.size, warn_above).row(
+            subject("mission", ISLR), declared.ravel(), allowable.ravel(), doubt=doubt.ravel(), **of_row
+        )
+        is_none = np.isnan(judged.declared)
+        judged.status[is_none], judged.utilization[is_none] = CODE["not_declared"], math.nan
+        return judged
+
+    # ---------------------------------------------------------------- powers together
+    def islr_rows(self, model: str, cubic: Callable[[str], Any]) -> Iterator[IslrRow]:
+        """Rows of what spreads in sum: for the mission, and for each owner unless only wideband vibration spreads.
+
+        `cubic` gives the cubic phase of an owner at one sigma, which ISLR holds where nothing else does. [rad]
+        """
+        mission, split = self.mission, self.allocation.islr
+        if mission.requirements.islr is None:
+            return
+        owners = ("transmitter", "receiver", *(["clock"] if split.clock is not None else []), "mission")
+        found = held_by_islr(mission, self.errors, self.echoes, model, self.geometry)
+        members = [spread_powers(mission, found, split, owner, cubic) for owner in owners]
+        powers = [self._table([one.variance for one in of_owner]) for of_owner in members]
+        is_declared = np.array([~np.isnan(of_owner).all(axis=0) for of_owner in powers])
+        variance = np.array([np.nan_to_num(of_owner).sum(axis=0) for of_owner in powers])
+        models = (model, "full" if model == "published" else "published")
+        limit, limit_of_other = (
+            self._table([spread_limit(mission, self.allocation, owner, one) for owner in owners]) for one in models
+        )
+        rms = np.sqrt(variance)
+        judged = self._judged(np.where(is_declared, rms, math.nan), limit, doubt=rms > limit_of_other * BOUND)
+        is_vibration = [one.row_id.endswith("vibration.wideband") for one in members[-1]]
+        makes_more = ~np.isnan(powers[-1][~np.array(is_vibration, dtype=bool)]).all(axis=0)
+        energy = mainlobe_energy(mission)
+        declared, allowable = (
+            np.where(column > 0, islr_db(column**2, model, energy), math.nan)
+            for column in (judged.declared, judged.allowable)
+        )
+        in_db = judged._replace(declared=declared, allowable=allowable)
+        rows = in_db.apart([subject(owner, ISLR) for owner in owners])
+        for row, *others in zip(rows, members, variance, limit, limit_of_other, strict=True):
+            is_there = makes_more | (row.subject.owner == "mission")  # else its own row holds it to the share
+            row = row.where(~is_there, Judged.of_none(row.subject, self.judging.cases)).held_to(ISLR)
+            yield IslrRow(row, is_there, *others)
+
+
+# ---------------------------------------------------------------------- in words
+def _rows_of(analysis: Analysis, allocation: Allocation) -> RandomRows:
+    mission = analysis.mission
+    return RandomRows(Judging(1, mission.allocation.warn_above), mission, allocation, analysis.random, tones(mission))
 
 
 def random_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterator[Row]:
-    """Rows of every error of a sensor or a clock, declared or not."""
-    other = "full" if gating == "published" else "published"
-    for error in analysis.random:
-        yield _row(analysis, error, gating, other, allocation)
+    """Rows of every error of a sensor or a clock of one mission, declared or not."""
+    with np.errstate(all="ignore"):
+        rows = list(_rows_of(analysis, allocation).rows(gating))
+    for one in rows:
+        yield _row(analysis.mission, allocation, one, gating)
 
 
-def _row(analysis: Analysis, error: RandomError, gating: str, other: str, allocation: Allocation) -> Row:
-    mission, gain, size = analysis.mission, allocation.autofocus_gain, error.declared
-    mine, theirs = error.effect(gating), error.effect(other)
-    held, held_by_other = held_effect(mission, mine), held_effect(mission, theirs)
-    limits, others = (limits_for(mission, allocation, error.owner, model, gain) for model in (gating, other))
-    sizes = sizes_at(held, limits)
-    allowable = min(sizes.values(), default=None)
-    binding = min(sizes, key=lambda name: sizes[name]) if sizes else None
-    qpe = cubic = None
-    over = doubt = info = NOTHING
-    if size is not None:
-        qpe, cubic = mine.quadratic * size, mine.cubic * size
-        if mission.allocation.combine != "each":
-            info = phrases.aggregate_decides(mission.allocation.combine)
-        elif allowable is not None and size > allowable:
-            over = _over(mission, error, gating, limits, binding or "", allocation).then(error.extrapolated)
-        doubt = _doubt(mission, other, held_by_other, others, size)
-    by_model = (mine, theirs) if gating == "published" else (theirs, mine)
-    row = judged(
+def _row(mission: Mission, allocation: Allocation, one: RandomRow, gating: str) -> Row:
+    error, size, combine = one.error, one.error.declared, mission.allocation.combine
+    mine, limit = error.effect(gating), float(allocation.qpe_limit(error.owner) * allocation.autofocus_gain)
+    binding = REQUIREMENTS[one.judged.binding[0]] if one.judged.binding[0] >= 0 else None
+    over = doubt = NOTHING
+    if one.judged.status[0] == CODE["fail"]:
+        over = _over(mission, error, gating, binding, allocation).then(error.extrapolated)
+    if one.is_over_other[0]:
+        doubt = _doubt(mission, error, gating, HELD[one.bound_by_other[0]], limit)
+    limits = [limit / effect.quadratic if effect.quadratic else None for effect in (error.published, error.full)]
+    if error.unit == "dB":
+        limits = [_decibel(factor) for factor in limits]
+    equation, evidence, notes = _said(mission, error)
+    return worded(
         mission,
-        subject=error.subject,
-        metric=QUADRATIC,
+        one.judged,
         unit=error.unit,
-        declared=size,
-        allowable=allowable,
         path=error.path,
-        equation=error.equation,
-        gain=_gain(binding, qpe, limits, gain, size, allowable),
+        equation=equation,
         over=over,
         doubt=doubt,
-        no_limit=_no_limit(error, mine) if allowable is None else NOTHING,
-        info=info,
-        limits=tuple(limits.quadratic / effect.quadratic if effect.quadratic else None for effect in by_model),  # type: ignore[arg-type]
-        qpe=None if size is None else by_model[0].quadratic * size,
-        qpe_full=None if size is None else by_model[1].quadratic * size,
-        evidence=error.evidence,
-        notes=error.notes,
-    )
-    row = row._replace(
-        binding_requirement=binding,
-        cubic_rad=cubic,
+        no_limit=_unlimited(mission, error, mine),
+        info=NOTHING if combine == "each" else phrases.aggregate_decides(combine),
+        without_autofocus=float(one.without_autofocus[0]),
+        limits=(limits[0], limits[1]),
+        qpe_published_rad=None if size is None else error.published.quadratic * size,
+        qpe_full_rad=None if size is None else error.full.quadratic * size,
         islr_db=None if size is None else shown_islr_db(mission, (mine.spread * size) ** 2),
+        evidence=evidence,
+        remarks=notes,
+        binding_requirement=binding,
         model=gating,
     )
-    return in_decibel(row) if error.unit == "dB" else row
 
 
-def _no_limit(error: RandomError, effect: RandomEffect) -> Note:
+def _decibel(factor: float | None) -> float | None:
+    """Level of a factor of amplitude. [dB]"""
+    return 20 * math.log10(factor) + 0.0 if factor else None
+
+
+def _said(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
+    """Equation, evidence and notes of an error's row."""
+    kind, figure, sync = error.subject.kind, error.subject.axis, mission.synchronization
+    if sync is not None and kind == "synchronization":
+        return "synchronisation", sync.source, () if sync.interval else (phrases.another_for_each_pulse(),)
+    if kind == "oscillator":
+        return _said_of_oscillator(mission, error)
+    motion: MotionError = getattr(mission.platforms, error.owner).motion_error
+    if kind == "random":
+        source, figure, equation = process_of(mission, error).source, "random", "Gauss-Markov"
+    else:
+        is_own = motion.imu is not None and motion.key_of(figure) == figure
+        source, equation = motion.imu.source if motion.imu and is_own else None, "inertial sensor"
+    return equation, source or motion.evidence(figure), override_notes(error.owner, motion.overridden, figure)
+
+
+def _said_of_oscillator(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
+    oscillator: Oscillator = getattr(mission.platforms, error.owner).oscillator
+    own, sync = error.noise, mission.synchronization
+    notes = [*override_notes(error.owner, oscillator.overridden)]
+    if own is not None and not mission.has_direct_path:
+        notes += [note for note in (own.extrapolated, *own.notes) if note]
+        if sync is not None and sync.interval is not None:
+            notes.append(phrases.left_by_exchanges(sync.interval))
+    if own is not None and _GOOD_FIT < own.misfit <= POOR_FIT:
+        notes.append(phrases.power_law_fits(own.misfit))
+    return "phase noise", oscillator.source, tuple(notes)
+
+
+def _unlimited(mission: Mission, error: RandomError, effect: RandomEffect) -> Note:
     """Say why nothing limits an error: it does nothing, or what it does is not required."""
-    parts = [name for name, size in (("cubic phase", effect.cubic), ("ISLR", effect.spread)) if size]
-    return phrases.no_requirement_limits(parts) if parts else error.no_limit
+    does = [name for name, size in (("cubic phase", effect.cubic), ("ISLR", effect.spread)) if size]
+    return phrases.no_requirement_limits(does) if does else no_effect(mission, error)
 
 
-def _gain(
-    binding: str | None, qpe: float | None, limits: Limits, gain: float, size: float | None, allowable: float | None
-) -> float:
-    """Autofocus gain within an allowable: of one that the quadratic phase does not set, how far that is used."""
-    if gain == 1 or not qpe or not size or allowable is None:
-        return 1.0
-    return gain if binding == QUADRATIC else qpe / (limits.quadratic / gain) / (size / allowable)
+def no_effect(mission: Mission, error: RandomError) -> Note:
+    """Say why an error does nothing."""
+    if error.subject.kind in ("imu", "random"):
+        return phrases.across_the_line_of_sight()
+    if error.subject.kind == "synchronization":
+        return phrases.nothing_spreads()
+    return phrases.oscillators_drop_out() if mission.has_direct_path else phrases.no_phase_noise()
 
 
-def in_decibel(row: Row) -> Row:
-    """Write a row whose numbers are factors of amplitude in decibel; its utilization stays that of amplitudes."""
-
-    def level(factor: float | None) -> float | None:
-        return 20 * math.log10(factor) + 0.0 if factor else None
-
-    return row._replace(
-        declared=level(row.declared),
-        allowable=level(row.allowable),
-        allowable_published=level(row.allowable_published),
-        allowable_full=level(row.allowable_full),
-    )
-
-
-def _over(
-    mission: Mission, error: RandomError, model: str, limits: Limits, binding: str, allocation: Allocation
-) -> Note:
-    effect, size = held_effect(mission, error.effect(model)), error.declared or 0.0
+def _over(mission: Mission, error: RandomError, model: str, binding: str | None, allocation: Allocation) -> Note:
+    effect, size = held_effect(mission, error.effect(model)), error.declared
+    limits = limits_for(mission, allocation, error.owner, model, allocation.autofocus_gain)
     if binding == CUBIC:
-        return phrases.cubic_phase_over(effect.cubic * size, limits.cubic or 0.0)
+        return phrases.cubic_phase_over(effect.cubic * size, limits.cubic)
     if binding == ISLR:
         level = _levels(mission, model)
-        return phrases.spreads_too_much(level(effect.spread * size), level(limits.spread or 0.0))
+        return phrases.spreads_too_much(level(effect.spread * size), level(limits.spread))
     qpe = effect.quadratic * size
     needed = needed_sentence(allocation.n_pull_needed(qpe, error.owner), caps(mission))
     return phrases.quadratic_phase_over(qpe, limits.quadratic).then(needed)
 
 
+def _doubt(mission: Mission, error: RandomError, gating: str, binding: str, limit: float) -> Note:
+    """Say by which requirement the model that does not gate fails a declared error."""
+    other, size = "full" if gating == "published" else "published", error.declared
+    effect = held_effect(mission, error.effect(other))
+    if binding == ISLR:
+        return phrases.other_model_spreads(other, _levels(mission, other)(effect.spread * size))
+    if binding == QUADRATIC:
+        return phrases.other_model_fails(other, effect.quadratic * size, limit, "rad", "QPE")
+    allowed = mission.requirements.cubic_phase_error or 0.0
+    return phrases.other_model_fails(other, effect.cubic * size, allowed, "rad", "cubic phase")
+
+
 def _levels(mission: Mission, model: str) -> Callable[[float], float]:
     """ISLR of an rms phase [rad] by a model, whatever the size that it is compared with. [dB]"""
     energy = mainlobe_energy(mission)
-    return lambda rms: islr_db(rms**2, model, energy) if rms else 0.0
+    return lambda rms: float(islr_db(rms**2, model, energy)) if rms else 0.0
 
 
-def _doubt(mission: Mission, other: str, effect: RandomEffect, limits: Limits, size: float) -> Note:
-    """Say that the model that does not gate fails a declared error; else nothing."""
-    sizes = sizes_at(effect, limits)
-    if not sizes or size <= min(sizes.values()) * (1 + UTILIZATION_TOLERANCE):
-        return NOTHING
-    name = min(sizes, key=lambda one: sizes[one])
-    if name == ISLR:
-        return phrases.other_model_spreads(other, _levels(mission, other)(effect.spread * size))
-    if name == QUADRATIC:
-        return phrases.other_model_fails(other, effect.quadratic * size, limits.quadratic, "rad", "QPE")
-    return phrases.other_model_fails(other, effect.cubic * size, limits.cubic or 0.0, "rad", "cubic phase")
-
-
-# ---------------------------------------------------------------------- powers together
 def islr_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterator[Row]:
-    """Rows of what spreads in sum: for the mission, and for each owner unless only wideband vibration spreads."""
-    mission = analysis.mission
-    if mission.requirements.islr is None:
-        return
-    owners = ["transmitter", "receiver", "mission"]
-    if allocation.islr.clock is not None:
-        owners.insert(2, "clock")
-    other = "full" if gating == "published" else "published"
-    level = _levels(mission, gating)  # by one rule: what is required of the whole reads as required
-    powers = {owner: spread_powers(analysis, allocation, owner, gating) for owner in owners}
-    is_vibration_alone = all(row_id.endswith("vibration.wideband") for row_id, _ in powers["mission"])
-    for owner, members in powers.items():
-        if owner != "mission" and is_vibration_alone:  # its own row holds it to the platform's share
-            continue
-        variance = math.fsum(power for _, power in members)
-        limit, by_other = (spread_limit(mission, allocation, owner, model) or 0.0 for model in (gating, other))
-        rms = math.sqrt(variance)
+    """Rows of what spreads in sum of one mission."""
+    mission, level = analysis.mission, _levels(analysis.mission, gating)  # by one rule: the whole reads as required
+    other, cubic = "full" if gating == "published" else "published", cubic_at_one_sigma(analysis, allocation, gating)
+    with np.errstate(all="ignore"):
+        rows = [one for one in _rows_of(analysis, allocation).islr_rows(gating, cubic) if one.is_there[0]]
+    for one in rows:
+        variance, limit, by_other = (float(column[0]) for column in (one.variance, one.limit, one.limit_of_other))
         over = doubt = NOTHING
-        if rms > limit and members:
-            row_id, largest = max(members, key=lambda member: member[1])
-            over = phrases.noise_spreads_too_much(level(rms), level(limit), row_id, level(math.sqrt(largest)))
-        if rms > by_other * (1 + UTILIZATION_TOLERANCE):
+        if math.sqrt(variance) > by_other * BOUND:
             doubt = phrases.other_model_allows(other, level(by_other), "dB")
-        row = judged(
+        levels = [level(size) if size else None for size in (limit, by_other)]
+        if one.judged.status[0] == CODE["fail"]:
+            row_id, _, largest = max(one.members, key=lambda member: member.variance)
+            over = phrases.noise_spreads_too_much(
+                level(math.sqrt(variance)), level(limit), row_id, level(math.sqrt(largest))
+            )
+        yield worded(
             mission,
-            subject=subject(owner, ISLR),
-            metric=ISLR,
+            one.judged,
             unit="dB",
-            declared=rms if members else None,
-            allowable=limit,
             path=("requirements", "islr"),
             equation="powers of the rows",
             over=over,
             doubt=doubt,
-            limits=(limit, by_other) if gating == "published" else (by_other, limit),
+            limits=(levels[0], levels[1]) if gating == "published" else (levels[1], levels[0]),
+            islr_db=shown_islr_db(mission, variance),
+            binding_requirement=ISLR,
+            model=gating,
         )
-        yield _as_islr(row, shown_islr_db(mission, variance), gating, level)
-
-
-def _as_islr(row: Row, shown: float | None, gating: str, of_rms: Callable[[float], float]) -> Row:
-    """Write rms phases as the ISLR that they add; `shown` is that of an image, whatever model gates. [dB]"""
-
-    def level(rms: float | None) -> float | None:
-        return of_rms(rms) if rms else None
-
-    return row._replace(
-        declared=level(row.declared),
-        allowable=level(row.allowable),
-        allowable_published=level(row.allowable_published),
-        allowable_full=level(row.allowable_full),
-        islr_db=shown,
-        binding_requirement=ISLR,
-        model=gating,
-    )

@@ -77,7 +77,7 @@ def judged_requirements(
     unknown_place = _unknown_place(analysis, rows) or (doubts[0].note if doubts else NOTHING)
     if unknown_place and mission.requirements.location_error is not None:
         looked_at = [_misplaced(row, unknown_place) for row in looked_at]
-    has_noise = any(noise(analysis, model.name) for model in gates) or (
+    has_noise = any(noise(mission, analysis.random, model.name) for model in gates) or (
         mission.requirements.pslr is None and bool(tones(mission))
     )
     if not has_noise:
@@ -134,9 +134,10 @@ def effect_totals(analysis: Analysis, models: Sequence[Model]) -> list[EffectTot
 
 def effect_parts(analysis: Analysis, together: Together) -> dict[str, Phases]:
     """Cubic phase, rms phase that spreads and peak phase of tones of each declared error by a model. [rad]"""
+    noises = noise(analysis.mission, analysis.random, together.model.name)
     return {
         "cubic": together.all_cubics(),
-        "spread": [(one.row_id, math.sqrt(one.variance)) for one in noise(analysis, together.model.name)],
+        "spread": [(one.row_id, math.sqrt(one.variance)) for one in noises],
         "tone": [(one.subject.id, one.phase) for one in tones(analysis.mission)],
     }
 

@@ -11,6 +11,7 @@ from bisar_budget.effects.spectra import PowerLawPiece
 from bisar_budget.mission.instruments import Oscillator, Points, PowerLaw
 from bisar_budget.phrases import NOTHING, Note
 
+POOR_FIT = 0.2  # of an Allan deviation, from where a power law does not describe it
 _EXACT, _DESCRIBES = 1e-6, 0.01  # misfits of an Allan deviation: nothing, and so little that no term is added
 _STEEPEST, _LEAST_STEEP = 4.0, 3.0  # slopes of a mask below its first point
 

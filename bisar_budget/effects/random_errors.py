@@ -5,25 +5,28 @@ no sign. They contribute from the quadratic order on: the constant and linear pa
 leaves, and the mission declares it. To the published model the line of sight is that of mid-aperture
 (`theory.random_errors`); the full model lets it turn, knows a direct path, and counts what the displacement of the
 image adds.
+
+Numbers of a mission may be arrays (cases,); its geometry then is that of these cases.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from bisar_budget import evaluators, phrases
+from bisar_budget import evaluators
 from bisar_budget.constants import ROUNDING, STANDARD_GRAVITY
-from bisar_budget.effects.effect import PLATFORMS, override_notes
-from bisar_budget.effects.sources import exact_ranges
+from bisar_budget.effects.collections import axes_of
+from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.oscillators import Noise, noise_of
+from bisar_budget.effects.spectra import link_parts, parts, synchronized_parts
 from bisar_budget.effects.subject import Subject, subject
-from bisar_budget.effects.tones import Parts, gauss_markov
-from bisar_budget.effects.vibration import sight_of
+from bisar_budget.effects.tones import Floats, gauss_markov
 from bisar_budget.faults import KeyPath
-from bisar_budget.geometry import BistaticGeometry, PlatformState, Vector, dot
-from bisar_budget.mission.instruments import IMU_KINDS, GaussMarkov, Imu
+from bisar_budget.mission.instruments import IMU_KINDS, GaussMarkov, Oscillator
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import NOTHING, Note
@@ -44,32 +47,27 @@ class RandomEffect(NamedTuple):
     `covariance` is that of quadratic and cubic phase. [rad²/unit²]
     """
 
-    quadratic: float
-    cubic: float
-    spread: float
-    covariance: float = 0.0
+    quadratic: Any
+    cubic: Any
+    spread: Any
+    covariance: Any = 0.0
 
 
 class RandomError(NamedTuple):
     """One error of a sensor or a clock: what it is, how large it is declared, what one unit of it does.
 
     `declared` is the largest of the axes, coverage factor included, and all axes grow with it; None where the file is
-    silent. The unit of an oscillator is `dB`: its noise as a factor of amplitude, declared 1. `extrapolated` says how
-    its noise goes on beyond what the file states.
+    silent. The unit of an oscillator is `dB`: its noise as a factor of amplitude, declared 1. `noise` is the spectrum
+    of an oscillator; not of many cases.
     """
 
     subject: Subject
     unit: str
-    declared: float | None
+    declared: Any
     path: KeyPath
     published: RandomEffect
     full: RandomEffect
-    equation: str
-    evidence: str | None
-    no_limit: Note = phrases.nothing_spreads()
-    notes: tuple[Note, ...] = ()
-    extrapolated: Note = NOTHING
-    warning: Note = NOTHING
+    noise: Noise | None = None
 
     @property
     def id(self) -> str:
@@ -81,109 +79,171 @@ class RandomError(NamedTuple):
         """Whose share it counts against: transmitter, receiver or clock."""
         return self.subject.owner
 
+    @property
+    def extrapolated(self) -> Note:
+        """How the noise of an oscillator goes on beyond what the file states."""
+        return NOTHING if self.noise is None else self.noise.extrapolated
+
     def effect(self, model: str) -> RandomEffect:
         """What a unit does by a model."""
         return self.full if model == "full" else self.published
 
 
-def random_errors(mission: Mission, geometry: BistaticGeometry) -> list[RandomError]:
+def random_errors(mission: Mission, geometry: Any = None, cases: int = 1) -> list[RandomError]:
     """List the errors of sensors and clocks that a mission names, in a fixed order; nothing for most.
 
-    Of a platform with an inertial sensor every figure is listed, declared or not.
+    Of a platform with an inertial sensor every figure is listed, declared or not. `geometry` is that of many cases;
+    without it all numbers are floats.
     """
-    found: list[RandomError] = []
-    states = (geometry.transmitter, geometry.receiver)
-    if any(getattr(mission.platforms, name).motion_error.imu for name in PLATFORMS):
-        exact = exact_ranges(mission, geometry, NODES)
-        for name, state in zip(PLATFORMS, states, strict=True):
-            found += _of_imu(mission, name, state, exact)
-    for name, state in zip(PLATFORMS, states, strict=True):
-        found += _of_position(mission, name, state)
-    if mission.synchronization or any(getattr(mission.platforms, name).oscillator for name in PLATFORMS):
-        from bisar_budget.effects.clocks import clock_noise
-
-        found += clock_noise(mission)
-    return found
+    seen = _Seen(mission, geometry or mission.geometry, cases)
+    found = [error for name in PLATFORMS for error in _of_imu(seen, name)]
+    found += [error for name in PLATFORMS for error in _of_position(seen, name)]
+    found += [error for name in PLATFORMS for error in _of_oscillator(seen, name)]
+    found += _of_link(seen)
+    return [_of_one_case(mission, error) for error in found] if geometry is None else found
 
 
-def _of_imu(mission: Mission, name: str, state: PlatformState, exact: ExactRanges) -> Iterator[RandomError]:
-    error: MotionError = getattr(mission.platforms, name).motion_error
-    imu: Imu | None = error.imu
-    if imu is None:
+def process_of(mission: Mission, error: RandomError) -> GaussMarkov:
+    """Process of an error that is correlated noise of a position."""
+    motion: MotionError = getattr(mission.platforms, error.owner).motion_error
+    return next(one for one in motion.random if one.name == error.subject.axis)
+
+
+def _of_one_case(mission: Mission, error: RandomError) -> RandomError:
+    """An error of a single case with numbers in the places of its arrays, and the noise of an oscillator."""
+    published, full = (RandomEffect(*map(_number, effect)) for effect in (error.published, error.full))
+    noise = None
+    if error.subject.kind == "oscillator":
+        oscillator: Oscillator = getattr(mission.platforms, error.owner).oscillator
+        noise = noise_of(oscillator, mission.radar.center_frequency, mission.collection.aperture_time)
+    declared = None if error.declared is None else _number(error.declared)
+    return error._replace(declared=declared, published=published, full=full, noise=noise)
+
+
+def _number(value: Any) -> float:
+    return float(np.asarray(value).item())
+
+
+class _Seen:
+    """Cases as their sensors and clocks see them: numbers are arrays (…, cases)."""
+
+    def __init__(self, mission: Mission, geometry: Any, cases: int) -> None:
+        self.mission, self.geometry, self.cases = mission, geometry, cases
+        self.sights = geometry.sights(has_direct_path=mission.has_direct_path)
+        self.factor = mission.allocation.coverage_factor
+        self.aperture_time = self.array(mission.collection.aperture_time)
+        self.exact: ExactRanges | None = None
+
+    def array(self, value: Any) -> Floats:
+        """One number for each case."""
+        return np.broadcast_to(np.asarray(value, dtype=float), (self.cases,))
+
+    def arrays(self, values: Any) -> Floats:
+        """Numbers in a tuple, or in tuples, likewise."""
+        return np.array([self.arrays(value) if isinstance(value, tuple) else self.array(value) for value in values])
+
+    def error(self, name: str) -> MotionError:
+        """Of a platform."""
+        found: MotionError = getattr(self.mission.platforms, name).motion_error
+        return found
+
+    def axes(self, name: str) -> Floats:
+        """Axes of a platform's errors, (axes, 3, cases)."""
+        return self.arrays(axes_of(self.mission, name, getattr(self.geometry, name)))
+
+    def along(self, name: str, directions: Floats) -> tuple[Floats, Floats]:
+        """Root-sum-square of what directions (axes, 3, cases) have of the line of sight, and of what data hear."""
+        look, sight = getattr(self.geometry, name).look, self.sights[PLATFORMS.index(name)]
+        seen = _length_along(self.arrays(look), directions)
+        return seen, seen if sight is look else _length_along(self.arrays(sight), directions)
+
+    def exact_ranges(self) -> ExactRanges:
+        """Exact ranges at as many nodes as walks need."""
+        if self.exact is None:
+            mission, geometry = self.mission, self.geometry
+            self.exact = ExactRanges.of(
+                (geometry.transmitter, geometry.receiver),
+                mission.radar.wavelength,
+                mission.collection.aperture_time,
+                NODES,
+                self.cases,
+                has_direct_path=mission.has_direct_path,
+            )
+        return self.exact
+
+
+def _length_along(sight: Floats, directions: Floats) -> Floats:
+    return np.asarray(np.sqrt(np.square((directions * sight).sum(axis=1)).sum(axis=0)))
+
+
+def _parts_of_largest(values: Floats) -> tuple[Floats, Floats]:
+    """The largest of values (axes, cases), and each over it; 1 where there is none."""
+    largest = values.max(axis=0)
+    return largest, np.divide(values, largest, out=np.ones_like(values), where=largest > 0)
+
+
+# ---------------------------------------------------------------------- inertial sensors
+def _of_imu(seen: _Seen, name: str) -> Iterator[RandomError]:
+    error = seen.error(name)
+    if error.imu is None:
         return
-    axes, sight = state.frame(error.frame), sight_of(mission, name)
-    factor = mission.allocation.coverage_factor
+    axes = seen.axes(name)
+    leaks = np.stack([axes[:, 1], -axes[:, 0], np.zeros_like(axes[:, 0])], axis=1)  # axis × up, by a tilt about it
     for index, (kind, unit) in enumerate(IMU_UNITS.items()):
-        values: Vector | None = getattr(imu, kind)
-        largest = None if values is None else max(values)
-        parts = tuple(value / largest for value in values) if values and largest else (1.0, 1.0, 1.0)
-        directions = [
-            _scaled(_leak(axis) if kind in BY_GRAVITY else axis, p) for axis, p in zip(axes, parts, strict=True)
-        ]
-        along = math.hypot(*(dot(state.look, direction) for direction in directions))
-        row, heard = (
-            evaluators.inertial_phases(
-                part, part, STANDARD_GRAVITY, mission.radar.wavelength, mission.collection.aperture_time
-            )[index]
-            for part in (along, math.hypot(*(dot(sight, direction) for direction in directions)))
-        )
-        published = RandomEffect(row[0], row[1], row[2] / factor)
-        quadratic, cubic, covariance = _over_aperture(exact, name, kind, directions)
-        key = error.key_of(kind)
+        values, key = getattr(error.imu, kind), error.key_of(kind)
+        directions, declared = leaks if kind in BY_GRAVITY else axes, None
+        if values is not None:
+            declared, sizes = _parts_of_largest(seen.arrays(values))
+            directions = directions * sizes[:, None]
+        row, heard = (_at_mid_aperture(seen.mission, index, along) for along in seen.along(name, directions))
+        quadratic, cubic, covariance = _over_aperture(seen.exact_ranges(), PLATFORMS.index(name), kind, directions)
         yield RandomError(
             subject=subject(name, "imu", kind),
             unit=unit,
-            declared=None if largest is None else largest * factor,
+            declared=None if declared is None else declared * seen.factor,
             path=("platforms", name, "motion_error", *(("imu", kind) if key == kind else (key,))),
-            published=published,
-            full=RandomEffect(quadratic, cubic, heard[2] / factor, covariance),
-            equation="inertial sensor",
-            evidence=(imu.source if key == kind else None) or error.evidence(kind),
-            no_limit=phrases.across_the_line_of_sight(),
-            notes=override_notes(name, error.overridden, kind),
+            published=RandomEffect(row[0], row[1], row[2] / seen.factor),
+            full=RandomEffect(quadratic, cubic, heard[2] / seen.factor, covariance),
         )
 
 
-def _leak(axis: Vector) -> Vector:
-    """Where gravity leaks by a tilt about an axis: axis × up."""
-    return (axis[1], -axis[0], 0.0)
+def _at_mid_aperture(mission: Mission, index: int, along: Any) -> tuple[Any, ...]:
+    """Quadratic and cubic phase of a unit, and what is left, along so much of the line of sight. [rad]"""
+    wavelength, T = mission.radar.wavelength, mission.collection.aperture_time
+    return evaluators.inertial_phases(along, along, STANDARD_GRAVITY, wavelength, T)[index]
 
 
-def _scaled(vector: Vector, factor: float) -> Vector:
-    return (vector[0] * factor, vector[1] * factor, vector[2] * factor)
+def _over_aperture(exact: ExactRanges, place: int, kind: str, directions: Floats) -> tuple[Floats, Floats, Floats]:
+    """Sigma of quadratic and of cubic phase of a unit over the exact paths [rad], and their covariance. [rad²]
 
-
-def _over_aperture(
-    exact: ExactRanges, name: str, kind: str, directions: Sequence[Vector]
-) -> tuple[float, float, float]:
-    """Sigma of quadratic and of cubic phase of a unit over the exact paths [rad], and their covariance. [rad²]"""
-    by_node = np.array(covariance_at_nodes(kind, float(exact.half[0])))
-    sigmas = np.sqrt(np.diagonal(by_node))
-    scale = STANDARD_GRAVITY if kind in BY_GRAVITY else 1.0
-    squares, sizes = np.zeros((2, 2)), np.zeros(2)  # of both phases and their product
-    for direction in directions:
-        along = np.array([weights * exact.along(PLATFORMS.index(name), direction) for weights in exact.phase_weights])
-        weights = along[..., 0]  # (2, nodes)
-        squares += weights @ by_node @ weights.T
-        sizes += np.abs(weights * sigmas).sum(axis=1) ** 2
+    A covariance over the aperture is that over an aperture of 2 s, times a power of half the aperture time.
+    """
+    x, y, z = np.moveaxis(directions, 1, 0)[:, :, None]
+    moved = np.array(exact.phase_weights)[:, None] * exact.along(place, (x, y, z))  # (2, axes, nodes, cases)
+    of_unit, power = covariance_at_nodes(kind), GROWS[kind]
+    turned = of_unit @ moved
+    squares = (moved * turned).sum(axis=(1, 2))
+    sizes = np.square((np.abs(moved) * np.sqrt(np.diagonal(of_unit))[:, None]).sum(axis=2)).sum(axis=1)
+    scale = (STANDARD_GRAVITY if kind in BY_GRAVITY else 1.0) ** 2 * exact.half**power
     # What is left of terms that cancel exactly is rounding, and would make a limit out of nothing.
-    quadratic, cubic = (
-        scale * math.sqrt(square) if square > CANCELS * size else 0.0
-        for square, size in zip(np.diagonal(squares).tolist(), sizes.tolist(), strict=True)
-    )
-    return quadratic, cubic, scale**2 * float(squares[0, 1]) if quadratic and cubic else 0.0
+    is_real = squares > CANCELS * sizes
+    quadratic, cubic = np.sqrt(np.where(is_real, squares * scale, 0.0))
+    return quadratic, cubic, np.where(is_real.all(axis=0), (moved[0] * turned[1]).sum(axis=(0, 1)) * scale, 0.0)
 
 
 @cache
-def covariance_at_nodes(kind: str, half: float) -> tuple[tuple[float, ...], ...]:
-    """Covariance of the position error of a unit at the nodes, without gravity: zero at mid-aperture. [m²/unit²]"""
-    times = [node * half for node in evaluators.LEGENDRE_FITS[NODES][0]]
+def covariance_at_nodes(kind: str) -> Floats:
+    """Covariance of the position error of a unit at the nodes of 2 s, without gravity: zero at mid-aperture.
+
+    [m²/unit²]
+    """
+    times = evaluators.LEGENDRE_FITS[NODES][0]
     if kind in ("accelerometer_bias", "attitude", "gyro_bias"):
         order = 3 if kind == "gyro_bias" else 2
-        history = [tau**order / math.factorial(order) for tau in times]
-        return tuple(tuple(a * b for b in history) for a in history)
+        history = np.array(times) ** order / math.factorial(order)
+        return np.multiply.outer(history, history)
     walk = _velocity_walk if kind == "velocity_random_walk" else _angle_walk
-    return tuple(tuple(walk(*sorted((abs(s), abs(t)))) if s * t > 0 else 0.0 for t in times) for s in times)
+    return np.array([[walk(*sorted((abs(s), abs(t)))) if s * t > 0 else 0.0 for t in times] for s in times])
 
 
 def _velocity_walk(early: float, late: float) -> float:
@@ -197,38 +257,100 @@ def _angle_walk(early: float, late: float) -> float:
     return (early**5 / 5 + lag * early**4 / 2 + lag**2 * early**3 / 3) / 4
 
 
-def _of_position(mission: Mission, name: str, state: PlatformState) -> Iterator[RandomError]:
-    error: MotionError = getattr(mission.platforms, name).motion_error
+# ---------------------------------------------------------------------- position noise
+def _of_position(seen: _Seen, name: str) -> Iterator[RandomError]:
+    error = seen.error(name)
     if not error.random:
         return
-    k, factor = 2 * math.pi / mission.radar.wavelength, mission.allocation.coverage_factor
-    axes, sight = state.frame(error.frame), sight_of(mission, name)
-    key = error.key_of("random")
-    process: GaussMarkov
+    k, axes, key = 2 * math.pi / seen.mission.radar.wavelength, seen.axes(name), error.key_of("random")
     for index, process in enumerate(error.random):
-        largest = max(process.sigma)
-        sizes = [sigma / largest if largest else 1.0 for sigma in process.sigma]
-        parts = gauss_markov(mission.collection.aperture_time, process.correlation_time)
-        moved = [_scaled(axis, size) for axis, size in zip(axes, sizes, strict=True)]
+        largest, sizes = _parts_of_largest(seen.arrays(process.sigma))
+        found = np.sqrt(gauss_markov(seen.aperture_time, process.correlation_time))
         published, full = (
-            _correlated(parts, k * math.hypot(*(dot(by, one) for one in moved)), factor) for by in (state.look, sight)
+            RandomEffect(quadratic, cubic, left / seen.factor)
+            for quadratic, cubic, left in (k * along * found for along in seen.along(name, axes * sizes[:, None]))
         )
-        own: KeyPath = (key, index, "sigma") if key == "random" else (key,)
         yield RandomError(
             subject=subject(name, "random", process.name),
             unit="m",
-            declared=largest * factor,
-            path=("platforms", name, "motion_error", *own),
+            declared=largest * seen.factor,
+            path=("platforms", name, "motion_error", *((key, index, "sigma") if key == "random" else (key,))),
             published=published,
             full=full,
-            equation="Gauss-Markov",
-            evidence=process.source or error.evidence("random"),
-            no_limit=phrases.across_the_line_of_sight(),
-            notes=override_notes(name, error.overridden, "random"),
         )
 
 
-def _correlated(parts: Parts, along: float, factor: float) -> RandomEffect:
-    """Sigmas of a metre of a process, by what it changes of the phase. [rad/m]"""
-    quadratic, cubic, left = (along * math.sqrt(part) for part in parts)
-    return RandomEffect(quadratic, cubic, left / factor)
+# ---------------------------------------------------------------------- oscillators and their link
+def _of_oscillator(seen: _Seen, name: str) -> Iterator[RandomError]:
+    mission, sync = seen.mission, seen.mission.synchronization
+    oscillator: Oscillator | None = getattr(mission.platforms, name).oscillator
+    if oscillator is None:
+        return
+    found = np.zeros((3, seen.cases))
+    if sync is None or not sync.is_direct_path:
+        interval = None if sync is None else sync.interval
+        for (alike, each), places in _groups_alike((oscillator, interval), seen.cases):
+            found[:, places] = _parts_at_1_hz(alike, each, seen.aperture_time[places])
+    quadratic, cubic, spread = np.sqrt(found) * mission.radar.center_frequency
+    effect = RandomEffect(quadratic * seen.factor, cubic * seen.factor, spread)
+    key = ("platforms", name, "oscillator")
+    path = key if oscillator.sensor is None else (*key, "sensor")
+    yield RandomError(subject(name, "oscillator"), "dB", 1.0, path, effect, effect)
+
+
+def _parts_at_1_hz(oscillator: Oscillator, interval: float | None, aperture_time: Floats) -> Floats:
+    """Parts of the phase of an oscillator at 1 Hz, or of what exchanged pulses leave of it: they grow as f₀²."""
+    times, place = np.unique(aperture_time, return_inverse=True)
+    spectra: dict[Any, list[int]] = {}
+    for index, T in enumerate(times.tolist()):  # an Allan deviation may be fitted otherwise over another aperture
+        spectra.setdefault(noise_of(oscillator, 1.0, T).pieces, []).append(index)
+    found = np.zeros((3, times.size))
+    for pieces, some in spectra.items():
+        of_them = times[some]
+        found[:, some] = parts(pieces, of_them) if interval is None else synchronized_parts(pieces, of_them, interval)
+    return found[:, place]
+
+
+def _of_link(seen: _Seen) -> Iterator[RandomError]:
+    """Each exchange is wrong by an error of its own, and straight lines join them."""
+    sync = seen.mission.synchronization
+    if sync is None:
+        return
+    found = np.zeros((3, seen.cases))
+    if sync.interval is None:  # from pulse to pulse: all of it spreads
+        found[2] = 1.0
+    else:
+        for interval, places in _groups_alike(sync.interval, seen.cases):
+            times, place = np.unique(seen.aperture_time[places], return_inverse=True)
+            found[:, places] = np.array(link_parts(times, interval))[:, place]
+    quadratic, cubic, spread = np.sqrt(found)
+    effect = RandomEffect(quadratic, cubic, spread / seen.factor)
+    what = subject("clock", "synchronization")
+    yield RandomError(what, "rad", sync.error * seen.factor, ("synchronization", "error"), effect, effect)
+
+
+def _groups_alike(value: Any, cases: int) -> Iterator[tuple[Any, NDArray[np.intp]]]:
+    """Tell apart the cases in which a value, or what is in it, differs: the value of each group, and its cases."""
+    arrays = list(_arrays_in(value))
+    if not arrays:
+        yield value, np.arange(cases)
+        return
+    rows, group = np.unique(np.stack(arrays, axis=1), axis=0, return_inverse=True)
+    for place, row in enumerate(rows.tolist()):
+        yield _with_numbers(value, iter(row)), np.flatnonzero(group.ravel() == place)
+
+
+def _arrays_in(value: Any) -> Iterator[Floats]:
+    if isinstance(value, tuple):
+        for part in value:
+            yield from _arrays_in(part)
+    elif isinstance(value, np.ndarray):
+        yield value
+
+
+def _with_numbers(value: Any, numbers: Iterator[float]) -> Any:
+    """The same with numbers in the places of its arrays."""
+    if isinstance(value, tuple):
+        parts = [_with_numbers(part, numbers) for part in value]
+        return value._make(parts) if hasattr(value, "_make") else tuple(parts)
+    return next(numbers) if isinstance(value, np.ndarray) else value

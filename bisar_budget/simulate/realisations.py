@@ -14,11 +14,10 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import SPEED_OF_LIGHT, STANDARD_GRAVITY
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillators import noise_of
-from bisar_budget.effects.random_errors import RandomError
+from bisar_budget.effects.random_errors import RandomError, process_of
 from bisar_budget.effects.spectra import PowerLawPiece
 from bisar_budget.mission.instruments import GaussMarkov
 from bisar_budget.mission.model import Mission, Simulation
-from bisar_budget.mission.platforms import MotionError
 from bisar_budget.simulate.phase_history import Course, Floats
 
 _STEPS = 512  # from mid-aperture to the end of it, in which a walk is summed up
@@ -54,7 +53,7 @@ def position_courses(
     motion, kind = platform.motion_error, error.subject.axis
     factor = mission.allocation.coverage_factor
     axes = np.array(platform.state.frame(motion.frame))
-    process = _process(mission, error)
+    process = process_of(mission, error) if error.subject.kind == "random" else None
     values = process.sigma if process is not None else getattr(motion.imu, kind) or (1.0, 1.0, 1.0)
     sizes = np.array(values) / max(values) if max(values) else np.ones(3)
     sizes = sizes * (error.declared or 0.0) / factor
@@ -103,16 +102,8 @@ def flown_errors(analysis: Analysis) -> FlownErrors:
 
 
 def correlation_time(mission: Mission, error: RandomError) -> float:
-    """Of an error that is correlated noise; infinite of another. [s]"""
-    process = _process(mission, error)
-    return math.inf if process is None else process.correlation_time
-
-
-def _process(mission: Mission, error: RandomError) -> GaussMarkov | None:
-    if error.subject.kind != "random":
-        return None
-    motion: MotionError = getattr(mission.platforms, error.owner).motion_error
-    return next(one for one in motion.random if one.name == error.subject.axis)
+    """Of an error that is correlated noise. [s]"""
+    return process_of(mission, error).correlation_time
 
 
 def _bias(order: int) -> Callable[[Floats, int, np.random.Generator], Floats]:

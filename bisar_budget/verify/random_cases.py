@@ -10,9 +10,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bisar_budget.analysis.spread import islr_db, mainlobe_energy, shown_islr_db, spread_limit, spread_powers, tones
+from bisar_budget.analysis.spread import declared_powers, islr_db, mainlobe_energy, shown_islr_db, spread_limit, tones
 from bisar_budget.analysis.vibration_limits import echo_phase, highest_echo
-from bisar_budget.budget.random_rows import ISLR, held_effect, limits_for, sizes_at
+from bisar_budget.budget.random_rows import HELD, ISLR, held_effect, limits_for, sizes_at
 from bisar_budget.effects.clocks import Spur
 from bisar_budget.effects.exact_arrays import aperture_nodes
 from bisar_budget.effects.models import CUBIC
@@ -43,7 +43,8 @@ def limits_of(study: Study, error: RandomError) -> dict[str, float]:
     """Size at which each requirement that an error touches is reached, autofocus left out; empty: none limits it."""
     model = _model(study, error)
     effect = held_effect(study.mission, error.effect(model))
-    return sizes_at(effect, limits_for(study.mission, study.allocation, error.owner, model))
+    sizes = map(float, sizes_at(effect, limits_for(study.mission, study.allocation, error.owner, model)))
+    return {name: size for name, size in zip(HELD, sizes, strict=True) if math.isfinite(size)}
 
 
 def _model(study: Study, error: RandomError) -> str:
@@ -203,12 +204,13 @@ def verify_islr(study: Study, of: Subject) -> Verdict:
     limit = spread_limit(mission, study.allocation, of.owner, model) or 0.0
     level = islr_db(limit**2, model, mainlobe_energy(mission))
     blank = Verdict(id=of.id, model=study.model, boundary_error=level, unit="dB")
-    powers = spread_powers(study.analysis, study.allocation, of.owner, model)
-    total = math.fsum(power for _, power in powers)
+    powers = declared_powers(study.analysis, study.allocation, of.owner, model)
+    total = math.fsum(one.variance for one in powers)
     if not total:
         return blank._replace(reason=reasons.no_spread_declared())
     scale = limit / math.sqrt(total)
-    rms = {row_id: scale * math.sqrt(power) for row_id, power in powers if power}  # a direct path cancels some
+    # A direct path cancels some.
+    rms = {one.row_id: scale * math.sqrt(one.variance) for one in powers if one.variance}
     members = [
         error._replace(declared=scale * (error.declared or 0.0)) for error in study.analysis.random if error.id in rms
     ]

@@ -7,16 +7,15 @@ import numpy as np
 
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.analysis.spread import mainlobe_energy, spread_phase, spread_powers, tones
+from bisar_budget.analysis.spread import declared_powers, mainlobe_energy, spread_phase, tones
 from bisar_budget.analysis.together import Together
 from bisar_budget.analysis.vibration_limits import LARGEST_ECHO, Echo, bessel, highest_echo, tone_limits
-from bisar_budget.budget.random_rows import held_effect
+from bisar_budget.budget.random_rows import held_effect, no_effect
 from bisar_budget.constants import STANDARD_GRAVITY
 from bisar_budget.effects.clocks import spurs_of
 from bisar_budget.effects.correlation import phase_parts
 from bisar_budget.effects.models import CUBIC, QUADRATIC
-from bisar_budget.effects.oscillators import noise_of
-from bisar_budget.effects.random_errors import RandomEffect, RandomError
+from bisar_budget.effects.random_errors import RandomEffect, RandomError, process_of
 from bisar_budget.effects.spectra import PowerLawPiece, parts, synchronized_parts
 from bisar_budget.effects.subject import subject
 from bisar_budget.effects.tones import gauss_markov
@@ -51,7 +50,7 @@ def explained_random(analysis: Analysis, allocation: Allocation, error: RandomEr
     """From the line of the file to the allowable."""
     mission, kind = analysis.mission, error.subject.kind
     model = row.model or "published"
-    yield from _declared(mission, error)
+    yield from _declared(mission, error, row)
     if kind == "imu":
         yield from _imu(analysis, error, model)
     elif kind == "random":
@@ -64,13 +63,13 @@ def explained_random(analysis: Analysis, allocation: Allocation, error: RandomEr
     yield from _allowable(mission, allocation, error, row, model)
 
 
-def _declared(mission: Mission, error: RandomError) -> Iterator[Step]:
+def _declared(mission: Mission, error: RandomError, row: Row) -> Iterator[Step]:
     if error.declared is None:
         yield Step(missing(mission, error.path))
         return
     yield from step(f"Declared in {place(mission, error.path)}", as_written(mission, error.path))
-    if error.evidence:
-        yield from step("Evidence", printable(error.evidence))
+    if row.evidence:
+        yield from step("Evidence", printable(row.evidence))
     k = mission.allocation.coverage_factor
     if error.unit != "dB":
         lines = equation("declared", "k*|value|", {"k": k, "value": error.declared / k}, error.declared, error.unit)
@@ -126,8 +125,7 @@ def _of_one(kind: str, which: int, wavelength: float, T: float) -> float:
 
 def _position(analysis: Analysis, error: RandomError, model: str) -> Iterator[Step]:
     mission, effect = analysis.mission, error.effect(model)
-    motion = getattr(mission.platforms, error.owner).motion_error
-    process = next(one for one in motion.random if one.name == error.subject.axis)
+    process = process_of(mission, error)
     T, tau = mission.collection.aperture_time, process.correlation_time
     yield from step(
         "Half the aperture over the correlation time",
@@ -155,20 +153,20 @@ def _has_direct(mission: Mission, model: str) -> bool:
 def _oscillator(mission: Mission, error: RandomError) -> Iterator[Step]:
     oscillator = getattr(mission.platforms, error.owner).oscillator
     sync = mission.synchronization
-    noise = noise_of(oscillator, mission.radar.center_frequency, mission.collection.aperture_time)
+    pieces = () if error.noise is None else error.noise.pieces
     spectrum = "S = f_0²·S_y(f)/f²" if oscillator.phase_noise is None else "S = 2·L(f)·(f_0/f_osc)²"
     yield from step(
         f"One-sided spectrum of phase at {mission.radar.center_frequency:.6g} Hz, {spectrum} [rad²/Hz]",
         *(
             f"{piece.low:.6g} Hz to {piece.high:.6g} Hz: {piece.density:.6g} * f^-{piece.slope:.6g}"
-            for piece in noise.pieces
+            for piece in pieces
         ),
     )
     if not error.published.quadratic:
-        yield Step(error.no_limit)
+        yield Step(no_effect(mission, error))
         return
     interval = sync.interval if sync is not None and sync.method == "linear" else None
-    yield from _integrals(noise.pieces, mission, interval)
+    yield from _integrals(pieces, mission, interval)
     k = mission.allocation.coverage_factor
     if k != 1:
         yield from step(f"Phases times the coverage factor {number(k)}; what is left is a mean power and has none")
@@ -338,8 +336,8 @@ def _level(model: str, variance: str) -> str:
 def explained_islr(analysis: Analysis, allocation: Allocation, row: Row) -> Iterator[Step]:
     """Powers of everything that spreads, together."""
     mission, model, owner = analysis.mission, row.model or "published", row.owner
-    members = spread_powers(analysis, allocation, owner, model)
-    total, energy = math.fsum(power for _, power in members), mainlobe_energy(mission)
+    members = {one.row_id: one.variance for one in declared_powers(analysis, allocation, owner, model)}
+    total, energy = math.fsum(members.values()), mainlobe_energy(mission)
     known: dict[str, float] = {}
     rule = "the published rule takes the variance for it"
     if model != "published":
@@ -348,10 +346,10 @@ def explained_islr(analysis: Analysis, allocation: Allocation, row: Row) -> Iter
     if row.declared is None:
         yield from step("Nothing that spreads is declared")
     else:
-        yield from _tones_and_cubic(analysis, allocation, owner, model, dict(members))
-        width = max(len(name) for name, _ in members)
-        listed = [f"{printable(name):<{width}}  {power:.6g} rad²" for name, power in members]
-        terms = " + ".join(number(power) for _, power in members)
+        yield from _tones_and_cubic(analysis, allocation, owner, model, members)
+        width = max(len(name) for name in members)
+        listed = [f"{printable(name):<{width}}  {power:.6g} rad²" for name, power in members.items()]
+        terms = " + ".join(number(power) for power in members.values())
         title = "Squares of the rms phases that spread: independent, so they add"
         yield from step(title, *listed, Sum(f"v = {terms} = {with_unit(total, 'rad²')}"))
         lines = equation("declared", _level(model, "v"), {"v": total, **known}, row.declared, "dB")
