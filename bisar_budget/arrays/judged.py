@@ -146,7 +146,7 @@ class _Check:
         self.error_rows = ErrorRows(self.judging, self.errors, self.limits, self.gain, is_brief=self.is_brief)
         self.aggregates = Aggregates(self.judging, self.errors, together, self.limits, self.gain)
         self.random_rows = RandomRows(
-            self.judging, self.mission, self.allocation, self.random, self.tones, self.errors.geometries
+            self.judging, self.mission, self.allocation, self.random, self.errors.geometries
         )
         self.together = together
         by_model = [self._rows(model) for model in gates]
@@ -272,16 +272,16 @@ class _Check:
     def _instruments(self, gating: str) -> Iterator[Judged]:
         """Rows of sensors and clocks, and of all that echoes and spreads together."""
         rows, needs = self.random_rows, self.mission.requirements
-        for error in rows.rows(gating):
-            yield error.judged
+        yield from (one.judged for one in rows.rows(gating))
         for spur in judged_spurs(self.judging, self.mission, self.allocation, gating):
             yield spur.judged
         if needs.pslr is not None:
             yield judged_pslr(self.judging, self.tones, needs.pslr)[0]
         together = self.together[gating]
         split = self.allocation.islr
-        for whole in rows.islr_rows(gating, lambda owner: together.cubic_without_coverage(split, owner)):
-            yield whole.judged
+        if needs.islr is not None:
+            sums = rows.islr_rows(gating, self.tones, lambda owner: together.cubic_without_coverage(split, owner))
+            yield from (one.judged for one in sums)
 
     @cached_property
     def _edges(self) -> ManySceneEdges | None:

@@ -125,11 +125,10 @@ class RandomRows:
         mission: Mission,
         allocation: Allocation,
         errors: Sequence[RandomError],
-        echoes: Sequence[Tone],
         geometry: Any = None,
     ) -> None:
-        self.judging, self.mission, self.allocation, self.geometry = judging, mission, allocation, geometry
-        self.errors, self.echoes = errors, echoes
+        self.judging, self.mission, self.allocation = judging, mission, allocation
+        self.errors, self.geometry = errors, geometry
 
     def noise(self, model: str) -> list[SpreadPhase]:
         """Parts that spread beyond the cubic."""
@@ -204,24 +203,22 @@ class RandomRows:
         return judged
 
     # ---------------------------------------------------------------- powers together
-    def islr_rows(self, model: str, cubic: Callable[[str], Any]) -> Iterator[IslrRow]:
+    def islr_rows(self, model: str, echoes: Sequence[Tone], cubic: Callable[[str], Any]) -> Iterator[IslrRow]:
         """Rows of what spreads in sum: for the mission, and for each owner unless only wideband vibration spreads.
 
-        `cubic` gives the cubic phase of an owner at one sigma, which ISLR holds where nothing else does. [rad]
+        `echoes` are all tones; `cubic` gives the cubic phase of an owner at one sigma [rad], which ISLR holds where
+        nothing else does.
         """
         mission, split = self.mission, self.allocation.islr
-        if mission.requirements.islr is None:
-            return
         owners = ("transmitter", "receiver", *(["clock"] if split.clock is not None else []), "mission")
-        found = held_by_islr(mission, self.errors, self.echoes, model, self.geometry)
+        found = held_by_islr(mission, self.errors, echoes, model, self.geometry)
         members = [spread_powers(mission, found, split, owner, cubic) for owner in owners]
         powers = [self._table([one.variance for one in of_owner]) for of_owner in members]
         is_declared = np.array([~np.isnan(of_owner).all(axis=0) for of_owner in powers])
         variance = np.array([np.nan_to_num(of_owner).sum(axis=0) for of_owner in powers])
         models = (model, "full" if model == "published" else "published")
-        limit, limit_of_other = (
-            self._table([spread_limit(mission, self.allocation, owner, one) for owner in owners]) for one in models
-        )
+        shares = np.sqrt(self._table([split.of(owner) for owner in owners]))
+        limit, limit_of_other = (shares * spread_limit(mission, self.allocation, "mission", one) for one in models)
         rms = np.sqrt(variance)
         judged = self._judged(np.where(is_declared, rms, math.nan), limit, doubt=rms > limit_of_other * BOUND)
         is_vibration = [one.row_id.endswith("vibration.wideband") for one in members[-1]]
@@ -242,7 +239,7 @@ class RandomRows:
 # ---------------------------------------------------------------------- in words
 def _rows_of(analysis: Analysis, allocation: Allocation) -> RandomRows:
     mission = analysis.mission
-    return RandomRows(Judging(1, mission.allocation.warn_above), mission, allocation, analysis.random, tones(mission))
+    return RandomRows(Judging(1, mission.allocation.warn_above), mission, allocation, analysis.random)
 
 
 def random_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterator[Row]:
@@ -371,10 +368,12 @@ def _levels(mission: Mission, model: str) -> Callable[[float], float]:
 def islr_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterator[Row]:
     """Rows of what spreads in sum of one mission."""
     mission, level = analysis.mission, _levels(analysis.mission, gating)  # by one rule: the whole reads as required
+    if mission.requirements.islr is None:
+        return
     other, cubic = "full" if gating == "published" else "published", cubic_at_one_sigma(analysis, allocation, gating)
     with np.errstate(all="ignore"):
-        rows = [one for one in _rows_of(analysis, allocation).islr_rows(gating, cubic) if one.is_there[0]]
-    for one in rows:
+        rows = list(_rows_of(analysis, allocation).islr_rows(gating, tones(mission), cubic))
+    for one in (one for one in rows if one.is_there[0]):
         variance, limit, by_other = (float(column[0]) for column in (one.variance, one.limit, one.limit_of_other))
         over = doubt = NOTHING
         if math.sqrt(variance) > by_other * BOUND:

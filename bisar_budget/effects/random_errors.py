@@ -10,7 +10,7 @@ Numbers of a mission may be arrays (cases,); its geometry then is that of these 
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -131,16 +131,15 @@ class _Seen:
         self.mission, self.geometry, self.cases = mission, geometry, cases
         self.sights = geometry.sights(has_direct_path=mission.has_direct_path)
         self.factor = mission.allocation.coverage_factor
-        self.aperture_time = self.array(mission.collection.aperture_time)
+        self.aperture_time = np.broadcast_to(np.asarray(mission.collection.aperture_time), (cases,))
         self.exact: ExactRanges | None = None
 
-    def array(self, value: Any) -> Floats:
-        """One number for each case."""
-        return np.broadcast_to(np.asarray(value, dtype=float), (self.cases,))
-
-    def arrays(self, values: Any) -> Floats:
-        """Numbers in a tuple, or in tuples, likewise."""
-        return np.array([self.arrays(value) if isinstance(value, tuple) else self.array(value) for value in values])
+    def vector(self, values: Sequence[Any]) -> Floats:
+        """Three numbers for each case, (3, cases)."""
+        found = np.empty((3, self.cases))
+        for row, value in zip(found, values, strict=True):
+            row[:] = value
+        return found
 
     def error(self, name: str) -> MotionError:
         """Of a platform."""
@@ -149,13 +148,13 @@ class _Seen:
 
     def axes(self, name: str) -> Floats:
         """Axes of a platform's errors, (axes, 3, cases)."""
-        return self.arrays(axes_of(self.mission, name, getattr(self.geometry, name)))
+        return np.array([self.vector(axis) for axis in axes_of(self.mission, name, getattr(self.geometry, name))])
 
     def along(self, name: str, directions: Floats) -> tuple[Floats, Floats]:
         """Root-sum-square of what directions (axes, 3, cases) have of the line of sight, and of what data hear."""
         look, sight = getattr(self.geometry, name).look, self.sights[PLATFORMS.index(name)]
-        seen = _length_along(self.arrays(look), directions)
-        return seen, seen if sight is look else _length_along(self.arrays(sight), directions)
+        seen = _length_along(self.vector(look), directions)
+        return seen, seen if sight is look else _length_along(self.vector(sight), directions)
 
     def exact_ranges(self) -> ExactRanges:
         """Exact ranges at as many nodes as walks need."""
@@ -193,9 +192,12 @@ def _of_imu(seen: _Seen, name: str) -> Iterator[RandomError]:
         values, key = getattr(error.imu, kind), error.key_of(kind)
         directions, declared = leaks if kind in BY_GRAVITY else axes, None
         if values is not None:
-            declared, sizes = _parts_of_largest(seen.arrays(values))
+            declared, sizes = _parts_of_largest(seen.vector(values))
             directions = directions * sizes[:, None]
-        row, heard = (_at_mid_aperture(seen.mission, index, along) for along in seen.along(name, directions))
+        along, along_heard = seen.along(name, directions)
+        row = heard = _at_mid_aperture(seen.mission, index, along)
+        if along_heard is not along:
+            heard = _at_mid_aperture(seen.mission, index, along_heard)
         quadratic, cubic, covariance = _over_aperture(seen.exact_ranges(), PLATFORMS.index(name), kind, directions)
         yield RandomError(
             subject=subject(name, "imu", kind),
@@ -264,7 +266,7 @@ def _of_position(seen: _Seen, name: str) -> Iterator[RandomError]:
         return
     k, axes, key = 2 * math.pi / seen.mission.radar.wavelength, seen.axes(name), error.key_of("random")
     for index, process in enumerate(error.random):
-        largest, sizes = _parts_of_largest(seen.arrays(process.sigma))
+        largest, sizes = _parts_of_largest(seen.vector(process.sigma))
         found = np.sqrt(gauss_markov(seen.aperture_time, process.correlation_time))
         published, full = (
             RandomEffect(quadratic, cubic, left / seen.factor)
