@@ -214,26 +214,30 @@ class RandomRows:
         found = held_by_islr(mission, self.errors, echoes, model, self.geometry)
         members = [spread_powers(mission, found, split, owner, cubic) for owner in owners]
         powers = [self._table([one.variance for one in of_owner]) for of_owner in members]
-        is_declared = np.array([~np.isnan(of_owner).all(axis=0) for of_owner in powers])
-        variance = np.array([np.nan_to_num(of_owner).sum(axis=0) for of_owner in powers])
+        is_known = [~np.isnan(of_owner) for of_owner in powers]
+        variance = np.array([one.sum(axis=0, where=known) for one, known in zip(powers, is_known, strict=True)])
+        is_vibration = [one.row_id.endswith("vibration.wideband") for one in members[-1]]
+        is_there = np.array([is_known[-1][~np.array(is_vibration, dtype=bool)].any(axis=0)] * len(owners))
+        is_there[-1] = True  # where only vibration spreads, its own rows hold it to the shares
+        is_declared = np.array([known.any(axis=0) for known in is_known]) & is_there
         models = (model, "full" if model == "published" else "published")
         shares = np.sqrt(self._table([split.of(owner) for owner in owners]))
         limit, limit_of_other = (shares * spread_limit(mission, self.allocation, "mission", one) for one in models)
         rms = np.sqrt(variance)
-        judged = self._judged(np.where(is_declared, rms, math.nan), limit, doubt=rms > limit_of_other * BOUND)
-        is_vibration = [one.row_id.endswith("vibration.wideband") for one in members[-1]]
-        makes_more = ~np.isnan(powers[-1][~np.array(is_vibration, dtype=bool)]).all(axis=0)
+        judged = self._judged(
+            np.where(is_declared, rms, math.nan),
+            np.where(is_there, limit, math.nan),
+            doubt=rms > limit_of_other * BOUND,
+        )
         energy = mainlobe_energy(mission)
         declared, allowable = (
             np.where(column > 0, islr_db(column**2, model, energy), math.nan)
             for column in (judged.declared, judged.allowable)
         )
-        in_db = judged._replace(declared=declared, allowable=allowable)
-        rows = in_db.apart([subject(owner, ISLR) for owner in owners])
-        for row, *others in zip(rows, members, variance, limit, limit_of_other, strict=True):
-            is_there = makes_more | (row.subject.owner == "mission")  # else its own row holds it to the share
-            row = row.where(~is_there, Judged.of_none(row.subject, self.judging.cases)).held_to(ISLR)
-            yield IslrRow(row, is_there, *others)
+        judged = judged._replace(declared=declared, allowable=allowable).held_to(ISLR)
+        rows = judged.apart([subject(owner, ISLR) for owner in owners])
+        for row, *others in zip(rows, is_there, members, variance, limit, limit_of_other, strict=True):
+            yield IslrRow(row, *others)
 
 
 # ---------------------------------------------------------------------- in words
