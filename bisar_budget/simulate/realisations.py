@@ -101,11 +101,6 @@ def flown_errors(analysis: Analysis) -> FlownErrors:
     return FlownErrors(transmitter, receiver, clock)
 
 
-def correlation_time(mission: Mission, error: RandomError) -> float:
-    """Of an error that is correlated noise. [s]"""
-    return process_of(mission, error).correlation_time
-
-
 def _bias(order: int) -> Callable[[Floats, int, np.random.Generator], Floats]:
     def draw(times: Floats, draws: int, rng: np.random.Generator) -> Floats:
         found: Floats = rng.standard_normal((draws, 1)) * times**order / math.factorial(order)

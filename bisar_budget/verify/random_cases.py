@@ -16,14 +16,14 @@ from bisar_budget.budget.random_rows import HELD, ISLR, held_effect, limits_for,
 from bisar_budget.effects.clocks import Spur
 from bisar_budget.effects.exact_arrays import aperture_nodes
 from bisar_budget.effects.models import CUBIC
-from bisar_budget.effects.random_errors import RandomError
+from bisar_budget.effects.random_errors import RandomError, process_of
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.vibration import sight_of
 from bisar_budget.findings.images import Verdict
 from bisar_budget.mission.model import Simulation
 from bisar_budget.simulate.collection import Errors
 from bisar_budget.simulate.phase_history import SMOOTH, Course, Floats, PathError, PathSinusoid, cell_centres
-from bisar_budget.simulate.realisations import clock_seconds, correlation_time, phase_courses, position_courses
+from bisar_budget.simulate.realisations import clock_seconds, phase_courses, position_courses
 from bisar_budget.verify import reasons
 from bisar_budget.verify.phase_cases import TOLERANCE, compare
 from bisar_budget.verify.study import Study
@@ -166,7 +166,7 @@ def _smooth_noise(study: Study, error: RandomError, rng: np.random.Generator) ->
 
     At the nodes alone noise of a short correlation time would pass for a larger phase.
     """
-    T, time = study.collection.aperture_time, correlation_time(study.mission, error)
+    T, time = study.collection.aperture_time, process_of(study.mission, error).correlation_time
     times = _moments(study, _FINE)
     legendre = np.polynomial.legendre
     fit = np.linalg.pinv(legendre.legvander(2 * times / T, SMOOTH))
