@@ -11,7 +11,7 @@ Numbers of a mission may be arrays (cases,); its geometry then is that of these 
 
 import math
 from collections.abc import Iterator, Sequence
-from functools import cache
+from functools import cache, cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,12 +32,12 @@ from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.ranges.exact_ranges import ExactRanges
 
-IMU_UNITS = dict(zip(IMU_KINDS, ("m/s^2", "rad", "rad/s", "m/s/sqrt(s)", "rad/sqrt(s)"), strict=True))
-BY_GRAVITY = ("attitude", "gyro_bias", "angle_random_walk")
-NODES = 16  # a walk has a covariance with an edge, which fewer nodes miss by a percent
+_IMU_UNITS = dict(zip(IMU_KINDS, ("m/s^2", "rad", "rad/s", "m/s/sqrt(s)", "rad/sqrt(s)"), strict=True))
+_BY_GRAVITY = ("attitude", "gyro_bias", "angle_random_walk")
+_NODES = 16  # a walk has a covariance with an edge, which fewer nodes miss by a percent
 # The covariance of a position error over the aperture grows as this power of the aperture time.
-GROWS = {"accelerometer_bias": 4, "attitude": 4, "gyro_bias": 6, "velocity_random_walk": 3, "angle_random_walk": 5}
-CANCELS = ROUNDING * 1e-2  # of a square: below it, its root is rounding
+_GROWS = {"accelerometer_bias": 4, "attitude": 4, "gyro_bias": 6, "velocity_random_walk": 3, "angle_random_walk": 5}
+_CANCELS = ROUNDING * 1e-2  # of a square: below it, its root is rounding
 
 
 class RandomEffect(NamedTuple):
@@ -132,7 +132,6 @@ class _Seen:
         self.sights = geometry.sights(has_direct_path=mission.has_direct_path)
         self.factor = mission.allocation.coverage_factor
         self.aperture_time = np.broadcast_to(np.asarray(mission.collection.aperture_time), (cases,))
-        self.exact: ExactRanges | None = None
 
     def vector(self, values: Sequence[Any]) -> Floats:
         """Three numbers for each case, (3, cases)."""
@@ -142,7 +141,7 @@ class _Seen:
         return found
 
     def error(self, name: str) -> MotionError:
-        """Of a platform."""
+        """The motion error of a platform."""
         found: MotionError = getattr(self.mission.platforms, name).motion_error
         return found
 
@@ -156,19 +155,18 @@ class _Seen:
         seen = _length_along(self.vector(look), directions)
         return seen, seen if sight is look else _length_along(self.vector(sight), directions)
 
-    def exact_ranges(self) -> ExactRanges:
+    @cached_property
+    def exact(self) -> ExactRanges:
         """Exact ranges at as many nodes as walks need."""
-        if self.exact is None:
-            mission, geometry = self.mission, self.geometry
-            self.exact = ExactRanges.of(
-                (geometry.transmitter, geometry.receiver),
-                mission.radar.wavelength,
-                mission.collection.aperture_time,
-                NODES,
-                self.cases,
-                has_direct_path=mission.has_direct_path,
-            )
-        return self.exact
+        mission = self.mission
+        return ExactRanges.of(
+            (self.geometry.transmitter, self.geometry.receiver),
+            mission.radar.wavelength,
+            mission.collection.aperture_time,
+            _NODES,
+            self.cases,
+            has_direct_path=mission.has_direct_path,
+        )
 
 
 def _length_along(sight: Floats, directions: Floats) -> Floats:
@@ -188,9 +186,9 @@ def _of_imu(seen: _Seen, name: str) -> Iterator[RandomError]:
         return
     axes = seen.axes(name)
     leaks = np.stack([axes[:, 1], -axes[:, 0], np.zeros_like(axes[:, 0])], axis=1)  # axis × up, by a tilt about it
-    for index, (kind, unit) in enumerate(IMU_UNITS.items()):
+    for index, (kind, unit) in enumerate(_IMU_UNITS.items()):
         values, key = getattr(error.imu, kind), error.key_of(kind)
-        directions, declared = leaks if kind in BY_GRAVITY else axes, None
+        directions, declared = leaks if kind in _BY_GRAVITY else axes, None
         if values is not None:
             declared, sizes = _parts_of_largest(seen.vector(values))
             directions = directions * sizes[:, None]
@@ -198,7 +196,7 @@ def _of_imu(seen: _Seen, name: str) -> Iterator[RandomError]:
         row = heard = _at_mid_aperture(seen.mission, index, along)
         if along_heard is not along:
             heard = _at_mid_aperture(seen.mission, index, along_heard)
-        quadratic, cubic, covariance = _over_aperture(seen.exact_ranges(), PLATFORMS.index(name), kind, directions)
+        quadratic, cubic, covariance = _over_aperture(seen.exact, PLATFORMS.index(name), kind, directions)
         yield RandomError(
             subject=subject(name, "imu", kind),
             unit=unit,
@@ -222,24 +220,24 @@ def _over_aperture(exact: ExactRanges, place: int, kind: str, directions: Floats
     """
     x, y, z = np.moveaxis(directions, 1, 0)[:, :, None]
     moved = np.array(exact.phase_weights)[:, None] * exact.along(place, (x, y, z))  # (2, axes, nodes, cases)
-    of_unit, power = covariance_at_nodes(kind), GROWS[kind]
+    of_unit, power = _covariance_at_nodes(kind), _GROWS[kind]
     turned = of_unit @ moved
     squares = (moved * turned).sum(axis=(1, 2))
     sizes = np.square((np.abs(moved) * np.sqrt(np.diagonal(of_unit))[:, None]).sum(axis=2)).sum(axis=1)
-    scale = (STANDARD_GRAVITY if kind in BY_GRAVITY else 1.0) ** 2 * exact.half**power
+    scale = (STANDARD_GRAVITY if kind in _BY_GRAVITY else 1.0) ** 2 * exact.half**power
     # What is left of terms that cancel exactly is rounding, and would make a limit out of nothing.
-    is_real = squares > CANCELS * sizes
+    is_real = squares > _CANCELS * sizes
     quadratic, cubic = np.sqrt(np.where(is_real, squares * scale, 0.0))
     return quadratic, cubic, np.where(is_real.all(axis=0), (moved[0] * turned[1]).sum(axis=(0, 1)) * scale, 0.0)
 
 
 @cache
-def covariance_at_nodes(kind: str) -> Floats:
+def _covariance_at_nodes(kind: str) -> Floats:
     """Covariance of the position error of a unit at the nodes of 2 s, without gravity: zero at mid-aperture.
 
     [m²/unit²]
     """
-    times = evaluators.LEGENDRE_FITS[NODES][0]
+    times = evaluators.LEGENDRE_FITS[_NODES][0]
     if kind in ("accelerometer_bias", "attitude", "gyro_bias"):
         order = 3 if kind == "gyro_bias" else 2
         history = np.array(times) ** order / math.factorial(order)
