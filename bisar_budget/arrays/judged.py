@@ -42,7 +42,7 @@ from bisar_budget.effects.combined import combined_phase
 from bisar_budget.effects.declared import DeclaredErrors
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.models import LOCATION
-from bisar_budget.effects.random_errors import random_errors
+from bisar_budget.effects.random_errors import displaces_unknown, random_errors
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.vibration import OwnPhase, slow_phases
 from bisar_budget.findings.row import DECLARE
@@ -230,8 +230,6 @@ class _Check:
 
     def _is_misplaced(self, rows: Sequence[Judged]) -> NDArray[np.bool_]:
         """Whether errors that vary at random, or slowly, displace the image; as `requirement_table` has it."""
-        timing = self.mission.timing_error
-        is_clock_stated = timing.constant is not None and timing.linear is not None
         found = np.zeros(self.cases, dtype=bool)
         needed = self.mission.requirements.location_error
         if needed is not None and self.slow:
@@ -240,10 +238,7 @@ class _Check:
             most = combined_phase([("", size) for size in moves], self.combine, ())
             found = (most > self.array(needed) * BOUND) & np.any([one.moves > 0 for one in self.slow], axis=0)
         for error in self.stated_random:
-            if error.subject.kind in ("oscillator", "synchronization") and is_clock_stated:
-                continue
-            parts = [self.array(part) for model in MODELS for part in error.effect(model)[:2]]
-            found |= (self.array(error.declared) > 0) & np.any([part > 0 for part in parts], axis=0)
+            found |= displaces_unknown(self.mission, error)
         return found
 
     def _rows(self, gating: str) -> list[Judged]:

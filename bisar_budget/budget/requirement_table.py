@@ -32,6 +32,7 @@ from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.effects.combine import combine_phases
 from bisar_budget.effects.correlation import Correlated, combined_phase
 from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
+from bisar_budget.effects.random_errors import displaces_unknown
 from bisar_budget.findings.mission import FileWarning
 from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import Row
@@ -181,28 +182,12 @@ def _unknown_place(analysis: Analysis, rows: Sequence[Row]) -> Note:
         reached = [row.declared or 0.0 for row in rows if row.id == f"mission.{LOCATION}"]
         most = combine_phases([*reached, *(one.moves for one in slow)], mission.allocation.combine)
         slow = slow if most > needed * (1 + UTILIZATION_TOLERANCE) else []
-    at_random = _misplacing(analysis)
+    at_random = [error.id for error in analysis.random if displaces_unknown(mission, error)]
     if not slow and not at_random:
         return NOTHING
     causes = [*(["random errors"] if at_random else []), *(["slow vibration"] if slow else [])]
     cause = f"{' and '.join(causes)} {'move' if at_random else 'moves'}"
     return phrases.place_is_not_known([*at_random, *(one.row_id for one in slow)], cause)
-
-
-def _misplacing(analysis: Analysis) -> list[str]:
-    """Rows of the errors that displace the image by a random amount.
-
-    Both terms of the clock, where the file declares them, stand for what oscillators and a link do to the place.
-    """
-    timing = analysis.mission.timing_error
-    is_clock_stated = timing.constant is not None and timing.linear is not None
-    found = []
-    for error in analysis.random:
-        is_clock = error.subject.kind in ("oscillator", "synchronization")
-        moves = error.published.quadratic or error.full.quadratic or error.published.cubic or error.full.cubic
-        if error.declared and moves and not (is_clock and is_clock_stated):
-            found.append(error.id)
-    return found
 
 
 def _misplaced(row: Row, unknown_place: Note) -> Row:

@@ -11,7 +11,8 @@ Numbers of a mission may be arrays (cases,); its geometry then is that of these 
 
 import math
 from collections.abc import Iterator, Sequence
-from functools import cache, cached_property
+from functools import cache, cached_property, reduce
+from operator import or_
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -107,6 +108,19 @@ def process_of(mission: Mission, error: RandomError) -> GaussMarkov:
     """Process of an error that is correlated noise of a position."""
     motion: MotionError = getattr(mission.platforms, error.owner).motion_error
     return next(one for one in motion.random if one.name == error.subject.axis)
+
+
+def displaces_unknown(mission: Mission, error: RandomError) -> Any:
+    """Whether an error displaces the image by a random amount, in which cases.
+
+    Both terms of the clock, where the file declares them, stand for what oscillators and a link do to the place.
+    """
+    timing = mission.timing_error
+    is_clock_stated = timing.constant is not None and timing.linear is not None
+    if error.declared is None or (is_clock_stated and error.subject.kind in ("oscillator", "synchronization")):
+        return False
+    does = [part > 0 for effect in (error.published, error.full) for part in (effect.quadratic, effect.cubic)]
+    return (error.declared > 0) & reduce(or_, does)
 
 
 def _of_one_case(mission: Mission, error: RandomError) -> RandomError:
