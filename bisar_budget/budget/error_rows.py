@@ -69,12 +69,13 @@ class ErrorRows:
         needs, sources = errors.mission.requirements, block.sources
         limit = np.array([self.limits[source.owner] for source in sources])
         held = (limit, needs.cubic_phase_error, needs.location_error)
+        # Searches start from what declared errors are known to do.
+        mine, theirs = errors.of_block(gating, place), errors.of_block(other, place)
         allowed = block.allowed(gating, held, is_whole=self.is_whole)
         quadratic: dict[str, Floats] = {}
         if self.is_whole:
             by_other = block.allowed(other, (limit, None, None), is_whole=True)
             quadratic = {gating: allowed.quadratic, other: by_other.quadratic}
-        mine, theirs = errors.of_block(gating, place), errors.of_block(other, place)
         published = mine if gating == "published" else theirs
         is_again = np.array([[not source.is_independent] for source in sources])
         judged = self.judging.row(

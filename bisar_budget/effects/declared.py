@@ -60,8 +60,9 @@ class Does(NamedTuple):
     def farthest(self) -> tuple[Floats, Floats]:
         """Displacement by the sign that moves farther, turned to the declared one's side. [m]"""
         (x, y), (u, v) = self.displacement, self.opposite
-        is_ahead = np.hypot(x, y) >= np.hypot(u, v)
-        return np.where(is_ahead, x, -u), np.where(is_ahead, y, -v)
+        is_ahead, is_gone = np.hypot(x, y) >= np.hypot(u, v), np.isnan(x) | np.isnan(u)
+        east, north = (np.where(is_ahead, a, -b) for a, b in ((x, u), (y, v)))
+        return np.where(is_gone, math.nan, east), np.where(is_gone, math.nan, north)
 
     def of(self, some: Any) -> "Does":
         """The same of some of the errors."""
@@ -218,7 +219,7 @@ class ErrorBlock:
             largest = np.copysign(np.maximum(np.abs(ahead[row]), np.abs(back[row])), kept[is_large])
             kept[is_large] = np.where(is_gone, math.inf, largest)
         for place, one in ((found.displacement, ahead), (found.opposite, back)):
-            place[0][is_large], place[1][is_large] = np.where(is_gone, math.nan, one[1:3])
+            place[0][is_large], place[1][is_large] = one[1:3]
 
     def followed(self, some: Truths, sizes: Floats) -> Floats:
         """Rows of known points of some errors by sizes, of the positive sign and of the other, (2, 6, some)."""
@@ -302,16 +303,17 @@ class ErrorBlock:
             small = np.where((per_unit > 0) & ~np.isnan(limit), limit / per_unit, math.inf)
         order = np.argsort(small, axis=0, kind="stable")  # the one that binds is likely to be found first
         smallest, binding = np.full(small.shape[1:], math.inf), np.full(small.shape[1:], -1, dtype=np.int8)
-        quadratic = np.full(small.shape[1:], math.nan)
         for turn in order:
             requirement = np.array(held)[turn]
             first, of = (np.take_along_axis(one, turn[None], axis=0)[0] for one in (small, limit))
-            is_quadratic = requirement == 0
-            upto = np.where(is_quadratic, math.inf, smallest) if is_whole else smallest
-            found = self.reaching(model, requirement, of, first, upto)
-            quadratic = np.where(is_quadratic, found, quadratic)
+            found = self.reaching(model, requirement, of, first, smallest)
             is_less = found < smallest
             smallest, binding = np.where(is_less, found, smallest), np.where(is_less, requirement, binding)
+        quadratic = smallest
+        if is_whole and len(held) > 1:  # also where another requirement binds
+            is_other = binding > 0
+            beyond = self.reaching(model, np.zeros_like(order[0]), np.where(is_other, limit[0], math.nan), small[0])
+            quadratic = np.where(is_other, beyond, np.where(binding == 0, smallest, math.inf))
         if model == "full":
             binding = np.where(self.ends_image(smallest), len(HELD), binding)
         smallest, quadratic = (np.where(np.isfinite(one), one, math.nan) for one in (smallest, quadratic))
@@ -330,7 +332,7 @@ class ErrorBlock:
         whole = np.broadcast_to(limit, self.declared.shape)
         return whole if place == 0 else np.where(self.is_motion, whole, math.nan)
 
-    def reaching(self, model: str, requirement: Places, limit: Floats, small: Floats, upto: Any) -> Floats:
+    def reaching(self, model: str, requirement: Places, limit: Floats, small: Floats, upto: Any = math.inf) -> Floats:
         """Smallest sizes, of either sign, at which errors reach limits; infinite: none does `upto`.
 
         `requirement` is the place of each limit in `HELD`; `small` is the size were effects those of small errors. By
