@@ -27,13 +27,11 @@ __all__ = ["Analysis", "Model"]
 class Analysis:
     """One mission, analysed once.
 
-    `is_brief` leaves out what a terminal does not show: allowables of errors that nobody declared, and of the model
-    that does not gate. `is_bare` leaves out how far one autofocus correction serves the scene, and whether the
-    published model holds. Nothing is judged by them.
+    `is_bare` leaves out how far one autofocus correction serves the scene, and whether the published model holds.
+    Nothing is judged by them.
     """
 
     mission: Mission
-    is_brief: bool = False
     is_bare: bool = False
 
     @cached_property

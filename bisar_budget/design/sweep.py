@@ -508,7 +508,7 @@ class Engine:
             fault = error.faults[0]
             found["status"][place], found["reason"][place] = "error", f"{fault.key}: {fault.problem}"
             return
-        checked = check_mission(case, self.question.today, is_brief=self.is_brief, is_bare=True)
+        checked = check_mission(case, self.question.today, is_bare=True)
         geometry = checked.geometry
         numbers_found = (
             checked.resolution.range,
