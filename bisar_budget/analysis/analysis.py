@@ -6,7 +6,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from bisar_budget.analysis.allocation import Allocation, allocate
-from bisar_budget.effects.collections import Geometries, paths_of
 from bisar_budget.effects.correlation import Correlated, correlated_errors
 from bisar_budget.effects.declared import DeclaredErrors
 from bisar_budget.effects.effect import ErrorSource
@@ -63,9 +62,7 @@ class Analysis:
     @cached_property
     def errors(self) -> DeclaredErrors:
         """The declared errors as those of one case."""
-        platforms = self.mission.platforms
-        geometries = Geometries(paths_of(platforms.transmitter), paths_of(platforms.receiver))
-        return DeclaredErrors(self.mission, 1, self.exact.count, geometries, {})
+        return DeclaredErrors(self.mission, 1, self.exact.count, self.geometry, {})
 
     @cached_property
     def slow(self) -> list[OwnPhase]:

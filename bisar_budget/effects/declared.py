@@ -9,14 +9,13 @@ import numpy as np
 from bisar_budget import evaluators
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, ROUNDING, SPEED_OF_LIGHT
 from bisar_budget.effects import models
-from bisar_budget.effects.collections import Geometries, angle_between_lines, axes_of
 from bisar_budget.effects.combined import squared
 from bisar_budget.effects.effect import CLOCK_UNITS, MOTION_UNITS, PLATFORMS
 from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.subject import MOTION, Subject, subject
-from bisar_budget.geometry import FRAME_AXES
+from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, Vectors, angle_between_lines
 from bisar_budget.mission.model import Mission
-from bisar_budget.ranges.exact_ranges import Effects, ExactRanges, Floats, Lanes, Places, Truths, Vectors, joined
+from bisar_budget.ranges.exact_ranges import Effects, ExactRanges, Floats, Lanes, Places, Truths, joined
 from bisar_budget.ranges.point_paths import Held, PointPaths
 
 if TYPE_CHECKING:
@@ -77,7 +76,7 @@ class DeclaredErrors:
     """
 
     def __init__(
-        self, mission: Mission, cases: int, nodes: int, geometries: Geometries, shown: Mapping[str, Subject]
+        self, mission: Mission, cases: int, nodes: int, geometries: BistaticGeometry, shown: Mapping[str, Subject]
     ) -> None:
         self.mission, self.cases, self.geometries, self.shown = mission, cases, geometries, shown
         self.is_left_out = np.zeros(cases, dtype=bool)
@@ -121,7 +120,7 @@ class DeclaredErrors:
         for place, (name, path) in enumerate(zip(PLATFORMS, paths, strict=True)):
             rows = evaluators.published_motion(*path.position, *path.velocity, path.slant_range, wavelength, T)
             error = getattr(mission.platforms, name).motion_error
-            axes = axes_of(mission, name, path)
+            axes = path.frame(error.frame)
             for index, (kind, unit) in enumerate(MOTION_UNITS.items()):
                 covariance = error.covariance if kind != "acceleration" else None
                 values = error.stated(kind)

@@ -141,7 +141,7 @@ class FullModel:
         self._nearest_of = {name: float(R.min()) for name, R in zip(PLATFORMS, exact.ranges, strict=True)}
         self._nearest = min(self._nearest_of.values())
         self._apart = float(exact.baselines.min()) if exact.has_direct_path else math.inf
-        self._slant_ranges = {
+        self._slant_ranges: dict[str, float] = {
             "transmitter": geometry.transmitter.slant_range,
             "receiver": geometry.receiver.slant_range,
         }

@@ -22,7 +22,7 @@ from bisar_budget.mission.bounds import (
     SHARE,
     SIDELOBE_REQUIREMENT,
 )
-from bisar_budget.mission.platforms import CommonMotionError, Platforms, geometry_of, without_image
+from bisar_budget.mission.platforms import CommonMotionError, Platforms, without_image
 from bisar_budget.mission.readers import (
     Choice,
     Day,
@@ -350,7 +350,7 @@ class Mission(NamedTuple):
     @property
     def geometry(self) -> BistaticGeometry:
         """Both platforms in the frame of the scene."""
-        return geometry_of(self.platforms)
+        return self.platforms.geometry
 
     @property
     def has_direct_path(self) -> bool:

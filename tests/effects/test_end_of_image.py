@@ -14,13 +14,13 @@ import pytest
 from bisar_budget.arrays.judged import Checked, check_arrays
 from bisar_budget.budget.check import check_mission
 from bisar_budget.budget.judged_rows import REQUIREMENTS
-from bisar_budget.effects.collections import Geometries, paths_of
 from bisar_budget.effects.models import END_OF_IMAGE, QUADRATIC
 from bisar_budget.effects.subject import Subject
 from bisar_budget.findings.mission import MissionFindings, Report
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
+from bisar_budget.ranges.exact_ranges import nodes_for
 from bisar_budget.report import Style, render
 from bisar_budget.report.explain.explanation import explain
 from tests import reference
@@ -87,11 +87,9 @@ def test_where_a_requirement_is_reached_first_it_binds(family: str, seed: int) -
 
 def by_arrays(mission: Mission, shown: Mapping[str, Subject], *, is_brief: bool) -> Checked:
     """The mission as the one case of arrays."""
-    platforms = mission.platforms
-    geometries = Geometries(paths_of(platforms.transmitter), paths_of(platforms.receiver))
-    (nodes,) = geometries.nodes(np.array([mission.collection.aperture_time]), has_direct_path=mission.has_direct_path)
+    nodes = nodes_for(mission.geometry, mission.collection.aperture_time, has_direct_path=mission.has_direct_path)
     with np.errstate(all="ignore"):
-        return check_arrays(mission, 1, TODAY, int(nodes), geometries, shown, is_brief=is_brief)
+        return check_arrays(mission, 1, TODAY, nodes, mission.geometry, shown, is_brief=is_brief)
 
 
 @pytest.mark.parametrize("is_brief", [False, True])
