@@ -57,8 +57,8 @@ _cos = _either(math.cos, np.cos)
 _sin = _either(math.sin, np.sin)
 _arctan2 = _either(math.atan2, np.arctan2)
 _above = _either(
-    lambda floor, part: part if abs(part) > floor else 0.0,
-    lambda floor, part: np.where(np.abs(part) > floor, part, 0.0),
+    lambda floor, part: 0.0 if abs(part) <= floor else part,
+    lambda floor, part: np.where(np.abs(part) <= floor, 0.0, part),
 )
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from bisar_budget import units
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.faults import Changed, KeyPath, Place, Problem, SetValue
+from bisar_budget.faults import Changed, KeyPath, Place, Problem, SetValue, shown
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.bounds import (
     COORDINATE,
@@ -329,6 +329,20 @@ class Mission(NamedTuple):
     data: bytes = b""
     changes: tuple[SetValue, ...] = ()
     parts: tuple[PartFile, ...] = ()
+
+    def __repr__(self) -> str:
+        """File and name, on one line."""
+        return f"Mission({self.file!r}, {shown(self.name)!r})"
+
+    def __eq__(self, other: object) -> bool:
+        """Whether it says the same, in the same file; `places` are where the bytes of `data` stand."""
+        return isinstance(other, Mission) and tuple(self._replace(places={})) == tuple(other._replace(places={}))
+
+    def __ne__(self, other: object) -> bool:
+        """Whether it does not; a tuple has its own answer."""
+        return not self == other
+
+    __hash__ = None  # type: ignore[assignment]  # holds mappings
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
