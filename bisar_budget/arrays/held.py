@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.effects.declared import SAFE
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.subject import MOTION
 from bisar_budget.geometry import STILL, BistaticGeometry, PlatformState, norm
@@ -18,6 +17,8 @@ from bisar_budget.mission.instruments import RISE, STEEPEST
 from bisar_budget.mission.model import PLACE_KEYS, WHOLE, MetricSplits, Mission, Shares, flies_on_earth
 from bisar_budget.mission.platforms import FARTHEST_BY, LEAST_BASELINE, MotionError, Platform, least_baseline
 from bisar_budget.ranges.exact_ranges import Floats
+
+SAFE = 1 + 1e-6  # nearer to a border of what forms an image, a case is checked by itself
 
 
 def not_held(mission: Mission, keys: Mapping[str, bool]) -> str:
@@ -89,8 +90,9 @@ def is_image(mission: Mission, geometries: BistaticGeometry, cases: int) -> NDAr
 
 def _has_baseline(apart: PlatformState, half: Floats) -> NDArray[np.bool_]:
     """Whether there is a direct path to follow, with room to spare."""
-    least = least_baseline(apart, half)
-    return np.asarray(least > SAFE * np.maximum(LEAST_BASELINE, apart.travelled(half) / FARTHEST_BY))
+    return np.asarray(
+        least_baseline(apart, half) > SAFE * np.maximum(LEAST_BASELINE, apart.travelled(half) / FARTHEST_BY)
+    )
 
 
 def _has_possible_figures(mission: Mission, cases: int) -> NDArray[np.bool_]:

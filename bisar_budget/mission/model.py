@@ -342,8 +342,6 @@ class Mission(NamedTuple):
         """Whether it does not; a tuple has its own answer."""
         return not self == other
 
-    __hash__ = None  # type: ignore[assignment]  # holds mappings
-
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
         """Hold it to a collection that forms an image, and to names that can be told apart."""
