@@ -6,7 +6,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from bisar_budget.analysis.allocation import Allocation, allocate
-from bisar_budget.effects.collections import Geometries, paths_of
 from bisar_budget.effects.correlation import Correlated, correlated_errors
 from bisar_budget.effects.declared import DeclaredErrors
 from bisar_budget.effects.effect import ErrorSource
@@ -47,9 +46,7 @@ class Analysis:
     @cached_property
     def errors(self) -> DeclaredErrors:
         """Every error the mission can have, declared or not, as those of one case."""
-        platforms = self.mission.platforms
-        geometries = Geometries(paths_of(platforms.transmitter), paths_of(platforms.receiver))
-        return DeclaredErrors(self.mission, 1, geometries, self.exact)
+        return DeclaredErrors(self.mission, 1, self.geometry, self.exact)
 
     @cached_property
     def sources(self) -> list[ErrorSource]:
@@ -70,7 +67,7 @@ class Analysis:
         """Phases of the declared vibrations below one cycle per aperture."""
         return [
             one._replace(qpe_rad=float(one.qpe_rad), cubic_rad=float(one.cubic_rad), moves=float(one.moves))
-            for one in slow_phases(self.mission)
+            for one in slow_phases(self.mission, self.geometry)
         ]
 
     def own_phases(self, model: str) -> list[OwnPhase]:

@@ -10,16 +10,16 @@ from bisar_budget import evaluators
 from bisar_budget.arrays.varied import groups_alike
 from bisar_budget.constants import STANDARD_GRAVITY
 from bisar_budget.effects import random_errors as scalar
-from bisar_budget.effects.collections import Geometries, axes_of
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.effects.spectra import link_parts, parts, synchronized_parts
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.tones import gauss_markov
+from bisar_budget.geometry import BistaticGeometry, Vectors, dot
 from bisar_budget.mission.instruments import GaussMarkov, Oscillator, Synchronization
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
-from bisar_budget.ranges.exact_ranges import ExactRanges, Floats, Vectors, dot
+from bisar_budget.ranges.exact_ranges import ExactRanges, Floats
 
 
 class ManyEffects(NamedTuple):
@@ -44,7 +44,7 @@ class ManyRandomErrors(NamedTuple):
         return self.full if model == "full" else self.published
 
 
-def many_random_errors(mission: Mission, geometries: Geometries, cases: int) -> list[ManyRandomErrors]:
+def many_random_errors(mission: Mission, geometries: BistaticGeometry, cases: int) -> list[ManyRandomErrors]:
     """List the errors of sensors and clocks that a mission names, in the order of `random_errors`."""
     found: list[ManyRandomErrors] = []
     sights = geometries.sights(has_direct_path=mission.has_direct_path)
@@ -64,13 +64,13 @@ def many_random_errors(mission: Mission, geometries: Geometries, cases: int) -> 
 
 # ---------------------------------------------------------------------- inertial sensors
 def _of_imu(
-    mission: Mission, place: int, geometries: Geometries, sight: Vectors, exact: ExactRanges
+    mission: Mission, place: int, geometries: BistaticGeometry, sight: Vectors, exact: ExactRanges
 ) -> Iterator[ManyRandomErrors]:
     name, path = PLATFORMS[place], geometries.both[place]
     error: MotionError = getattr(mission.platforms, name).motion_error
     if error.imu is None:
         return
-    axes, factor = axes_of(mission, name, path), mission.allocation.coverage_factor
+    axes, factor = path.frame(error.frame), mission.allocation.coverage_factor
     wavelength, T = mission.radar.wavelength, mission.collection.aperture_time
     for index, (kind, unit) in enumerate(scalar.IMU_UNITS.items()):
         values = getattr(error.imu, kind)
@@ -134,13 +134,15 @@ def _over_aperture(exact: ExactRanges, place: int, kind: str, directions: Sequen
 
 
 # ---------------------------------------------------------------------- position noise
-def _of_position(mission: Mission, place: int, geometries: Geometries, sight: Vectors) -> Iterator[ManyRandomErrors]:
+def _of_position(
+    mission: Mission, place: int, geometries: BistaticGeometry, sight: Vectors
+) -> Iterator[ManyRandomErrors]:
     name, path = PLATFORMS[place], geometries.both[place]
     error: MotionError = getattr(mission.platforms, name).motion_error
     if not error.random:
         return
     k, factor = 2 * math.pi / mission.radar.wavelength, mission.allocation.coverage_factor
-    axes = axes_of(mission, name, path)
+    axes = path.frame(error.frame)
     process: GaussMarkov
     for process in error.random:
         largest = _largest(process.sigma)

@@ -38,7 +38,6 @@ from bisar_budget.budget.requirement_states import (
 )
 from bisar_budget.budget.vibration_rows import Vibrations, judged_pslr, judged_spurs
 from bisar_budget.budget.waivers import is_waived
-from bisar_budget.effects.collections import Geometries
 from bisar_budget.effects.combined import combined_phase
 from bisar_budget.effects.declared import DeclaredErrors
 from bisar_budget.effects.effect import PLATFORMS
@@ -47,8 +46,9 @@ from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.vibration import OwnPhase, slow_phases
 from bisar_budget.findings.row import DECLARE
 from bisar_budget.findings.status import STATUS
+from bisar_budget.geometry import BistaticGeometry, norm
 from bisar_budget.mission.model import Mission
-from bisar_budget.ranges.exact_ranges import ExactRanges, norm
+from bisar_budget.ranges.exact_ranges import ExactRanges
 
 MODELS = ("published", "full")
 _STATUSES = tuple(STATUS)
@@ -61,7 +61,7 @@ class Checked(NamedTuple):
     rows: tuple[Judged, ...]
     is_left_out: NDArray[np.bool_]
     floor: NDArray[np.int8]
-    geometries: Geometries
+    geometries: BistaticGeometry
     requirements: tuple[RequirementState, ...]
 
 
@@ -70,7 +70,7 @@ def check_arrays(
     cases: int,
     today: date,
     nodes: int,
-    geometries: Geometries,
+    geometries: BistaticGeometry,
     shown: Mapping[str, Subject],
     *,
     is_brief: bool,
@@ -87,7 +87,7 @@ def check_arrays(
         Day on which waivers are judged, UTC.
     nodes : int
         Of the aperture, that all of them need.
-    geometries : Geometries
+    geometries : BistaticGeometry
         Of the mission.
     shown : mapping of str to Subject
         Rows, by id, of which the allowable is asked though nothing is declared.
@@ -366,7 +366,7 @@ class _Check:
         return floor
 
 
-def with_required(rows: Sequence[Judged], mission: Mission, geometries: Geometries, cases: int) -> list[Judged]:
+def with_required(rows: Sequence[Judged], mission: Mission, geometries: BistaticGeometry, cases: int) -> list[Judged]:
     """Put the row of what must be declared before the others; as `budget.required.with_required`."""
     if not mission.requirements.declare:
         return list(rows)

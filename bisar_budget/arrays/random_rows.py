@@ -20,9 +20,9 @@ from bisar_budget.analysis.spread import (
 )
 from bisar_budget.arrays.instruments import ManyRandomErrors
 from bisar_budget.budget.judged_rows import BOUND, REQUIREMENTS, Judged, Judging
-from bisar_budget.effects.collections import Geometries
 from bisar_budget.effects.models import QUADRATIC
 from bisar_budget.effects.subject import subject
+from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission
 from bisar_budget.ranges.exact_ranges import Floats
 
@@ -46,7 +46,7 @@ class RandomRows:
         Of the cases.
     mission : Mission
         Some of its numbers are arrays (cases,).
-    geometries : Geometries
+    geometries : BistaticGeometry
         Of the mission.
     errors : sequence of ManyRandomErrors
         Of sensors and clocks.
@@ -64,7 +64,7 @@ class RandomRows:
         self,
         judging: Judging,
         mission: Mission,
-        geometries: Geometries,
+        geometries: BistaticGeometry,
         errors: Sequence[ManyRandomErrors],
         held: Mapping[str, Floats],
         gain: Floats,

@@ -18,9 +18,9 @@ import numpy as np
 
 from bisar_budget import evaluators, phrases
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG
-from bisar_budget.effects.collections import Geometries, angle_between_lines
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource
 from bisar_budget.effects.sources import Errors
+from bisar_budget.geometry import BistaticGeometry, angle_between_lines
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.ranges import point_paths
@@ -102,7 +102,7 @@ class ImagePlanes(NamedTuple):
         )
 
 
-def published_planes(geometry: Geometries) -> tuple[ImagePlanes, Any]:
+def published_planes(geometry: BistaticGeometry) -> tuple[ImagePlanes, Any]:
     """Invert Q with the range held constant, (19) and (30); and the angle between its gradients. [deg]
 
     That Q can be singular where the true gradients are not: its second row is v/R, theirs v⊥/R.
@@ -365,7 +365,7 @@ class DeclaredErrors:
         Some of its numbers may be arrays (cases,).
     cases : int
         How many.
-    geometries : Geometries
+    geometries : BistaticGeometry
         Of the cases.
     exact : ExactRanges
         Of the cases.
@@ -382,7 +382,7 @@ class DeclaredErrors:
         self,
         mission: Mission,
         cases: int,
-        geometries: Geometries,
+        geometries: BistaticGeometry,
         exact: ExactRanges,
         shown: Container[str] | None = None,
     ) -> None:

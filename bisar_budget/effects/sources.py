@@ -12,7 +12,6 @@ import numpy as np
 
 from bisar_budget import evaluators, phrases
 from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
-from bisar_budget.effects.collections import Geometries, axes_of
 from bisar_budget.effects.combined import squared
 from bisar_budget.effects.effect import (
     CLOCK_UNITS,
@@ -24,11 +23,11 @@ from bisar_budget.effects.effect import (
 )
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.faults import KeyPath
-from bisar_budget.geometry import FRAME_AXES, BistaticGeometry
+from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, Vectors
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import Effect, ExactRanges, Vectors, nodes_for
+from bisar_budget.ranges.exact_ranges import Effect, ExactRanges, nodes_for
 
 if TYPE_CHECKING:
     from bisar_budget.mission.covariance import Covariance
@@ -41,8 +40,7 @@ def exact_ranges(mission: Mission, geometry: BistaticGeometry, count: int | None
     """Exact ranges of a mission at its scene centre, at as many nodes as it needs, or a given number."""
     T, is_heard = mission.collection.aperture_time, mission.has_direct_path
     count = count or nodes_for(geometry, T, has_direct_path=is_heard)
-    paths = (geometry.transmitter, geometry.receiver)
-    return ExactRanges.of(paths, mission.radar.wavelength, T, count, has_direct_path=is_heard)
+    return ExactRanges.of(geometry.both, mission.radar.wavelength, T, count, has_direct_path=is_heard)
 
 
 class Errors:
@@ -52,7 +50,7 @@ class Errors:
     ----------
     mission : Mission
         Some of its numbers may be arrays (cases,).
-    geometry : Geometries
+    geometry : BistaticGeometry
         Of the cases.
     exact : ExactRanges
         Of the cases.
@@ -61,7 +59,7 @@ class Errors:
     """
 
     def __init__(
-        self, mission: Mission, geometry: Geometries, exact: ExactRanges, shown: Container[str] | None = None
+        self, mission: Mission, geometry: BistaticGeometry, exact: ExactRanges, shown: Container[str] | None = None
     ) -> None:
         self.mission, self.geometry, self.exact, self.shown = mission, geometry, exact, shown
         self.factor = mission.allocation.coverage_factor
@@ -107,7 +105,7 @@ class Errors:
             return
         in_scene = error.frame == "scene"
         published, full = self.legs(place, kind)
-        axes = axes_of(self.mission, name, self.geometry.both[place])
+        axes = self.geometry.both[place].frame(error.frame)
         covariance = error.covariance if kind != "acceleration" else None
         key = "covariance" if covariance is not None else error.key_of(kind)
         path: KeyPath = ("platforms", name, "motion_error", key)

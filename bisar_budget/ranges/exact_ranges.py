@@ -16,20 +16,19 @@ of one case. A single case serves any number of lanes as it stands.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any, NamedTuple, Protocol
+from functools import cached_property, reduce
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
 from bisar_budget.evaluators import LEGENDRE_FITS, full_ground_inverse
-from bisar_budget.geometry import BistaticGeometry
+from bisar_budget.geometry import BistaticGeometry, PlatformState, Vectors, dot, norm
 
 Floats = NDArray[np.float64]
 Places = NDArray[np.intp]
 Truths = NDArray[np.bool_]
-Vectors = tuple[Any, Any, Any]  # three components, each an array or a float
 
 # Way of a platform in half an aperture, over its slant range, up to which so many nodes change phases by less than
 # 1e-6 of themselves; beyond the last, 16 nodes are right to 1e-3 at 1.25.
@@ -48,42 +47,14 @@ UNSEEN_RAD = 3e-5  # what the last step of the search may change a phase by beyo
 _STILL = [np.zeros((1, 1))] * 3  # a platform that no error moves
 
 
-class AnyPath(Protocol):
-    """One platform in one case or in many, at mid-aperture: components are floats or (cases,)."""
-
-    @property
-    def position(self) -> Vectors:
-        """[m]"""
-
-    @property
-    def velocity(self) -> Vectors:
-        """[m/s]"""
-
-    @property
-    def acceleration(self) -> Vectors:
-        """[m/s²]"""
-
-    @property
-    def bends(self) -> tuple[Vectors, ...]:
-        """Coefficients of τ³, τ⁴, …. [m/s³], [m/s⁴], …"""
-
-
-def dot(a: Vectors, b: Vectors) -> Any:
-    """Scalar product."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def norm(a: Vectors) -> Any:
-    """Length."""
-    return np.sqrt(dot(a, a))
-
-
-def nodes_for(geometry: BistaticGeometry, aperture_time_s: float, *, has_direct_path: bool = False) -> int:
-    """Number of nodes that a collection needs: of the lines of sight, and of the direct path where that counts."""
+def nodes_for(geometry: BistaticGeometry, aperture_time_s: Any, *, has_direct_path: bool = False) -> Any:
+    """Number of nodes that cases need: of the lines of sight, and of the direct path where that counts."""
     half = aperture_time_s / 2
-    turning = (geometry.transmitter, geometry.receiver, *((geometry.apart,) if has_direct_path else ()))
-    way = max(state.travelled(half) / state.slant_range for state in turning)
-    return next(count for limit, count in NODES if way <= limit)
+    turning = (*geometry.both, *((geometry.apart,) if has_direct_path else ()))
+    way = reduce(np.maximum, [path.travelled(half) / path.slant_range for path in turning])
+    limits, counts = zip(*NODES, strict=True)
+    found = np.array(counts)[np.searchsorted(limits, way)]
+    return found if np.ndim(way) else int(found)
 
 
 class Effect(NamedTuple):
@@ -228,7 +199,7 @@ class ExactRanges:
     @classmethod
     def of(
         cls,
-        paths: Sequence[AnyPath],
+        paths: Sequence[PlatformState],
         wavelength: Any,
         aperture_time: Any,
         count: int,
@@ -244,7 +215,7 @@ class ExactRanges:
         for path in paths:
             x, y, z = (np.broadcast_to(part, (cases,)) for part in path.position)
             middles.append((x, y, z))
-        tracks = [positions(path, times) for path in paths]
+        tracks = [path.place(times) for path in paths]
         return cls(half, k, count, tracks, middles, has_direct_path=has_direct_path)
 
     def at(self, east: Floats, north: Floats, case: Places) -> "ExactRanges":
@@ -583,17 +554,6 @@ class ExactRanges:
         for kept, phase in zip((found.quadratic, found.cubic), phases, strict=True):
             one = phase[is_done]
             kept[places] = np.where(np.abs(one) > rounding, one, 0.0)
-
-
-def positions(path: AnyPath, times: Floats) -> Vectors:
-    """Positions at slow times (nodes, cases). [m]"""
-    found = []
-    for axis in range(3):
-        place = path.position[axis] + times * (path.velocity[axis] + times * path.acceleration[axis] / 2)
-        for power, bend in enumerate(path.bends, 3):
-            place = place + bend[axis] * times**power
-        found.append(np.broadcast_to(place, times.shape))
-    return (found[0], found[1], found[2])
 
 
 def _weighted(along: Sequence[Any], weight: Any) -> Sequence[Any]:
