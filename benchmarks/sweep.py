@@ -122,7 +122,7 @@ def of_kinds(runs: int, side: int = 64, few: int = 16) -> None:
                 values = {key: float(one[0]) for key, one in cases.values(place, place + 1).items()}
                 found = [SetValue(one.key, f"{values[one.key]!r} {one.dimension.si}") for one in cases.varied]
                 case = parse_mission(mission.data, mission.file, changes=(*mission.changes, *found))
-                check_mission(case, DAY, is_brief=True)
+                check_mission(case, DAY)
 
         together()
         rounds = [(timed(together)[1] / cases.count, timed(one_by_one)[1] / few) for _ in range(runs)]
@@ -151,7 +151,6 @@ def of_a_million(count: int, runs: int) -> None:
             check_mission(
                 parse_mission(mission.data, mission.file, changes=[SetValue(*one) for one in values]),
                 DAY,
-                is_brief=True,
             )
 
     # Memory first: by hand, whole arrays take gigabytes.

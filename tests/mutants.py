@@ -114,8 +114,8 @@ MUTANTS = (
     Mutant(
         "cross-range resolution: without its sine",
         _GEOMETRY,
-        "across = math.hypot(*self.doppler_gradient) * math.sin(self.gradient_angle)",
-        "across = math.hypot(*self.doppler_gradient)",
+        "across = _hypot(*self.doppler_gradient) * _sin(self.gradient_angle)",
+        "across = _hypot(*self.doppler_gradient)",
         ("tests/budget/test_defects.py::test_cross_range_resolution_of_gradients_that_are_not_at_right_angles",),
     ),
     Mutant(

@@ -8,18 +8,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT
-from bisar_budget.effects.collections import Geometries, Paths
-from bisar_budget.effects.declared import SAFE
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.subject import MOTION
-from bisar_budget.geometry import STILL
+from bisar_budget.geometry import STILL, BistaticGeometry, PlatformState, norm
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.covariance import EIGENVALUE_TOLERANCE
 from bisar_budget.mission.instruments import RISE, STEEPEST
 from bisar_budget.mission.model import PLACE_KEYS, WHOLE, MetricSplits, Mission, Shares, flies_on_earth
-from bisar_budget.mission.platforms import BASELINE_PLACES, FARTHEST_BY, LEAST_BASELINE, MotionError, Platform
-from bisar_budget.ranges.exact_ranges import Floats, norm, positions
+from bisar_budget.mission.platforms import FARTHEST_BY, LEAST_BASELINE, MotionError, Platform, least_baseline
+from bisar_budget.ranges.exact_ranges import Floats
+
+SAFE = 1 + 1e-6  # nearer to a border of what forms an image, a case is checked by itself
 
 
 def not_held(mission: Mission, keys: Mapping[str, bool]) -> str:
@@ -69,32 +68,31 @@ _FREE = {
 }
 
 
-def is_image(mission: Mission, geometries: Geometries, cases: int) -> NDArray[np.bool_]:
+def is_image(mission: Mission, geometries: BistaticGeometry, cases: int) -> NDArray[np.bool_]:
     """Whether each case forms an image, with room to spare; `mission` may hold arrays, (cases,)."""
     is_one = _has_possible_figures(mission, cases)
     half = np.asarray(mission.collection.aperture_time) / 2
     still: Any = True
-    for name, paths in zip(PLATFORMS, (geometries.transmitter, geometries.receiver), strict=True):
+    for name, paths in zip(PLATFORMS, geometries.both, strict=True):
         platform = getattr(mission.platforms, name)
         is_one &= (paths.slant_range > SAFE) & (np.asarray(paths.position[2]) - paths.sinks(half) >= 0)
-        is_one &= paths.has_frame(platform.motion_error.frame)
+        is_one &= paths.has_frame(platform.motion_error.frame, SAFE)
         still = still & (norm(paths.velocity) < STILL * SAFE)
         if np.ndim(platform.speed):
             is_one &= np.asarray(platform.speed) != 0
-    turning = sum(norm(path.velocity) / path.slant_range for path in (geometries.transmitter, geometries.receiver))
     is_one &= ~np.asarray(still)
-    is_one &= np.hypot(*geometries.range_gradient) > MIN_GROUND_GRADIENT * SAFE
-    is_one &= np.hypot(*geometries.doppler_gradient) > 1e-9 * SAFE * turning
-    is_one &= np.degrees(geometries.gradient_angle) > MIN_GRADIENT_ANGLE_DEG * SAFE
+    for spans in geometries.spans_ground(SAFE):
+        is_one &= spans
     if mission.has_direct_path:
         is_one &= _has_baseline(geometries.apart, np.broadcast_to(half, (cases,)))
     return is_one & (np.asarray(mission.radar.bandwidth) * SAFE < 2 * np.asarray(mission.radar.center_frequency))
 
 
-def _has_baseline(apart: Paths, half: Floats) -> NDArray[np.bool_]:
+def _has_baseline(apart: PlatformState, half: Floats) -> NDArray[np.bool_]:
     """Whether there is a direct path to follow, with room to spare."""
-    least = norm(positions(apart, half * np.linspace(-1, 1, BASELINE_PLACES)[:, None])).min(axis=0)
-    return np.asarray(least > SAFE * np.maximum(LEAST_BASELINE, apart.travelled(half) / FARTHEST_BY))
+    return np.asarray(
+        least_baseline(apart, half) > SAFE * np.maximum(LEAST_BASELINE, apart.travelled(half) / FARTHEST_BY)
+    )
 
 
 def _has_possible_figures(mission: Mission, cases: int) -> NDArray[np.bool_]:

@@ -17,9 +17,9 @@ from bisar_budget.analysis.allocation import allocate
 from bisar_budget.analysis.spread import tones
 from bisar_budget.arrays.aggregates import Aggregates, ManyTogether, is_owed
 from bisar_budget.arrays.edge import HeldTogether, ManySceneEdges, many_scene_edges
-from bisar_budget.arrays.error_rows import ErrorRows
 from bisar_budget.arrays.rim import ManyScenePhases
 from bisar_budget.arrays.shares import shares_of
+from bisar_budget.budget.error_rows import ErrorRows
 from bisar_budget.budget.input_doubt import declared_position_error, is_in_doubt, least_doubt
 from bisar_budget.budget.judged_rows import BOUND, CODE, Judged, Judging
 from bisar_budget.budget.orbit import FASTEST_FLIGHT
@@ -37,7 +37,6 @@ from bisar_budget.budget.requirement_states import (
 )
 from bisar_budget.budget.vibration_rows import Vibrations, judged_pslr, judged_spurs
 from bisar_budget.budget.waivers import is_waived
-from bisar_budget.effects.collections import Geometries
 from bisar_budget.effects.combined import combined_phase
 from bisar_budget.effects.declared import DeclaredErrors
 from bisar_budget.effects.effect import PLATFORMS
@@ -47,8 +46,9 @@ from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.vibration import OwnPhase, slow_phases
 from bisar_budget.findings.row import DECLARE
 from bisar_budget.findings.status import STATUS
+from bisar_budget.geometry import BistaticGeometry, norm
 from bisar_budget.mission.model import Mission
-from bisar_budget.ranges.exact_ranges import norm
+from bisar_budget.ranges.exact_ranges import ExactRanges
 
 MODELS = ("published", "full")
 _STATUSES = tuple(STATUS)
@@ -61,7 +61,7 @@ class Checked(NamedTuple):
     rows: tuple[Judged, ...]
     is_left_out: NDArray[np.bool_]
     floor: NDArray[np.int8]
-    geometries: Geometries
+    geometries: BistaticGeometry
     requirements: tuple[RequirementState, ...]
 
 
@@ -70,7 +70,7 @@ def check_arrays(
     cases: int,
     today: date,
     nodes: int,
-    geometries: Geometries,
+    geometries: BistaticGeometry,
     shown: Mapping[str, Subject],
     *,
     is_brief: bool,
@@ -87,18 +87,21 @@ def check_arrays(
         Day on which waivers are judged, UTC.
     nodes : int
         Of the aperture, that all of them need.
-    geometries : Geometries
+    geometries : BistaticGeometry
         Of the mission.
     shown : mapping of str to Subject
         Rows, by id, of which the allowable is asked though nothing is declared.
     is_brief : bool
         Search for limits as a brief check does: in an order that finds the one that binds early.
     """
-    return _Check(DeclaredErrors(mission, cases, nodes, geometries, shown), today, is_brief).checked()
+    T, is_heard = mission.collection.aperture_time, mission.has_direct_path
+    exact = ExactRanges.of(geometries.both, mission.radar.wavelength, T, nodes, cases, has_direct_path=is_heard)
+    return _Check(DeclaredErrors(mission, cases, geometries, exact, shown), today, shown, is_brief).checked()
 
 
 class _Check:
-    def __init__(self, errors: DeclaredErrors, today: date, is_brief: bool) -> None:
+    def __init__(self, errors: DeclaredErrors, today: date, shown: Mapping[str, Subject], is_brief: bool) -> None:
+        self.shown = shown
         self.is_brief = is_brief
         platforms = [getattr(errors.mission.platforms, name) for name in PLATFORMS]
         self.vibrations = [platform.motion_error.vibration for platform in platforms]
@@ -129,9 +132,6 @@ class _Check:
     def checked(self) -> Checked:
         """Judge every row by the model that gates."""
         gating = self.mission.gating_model
-        if gating != "published":  # searches start from what declared errors are known to do
-            for error in self.errors.stated:
-                self.does("full", error)
         gates = [model for model in MODELS if gating in (model, "strictest")]
         own = {model: self._own(model) for model in MODELS}
         self.split = shares_of(self.errors, gates, [own[model] for model in gates])
@@ -143,7 +143,7 @@ class _Check:
         owners = (*PLATFORMS, "clock", "mission")
         self.limits = {owner: self.array(self.split.of(owner) * total) * self.gain for owner in owners}
         together = {model: ManyTogether(self.errors, model, own[model], self.split) for model in MODELS}
-        self.error_rows = ErrorRows(self.judging, self.errors, self.limits, self.gain, is_brief=self.is_brief)
+        self.error_rows = ErrorRows(self.judging, self.errors, self.limits, self.gain, is_whole=not self.is_brief)
         self.aggregates = Aggregates(self.judging, self.errors, together, self.limits, self.gain)
         self.random_rows = RandomRows(
             self.judging, self.mission, self.allocation, self.random, self.errors.geometries
@@ -243,7 +243,8 @@ class _Check:
 
     def _rows(self, gating: str) -> list[Judged]:
         other = "published" if gating == "full" else "full"
-        rows = [*self.error_rows.rows(gating, other), *self._vibrations(gating)]
+        rows = [one.judged for one in self.error_rows.rows(gating, other)]
+        rows += self._vibrations(gating)
         rows += self._instruments(gating)
         rows += self.aggregates.rows(gating, other)
         if self.mission.scene.radius is not None:
@@ -256,7 +257,7 @@ class _Check:
 
     def _vibrations(self, gating: str) -> list[Judged]:
         """Rows of vibrations, where one is declared or asked for."""
-        if not self._vibrates and not any(what.kind == "vibration" for what in self.errors.shown.values()):
+        if not self._vibrates and not any(what.kind == "vibration" for what in self.shown.values()):
             return []
         found: dict[str, Judged] = {}
         for one in self.swaying.rows(gating):
@@ -356,7 +357,7 @@ class _Check:
         return floor
 
 
-def with_required(rows: Sequence[Judged], mission: Mission, geometries: Geometries, cases: int) -> list[Judged]:
+def with_required(rows: Sequence[Judged], mission: Mission, geometries: BistaticGeometry, cases: int) -> list[Judged]:
     """Put the row of what must be declared before the others; as `budget.required.with_required`."""
     if not mission.requirements.declare:
         return list(rows)

@@ -43,7 +43,6 @@ def check_mission(
     mission: Mission,
     today: date,
     *,
-    is_brief: bool = False,
     is_bare: bool = False,
     outside: Outside = NOTHING_OUTSIDE,
 ) -> MissionFindings:
@@ -55,9 +54,6 @@ def check_mission(
         As loaded.
     today : date
         Day on which waivers are judged, UTC.
-    is_brief : bool
-        Leave out what a terminal does not show: allowables of errors that nobody declared, and by the model that does
-        not gate, but for what `model_doubt` compares. Statuses are the same.
     is_bare : bool
         Leave out what decides nothing and is searched for: how far one autofocus correction serves the scene, and
         whether the published model holds.
@@ -69,7 +65,7 @@ def check_mission(
     MissionFindings
         Rows in the order of the contract, declared or not.
     """
-    analysis = Analysis(mission, is_brief, is_bare)
+    analysis = Analysis(mission, is_bare)
     gating = mission.gating_model
     if gating == "strictest":
         checked = stricter(_checked(analysis, "published"), _checked(analysis, "full"))
@@ -135,7 +131,7 @@ def _checked(analysis: Analysis, gating: str) -> _Checked:
     model, other = analysis.models(gating)
     allocation = analysis.allocation
     rows = [
-        *error_rows(analysis, model, other, allocation),
+        *error_rows(analysis, gating, allocation),
         *vibration_rows(mission, allocation, gating),
         *_instrument_rows(analysis, gating, allocation),
         *aggregate_rows(analysis, model, other, allocation),

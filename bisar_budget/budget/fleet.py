@@ -50,7 +50,6 @@ def check_files(
     model: str | None,
     keep: Callable[[Found], Kept],
     *,
-    is_brief: bool = False,
     drawn: Draws | None = None,
     changes: Sequence[SetValue] = (),
     outside: Outside = NOTHING_OUTSIDE,
@@ -67,8 +66,6 @@ def check_files(
         Gating model in place of each file's own.
     keep : callable
         Makes of the findings about a file what is wanted of them, in the process that found them.
-    is_brief : bool
-        Leave out what a terminal does not show.
     drawn : Draws, optional
         Of a Monte Carlo; None: no draws.
     changes : sequence of SetValue
@@ -81,9 +78,7 @@ def check_files(
     list
         What `keep` made of each.
     """
-    one = partial(
-        _kept, today=today, model=model, keep=keep, is_brief=is_brief, drawn=drawn, changes=changes, outside=outside
-    )
+    one = partial(_kept, today=today, model=model, keep=keep, drawn=drawn, changes=changes, outside=outside)
     count = cores()
     is_shared = drawn is not None and drawn.share is not None
     if len(files) < MANY or count == 1 or "-" in files or keep is whole or is_shared:
@@ -117,13 +112,12 @@ def _kept(
     today: date,
     model: str | None,
     keep: Callable[[Found], Kept],
-    is_brief: bool,
     drawn: Draws | None,
     changes: Sequence[SetValue],
     outside: Outside,
 ) -> Kept:
     try:
-        found = check_mission(load_mission(file, model, changes), today, is_brief=is_brief, outside=outside)
+        found = check_mission(load_mission(file, model, changes), today, outside=outside)
     except MissionError as error:
         return keep(UnusableMission(file=file, faults=error.faults, data=error.data))
     if drawn is not None:

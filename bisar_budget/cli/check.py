@@ -294,9 +294,8 @@ def check(
     if FORMATS[format_name].is_piecewise and not (written or verifying or draws):
         from bisar_budget.budget.fleet import check_files
 
-        is_brief = format_name == "text" and verbosity <= 0 and not all_rows
         keep = partial(piece, format_name=format_name, style=style)
-        pieces = check_files(files, judged_on, model, keep, is_brief=is_brief, changes=changes, outside=from_outside)
+        pieces = check_files(files, judged_on, model, keep, changes=changes, outside=from_outside)
         if says_faults:
             _say_faults(piece.unusable for piece in pieces)
         deliver(joined(format_name, pieces, __version__, style), output, format_name)

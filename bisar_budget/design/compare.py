@@ -174,9 +174,7 @@ class _PartSearch:
         except MissionError as error:
             fault = error.faults[0]
             return _CheckedPart(None, reason=f"{fault.key}: {fault.problem}")
-        return _CheckedPart(
-            check_mission(mission, today, is_brief=True, is_bare=True), self._taken(mission, one.part)
-        )
+        return _CheckedPart(check_mission(mission, today, is_bare=True), self._taken(mission, one.part))
 
     def _taken(self, mission: Mission, part: Part) -> tuple[str, ...]:
         platform = getattr(mission.platforms, self.platform)

@@ -42,7 +42,7 @@ def relaxed_errors(mission: Mission, found: MissionFindings, today: date) -> Ite
             doubled = scaled(mission, key, FACTOR)
         except QuestionError:  # all of it is 0
             continue
-        after = check_mission(doubled, today, is_brief=True, is_bare=True)
+        after = check_mission(doubled, today, is_bare=True)
         yield Relaxed(
             key=key,
             shares_before=_shares(found),

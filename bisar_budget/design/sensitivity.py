@@ -63,7 +63,7 @@ def sensitivity(
     """
     variation, of_parts = _stating_its_parts(Variation(mission, model))
     base = variation.read()
-    found = check_mission(base, today, is_brief=True, is_bare=True)
+    found = check_mission(base, today, is_bare=True)
     hold_to_decisions([found], row)
     at_file = _uses(found.rows, row)
     if at_file is None:
@@ -202,7 +202,7 @@ class _Differences:
         except MissionError as error:
             fault = error.faults[0]
             return f"{fault.key}: {fault.problem}"
-        uses = _uses(check_mission(mission, self.today, is_brief=True, is_bare=True).rows, self.row)
+        uses = _uses(check_mission(mission, self.today, is_bare=True).rows, self.row)
         return "no utilization has a value there" if uses is None else uses
 
 

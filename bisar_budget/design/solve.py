@@ -222,10 +222,10 @@ class _Search:
         complies, utilization = status not in self.breaks, None if math.isnan(use) else use
         return State(value, complies, status, row or None, bound_by or None, utilization, range_m, cross_m)
 
-    def evaluate(self, value: float, *, is_brief: bool = True) -> State:
+    def evaluate(self, value: float) -> State:
         """Check the mission with another value."""
         try:
-            return self._state(value, check_mission(self.at(value), self.today, is_brief=is_brief, is_bare=True))
+            return self._state(value, check_mission(self.at(value), self.today, is_bare=True))
         except MissionError as error:
             fault = error.faults[0]
             return State(value, complies=False, status="error", reason=f"{fault.key}: {fault.problem}")
@@ -256,7 +256,7 @@ class _Search:
         """Check the mission with a value as it would stand in the file, in full."""
         value = self.number.read(text)
         if self.is_scale:
-            return self.evaluate(value, is_brief=False)
+            return self.evaluate(value)
         try:
             mission = self.variation.read([SetValue(self.key, text)])
             return self._state(value, check_mission(mission, self.today, is_bare=True))

@@ -27,13 +27,14 @@ from bisar_budget.design.cases import Cases, words_of
 from bisar_budget.design.quantities import Choices, Number, QuestionError, number_of, tree_of
 from bisar_budget.design.swept import Column, Part, Swept, Values
 from bisar_budget.design.variation import ALIKE, Variation, breaking, standing
-from bisar_budget.effects.collections import Geometries, paths_of
 from bisar_budget.faults import Fault, MissionError, SetValue, fault_words, shown
 from bisar_budget.findings.row import Row, unknown_id
 from bisar_budget.findings.status import RANK, STATUS
+from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.named import Named, named_by
+from bisar_budget.ranges.exact_ranges import nodes_for
 from bisar_budget.workers import MapBlocks, Progress, unseen, worker_pool
 
 if TYPE_CHECKING:
@@ -439,18 +440,17 @@ class Engine:
         held[some] &= is_image(mission, geometries, some.size)
         counts = np.zeros(held.size, dtype=int)
         T = np.broadcast_to(mission.collection.aperture_time, (some.size,))
-        counts[some] = geometries.nodes(T, has_direct_path=mission.has_direct_path)
+        counts[some] = nodes_for(geometries, T, has_direct_path=mission.has_direct_path)
         for count in np.unique(counts[held]):
             same = np.flatnonzero(held & (counts == count))
             held[same] = self._of_same_nodes(found, same, int(count))
         return held
 
-    def _arrays(self, found: Mapping[str, Values], some: NDArray[Any]) -> tuple[Mission, Geometries]:
+    def _arrays(self, found: Mapping[str, Values], some: NDArray[Any]) -> tuple[Mission, BistaticGeometry]:
         mission = self.mission
         for number in self.numbers:
             mission = varied(mission, number.key, found[number.key][some])
-        platforms = mission.platforms
-        return mission, Geometries(paths_of(platforms.transmitter), paths_of(platforms.receiver))
+        return mission, mission.geometry
 
     def _of_same_nodes(self, found: dict[str, Values], some: NDArray[Any], nodes: int) -> NDArray[np.bool_]:
         mission, geometries = self._arrays(found, some)
@@ -490,7 +490,7 @@ class Engine:
                 found[one.name][to] = np.broadcast_to(of_nothing, some.shape)[sure]
         return sure
 
-    def _status_of_nothing(self, row_id: str, mission: Mission, geometries: Geometries, cases: int) -> Any:
+    def _status_of_nothing(self, row_id: str, mission: Mission, geometries: BistaticGeometry, cases: int) -> Any:
         """Status of a row that is not declared in any case."""
         what = self.subjects.get(row_id)
         if what is None:
@@ -508,7 +508,7 @@ class Engine:
             fault = error.faults[0]
             found["status"][place], found["reason"][place] = "error", f"{fault.key}: {fault.problem}"
             return
-        checked = check_mission(case, self.question.today, is_brief=self.is_brief, is_bare=True)
+        checked = check_mission(case, self.question.today, is_bare=True)
         geometry = checked.geometry
         numbers_found = (
             checked.resolution.range,

@@ -3,7 +3,6 @@
 # What other rooms may use.
 __all__ = [
     "clocks",
-    "collections",
     "combine",
     "combined",
     "correlation",

@@ -20,13 +20,13 @@ from numpy.typing import NDArray
 
 from bisar_budget import evaluators
 from bisar_budget.constants import ROUNDING, STANDARD_GRAVITY
-from bisar_budget.effects.collections import axes_of
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillators import Noise, noise_of
 from bisar_budget.effects.spectra import link_parts, parts, synchronized_parts
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.tones import Floats, gauss_markov
 from bisar_budget.faults import KeyPath
+from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.mission.instruments import IMU_KINDS, GaussMarkov, Oscillator
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
@@ -90,7 +90,7 @@ class RandomError(NamedTuple):
         return self.full if model == "full" else self.published
 
 
-def random_errors(mission: Mission, geometry: Any = None, cases: int = 1) -> list[RandomError]:
+def random_errors(mission: Mission, geometry: BistaticGeometry | None = None, cases: int = 1) -> list[RandomError]:
     """List the errors of sensors and clocks that a mission names, in a fixed order; nothing for most.
 
     Of a platform with an inertial sensor every figure is listed, declared or not. `geometry` is that of many cases;
@@ -141,7 +141,7 @@ def _number(value: Any) -> float:
 class _Seen:
     """Cases as their sensors and clocks see them: numbers are arrays (…, cases)."""
 
-    def __init__(self, mission: Mission, geometry: Any, cases: int) -> None:
+    def __init__(self, mission: Mission, geometry: BistaticGeometry, cases: int) -> None:
         self.mission, self.geometry, self.cases = mission, geometry, cases
         self.sights = geometry.sights(has_direct_path=mission.has_direct_path)
         self.factor = mission.allocation.coverage_factor
@@ -161,7 +161,8 @@ class _Seen:
 
     def axes(self, name: str) -> Floats:
         """Axes of a platform's errors, (axes, 3, cases)."""
-        return np.array([self.vector(axis) for axis in axes_of(self.mission, name, getattr(self.geometry, name))])
+        path: PlatformState = getattr(self.geometry, name)
+        return np.array([self.vector(axis) for axis in path.frame(self.error(name).frame)])
 
     def along(self, name: str, directions: Floats) -> tuple[Floats, Floats]:
         """Root-sum-square of what directions (axes, 3, cases) have of the line of sight, and of what data hear."""
@@ -174,7 +175,7 @@ class _Seen:
         """Exact ranges at as many nodes as walks need."""
         mission = self.mission
         return ExactRanges.of(
-            (self.geometry.transmitter, self.geometry.receiver),
+            self.geometry.both,
             mission.radar.wavelength,
             mission.collection.aperture_time,
             _NODES,

@@ -61,8 +61,7 @@ def counted(mission: Mission, name: str, value: Any, metric: str, geometry: Any 
     """The same of a platform of a mission: what changes the range, or the range less the direct path. [m]"""
     platform = getattr(mission.platforms, name)
     error: MotionError = platform.motion_error
-    # Axes that need the Earth are those of a path that does not vary.
-    state = platform.state if geometry is None or error.frame == "ric" else getattr(geometry, name)
+    state = getattr(geometry or mission.geometry, name)
     sight = sight_of(mission, name, geometry) if mission.has_direct_path else None
     return along_line_of_sight(value, error, state, metric, sight)
 

@@ -4,7 +4,7 @@ from datetime import date
 from typing import TYPE_CHECKING, NamedTuple
 
 from bisar_budget.analysis.allocation import Allocation
-from bisar_budget.faults import Fault, SetValue
+from bisar_budget.faults import Fault, SetValue, shown
 from bisar_budget.findings.requirement import DeclaredKinds, JudgedRequirement, Override
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUSES, worst
@@ -76,6 +76,10 @@ class MissionFindings(NamedTuple):
     kinds: DeclaredKinds = DeclaredKinds()
     overrides: tuple[Override, ...] = ()  # what from outside the file bears on the verdict
     model_doubt: Note = NOTHING  # where the published model judges and does not hold
+
+    def __repr__(self) -> str:
+        """File, name and status, on one line."""
+        return f"MissionFindings({self.file!r}, {shown(self.name)!r}, {self.status!r})"
 
     @property
     def mission(self) -> Mission | None:

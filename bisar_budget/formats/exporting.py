@@ -237,7 +237,7 @@ def _vectors(
         ("Tx", flown.transmitter, smooth.transmitter, mission.geometry.transmitter, -1.0),
         ("Rcv", flown.receiver, smooth.receiver, mission.geometry.receiver, 1.0),
     )
-    turn = np.array(axes.axes)
+    turn: Floats = np.array(axes.axes)
     for side, path, slow, state, sign in sides:
         place = path.measured
         velocity = np.array([state.at(tau)[1] for tau in slow_time.tolist()])

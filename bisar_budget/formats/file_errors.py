@@ -83,7 +83,7 @@ def declared(
         raise frame.fault(f"must be one of {', '.join(FRAMES)} (got {name!r})")
     target = state.frame("scene") if name == "ECF" else axes.radial(state.position, state.velocity)
     source = _axes_of(name, state, axes)
-    turn = np.array(target) @ np.array(source).T  # from the file's frame into that of the mission
+    turn: Floats = np.array(target) @ np.array(source).T  # from the file's frame into that of the mission
     both = np.kron(np.eye(2), turn)
     turned = both @ covariance @ both.T
     remarks = []

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from bisar_budget import units
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.faults import Changed, KeyPath, Place, Problem, SetValue
+from bisar_budget.faults import Changed, KeyPath, Place, Problem, SetValue, shown
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.bounds import (
     COORDINATE,
@@ -22,7 +22,7 @@ from bisar_budget.mission.bounds import (
     SHARE,
     SIDELOBE_REQUIREMENT,
 )
-from bisar_budget.mission.platforms import CommonMotionError, Platforms, geometry_of, without_image
+from bisar_budget.mission.platforms import CommonMotionError, Platforms, without_image
 from bisar_budget.mission.readers import (
     Choice,
     Day,
@@ -330,6 +330,18 @@ class Mission(NamedTuple):
     changes: tuple[SetValue, ...] = ()
     parts: tuple[PartFile, ...] = ()
 
+    def __repr__(self) -> str:
+        """File and name, on one line."""
+        return f"Mission({self.file!r}, {shown(self.name)!r})"
+
+    def __eq__(self, other: object) -> bool:
+        """Whether it says the same, in the same file; `places` are where the bytes of `data` stand."""
+        return isinstance(other, Mission) and tuple(self._replace(places={})) == tuple(other._replace(places={}))
+
+    def __ne__(self, other: object) -> bool:
+        """Whether it does not; a tuple has its own answer."""
+        return not self == other
+
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
         """Hold it to a collection that forms an image, and to names that can be told apart."""
@@ -350,7 +362,7 @@ class Mission(NamedTuple):
     @property
     def geometry(self) -> BistaticGeometry:
         """Both platforms in the frame of the scene."""
-        return geometry_of(self.platforms)
+        return self.platforms.geometry
 
     @property
     def has_direct_path(self) -> bool:

@@ -1,9 +1,9 @@
 """Platforms of a mission file: where they fly, in one of five ways, and how wrong their motion is measured."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
-from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+
+import numpy as np
 
 from bisar_budget.faults import KeyPath, Problem
 from bisar_budget.geometry import (
@@ -46,7 +46,7 @@ FARTHEST_BY = 3  # times the least baseline, that they move by in half an apertu
 
 SIZES = Triple(SIZE)
 # A 32nd of the way from one place to the next, the distance between is not smaller by as much as matters.
-BASELINE_PLACES = 65
+_PLACES = np.linspace(-1, 1, 65)[:, None]
 
 ALONG_SIGHT_OR_AXES = OneOf(lambda value: SIZES if isinstance(value, list) else SIZE, (SIZE, SIZES))
 
@@ -311,14 +311,27 @@ class Platform(NamedTuple):
 
     @property
     def state(self) -> PlatformState:
-        """Its path in the frame of the scene; of a way that needs to be found once it is, see `is_of_the_earth`."""
+        """Its path in the frame of the scene; of a way that needs to be found once it is, see `is_of_the_earth`.
+
+        Numbers may be arrays (cases,).
+        """
         if self.path is not None:
             return self.path.state
-        curves = (self.acceleration, self.jerk, self.snap)
+        acceleration, bends = self.acceleration or STRAIGHT, _bends(self.jerk, self.snap)
         if self.position is not None and self.velocity is not None:
-            return _state_from_vectors(self.position, self.velocity, *curves)
-        polar = (self.slant_range, self.azimuth, self.elevation, self.speed, self.motion_azimuth, self.climb)
-        return _state_from_angles(*polar, *curves)
+            return PlatformState(
+                position=self.position, velocity=self.velocity, acceleration=acceleration, bends=bends
+            )
+        return state_from_angles(
+            slant_range=self.slant_range,
+            azimuth=self.azimuth,
+            elevation=self.elevation,
+            speed=self.speed,
+            motion_azimuth=0.0 if self.motion_azimuth is None else self.motion_azimuth,  # of a fixed platform
+            climb=0.0 if self.climb is None else self.climb,
+            acceleration=acceleration,
+            bends=bends,
+        )
 
 
 def _unclear_geometry(given: Sequence[str], *, is_fixed: bool, may_be_fixed: bool) -> Problem | None:
@@ -346,73 +359,38 @@ def _bends(jerk: Vector | None, snap: Vector | None) -> tuple[Vector, ...]:
     return ((a / 6, b / 6, c / 6), (x / 24, y / 24, z / 24))
 
 
-# Asked for while a platform is read, while its mission is, and when that is checked.
-@lru_cache(maxsize=8)
-def _state_from_vectors(
-    position: Vector, velocity: Vector, acceleration: Vector | None, jerk: Vector | None, snap: Vector | None
-) -> PlatformState:
-    return PlatformState(
-        position=position, velocity=velocity, acceleration=acceleration or STRAIGHT, bends=_bends(jerk, snap)
-    )
-
-
-@lru_cache(maxsize=8)
-def _state_from_angles(
-    slant_range: float | None,
-    azimuth: float | None,
-    elevation: float | None,
-    speed: float | None,
-    motion_azimuth: float | None,
-    climb: float | None,
-    acceleration: Vector | None,
-    jerk: Vector | None,
-    snap: Vector | None,
-) -> PlatformState:
-    state = state_from_angles(
-        slant_range=slant_range or 0.0,
-        azimuth=azimuth or 0.0,
-        elevation=elevation or 0.0,
-        speed=speed or 0.0,
-        motion_azimuth=motion_azimuth or 0.0,
-        climb=climb or 0.0,
-        acceleration=acceleration or STRAIGHT,
-    )
-    return replace(state, bends=_bends(jerk, snap)) if jerk or snap else state
-
-
 class Platforms(NamedTuple):
     """The two of them."""
 
     transmitter: Annotated[Platform, Key(Section(Platform))]
     receiver: Annotated[Platform, Key(Section(Platform))]
 
-
-@lru_cache(maxsize=4)  # asked for when a mission is read and again when it is checked
-def geometry_of(platforms: Platforms) -> BistaticGeometry:
-    """Both platforms in the frame of the scene."""
-    return BistaticGeometry(transmitter=platforms.transmitter.state, receiver=platforms.receiver.state)
+    @property
+    def geometry(self) -> BistaticGeometry:
+        """Both platforms in the frame of the scene."""
+        return BistaticGeometry(transmitter=self.transmitter.state, receiver=self.receiver.state)
 
 
 def without_image(platforms: Platforms, aperture_time_s: float | None, *, has_direct_path: bool) -> Iterator[Problem]:
     """Say what keeps paths from forming an image; no aperture is one that is wrong by itself."""
-    yield from _no_image(geometry_of(platforms))
+    geometry = platforms.geometry
+    yield from _no_image(geometry)
     if aperture_time_s is not None:
-        yield from _dives(platforms, aperture_time_s)
+        yield from _dives(platforms, geometry, aperture_time_s)
         if has_direct_path:
-            yield from _no_baseline(geometry_of(platforms).apart, aperture_time_s / 2)
+            yield from _no_baseline(geometry.apart, aperture_time_s / 2)
 
 
 def _no_image(geometry: BistaticGeometry) -> Iterator[Problem]:
-    if all(norm(platform.velocity) < STILL for platform in (geometry.transmitter, geometry.receiver)):
+    if all(norm(platform.velocity) < STILL for platform in geometry.both):
         yield Problem("both platforms are still: no aperture", at=("platforms",))
     elif degeneracy := geometry.degeneracy():
         yield Problem(degeneracy, at=("platforms",))
 
 
-def _dives(platforms: Platforms, aperture_time: float) -> Iterator[Problem]:
-    for name, platform in (("transmitter", platforms.transmitter), ("receiver", platforms.receiver)):
-        state = platform.state
-        lowest = min(state.at(tau)[0][2] for tau in _turning_points(state, aperture_time / 2))
+def _dives(platforms: Platforms, geometry: BistaticGeometry, aperture_time: float) -> Iterator[Problem]:
+    for name, platform, state in zip(Platforms._fields, platforms, geometry.both, strict=True):
+        lowest = min(state.place(tau)[2] for tau in _turning_points(state, aperture_time / 2))
         if lowest < 0 <= state.position[2]:
             key: KeyPath = ("climb",) if platform.velocity is None else ("velocity", 2)
             if platform.acceleration is not None:
@@ -425,10 +403,13 @@ def _dives(platforms: Platforms, aperture_time: float) -> Iterator[Problem]:
             )
 
 
+def least_baseline(apart: PlatformState, half: Any) -> Any:
+    """Least distance of the platforms over an aperture, half of which lasts so long [s]. [m]"""
+    return norm(apart.place(half * _PLACES)).min(axis=0)
+
+
 def _no_baseline(apart: PlatformState, half: float) -> Iterator[Problem]:
-    steps = BASELINE_PLACES // 2
-    least = min(norm(apart.at(half * part / steps)[0]) for part in range(-steps, steps + 1))
-    way = apart.travelled(half)
+    least, way = float(least_baseline(apart, half)[0]), apart.travelled(half)
     if least < max(LEAST_BASELINE, way / FARTHEST_BY):
         yield Problem(
             f"there is no direct path to follow: the platforms come within {least:.3g} m of each other, and move "

@@ -16,20 +16,19 @@ of one case. A single case serves any number of lanes as it stands.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any, NamedTuple, Protocol
+from functools import cached_property, reduce
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.constants import ROUNDING
+from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
 from bisar_budget.evaluators import LEGENDRE_FITS, full_ground_inverse
-from bisar_budget.geometry import BistaticGeometry
+from bisar_budget.geometry import BistaticGeometry, PlatformState, Vectors, dot, norm
 
 Floats = NDArray[np.float64]
 Places = NDArray[np.intp]
 Truths = NDArray[np.bool_]
-Vectors = tuple[Any, Any, Any]  # three components, each an array or a float
 
 # Way of a platform in half an aperture, over its slant range, up to which so many nodes change phases by less than
 # 1e-6 of themselves; beyond the last, 16 nodes are right to 1e-3 at 1.25.
@@ -41,52 +40,31 @@ SKEWED = 0.01  # the same over the sine between the gradients, where they are ne
 BENT = 0.05  # of what Doppler turns by at the centre: velocity errors turn it by less, or its slopes are others
 FEW = 4
 SHRINKS = 0.5  # square of each step of the search over that of the one before; else it does not settle
+CLOCK_POWERS = {"s": 0, "s/s": 1, "1/s": 2, "1/s^2": 3}  # of slow time, by the unit of a clock error
 EPSILON = 2e-15  # of a range sum: what rounding of a few operations leaves
 UNSEEN_RAD = 3e-5  # what the last step of the search may change a phase by beyond the part counted linearly
 
 _STILL = [np.zeros((1, 1))] * 3  # a platform that no error moves
 
 
-class AnyPath(Protocol):
-    """One platform in one case or in many, at mid-aperture: components are floats or (cases,)."""
-
-    @property
-    def position(self) -> Vectors:
-        """[m]"""
-
-    @property
-    def velocity(self) -> Vectors:
-        """[m/s]"""
-
-    @property
-    def acceleration(self) -> Vectors:
-        """[m/s²]"""
-
-    @property
-    def bends(self) -> tuple[Vectors, ...]:
-        """Coefficients of τ³, τ⁴, …. [m/s³], [m/s⁴], …"""
-
-
-def dot(a: Vectors, b: Vectors) -> Any:
-    """Scalar product."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def norm(a: Vectors) -> Any:
-    """Length."""
-    return np.sqrt(dot(a, a))
-
-
-def nodes_for(geometry: BistaticGeometry, aperture_time_s: float, *, has_direct_path: bool = False) -> int:
-    """Number of nodes that a collection needs: of the lines of sight, and of the direct path where that counts."""
+def nodes_for(geometry: BistaticGeometry, aperture_time_s: Any, *, has_direct_path: bool = False) -> Any:
+    """Number of nodes that cases need: of the lines of sight, and of the direct path where that counts."""
     half = aperture_time_s / 2
-    turning = (geometry.transmitter, geometry.receiver, *((geometry.apart,) if has_direct_path else ()))
-    way = max(state.travelled(half) / state.slant_range for state in turning)
-    return next(count for limit, count in NODES if way <= limit)
+    turning = (*geometry.both, *((geometry.apart,) if has_direct_path else ()))
+    way = reduce(np.maximum, [path.travelled(half) / path.slant_range for path in turning])
+    limits, counts = zip(*NODES, strict=True)
+    found = np.array(counts)[np.searchsorted(limits, way)]
+    return found if np.ndim(way) else int(found)
 
 
-class Effects(NamedTuple):
-    """What a small unit of an error does in each lane, as `Effect`."""
+class Effect(NamedTuple):
+    """What one unit of an error does, signed like the range error; numbers, or arrays of cases.
+
+    Constant [m/unit] and linear [(m/s)/unit] term of the range error; quadratic and cubic phase at the
+    aperture edge [rad/unit]. By the published model they are coefficients at the aperture midpoint. By the full
+    model they are fitted over the aperture, of an error too small for a second order, and its phases hold what the
+    displacement of the image adds.
+    """
 
     constant: Any
     linear: Any
@@ -221,7 +199,7 @@ class ExactRanges:
     @classmethod
     def of(
         cls,
-        paths: Sequence[AnyPath],
+        paths: Sequence[PlatformState],
         wavelength: Any,
         aperture_time: Any,
         count: int,
@@ -237,7 +215,7 @@ class ExactRanges:
         for path in paths:
             x, y, z = (np.broadcast_to(part, (cases,)) for part in path.position)
             middles.append((x, y, z))
-        tracks = [positions(path, times) for path in paths]
+        tracks = [path.place(times) for path in paths]
         return cls(half, k, count, tracks, middles, has_direct_path=has_direct_path)
 
     def at(self, east: Floats, north: Floats, case: Places) -> "ExactRanges":
@@ -323,6 +301,11 @@ class ExactRanges:
         """Position error at the nodes of a unit of an error: 1, τ or τ²/2 of (22)."""
         return {"m": np.ones_like(self.times), "m/s": self.times, "m/s^2": self.times**2 / 2}
 
+    def clock_course(self, unit: str) -> Floats:
+        """Range error at the nodes of a unit of a clock error; nothing if the direct path is the clock. [m/unit]"""
+        metres: Floats = SPEED_OF_LIGHT * self.times ** CLOCK_POWERS[unit]
+        return metres * 0.0 if self.has_direct_path else metres
+
     def along(self, platform: int, direction: Vectors) -> Floats:
         """What a metre along a direction does to the range of a platform at the nodes, −u·d; if heard, −(u − b)·d."""
         found: Floats = -dot(self.tracks[platform], direction) / self.ranges[platform]
@@ -378,9 +361,10 @@ class ExactRanges:
         )
         return quadratic, cubic
 
-    def effect(self, range_error: Floats) -> Effects:
+    def effect(self, range_error: Floats) -> Effect:
         """Effect of a range error at the nodes, that of the displacement included."""
-        constant, linear, own, own_cubic = self.fit @ range_error
+        lanes = range_error.shape[1:]  # the last axis is that of the cases
+        constant, linear, own, own_cubic = (self.fit @ range_error.reshape(self.count, -1)).reshape(4, *lanes)
         linear = linear / self.half
         own, own_cubic = own * self.k, own_cubic * self.k
         size = np.abs(range_error).max(axis=0) * self.k
@@ -389,14 +373,14 @@ class ExactRanges:
         seen = size + np.abs(q_0 * constant) + np.abs(q_1 * linear)
         seen_cubic = size + np.abs(c_0 * constant) + np.abs(c_1 * linear)
         # What is left of terms that cancel exactly is rounding, and would make a limit out of nothing.
-        return Effects(
+        return Effect(
             constant,
             np.where(np.abs(linear) * self.half <= ROUNDING * size / self.k, 0.0, linear),
             np.where(np.abs(qpe) <= ROUNDING * seen, 0.0, qpe),
             np.where(np.abs(cubic) <= ROUNDING * seen_cubic, 0.0, cubic),
         )
 
-    def displacement(self, effect: Effects, size: Any) -> tuple[Any, Any]:
+    def displacement(self, effect: Effect, size: Any) -> tuple[Any, Any]:
         """Displacement on the ground by so many units. [m]"""
         scale = size / self.determinant
         (a, b), (c, d) = self.adjugate
@@ -570,17 +554,6 @@ class ExactRanges:
         for kept, phase in zip((found.quadratic, found.cubic), phases, strict=True):
             one = phase[is_done]
             kept[places] = np.where(np.abs(one) > rounding, one, 0.0)
-
-
-def positions(path: AnyPath, times: Floats) -> Vectors:
-    """Positions at slow times (nodes, cases). [m]"""
-    found = []
-    for axis in range(3):
-        place = path.position[axis] + times * (path.velocity[axis] + times * path.acceleration[axis] / 2)
-        for power, bend in enumerate(path.bends, 3):
-            place = place + bend[axis] * times**power
-        found.append(np.broadcast_to(place, times.shape))
-    return (found[0], found[1], found[2])
 
 
 def _weighted(along: Sequence[Any], weight: Any) -> Sequence[Any]:

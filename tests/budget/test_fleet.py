@@ -5,13 +5,9 @@ from datetime import date
 import pytest
 
 from bisar_budget.budget import fleet
-from bisar_budget.budget.check import check_mission
 from bisar_budget.findings.mission import Report
-from bisar_budget.mission.load import parse_mission
 from bisar_budget.report import Style, render
-from tests import families
 from tests.conftest import mission_text
-from tests.families import FAMILIES
 
 DAY = date(2026, 11, 21)
 
@@ -55,17 +51,3 @@ def test_the_command_checks_a_fleet(run, files, monkeypatch) -> None:
     parallel = run("check", "-q", *files)
     assert parallel.exit_code == serial.exit_code == 2
     assert parallel.stdout == serial.stdout
-
-
-@pytest.mark.parametrize("family", FAMILIES)
-def test_what_a_terminal_leaves_out_changes_no_verdict(family: str) -> None:
-    """Statuses of all rows, and utilizations of the errors as stated, are those of the complete check."""
-    for seed in range(40, 44):
-        mission = parse_mission(families.mission_text(family, seed))
-        whole, brief = (check_mission(mission, DAY, is_brief=is_brief) for is_brief in (False, True))
-        assert brief.status == whole.status
-        assert [(r.id, r.status) for r in brief.rows] == [(r.id, r.status) for r in whole.rows]
-        for one, other in zip(brief.rows, whole.rows, strict=True):
-            if one.utilization is not None:  # where a search begins shows in the last digits
-                assert one.utilization == pytest.approx(other.utilization, rel=1e-4)
-                assert one.binding_requirement == other.binding_requirement

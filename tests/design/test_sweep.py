@@ -60,7 +60,7 @@ def assert_as_checked(mission, cases, whole, columns=(), model=None) -> None:
         got = {name: column[place] for name, column in whole.items()}
         try:
             case = parse_mission(mission.data, mission.file, model, changes=(*mission.changes, *changes))
-            found = check_mission(case, DAY, is_brief=not columns)
+            found = check_mission(case, DAY)
         except MissionError as error:
             assert got["status"] == "error", values
             assert got["reason"].endswith(error.faults[0].problem.partition(" (")[0]) or got["reason"]
@@ -705,7 +705,7 @@ class TestWords:
                 assert whole["status"][place] == "error"
                 assert whole["reason"][place] == f"{error.faults[0].key}: {error.faults[0].problem}"
                 continue
-            found = check_mission(case, DAY, is_brief=not columns)
+            found = check_mission(case, DAY)
             stands = standing(found, None, breaking("fail"))
             assert (whole["status"][place], whole["worst_row"][place]) == (found.status, stands.row or ""), values
             assert whole["utilization"][place] == pytest.approx(stands.utilization, rel=NEAR)

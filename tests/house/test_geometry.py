@@ -8,6 +8,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from bisar_budget import geometry as g
+from bisar_budget.ranges.exact_ranges import nodes_for
 
 
 def state(position, velocity=(0.0, 100.0, 0.0)) -> g.PlatformState:
@@ -152,3 +153,57 @@ def test_a_short_range_gradient_is_refused(ground: float, is_degenerate: bool) -
 def test_doppler_gradients_that_cancel_are_refused() -> None:
     pair = both(state((5e3, 0, 0), (0, 100, 0)), state((5e3, 1e-9, 0), (0, -100, 0)))
     assert "Doppler does not change" in pair.degeneracy()
+
+
+@given(st.lists(st.tuples(*[st.tuples(coordinate, coordinate, st.floats(10, 1e4))] * 5), min_size=1, max_size=4))
+def test_many_cases_are_those_of_each(cases) -> None:
+    """Numbers of one case make plain floats, and arrays hold the same of each case."""
+
+    def pair(p, v, q, w, bend):
+        return g.BistaticGeometry(
+            transmitter=g.PlatformState(position=p, velocity=v, acceleration=bend, bends=(bend,)),
+            receiver=g.PlatformState(position=q, velocity=w),
+        )
+
+    many = pair(*(tuple(np.array(part).T) for part in zip(*cases, strict=True)))
+    for index, case in enumerate(cases):
+        one = pair(*case)
+        for of_one, of_many in zip(numbers(one), numbers(many), strict=True):
+            assert type(of_one) in (float, bool, int)
+            assert np.broadcast_to(of_many, (len(cases),))[index] == pytest.approx(of_one, rel=1e-9, abs=1e-9)
+
+
+def numbers(pair: g.BistaticGeometry):
+    """What a geometry says, where platforms are apart."""
+    for path in (*pair.both, pair.apart):
+        yield from (*path.at(1.5)[0], *path.at(1.5)[1], path.travelled(2.0), path.sinks(2.0), path.is_still)
+    for path in pair.both:
+        yield from (*path.look, *path.look_rate, path.azimuth, path.elevation)
+        yield from (path.has_frame("track"), path.has_frame("look"), path.has_frame("ric"))
+    yield from (*pair.range_gradient, *pair.doppler_gradient, pair.bistatic_angle, pair.look_azimuth)
+    yield from (nodes_for(pair, 5.0), *pair.sights(has_direct_path=False)[0])
+
+
+def test_frames_of_many_cases_hold_no_number_where_there_is_none() -> None:
+    north, up, still = (0.0, 9.0, 0.0), (0.0, 0.0, 9.0), (0.0, 0.0, 0.0)
+    platform = state((5e3, 1e3, 2e3), tuple(np.array([north, up, still]).T))
+    assert platform.has_frame("track").tolist() == [True, False, False]
+    along, across, _ = np.array(platform.frame("track")).transpose(0, 2, 1)
+    assert along[0].tolist() == [0, 1, 0]
+    assert across[0].tolist() == [-1, 0, 0]
+    assert np.isnan(across[1:]).any(axis=1).all()
+    with pytest.raises(g.UndefinedFrameError, match="latitude"):
+        platform.frame("ric")
+
+
+@pytest.mark.parametrize("margin", [1.0, 1.1])
+def test_a_case_spans_the_ground_as_said_of_it_alone(margin: float) -> None:
+    """Both sides of each border, with and without a margin."""
+    turns = np.array([0.99, 1.01, 1.09, 1.11, 30.0])
+    angles = np.radians(turns)
+    receiver = state((0.0, 0.0, 4e3), (100 * np.cos(angles), 100 * np.sin(angles), 0.0))
+    pair = both(state((9e3, 0.0, 0.0), (0.0, 0.0, 0.0)), receiver)
+    assert np.all(pair.spans_ground(margin)[2] == (turns > margin))
+    for gradient, spans in ((0.0199, False), (0.0201, margin == 1.0), (0.0221, True)):
+        overhead = state((gradient * 9e3, 0.0, math.sqrt(1 - gradient**2) * 9e3))
+        assert both(overhead, state((0.0, 0.0, 4e3))).spans_ground(margin)[0] is spans

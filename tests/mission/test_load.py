@@ -1,23 +1,54 @@
 """Reading mission files: positions, YAML's pitfalls, limits, and a fuzz of the whole loader."""
 
 import sys
+from datetime import date
 
 import pytest
 import yaml
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from bisar_budget.budget.check import check_mission
 from bisar_budget.faults import MissionError
 from bisar_budget.mission import tree
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import MISSION, Mission
-from tests.conftest import BASE, mission_text
+from tests.conftest import BASE, ROOT, mission_text
 
 
 def faults_of(text: str | bytes):
     with pytest.raises(MissionError) as error:
         parse_mission(text, "m.yaml")
     return error.value
+
+
+MISSIONS = sorted(map(str, (ROOT / "specs/missions").glob("*.yaml")))
+
+
+@pytest.mark.parametrize("file", MISSIONS)
+def test_a_file_read_twice_is_the_same_mission(file: str) -> None:
+    mission, again = load_mission(file), load_mission(file)
+    assert mission == again
+    assert not mission != again  # noqa: SIM202  (a tuple answers it by itself)
+    assert mission.geometry == again.geometry
+    longer = mission._replace(collection=mission.collection._replace(aperture_time=1.1))
+    assert mission != longer
+    assert not mission == longer  # noqa: SIM201
+    assert mission != tuple(mission)
+
+
+@pytest.mark.parametrize("file", MISSIONS)
+def test_a_mission_and_its_findings_are_shown_on_one_line(file: str) -> None:
+    mission = load_mission(file)
+    assert repr(mission) == f"Mission({file!r}, {mission.name!r})"
+    for is_without in (False, True):
+        found = check_mission(mission, date(2026, 1, 1), is_brief=is_without)
+        assert repr(found) == f"MissionFindings({file!r}, {mission.name!r}, {found.status!r})"
+
+
+def test_a_long_name_is_shown_shortened() -> None:
+    mission = parse_mission(mission_text(name="n" * 500), "a\nb.yaml")
+    assert repr(mission) == f"Mission('a\\nb.yaml', '{'n' * 57}...')"
 
 
 def test_values_know_their_line() -> None:

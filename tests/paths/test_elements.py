@@ -2,7 +2,6 @@
 
 import json
 import math
-import subprocess
 import sys
 from importlib.resources import files
 
@@ -258,20 +257,3 @@ def test_without_sgp4_an_error_says_what_to_install(monkeypatch: pytest.MonkeyPa
     with pytest.raises(PathFileError) as error:
         orbit_of(TLE)
     assert str(error.value) == "s.tle:2: needs the package sgp4: pip install 'bisar-budget[orbits]'"
-
-
-def test_elements_need_no_array_library() -> None:
-    code = f"""
-import sys
-from bisar_budget.paths.mean_elements import read_omm
-from bisar_budget.paths.two_lines import read_tle
-from bisar_budget.paths.flight import interpolated
-from bisar_budget.paths.instant import Instant
-center = Instant(61192, 19231.25)
-orbit = read_tle({TLE!r}, "s.tle", None, center)
-interpolated(lambda tau: orbit.place(center.after(tau)), 1.0)
-read_omm({omm_xml()!r}, "s.xml", None, center)
-print("numpy" in sys.modules)
-"""
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True)
-    assert done.stdout == "False\n"

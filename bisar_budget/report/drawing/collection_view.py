@@ -40,7 +40,7 @@ class SeenPlatform(NamedTuple):
     @property
     def is_still(self) -> bool:
         """Say whether it is fixed to the ground."""
-        return norm(self.state.velocity) == 0
+        return bool(norm(self.state.velocity) == 0)
 
     @property
     def motion(self) -> str:

@@ -124,7 +124,7 @@ def _direction(velocity: Vector) -> Vector:
 
 def _planes_apart(geometry: BistaticGeometry) -> float:
     """Angle between the vertical planes through the platforms, 0 to π. [rad]"""
-    turn = geometry.receiver.azimuth - geometry.transmitter.azimuth
+    turn: float = geometry.receiver.azimuth - geometry.transmitter.azimuth
     return abs((turn + math.pi) % (2 * math.pi) - math.pi)
 
 
@@ -135,7 +135,7 @@ def _is_on_other_side(geometry: BistaticGeometry, turned: float) -> bool:
     pair = geometry.transmitter, geometry.receiver
     in_drawing = math.dist(*((math.hypot(*p.position[:2]), p.position[2]) for p in pair))
     in_space = math.dist(*(p.position for p in pair))
-    widest = max(p.slant_range for p in pair)
+    widest: float = max(p.slant_range for p in pair)
     return in_drawing < 0.08 * widest < in_space
 
 
@@ -147,7 +147,7 @@ def _planes_in_words(geometry: BistaticGeometry, turned: float) -> str:
 
 
 def _is_overhead(state: PlatformState) -> bool:
-    return math.hypot(*state.position[:2]) <= 1e-9 * state.slant_range
+    return bool(math.hypot(*state.position[:2]) <= 1e-9 * state.slant_range)
 
 
 def _in_own_plane(name: str, state: PlatformState, side: float, look_azimuth: float, T: float) -> SeenPlatform:
