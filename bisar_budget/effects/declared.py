@@ -19,7 +19,7 @@ import numpy as np
 from bisar_budget import evaluators, phrases
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource
-from bisar_budget.effects.sources import Errors
+from bisar_budget.effects.sources import ErrorListing
 from bisar_budget.geometry import BistaticGeometry, angle_between_lines
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import NOTHING, Note
@@ -403,7 +403,7 @@ class DeclaredErrors:
             4 * exact.k + np.abs(c_0) + 1.5 / half * np.abs(c_1),
             np.hypot(a, c) + 1.5 / half * np.hypot(b, d),
         ]
-        self.listed = list(Errors(mission, geometries, exact, shown).listed())
+        self.listed = list(ErrorListing(mission, geometries, exact, shown).listed())
         self.stated = [error for error in self.listed if error.declared is not None and error.is_independent]
         size = max(1, _TOGETHER // (2 * cases))
         starts = range(0, len(self.listed), size)

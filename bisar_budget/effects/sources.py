@@ -43,7 +43,7 @@ def exact_ranges(mission: Mission, geometry: BistaticGeometry, count: int | None
     return ExactRanges.of(geometry.both, mission.radar.wavelength, T, count, has_direct_path=is_heard)
 
 
-class Errors:
+class ErrorListing:
     """The errors of cases of one mission, as their file states them.
 
     Parameters
@@ -174,7 +174,7 @@ class Errors:
                 )
 
     def _of_both_platforms(self) -> Iterator[ErrorSource]:
-        """Errors that both platforms have in common: the effects of both legs add with their signs.
+        """ErrorListing that both platforms have in common: the effects of both legs add with their signs.
 
         A bias of one GNSS service moves both measured paths by the same vector. The range error, and with it Table I
         and the full model, is linear in the errors, so the common effect is the sum of the two platforms' own.

@@ -5,7 +5,7 @@ from datetime import date
 import pytest
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.effects.sources import Errors
+from bisar_budget.effects.sources import ErrorListing
 from bisar_budget.findings.mission import Report
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.monte_carlo.probability import monte_carlo
@@ -19,7 +19,7 @@ from tests.conftest import mission_text
 def counted(monkeypatch) -> dict[str, int]:
     """How often errors were listed and exact ranges set up."""
     count = {"error_sources": 0, "exact ranges": 0}
-    listed, set_up = Errors.listed, ExactRanges.__init__
+    listed, set_up = ErrorListing.listed, ExactRanges.__init__
 
     def error_sources(errors):
         count["error_sources"] += 1
@@ -29,7 +29,7 @@ def counted(monkeypatch) -> dict[str, int]:
         count["exact ranges"] += 1
         set_up(*arguments, **named)
 
-    monkeypatch.setattr(Errors, "listed", error_sources)
+    monkeypatch.setattr(ErrorListing, "listed", error_sources)
     monkeypatch.setattr(ExactRanges, "__init__", init)
     return count
 
