@@ -13,7 +13,7 @@ from pathlib import Path
 from unittest.mock import patch
 
 from bisar_budget.design import solve as solving
-from bisar_budget.design.solution import Solution
+from bisar_budget.design.solve import Solution
 from bisar_budget.faults import SetValue
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.model import Mission

@@ -95,11 +95,13 @@ def closed(text: str) -> str:
 class SetValue(NamedTuple):
     """A value that an option puts in place of what a mission file says: `--set radar.bandwidth=150MHz`.
 
-    `text` is the value as a file would have it.
+    `text` is the value as a file would have it. `number` is the same in SI where it is a number that was found, as of
+    a case of a sweep: readers take it as it is, and nobody reads the text but people.
     """
 
     key: str
     text: str
+    number: float | None = None
 
     @property
     def option(self) -> str:

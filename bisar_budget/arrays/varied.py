@@ -1,7 +1,8 @@
 """A mission in which some numbers are arrays, one element a case: how they come into it, and what is alike in it."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from dataclasses import fields, is_dataclass
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.covariance import KINDS, Covariance, error_index
 from bisar_budget.mission.instruments import Imu, PowerLaw
 from bisar_budget.mission.model import Mission, Simulation
-from bisar_budget.mission.platforms import CommonMotionError
+from bisar_budget.mission.platforms import CommonMotionError, FlownPath
 from bisar_budget.units import Dimension, parse_quantity
 
 # Sections that a file may leave out, and keys whose scalar stands for each of three axes.
@@ -81,26 +82,96 @@ def _with_element(covariance: Covariance, parts: Sequence[str], number: Any) -> 
 
 def groups_alike(value: Any, cases: int) -> Iterator[tuple[Any, NDArray[np.intp]]]:
     """Tell apart the cases in which a value, or what is in it, differs: the value of each group, and its cases."""
-    arrays = list(_arrays_in(value))
+    arrays = [leaf for leaf in _leaves(value) if np.ndim(leaf)]
     if not arrays:
         yield value, np.arange(cases)
         return
     rows, group = np.unique(np.stack(arrays, axis=1), axis=0, return_inverse=True)
     for place, row in enumerate(rows.tolist()):
-        yield _with_numbers(value, iter(row)), np.flatnonzero(group.ravel() == place)
+        numbers = iter(row)
+        found = _with_leaves(value, lambda leaf, numbers=numbers: next(numbers) if np.ndim(leaf) else leaf)
+        yield found, np.flatnonzero(group.ravel() == place)
 
 
-def _arrays_in(value: Any) -> Iterator[Any]:
+def picked(mission: Mission, places: NDArray[np.intp]) -> Mission:
+    """The mission with some of the cases of its arrays."""
+    return cast(Mission, _with_leaves(mission, lambda leaf: leaf[places] if np.ndim(leaf) else leaf))
+
+
+def stacked(missions: Sequence[Mission]) -> Iterator[tuple[Mission, NDArray[np.intp]]]:
+    """Put missions of one shape into one that has arrays where their numbers differ; with it the places of each.
+
+    Missions have one shape where all else in them is the same: the keys that are stated, words, lengths of lists.
+    What arrays never read is left out.
+    """
+    shapes: dict[Any, tuple[Mission, list[int], list[list[float]]]] = {}
+    for place, mission in enumerate(map(_bare, missions)):
+        numbers: list[float] = []
+        _, places, rows = shapes.setdefault(_shape(mission, numbers), (mission, [], []))
+        places.append(place)
+        rows.append(numbers)
+    for mission, places, rows in shapes.values():
+        columns = [column if np.ptp(column) else column.item(0) for column in np.array(rows).T]
+        each = iter(columns)
+        found = _with_leaves(mission, lambda leaf, each=each: next(each) if isinstance(leaf, float) else leaf)
+        yield found, np.array(places)
+
+
+def _bare(mission: Mission) -> Mission:
+    """The mission without what says where it and its paths come from."""
+    for name, platform in zip(mission.platforms._fields, mission.platforms, strict=True):
+        if platform.path is not None:
+            path = platform.path
+            path = FlownPath(
+                state=path.state,
+                samples=path.samples and 1,
+                doubts=path.doubts and ("",),
+                doubt_m=path.doubt_m,
+                is_doubted=path.is_doubted,
+            )
+            platforms = mission.platforms._replace(**{name: platform._replace(path=path)})
+            mission = mission._replace(platforms=platforms)
+    return mission._replace(places={}, data=b"", changes=(), parts=())
+
+
+def _parts(value: Any) -> Any:
+    """What a value is made of; None of a number, an array or a word."""
     if isinstance(value, tuple):
-        for part in value:
-            yield from _arrays_in(part)
-    elif np.ndim(value):
+        return value
+    if isinstance(value, dict):
+        return tuple(value.values())
+    return tuple(getattr(value, one.name) for one in fields(value)) if is_dataclass(value) else None
+
+
+def _shape(value: Any, numbers: list[float]) -> Any:
+    """All of a value but its numbers, which are put into a list."""
+    if isinstance(value, float):
+        numbers.append(value)
+        return float
+    parts = _parts(value)
+    if parts is None:
+        return value
+    names = tuple(value) if isinstance(value, dict) else type(value)
+    return (names, *[_shape(part, numbers) for part in parts])
+
+
+def _leaves(value: Any) -> Iterator[Any]:
+    parts = _parts(value)
+    if parts is None:
         yield value
+        return
+    for part in parts:
+        yield from _leaves(part)
 
 
-def _with_numbers(value: Any, numbers: Iterator[float]) -> Any:
-    """The same with numbers in the places of its arrays."""
+def _with_leaves(value: Any, put: Callable[[Any], Any]) -> Any:
+    """The same with something else in the place of each number, array or word."""
+    parts = _parts(value)
+    if parts is None:
+        return put(value)
+    found = [_with_leaves(part, put) for part in parts]
+    if isinstance(value, dict):
+        return dict(zip(value, found, strict=True))
     if isinstance(value, tuple):
-        parts = [_with_numbers(part, numbers) for part in value]
-        return value._make(parts) if hasattr(value, "_make") else tuple(parts)
-    return next(numbers) if np.ndim(value) else value
+        return value._make(found) if hasattr(value, "_make") else tuple(found)
+    return type(value)(**{one.name: part for one, part in zip(fields(value), found, strict=True)})

@@ -119,7 +119,9 @@ def _put(container: Any, name: str | int, value: Any) -> None:
 
 
 def _value(tree: Tree, change: SetValue, path: KeyPath) -> Any:
-    """Read the text of the value as the file's own would be; its faults name the option."""
+    """Read the text of the value as the file's own would be; its faults name the option. A number is as it is."""
+    if change.number is not None:
+        return change.number
     try:
         next_event = events(change.text)
         while type(event := next_event()) is not yaml.DocumentStartEvent:

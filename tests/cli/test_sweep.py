@@ -18,7 +18,7 @@ import pytest
 
 from bisar_budget.cli import sweep as command
 from bisar_budget.design import sweep as engine
-from bisar_budget.design.swept import Part, Swept
+from bisar_budget.design.table import Part, Swept
 from tests.conftest import ROOT, heed_signals, mission_text
 
 SECTION_V = str(ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml")

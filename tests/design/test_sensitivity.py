@@ -18,7 +18,7 @@ from bisar_budget.cli import waiting
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.design import sensitivity as asking
 from bisar_budget.design.quantities import QuestionError
-from bisar_budget.design.slopes import Sensitivity, Slope
+from bisar_budget.design.sensitivity import Sensitivity, Slope
 from bisar_budget.faults import SetValue
 from bisar_budget.mission.changes import read_changes
 from bisar_budget.mission.load import load_mission, parse_mission
