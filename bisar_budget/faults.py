@@ -95,18 +95,29 @@ def closed(text: str) -> str:
 class SetValue(NamedTuple):
     """A value that an option puts in place of what a mission file says: `--set radar.bandwidth=150MHz`.
 
-    `text` is the value as a file would have it. `number` is the same in SI where it is a number that was found, as of
-    a case of a sweep: readers take it as it is, and nobody reads the text but people.
+    `text` is the value as a file would have it.
     """
 
     key: str
     text: str
-    number: float | None = None
 
     @property
     def option(self) -> str:
         """What a message about the value begins with."""
         return f"--set {printable(self.key)}"
+
+
+class SetNumber(SetValue):
+    """A number in SI in the same place, as of a case of a sweep: readers take it as it is, the text is for people."""
+
+    number: float
+
+    @classmethod
+    def of(cls, key: str, number: float, unit: str) -> "SetNumber":
+        """The number for a key; `unit` is the one of SI."""
+        found = cls(key, f"{number!r} {unit}".rstrip())
+        found.number = number
+        return found
 
 
 class Changed:

@@ -1,7 +1,8 @@
 """A mission in which some numbers are arrays, one element a case: how they come into it, and what is alike in it."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
@@ -88,9 +89,7 @@ def groups_alike(value: Any, cases: int) -> Iterator[tuple[Any, NDArray[np.intp]
         return
     rows, group = np.unique(np.stack(arrays, axis=1), axis=0, return_inverse=True)
     for place, row in enumerate(rows.tolist()):
-        numbers = iter(row)
-        found = _with_leaves(value, lambda leaf, numbers=numbers: next(numbers) if np.ndim(leaf) else leaf)
-        yield found, np.flatnonzero(group.ravel() == place)
+        yield _with_leaves(value, partial(_next_of, iter(row), np.ndim)), np.flatnonzero(group.ravel() == place)
 
 
 def picked(mission: Mission, places: NDArray[np.intp]) -> Mission:
@@ -98,7 +97,7 @@ def picked(mission: Mission, places: NDArray[np.intp]) -> Mission:
     return cast(Mission, _with_leaves(mission, lambda leaf: leaf[places] if np.ndim(leaf) else leaf))
 
 
-def stacked(missions: Sequence[Mission]) -> Iterator[tuple[Mission, NDArray[np.intp]]]:
+def stacked(missions: Iterable[Mission]) -> Iterator[tuple[Mission, NDArray[np.intp]]]:
     """Put missions of one shape into one that has arrays where their numbers differ; with it the places of each.
 
     Missions have one shape where all else in them is the same: the keys that are stated, words, lengths of lists.
@@ -112,9 +111,16 @@ def stacked(missions: Sequence[Mission]) -> Iterator[tuple[Mission, NDArray[np.i
         rows.append(numbers)
     for mission, places, rows in shapes.values():
         columns = [column if np.ptp(column) else column.item(0) for column in np.array(rows).T]
-        each = iter(columns)
-        found = _with_leaves(mission, lambda leaf, each=each: next(each) if isinstance(leaf, float) else leaf)
-        yield found, np.array(places)
+        yield _with_leaves(mission, partial(_next_of, iter(columns), _is_number)), np.array(places)
+
+
+def _is_number(leaf: Any) -> bool:
+    return isinstance(leaf, float)
+
+
+def _next_of(numbers: Iterator[Any], is_theirs: Callable[[Any], Any], leaf: Any) -> Any:
+    """The next number in the place of a leaf that is one of theirs."""
+    return next(numbers) if is_theirs(leaf) else leaf
 
 
 def _bare(mission: Mission) -> Mission:
@@ -145,7 +151,7 @@ def _parts(value: Any) -> Any:
 
 def _shape(value: Any, numbers: list[float]) -> Any:
     """All of a value but its numbers, which are put into a list."""
-    if isinstance(value, float):
+    if _is_number(value):
         numbers.append(value)
         return float
     parts = _parts(value)

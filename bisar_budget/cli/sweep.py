@@ -251,7 +251,9 @@ class _Run:
         each = max((seconds - before) / (tried - tried / _LARGER), seconds / tried / 10)
         workers = self.kept.workers if self.kept else None
         threads = workers.threads if workers else min(self.jobs, cores())
-        is_slow = Asked(self.mission, self.cases, columns=self.columns, model=self.model, today=self.day).chunks().is_slow
+        is_slow = (
+            Asked(self.mission, self.cases, columns=self.columns, model=self.model, today=self.day).chunks().is_slow
+        )
         return each * self.cases.count / (threads if is_slow else 1)  # processes: arrays are faster alone
 
     def _trial(self, count: int) -> float:

@@ -56,7 +56,7 @@ def to_image(mission: Mission, solution: Solution | Comparison, model: str | Non
     text = solution.texts[best.inside.value]
     if solution.is_scale:
         return ToImage(scaled(variation.read(), solution.key, best.inside.value), row, f"factor {text}")
-    return ToImage(variation.read([SetValue(solution.key, text, best.inside.value)]), row, text)
+    return ToImage(variation.read([SetValue(solution.key, text)]), row, text)
 
 
 def imaged(asked: ToImage, progress: Progress = unseen) -> Imaged:

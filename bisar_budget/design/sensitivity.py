@@ -233,7 +233,7 @@ def sensitivity(
     today : date
         Day on which waivers are judged, UTC.
     progress : callable, optional
-        Is told, after each case that is read by itself, how many are done, and how many there are.
+        Is told how many values are done, and how many there are.
 
     Returns
     -------

@@ -6,11 +6,12 @@ these look at many values at once, in the case table. Values in SI and radians; 
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from datetime import date
+from functools import partial
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -39,10 +40,13 @@ _OF_ALL = ", or --scale for all of them"
 PLACES = 65  # of a range
 PLACES_OF_CIRCLE = 181  # every 2 degrees: geometry changes fast where gradients are nearly parallel
 _NARROW = 2e-7  # of the value, between the two sides of a crossing before they are written
-_STEPS = 25  # places at once between the two sides of a crossing: four times are enough for 65 of a range
-_STEPS_OF_TURN = 15  # and around a turn
-_NARROW_TURN = 7e-5  # of two places of the range
+_GOLDEN = (math.sqrt(5) - 1) / 2
+_STEPS_TO_TURN = 20  # a golden section to 7e-5 of two places
 _TURNS = 16  # that are looked for
+_LEVELS, _LEVELS_READ = 5, 2  # steps of a search that are looked ahead; where each case is read, it costs more
+
+# With what is known of values it has an outcome, or a set of values that it needs to know more of.
+Search = Callable[[Mapping[float, "State"]], Any]
 
 
 class State(NamedTuple):
@@ -185,7 +189,7 @@ def solve(
     today : date
         Day on which waivers are judged, UTC.
     progress : callable, optional
-        Is told, after each value of the scan that is read by itself, how many are done, and how many there are.
+        Is told how many values are done, and how many there are.
 
     Returns
     -------
@@ -288,6 +292,7 @@ class _Search:
         hold_to_decisions([check_mission(self.base, today, is_brief=True, is_bare=True), *at_the_end()], row)
         question = Question(mission.data, mission.file, mission.changes, (key,), (), model, today)
         self.table = Table(question._replace(row=row, breaks=self.breaks), mission, [of_table])
+        self.levels = _LEVELS_READ if self.table.to_read else _LEVELS
 
     def places(self) -> list[float]:
         """Values that the scan looks at, in rising order; that of the file is among them."""
@@ -324,59 +329,30 @@ class _Search:
     def crossings(self, borders: Sequence[tuple[State, State]]) -> tuple[Crossing, ...]:
         """Bracket borders between two places, write both sides with few digits, check them as they are written."""
         least = 1e-9 * (self.range.high - self.range.low)  # around 0, where no part of the value is small
-        narrow = list(borders)
-        while True:
-            ladders = [
-                _between(low.value, high.value, _STEPS)
-                if high.value - low.value > _NARROW * max(abs(low.value), abs(high.value), least)
-                else []
-                for low, high in narrow
-            ]
-            if not any(ladders):
-                break
-            for place, steps in enumerate(self._each(ladders)):
-                low, high = narrow[place]
-                narrow[place] = next(
-                    (one, other) for one, other in pairwise([low, *steps, high]) if one.complies != other.complies
-                )
-        texts = [(self.number.text(low.value, is_up=False), self.number.text(high.value, is_up=True)) for low, high in narrow]
-        written = self._each([[self.number.read(text) for text in both] for both in texts])
-        return tuple(_crossing(*sides, *both) for sides, both in zip(narrow, written, strict=True))
-
-    def _each(self, ladders: Sequence[Sequence[float]]) -> list[list[State]]:
-        """States of the values of each ladder, all checked together."""
-        values = [value for ladder in ladders for value in ladder]
-        states = iter(self.states(values) if values else ())
-        return [[next(states) for _ in ladder] for ladder in ladders]
+        narrow = self._searched([partial(_bracketed, low, high, least, self.levels) for low, high in borders])
+        texts = [
+            text
+            for low, high in narrow
+            for text in (self.number.text(low.value, is_up=False), self.number.text(high.value, is_up=True))
+        ]
+        written = iter(self.states([self.number.read(text) for text in texts]) if texts else ())
+        return tuple(_crossing(low, high, next(written), next(written)) for low, high in narrow)
 
     def _turned(self, states: Sequence[State]) -> list[State]:
         """Where the utilization turns between places without a change of compliance, a state that differs in it."""
-        turns: list[tuple[float, float, State]] = []
-        for before, here, after in zip(states, states[1:], states[2:], strict=False):
-            uses = [state.utilization for state in (before, here, after)]
-            if not before.complies == here.complies == after.complies or any(use is None for use in uses):
-                continue
-            first, middle, last = (_sign(here) * use for use in uses if use is not None)
-            ends = [end for end in (first, last) if not _is_alike(end, middle)]  # a turn that rounding makes is none
-            if ends and max(ends) < middle:
-                turns.append((before.value, after.value, here))
-        turns, found = turns[:_TURNS], []
-        widths = {here.value: _NARROW_TURN * (high - low) for low, high, here in turns}
-        while turns:
-            ladders = self._each([_between(low, high, _STEPS_OF_TURN) for low, high, _ in turns])
-            going = []
-            for (low, high, here), steps in zip(turns, ladders, strict=True):
-                differing = next((one for one in steps if one.complies != here.complies and not one.reason), None)
-                if differing is not None:
-                    found.append(differing)
-                elif steps and all(one.utilization is not None for one in steps):
-                    heights = [_sign(here) * (one.utilization or 0.0) for one in steps]
-                    best = heights.index(max(heights))
-                    values = [low, *(one.value for one in steps), high]
-                    if values[best + 2] - values[best] > widths[here.value]:
-                        going.append((values[best], values[best + 2], here))
-            turns = going
-        return found
+        searches = [partial(_turn, *turn, self.levels - 1) for turn in _turns(states)[:_TURNS]]
+        return [state for state in self._searched(searches) if state is not None]
+
+    def _searched(self, searches: Sequence[Search]) -> list[Any]:
+        """Go on with all searches at once, until each has what it looks for."""
+        known: dict[float, State] = {}
+        while True:
+            found = [search(known) for search in searches]
+            needed = {value for one in found if isinstance(one, set) for value in one} - known.keys()
+            if not needed:
+                return found
+            values = sorted(needed)
+            known.update(zip(values, self.states(values), strict=True))
 
     def texts(self, crossings: Sequence[Crossing], nearest: State) -> dict[float, str]:
         """Every value that is said, as the file would have it."""
@@ -386,10 +362,72 @@ class _Search:
         return {value: self.number.text(value) for value in values}
 
 
-def _between(low: float, high: float, count: int) -> list[float]:
-    """Values between two others, as many as floats leave room for."""
-    values = (low + (high - low) * step / (count + 1) for step in range(1, count + 1))
-    return sorted({value for value in values if low < value < high})
+def _bracketed(
+    low: State, high: State, least: float, levels: int, known: Mapping[float, State]
+) -> tuple[State, State] | set[float]:
+    """Halve the interval with a border in it until it is narrow; without a state, the values that may come next."""
+    while high.value - low.value > _NARROW * max(abs(low.value), abs(high.value), least):
+        middle = (low.value + high.value) / 2
+        if not low.value < middle < high.value:
+            break
+        if middle not in known:
+            return _halves(low.value, high.value, levels)
+        state = known[middle]
+        low, high = (state, high) if state.complies == low.complies else (low, state)
+    return low, high
+
+
+def _halves(low: float, high: float, levels: int) -> set[float]:
+    """Every value that so many halvings may look at."""
+    middle = (low + high) / 2
+    if not levels or not low < middle < high:
+        return set()
+    return {middle, *_halves(low, middle, levels - 1), *_halves(middle, high, levels - 1)}
+
+
+def _turns(states: Sequence[State]) -> list[tuple[float, float, State]]:
+    """Places between which the utilization turns without a change of compliance, and the state between them."""
+    found = []
+    for before, here, after in zip(states, states[1:], states[2:], strict=False):
+        uses = [state.utilization for state in (before, here, after)]
+        if not before.complies == here.complies == after.complies or any(use is None for use in uses):
+            continue
+        first, middle, last = (_sign(here) * use for use in uses if use is not None)
+        ends = [end for end in (first, last) if not _is_alike(end, middle)]  # a turn that rounding makes is none
+        if ends and max(ends) < middle:
+            found.append((before.value, after.value, here))
+    return found
+
+
+def _turn(
+    low: float, high: float, here: State, levels: int, known: Mapping[float, State]
+) -> State | set[float] | None:
+    """The first state around a turn whose compliance differs, None if none does, or the values that may come next."""
+    for _ in range(_STEPS_TO_TURN):
+        values = _golden(low, high)
+        if not known.keys() >= set(values):
+            return _sections(low, high, levels)
+        left, right = (known[value] for value in values)
+        for state in (left, right):
+            if state.complies != here.complies and not state.reason:
+                return state
+        if left.utilization is None or right.utilization is None:
+            return None
+        is_left = _sign(here) * left.utilization > _sign(here) * right.utilization
+        low, high = (low, right.value) if is_left else (left.value, high)
+    return None
+
+
+def _golden(low: float, high: float) -> tuple[float, float]:
+    return high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+
+
+def _sections(low: float, high: float, levels: int) -> set[float]:
+    """Every value that so many golden sections may look at."""
+    if not levels:
+        return set()
+    left, right = _golden(low, high)
+    return {left, right, *_sections(low, right, levels - 1), *_sections(left, high, levels - 1)}
 
 
 def _crossing(low: State, high: State, below: State, above: State) -> Crossing:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 _SLOW = 1 / 8  # of cases that are read one by one, from which processes share them out
 _MANY = 8  # parts, from which processes of their own are worth their start
 _TOGETHER = 8192  # cases of a part: their arrays stay in a processor's cache
-_FEW = 128  # cases of a part where each is read
+_FEW = 64  # cases of a part where each is read
 
 Block = tuple[int, int, Mapping[str, Any]]  # first case, the one after the last, values of each key
 
@@ -208,7 +208,10 @@ class Asked:
         cases = self.cases
         places = np.linspace(0, cases.count - 1, _FEW).astype(int)
         some = [cases.values(place, place + 1) for place in places.tolist()]
-        return self.table.reads({one.key: np.concatenate([each[one.key] for each in some]) for one in cases.varied}) / _FEW
+        return (
+            self.table.reads({one.key: np.concatenate([each[one.key] for each in some]) for one in cases.varied})
+            / _FEW
+        )
 
     @cached_property
     def travelling(self) -> "Question":

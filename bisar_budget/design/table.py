@@ -24,7 +24,7 @@ from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.design.quantities import FACTOR, Number, QuestionError, number_of, tree_of
 from bisar_budget.design.scaled import scaled
 from bisar_budget.effects.collections import Geometries, paths_of
-from bisar_budget.faults import MissionError, SetValue
+from bisar_budget.faults import MissionError, SetNumber, SetValue
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import unknown_id
 from bisar_budget.findings.status import RANK, STATUS
@@ -224,9 +224,7 @@ class Variation:
 
     def at(self, values: Mapping[Number, float], changes: Sequence[SetValue] = ()) -> Mission:
         """Read the mission with other numbers, in SI, after other changes; raises `MissionError`."""
-        numbers = [
-            SetValue(one.key, f"{value!r} {one.dimension.si}".rstrip(), value) for one, value in values.items()
-        ]
+        numbers = [SetNumber.of(one.key, value, one.dimension.si) for one, value in values.items()]
         return self.read([*changes, *numbers])
 
 
@@ -306,7 +304,7 @@ class Table:
     def part(self, start: int, stop: int, values: Mapping[str, Any], progress: Progress = unseen) -> Part:
         """Check cases `start` to `stop`, whose values are (stop - start,).
 
-        `progress` is told, after each that is read, how many are done, and how many there are.
+        `progress` is told how many are done, and how many there are: after each that is read, and in the end.
         """
         cases = stop - start
         found: dict[str, Values] = {key: np.asarray(values[key], dtype=object) for key in self.question.choices}
@@ -394,6 +392,7 @@ class Table:
         read = self._all_read(found, others.tolist(), places, progress)
         for mission, some in stacked(read):
             self._check(found, np.array(places)[some], mission, _geometries_of(mission))
+        progress(cases, cases)
 
     def _arrays(self, found: Mapping[str, Values], cases: int) -> tuple[Places, Mission, Geometries]:
         """The cases whose numbers can be put into the mission, the mission with them, and its geometry."""

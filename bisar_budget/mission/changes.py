@@ -8,7 +8,7 @@ from typing import Any
 
 import yaml
 
-from bisar_budget.faults import Changed, InvalidValueError, KeyPath, SetValue, shown
+from bisar_budget.faults import Changed, InvalidValueError, KeyPath, SetNumber, SetValue, shown
 from bisar_budget.mission.readers import INVALID, is_place
 from bisar_budget.mission.tree import MAX_BYTES, Tree, UnusableError, events
 
@@ -120,7 +120,7 @@ def _put(container: Any, name: str | int, value: Any) -> None:
 
 def _value(tree: Tree, change: SetValue, path: KeyPath) -> Any:
     """Read the text of the value as the file's own would be; its faults name the option. A number is as it is."""
-    if change.number is not None:
+    if isinstance(change, SetNumber):
         return change.number
     try:
         next_event = events(change.text)

@@ -1,8 +1,8 @@
 """How a value of a mission file is read: one reader per kind of value, which also writes its JSON Schema.
 
 A section of the file is a `NamedTuple` whose keys are annotated with `Key(reader, description)`; see `model`.
-Readers are given what stands in the file (text, list or mapping; of a case a number in SI), say what is wrong with it through
-`report`, and return `INVALID` when they said something. This does for a mission file what a validation
+Readers are given what stands in the file (text, list or mapping; of a case a number in SI), say what is wrong with it
+through `report`, and return `INVALID` when they said something. This does for a mission file what a validation
 library would, in a fifth of the import time: `check` starts in every commit of somebody's repository.
 """
 
