@@ -9,6 +9,7 @@ import math
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
+from functools import cached_property
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -32,7 +33,7 @@ from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.load import mission_of
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.named import Named
-from bisar_budget.mission.tree import read_tree
+from bisar_budget.mission.tree import Tree, read_tree
 from bisar_budget.workers import Progress, unseen
 
 ALIKE = 1e-9  # of a utilization: a common error along x and along y may bind alike, but for rounding
@@ -206,8 +207,12 @@ class Variation:
 
     def __init__(self, mission: Mission, model: str | None, named: Named | None = None) -> None:
         self.mission, self.model = mission, model
-        self.tree = read_tree(mission.data, mission.file)
         self.parse = mission_of if named is None else named.parse
+
+    @cached_property
+    def tree(self) -> Tree:
+        """What the file says."""
+        return read_tree(self.mission.data, self.mission.file)
 
     def read(self, changes: Sequence[SetValue] = ()) -> Mission:
         """Read the mission with values in place of its own.
@@ -306,12 +311,7 @@ class Table:
 
         `progress` is told how many are done, and how many there are: after each that is read, and in the end.
         """
-        cases = stop - start
-        found: dict[str, Values] = {key: np.asarray(values[key], dtype=object) for key in self.question.choices}
-        found |= {number.key: np.asarray(values[number.key], dtype=float) for number in self.numbers}
-        columns = [(column.name, column.is_text) for column in (*GEOMETRY, *VERDICT, REASON)]
-        for name, is_text in (*columns, *((one.name, one.is_text) for one in self.asked)):
-            found[name] = np.full(cases, "", dtype=object) if is_text else np.full(cases, math.nan)
+        found = self._columns(values, stop - start)
         if self.question.choices:
             for table, places in self._by_words(found):
                 numbers = {number.key: found[number.key][places] for number in self.numbers}
@@ -323,8 +323,8 @@ class Table:
 
     def reads(self, values: Mapping[str, Any]) -> int:
         """How many of some cases are read, each by itself."""
-        found = {key: np.asarray(column) for key, column in values.items()}
-        cases = next(iter(found.values())).size
+        cases = len(next(iter(values.values())))
+        found = self._columns(values, cases)
         if self.question.choices:
             return sum(
                 table.reads({one.key: found[one.key][places] for one in self.numbers})
@@ -332,6 +332,15 @@ class Table:
                 if self.numbers
             )
         return cases - int(self._arrays(found, cases)[0].size)
+
+    def _columns(self, values: Mapping[str, Any], cases: int) -> dict[str, Values]:
+        """The values of some cases, and room for what is found of them."""
+        found: dict[str, Values] = {key: np.asarray(values[key], dtype=object) for key in self.question.choices}
+        found |= {number.key: np.asarray(values[number.key], dtype=float) for number in self.numbers}
+        columns = [(column.name, column.is_text) for column in (*GEOMETRY, *VERDICT, REASON)]
+        for name, is_text in (*columns, *((one.name, one.is_text) for one in self.asked)):
+            found[name] = np.full(cases, "", dtype=object) if is_text else np.full(cases, math.nan)
+        return found
 
     # ---------------------------------------------------------------- one mission for the same words
     def _by_words(self, found: Mapping[str, Values]) -> Iterator[tuple["Table", Places]]:
