@@ -341,7 +341,7 @@ class _Beside:
             if number is not None:
                 for one, value in number.at(number.value + steps * number.step).items():
                     values[one.key][place] = value
-        found = self.table.part(0, len(cases), values, progress).values
+        found = self.table.watched(values, progress)
         texts = ("worst_row", "binding_requirement", "reason")
         asked = [found[f"{name}.utilization"] if name else [None] * len(cases) for name in (self.row, self.worst)]
         return [

@@ -312,7 +312,7 @@ class _Search:
     def states(self, values: Sequence[float], progress: Progress = unseen) -> list[State]:
         """Check the mission with each of many values."""
         (number,) = self.table.numbers
-        found = self.table.part(0, len(values), {number.key: np.array(values)}, progress).values
+        found = self.table.watched({number.key: np.array(values)}, progress)
         columns = (*VERDICT, *GEOMETRY[:2], REASON)
         lines = zip(values, *(found[column.name].tolist() for column in columns), strict=True)
         return [self._of_line(*line) for line in lines]

@@ -10,6 +10,7 @@ from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
 from functools import cached_property
+from itertools import pairwise
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -36,6 +37,7 @@ from bisar_budget.mission.named import Named
 from bisar_budget.mission.tree import Tree, read_tree
 from bisar_budget.workers import Progress, unseen
 
+_SOON, _SELDOM = (2, 12), 48  # cases after which it is told how far many are
 ALIKE = 1e-9  # of a utilization: a common error along x and along y may bind alike, but for rounding
 
 Values = NDArray[np.float64] | NDArray[np.object_]
@@ -306,11 +308,22 @@ class Table:
             if one.reader is not FACTOR and not is_held(self.mission, one.key, is_stated=one.value is not None)
         }
 
-    def part(self, start: int, stop: int, values: Mapping[str, Any], progress: Progress = unseen) -> Part:
-        """Check cases `start` to `stop`, whose values are (stop - start,).
+    def watched(self, values: Mapping[str, Any], progress: Progress = unseen) -> dict[str, Values]:
+        """Check cases, and tell how many are done, and how many there are: soon, and then seldom, for it costs time."""
+        cases = len(next(iter(values.values())))
+        ends = (
+            [cases]
+            if progress is unseen
+            else [end for end in (*_SOON, *range(_SELDOM, cases, _SELDOM)) if end < cases]
+        )
+        parts = []
+        for start, stop in pairwise(dict.fromkeys((0, *ends, cases))):
+            parts.append(self.part(start, stop, {key: column[start:stop] for key, column in values.items()}).values)
+            progress(stop, cases)
+        return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
-        `progress` is told how many are done, and how many there are: after each that is read, and in the end.
-        """
+    def part(self, start: int, stop: int, values: Mapping[str, Any]) -> Part:
+        """Check cases `start` to `stop`, whose values are (stop - start,)."""
         found = self._columns(values, stop - start)
         if self.question.choices:
             for table, places in self._by_words(found):
@@ -318,7 +331,7 @@ class Table:
                 for name, of_some in table.part(0, places.size, numbers).values.items():
                     found[name][places] = of_some
         else:
-            self._fill(found, progress)
+            self._fill(found)
         return Part(start, stop, found)
 
     def reads(self, values: Mapping[str, Any]) -> int:
@@ -390,18 +403,16 @@ class Table:
         return mission
 
     # ---------------------------------------------------------------- all together
-    def _fill(self, found: dict[str, Values], progress: Progress) -> None:
+    def _fill(self, found: dict[str, Values]) -> None:
         """Check every case."""
         cases = found["utilization"].size
         some, mission, geometries = self._arrays(found, cases)
         if some.size:
             self._check(found, some, mission, geometries)
-        others = np.delete(np.arange(cases), some)
         places: list[int] = []
-        read = self._all_read(found, others.tolist(), places, progress)
+        read = self._all_read(found, np.delete(np.arange(cases), some).tolist(), places)
         for mission, some in stacked(read):
             self._check(found, np.array(places)[some], mission, _geometries_of(mission))
-        progress(cases, cases)
 
     def _arrays(self, found: Mapping[str, Values], cases: int) -> tuple[Places, Mission, Geometries]:
         """The cases whose numbers can be put into the mission, the mission with them, and its geometry."""
@@ -422,11 +433,8 @@ class Table:
         mission = picked(mission, np.flatnonzero(is_sure))
         return some[is_sure], mission, _geometries_of(mission)
 
-    def _all_read(
-        self, found: dict[str, Values], others: Sequence[int], places: list[int], progress: Progress
-    ) -> Iterator[Mission]:
+    def _all_read(self, found: dict[str, Values], others: Sequence[int], places: list[int]) -> Iterator[Mission]:
         """Read other cases, one after the other, and note the place of each that is a mission."""
-        done, cases = found["utilization"].size - len(others), found["utilization"].size
         for place in others:
             mission = self._read(found, place)
             if mission is not None and self.is_alone:
@@ -434,8 +442,6 @@ class Table:
             elif mission is not None:
                 places.append(place)
                 yield mission
-            done += 1
-            progress(done, cases)
 
     def _check(self, found: dict[str, Values], some: Places, mission: Mission, geometries: Geometries) -> None:
         """Judge the cases of a mission together, those that need as many nodes."""

@@ -312,6 +312,23 @@ def test_what_decides_more_than_itself_is_read_and_judged_together() -> None:
     assert list(whole["binding_requirement"]) == ["pslr"] * 2
 
 
+@pytest.mark.parametrize(
+    ("name", "axes"),
+    [
+        ("sentinel1_aircraft_log", {"collection__aperture_time": [0.2, 1.0, 6.0, 900.0]}),  # longer than the log
+        ("astra_drone", {"scene__latitude": [0.5, 0.8], "platforms__receiver__altitude": [50.0, 2000.0]}),
+    ],
+)
+def test_paths_that_are_found_anew_are_stacked(name, axes) -> None:
+    """Orders of fits differ, and so do words of doubt; some cases are below the horizon, or beyond a log."""
+    mission = load_mission(str(MISSIONS / f"{name}.yaml"))
+    cases = grid(mission, **axes)
+    whole, by_case = swept(mission, cases)
+    assert by_case == 0
+    assert "error" in whole["status"]
+    assert_as_checked(mission, cases, whole)
+
+
 _LINK = "{error: 1 deg, interval: 0.3 s}"
 _FIGURES: dict[str, Any] = {
     "synchronization": {"error": "1 deg", "interval": "0.3 s"},
