@@ -309,7 +309,7 @@ class Table:
         }
 
     def watched(self, values: Mapping[str, Any], progress: Progress = unseen) -> dict[str, Values]:
-        """Check cases, and tell how many are done, and how many there are: soon, and then seldom, for it costs time."""
+        """Check cases, and tell how many of how many are done: soon, and then seldom, for it costs time."""
         cases = len(next(iter(values.values())))
         ends = (
             [cases]
