@@ -1,4 +1,4 @@
-"""Solving missions for the aperture time: one by one ÷ by arrays, and whether both find the same.
+"""Solving missions for the aperture time, and their sensitivities, beside as many checks as a range has places.
 
 Each example of specs/missions, then two of them with a radius of the scene. In one process and one thread.
 
@@ -8,12 +8,13 @@ Each example of specs/missions, then two of them with a radius of the scene. In 
 import argparse
 import statistics
 import time
+from collections.abc import Callable
 from datetime import date
 from pathlib import Path
-from unittest.mock import patch
 
-from bisar_budget.design import solve as solving
-from bisar_budget.design.solution import Solution
+from bisar_budget.budget.check import check_mission
+from bisar_budget.design.sensitivity import sensitivity
+from bisar_budget.design.solve import PLACES, solve
 from bisar_budget.faults import SetValue
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.model import Mission
@@ -23,34 +24,23 @@ DAY = date(2026, 1, 1)
 WITH_A_SCENE = ("rigling_moses_section_v", "uav_pair_l_band")
 
 
-def solved(mission: Mission) -> tuple[Solution, float]:
-    """A solution, and the seconds of processor time that it takes."""
+def timed(task: Callable[[], object]) -> float:
+    """Processor time of a task. [s]"""
     began = time.process_time()
-    found = solving.solve(mission, "collection.aperture_time", today=DAY)
-    return found, time.process_time() - began
-
-
-def apart(one: Solution, other: Solution) -> float:
-    """Largest relative distance of two crossings; the searches bracket each within 1e-6."""
-    pairs = zip(one.crossings, other.crossings, strict=True)
-    return max((abs(a.inside.value / b.inside.value - 1) for a, b in pairs), default=0.0)
+    task()
+    return time.process_time() - began
 
 
 def compare(name: str, mission: Mission, runs: int) -> None:
-    """Print medians of both, in turn, and their ratio."""
-    together, alone = [], []
-    for _ in range(runs):
-        found, seconds = solved(mission)
-        together.append(seconds)
-        with patch.object(solving._Search, "_engine", lambda *_: None):
-            other, seconds = solved(mission)
-        alone.append(seconds)
-    by_case, by_arrays = statistics.median(alone), statistics.median(together)
-    print(
-        f"  {name:34} {1e3 * by_case:7.0f} ms ÷ {1e3 * by_arrays:6.0f} ms = {by_case / by_arrays:5.1f}   "
-        f"{len(found.crossings)} crossings, apart by {apart(found, other):.1e}",
-        flush=True,
+    """Print medians of all three, in turn."""
+    tasks = (
+        lambda: [check_mission(mission, DAY, is_brief=True, is_bare=True) for _ in range(PLACES)],
+        lambda: solve(mission, "collection.aperture_time", today=DAY),
+        lambda: sensitivity(mission, today=DAY),
     )
+    each = [[timed(task) for task in tasks] for _ in range(runs)]
+    checks, solving, asking = (1e3 * statistics.median(seconds) for seconds in zip(*each, strict=True))
+    print(f"  {name:34} {checks:7.0f} ms   {solving:6.0f} ms   {asking:6.0f} ms", flush=True)
 
 
 def main() -> None:
@@ -58,7 +48,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--runs", type=int, default=3)
     runs = parser.parse_args().runs
-    print("solve for the aperture time: one by one ÷ by arrays, CPU")
+    print(f"{PLACES} checks, solve for the aperture time, sensitivity: CPU")
     for path in sorted(MISSIONS.glob("*.yaml")):
         compare(path.stem, load_mission(str(path)), runs)
     for name in WITH_A_SCENE:

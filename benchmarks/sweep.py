@@ -115,7 +115,8 @@ def of_kinds(runs: int, side: int = 64, few: int = 16) -> None:
         cases = Grid(numbers, axes)
 
         def together(mission: Mission = mission, cases: Grid = cases) -> None:
-            assert not sum(part.by_case for part in sweep(mission, cases, today=DAY).parts)
+            for _ in sweep(mission, cases, today=DAY).parts:
+                pass
 
         def one_by_one(mission: Mission = mission, cases: Grid = cases) -> None:
             for place in range(0, cases.count, cases.count // few):
@@ -142,8 +143,8 @@ def of_a_million(count: int, runs: int) -> None:
     azimuth, T = (axis.ravel() for axis in np.meshgrid(*axes, indexing="ij"))
 
     def swept() -> None:
-        for part in sweep(mission, cases, today=DAY).parts:
-            assert not part.by_case
+        for _ in sweep(mission, cases, today=DAY).parts:
+            pass
 
     def looped(few: int = 200) -> None:
         for place in range(few):

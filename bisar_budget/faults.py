@@ -107,6 +107,19 @@ class SetValue(NamedTuple):
         return f"--set {printable(self.key)}"
 
 
+class SetNumber(SetValue):
+    """A number in SI in the same place, as of a case of a sweep: readers take it as it is, the text is for people."""
+
+    number: float
+
+    @classmethod
+    def of(cls, key: str, number: float, unit: str) -> "SetNumber":
+        """The number for a key; `unit` is the one of SI."""
+        found = cls(key, f"{number!r} {unit}".rstrip())
+        found.number = number
+        return found
+
+
 class Changed:
     """Stands where the parser's event of a value would: the value is from an option, and has no line."""
 

@@ -1,7 +1,7 @@
-"""Which missions, keys and cases arrays hold; what they do not, `check_mission` does one by one."""
+"""Which keys take an array of numbers, and which of the cases then are missions; the others are read as files are."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -21,16 +21,12 @@ from bisar_budget.ranges.exact_ranges import Floats
 SAFE = 1 + 1e-6  # nearer to a border of what forms an image, a case is checked by itself
 
 
-def not_held(mission: Mission, keys: Mapping[str, bool]) -> str:
-    """Say which of the keys that vary arrays do not hold; empty where they hold all of them.
+def is_held(mission: Mission, key: str, *, is_stated: bool) -> bool:
+    """Whether an array can take the place of a number, which the file states or does not.
 
-    `keys` are true where the file states them. Arrays hold everything else that a mission can have. A path that the
-    Earth, an orbit or a log decides is held as long as nothing varies that it follows from.
+    It cannot where the number decides more than itself: a path of an orbit or a log, the place of the scene on the
+    Earth, an element of a covariance matrix.
     """
-    return next((key for key, is_stated in keys.items() if not _is_held(mission, key, is_stated)), "")
-
-
-def _is_held(mission: Mission, key: str, is_stated: bool) -> bool:
     section, *parts = parts_of(key)
     if section == "platforms":
         platform: Platform = getattr(mission.platforms, parts[0])
@@ -69,7 +65,10 @@ _FREE = {
 
 
 def is_image(mission: Mission, geometries: BistaticGeometry, cases: int) -> NDArray[np.bool_]:
-    """Whether each case forms an image, with room to spare; `mission` may hold arrays, (cases,)."""
+    """Whether each case forms an image, with room to spare; `mission` may hold arrays, (cases,).
+
+    A file that is read says so to the last digit, and why not.
+    """
     is_one = _has_possible_figures(mission, cases)
     half = np.asarray(mission.collection.aperture_time) / 2
     still: Any = True

@@ -12,7 +12,7 @@ from bisar_budget.cli.waiting import watched
 if TYPE_CHECKING:
     from bisar_budget.cluster.scheduler import Workers
     from bisar_budget.design.sweep import Asked
-    from bisar_budget.design.swept import Swept
+    from bisar_budget.design.table import Swept
 
 
 class Keeping(NamedTuple):

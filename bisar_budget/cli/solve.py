@@ -27,8 +27,8 @@ from bisar_budget.cli.streams import (
 from bisar_budget.cli.waiting import FORMING, foretell, watched, watched_checks
 
 if TYPE_CHECKING:
-    from bisar_budget.design.compared import Comparison
-    from bisar_budget.design.solution import Solution
+    from bisar_budget.design.compare import Comparison
+    from bisar_budget.design.solve import Solution
     from bisar_budget.faults import SetValue
     from bisar_budget.mission.model import Mission
 

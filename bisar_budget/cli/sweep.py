@@ -34,7 +34,7 @@ from bisar_budget.resources import cores
 
 if TYPE_CHECKING:
     from bisar_budget.design.cases import Cases
-    from bisar_budget.design.swept import Part, Swept
+    from bisar_budget.design.table import Part, Swept
     from bisar_budget.faults import SetValue
     from bisar_budget.findings.requirement import Override
     from bisar_budget.mission.model import Mission
@@ -212,7 +212,7 @@ class _Run:
     ) -> None:
         self.mission, self.cases, self.columns, self.model = mission, cases, columns, model
         self.day, self.jobs, self.kept, self.overrides = day, jobs, kept, overrides
-        self.done = self.by_case = self.complying = self.unevaluated = self.missing = 0
+        self.done = self.complying = self.unevaluated = self.missing = 0
 
     def swept(self, cases: "Cases", columns: Sequence[str]) -> "Swept":
         """Ask the engine."""
@@ -236,12 +236,14 @@ class _Run:
 
     def _seconds(self) -> float:
         """Measure how long all cases will take, by some of them."""
+        from bisar_budget.design.sweep import Asked
+
         tried = 100
         self._trial(tried)  # it imports what it needs
-        before = self._trial(tried)[0]
+        before = self._trial(tried)
         while True:
             tried *= _LARGER
-            seconds, alone = self._trial(tried)
+            seconds = self._trial(tried)
             if seconds > _TRIAL or _LARGER * tried > self.cases.count:
                 break
             before = seconds
@@ -249,17 +251,20 @@ class _Run:
         each = max((seconds - before) / (tried - tried / _LARGER), seconds / tried / 10)
         workers = self.kept.workers if self.kept else None
         threads = workers.threads if workers else min(self.jobs, cores())
-        sharing = threads if alone > tried / 2 else 1  # processes: arrays are faster alone
-        return each * self.cases.count / sharing
+        is_slow = (
+            Asked(self.mission, self.cases, columns=self.columns, model=self.model, today=self.day).chunks().is_slow
+        )
+        return each * self.cases.count / (threads if is_slow else 1)  # processes: arrays are faster alone
 
-    def _trial(self, count: int) -> tuple[float, int]:
-        """Check some of the cases: how long they take, and how many are checked one by one."""
+    def _trial(self, count: int) -> float:
+        """How long it takes to check some of the cases. [s]"""
         from bisar_budget.design.cases import some_of
 
         parts = self.swept(some_of(self.cases, count), self.columns).parts
         began = perf_counter()
-        alone = sum(part.by_case for part in parts)
-        return perf_counter() - began, alone
+        for _ in parts:
+            pass
+        return perf_counter() - began
 
     def write(self, output: str | None, plot: str | None, plot_column: str | None, is_polar: bool) -> None:
         """Check the cases, write the table as they come, then the plot, and say what was found."""
@@ -314,7 +319,6 @@ class _Run:
                 self.unevaluated += times * (name == "not_evaluated")
                 self.complying += times * (name != "error" and not STATUS[name].fails)
             self.done += part.stop - part.start
-            self.by_case += part.by_case
             if gathered is not None:
                 gathered.add(part)
             yield part
@@ -352,7 +356,7 @@ class _Run:
         return 0 < self.unevaluated == self.done - self.missing
 
     def _summary(self) -> str:
-        """One line: how many cases, how many comply, how they were checked."""
+        """One line: how many cases, and how many comply."""
         if not self.done:
             return f"{printable(self.mission.name)}: no case was checked"
         said = [f"{self.done} case{'' if self.done == 1 else 's'}"]
@@ -363,7 +367,6 @@ class _Run:
             said.append(f"{self.unevaluated} not evaluated")
         if self.missing:
             said.append(f"{self.missing} without a mission")
-        said.append(f"{_part(self.by_case, self.done)} checked one by one")
         return f"{printable(self.mission.name)}: {', '.join(said)}"
 
 

@@ -52,21 +52,22 @@ def watched(label: str, total: int = 1, done: int = 0) -> "Iterator[Progress]":
 def watched_checks(name: str) -> "Iterator[Progress]":
     """Give what takes how many checks of a mission are done, and how many there will be.
 
-    The second tells how long all will take: the first imports what it needs. A bar shows them after a moment.
+    The second time it is told says how long all will take: the first imports what it needs. A bar shows them after a
+    moment.
     """
     began = monotonic()
     with ExitStack() as ends:
         shown: list[Progress] = []
-        since, calls = began, 0
+        since, calls, before = began, 0, 0
 
         def progress(done: int, total: int) -> None:
-            nonlocal since, calls
+            nonlocal since, calls, before
             now, calls = monotonic(), calls + 1
             if calls == 2:
-                left = total - done + 2
-                doing = f"Checking {printable(name)} for {left} values or more"
-                foretell((now - since) * left, doing, "fewer declared errors and --model published take less")
-            since = now
+                doing = f"Checking {printable(name)} for {total} values or more"
+                seconds = (now - since) / max(1, done - before) * total
+                foretell(seconds, doing, "fewer declared errors and --model published take less")
+            since, before = now, done
             if not shown:
                 if now - began < _MOMENT:
                     return

@@ -18,7 +18,7 @@ import numpy as np
 from bisar_budget import __version__
 from bisar_budget.design.cases import Cases, CaseTable, Grid
 from bisar_budget.design.sweep import Asked, Chunks
-from bisar_budget.design.swept import Part
+from bisar_budget.design.table import Part
 from bisar_budget.faults import changes_words
 from bisar_budget.memory import hold_room
 from bisar_budget.resources import locked
@@ -45,13 +45,13 @@ def check_libraries(option: str, room: int, extra: str, *modules: str) -> None:
 def question_of(asked: Asked, chunks: Chunks) -> Question:
     """All that decides the values of parts, by the words that a message has for it: equal ones can be mixed."""
     question, swept = asked.travelling, asked.swept(iter(()))
-    waives = bool(asked.engine.mission.waivers)  # the day decides about waivers alone
+    waives = bool(asked.table.mission.waivers)  # the day decides about waivers alone
     return {
         "the version of bisar-budget was": __version__,
         "the hash of the mission file was": swept.mission_sha256[:16],
         "the hash of what the mission names was": question.named.sha256[:16] if question.named else "",
         "--set was": changes_words(question.changes),
-        "the model that decides was": asked.engine.mission.gating_model,
+        "the model that decides was": asked.table.mission.gating_model,
         "--date was": question.today.isoformat() if waives else "",
         "the cases were": f"{asked.cases.count} of {', '.join(swept.varied)}",
         "the hash of the values of the cases was": _hash_of(asked.cases)[:16],
@@ -140,7 +140,7 @@ class PartsFolder:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        said = {"question": json.dumps(self.question), "start": str(part.start), "by_case": str(part.by_case)}
+        said = {"question": json.dumps(self.question), "start": str(part.start)}
         kinds = {name: pa.string() if values.dtype == object else None for name, values in part.values.items()}
         table = pa.table({name: pa.array(values, kinds[name]) for name, values in part.values.items()})
         buffer = io.BytesIO()
@@ -167,7 +167,7 @@ class PartsFolder:
             try:
                 table = pq.ParquetFile(file, page_checksum_verification=True).read(use_threads=False)
                 values = {name: table.column(name).to_numpy() for name in table.column_names}
-                part = Part(start, start + table.num_rows, values, int(table.schema.metadata[b"by_case"]))
+                part = Part(start, start + table.num_rows, values)
             except (OSError, KeyError, ValueError, pa.ArrowException) as error:
                 if getattr(error, "errno", None) is None:  # what it holds is at fault, not the system
                     self.done.discard(start)

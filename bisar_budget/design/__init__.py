@@ -4,13 +4,10 @@
 __all__ = [
     "cases",
     "compare",
-    "compared",
     "imaged",
     "quantities",
     "sensitivity",
-    "slopes",
-    "solution",
     "solve",
     "sweep",
-    "swept",
+    "table",
 ]

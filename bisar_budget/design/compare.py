@@ -8,18 +8,81 @@ from datetime import date
 from typing import Any, NamedTuple
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.design.compared import Comparison, PartState
 from bisar_budget.design.quantities import QuestionError, tree_of
-from bisar_budget.design.variation import Standing, Variation, breaking, hold_to_decisions, standing
+from bisar_budget.design.solve import Imaged
+from bisar_budget.design.table import Standing, Variation, breaking, hold_to_decisions, standing
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.findings.mission import MissionFindings
+from bisar_budget.findings.requirement import Override
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.parts import FIGURES, Part, PartError, entries, evidence, find_part, folders
 
 _KINDS = {"motion_error": ("imu", "gnss"), "oscillator": ("oscillator",)}
+
+
+class PartState(NamedTuple):
+    """How the mission stands with one part.
+
+    `figures` are those that the mission takes of it; the file's own stand before them. `silent_on` are figures that
+    the mission takes of other parts of the kind and this one does not state: they stay undeclared. `own_row` uses
+    most of its limit among the rows that rest on these figures alone. `is_given` marks the part that the file names.
+    `reason` says why it does not comply where no row does; empty else.
+    """
+
+    id: str
+    name: str
+    kind: str
+    file: str
+    is_given: bool
+    figures: tuple[str, ...]
+    standing: Standing
+    own_row: str | None = None
+    own_utilization: float | None = None
+    reason: str = ""
+    silent_on: tuple[str, ...] = ()
+
+    @property
+    def complies(self) -> bool:
+        """Whether the mission does with it."""
+        return self.standing.complies
+
+
+class Comparison(NamedTuple):
+    """Parts for one key of one mission.
+
+    `parts` has those that comply first, the smallest margin first, then the others, the nearest miss first. `kinds`
+    are those that were compared, `kept` parts of other kinds that stay. `overridden` are figures that parts have and
+    the file states itself. `imaged` is what images say of the part with the smallest margin, if any were formed.
+    `overrides` is what from outside the file bears on it.
+    """
+
+    file: str
+    name: str
+    key: str
+    target: str
+    row: str | None
+    model: str
+    kinds: tuple[str, ...]
+    kept: tuple[str, ...]
+    overridden: tuple[str, ...]
+    parts: tuple[PartState, ...]
+    changes: tuple[SetValue, ...] = ()
+    imaged: Imaged | None = None
+    overrides: tuple[Override, ...] = ()
+
+    @property
+    def complying(self) -> tuple[PartState, ...]:
+        """The parts with which the mission complies."""
+        return tuple(part for part in self.parts if part.complies)
+
+    @property
+    def status(self) -> str:
+        """Whether `all`, `some` or `none` of the parts comply."""
+        count = len(self.complying)
+        return "none" if count == 0 else "all" if count == len(self.parts) else "some"
 
 
 def is_of_parts(key: str) -> bool:

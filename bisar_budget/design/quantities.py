@@ -146,7 +146,7 @@ def choices_of(tree: dict[str, Any], key: str, text: str) -> Choices | None:
 def as_number(key: str, reader: Quantity, value: Any) -> Number:
     """Put together a number and the unit that it is said in; `value` is what the file says, None if nothing."""
     dimension = reader.dimension
-    number = parse_quantity(value, dimension) if isinstance(value, str) else None
+    number = parse_quantity(value, dimension) if isinstance(value, str) else value if type(value) is float else None
     unit = _UNIT.sub("", value).strip() if isinstance(value, str) else ""
     unit = unit if unit in dimension.scales else units.normal_unit(unit)
     if unit not in dimension.scales or not unit:

@@ -1,8 +1,9 @@
 """A mission whose stated errors are all larger by a factor."""
 
-import math
 from collections.abc import Sequence
 from typing import Any, cast
+
+import numpy as np
 
 from bisar_budget import units
 from bisar_budget.design.quantities import QuestionError
@@ -20,10 +21,10 @@ _ACCEPTED = (
 )
 
 
-def scaled(mission: Mission, key: str, factor: float) -> Mission:
+def scaled(mission: Mission, key: str, factor: Any) -> Mission:
     """Multiply every error that stands below a key: amplitudes and sigmas, those of parts of the catalogue too.
 
-    Frequencies, correlation times and correlations stay.
+    Frequencies, correlation times and correlations stay. The factor may be an array (cases,).
 
     Raises
     ------
@@ -39,7 +40,7 @@ def scaled(mission: Mission, key: str, factor: float) -> Mission:
     return cast(Mission, changed)
 
 
-def _below(value: Any, reader: Reader, parts: Sequence[str], factor: float, key: str) -> tuple[Any, int]:
+def _below(value: Any, reader: Reader, parts: Sequence[str], factor: Any, key: str) -> tuple[Any, int]:
     """Go down to the key, and put what is scaled in its place on the way back."""
     if not parts:
         return _scaled(value, reader, factor, is_clock=parts_of(key)[0] == "timing_error")
@@ -55,7 +56,7 @@ def _below(value: Any, reader: Reader, parts: Sequence[str], factor: float, key:
     raise QuestionError(f"{key}: the mission has no {part}; {_ACCEPTED}")
 
 
-def _scaled(value: Any, reader: Reader, factor: float, is_clock: bool) -> tuple[Any, int]:
+def _scaled(value: Any, reader: Reader, factor: Any, is_clock: bool) -> tuple[Any, int]:
     """Multiply what is below a value; with it the number of numbers that are not zero."""
     reader = _form(reader, value)
     if value is None:
@@ -72,12 +73,12 @@ def _scaled(value: Any, reader: Reader, factor: float, is_clock: bool) -> tuple[
         return tuple(entry for entry, _ in pairs), sum(found for _, found in pairs)
     if isinstance(reader, Quantity):
         if reader.dimension in _LEVELS:
-            return value + 20 * math.log10(factor), 1
+            return value + 20 * np.log10(factor), 1
         if reader.dimension in _KEPT and not is_clock:
             return value, 0
-        return value * factor, int(value != 0)
+        return value * factor, int(np.any(value))
     if hasattr(value, "sigmas"):  # a covariance
-        return value._replace(sigmas=tuple(sigma * factor for sigma in value.sigmas)), int(any(value.sigmas))
+        return value._replace(sigmas=tuple(sigma * factor for sigma in value.sigmas)), int(np.any(value.sigmas))
     return value, 0
 
 

@@ -1,26 +1,211 @@
-"""What each number of a mission does to its worst utilization, by differences of whole checks."""
+"""What each number of a mission does to its worst utilization, by differences of whole checks.
+
+Every number that the file states, or takes from a part, is changed by itself, and all of these cases are checked
+together. Where the shares of a budget follow what is declared, it is also seen what an error that is relaxed costs
+the others. Values in SI and radians.
+"""
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import date
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import numpy as np
+
+from bisar_budget import units
 from bisar_budget.budget.check import check_mission
-from bisar_budget.design.quantities import QuestionError, tree_of
-from bisar_budget.design.relaxing import is_balanced, relaxed_errors
+from bisar_budget.design.quantities import FACTOR, Number, QuestionError, as_number, form_of, tree_of
 from bisar_budget.design.scaled import scaled
-from bisar_budget.design.slopes import Sensitivity, Slope
-from bisar_budget.design.stated import Skipped, Stated, stated_numbers
-from bisar_budget.design.variation import Variation, deciding_row, hold_to_decisions
-from bisar_budget.faults import MissionError, SetValue
+from bisar_budget.design.table import Question, Table, Variation, hold_to_decisions, standing
+from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.faults import SetValue
+from bisar_budget.findings.mission import MissionFindings
+from bisar_budget.findings.requirement import Override
 from bisar_budget.findings.row import Row
-from bisar_budget.mission.model import Mission
+from bisar_budget.findings.status import STATUS
+from bisar_budget.mission.bounds import DIRECTION, ELEVATION, LATITUDE
+from bisar_budget.mission.model import MISSION, SHARES, MetricSplits, Mission
 from bisar_budget.mission.parts import taken_figures
+from bisar_budget.mission.readers import INVALID, Choice, ListOf, Quantity, Reader, Triple, Version, Whole
 from bisar_budget.workers import Progress, unseen
 
-_BREAKS = ("fail",)
+LITTLE = 1e-4  # of a utilization: less of a change is not shown
+EVEN = 0.01  # part of every number for which effects are compared
+_FURTHEST = math.log(1e6)  # times: a number that would have to change by more decides nothing
 _NOTHING = 1e-9  # of a utilization: what rounding leaves of a check
+_RELAXED = 2.0  # times, an error that is relaxed
+_SAME = 1e-9  # of what is declared
+# Half of a difference. A power law of exponent p is wrong by (p - 1)(p - 2)/6 of its square, 2e-4 for the inverse
+# square; allowables by exact ranges end their search within 1e-5 of a limit, which is 1e-3 of a hundredth.
+RELATIVE_STEP = 0.01
+# Sines and decibels bend faster than powers: 3e-6 of a slope, and 1.4e-4.
+DIRECTION_STEP = math.radians(0.25)
+LEVEL_STEP = 0.25  # dB
+_EARTH = 6.371e6  # m, mean radius
+
+_LEVELS = (units.POWER_RATIO, units.PHASE_NOISE, units.TONE)
+
+
+# ---------------------------------------------------------------- what is found
+class Skipped(NamedTuple):
+    """A key that is left out, what the file says there, and why."""
+
+    key: str
+    text: str
+    reason: str
+
+
+class Slope(NamedTuple):
+    """What one number of the file does.
+
+    `text` is its value as the file has it, `value` the same in `unit`; of a covariance the factor 1 on its sigmas.
+    `per_text` says how much more of it `change` is for, `per` the same in SI, signed like the value, and `measure`
+    the same by one measure for all numbers: a part of the number, of a radian, of a power, of a range. `change` is
+    that of the worst utilization, `row_change` that of the row that was asked for; None where there is none. Both are
+    differences over values `step` to either side, or, where there is no mission on one side, over two steps on the
+    other (`difference`: central, forward, backward). `row_below` and `row_above` have the worst utilization at the
+    smaller and the larger end of the difference, in magnitude; `is_mixed` is whether the row that has it at the value
+    itself uses less at an end: the change is then made of the slopes of two rows. `part` is the part of the catalogue
+    that the number is taken from; empty if the file states it.
+    """
+
+    key: str
+    text: str
+    value: float
+    unit: str
+    per: float
+    per_text: str
+    step: float
+    difference: str
+    change: float
+    row_change: float | None
+    row_below: str
+    row_above: str
+    is_mixed: bool
+    part: str = ""
+    measure: float = 0.01
+
+    @property
+    def given(self) -> str:
+        """Its value as the file has it, and the part that it is from."""
+        return f"{self.text} ({self.part})" if self.part else self.text
+
+    @property
+    def effect(self) -> float:
+        """Change of what was asked for: the row, else the worst utilization."""
+        return self.change if self.row_change is None else self.row_change
+
+    @property
+    def even_effect(self) -> float:
+        """Effect of the same small part of every number: of itself, of a radian, of a power, of a range."""
+        return self.effect * EVEN / self.measure
+
+    @property
+    def is_proportional(self) -> bool:
+        """Whether it changes by parts of itself."""
+        return self.per_text == "1 %"
+
+
+class Relaxed(NamedTuple):
+    """What doubling one declared error costs the others where shares are balanced.
+
+    `shares_before` and `shares_after` are those of transmitter and receiver. `transmitter` and `receiver` have, of
+    each, the worst utilization of the judged rows that are not of this error, before and after, and the row that has
+    it after; None where there is none.
+    """
+
+    key: str
+    shares_before: tuple[float, float]
+    shares_after: tuple[float, float]
+    transmitter: tuple[str, float, float] | None
+    receiver: tuple[str, float, float] | None
+
+    @property
+    def moves_shares(self) -> bool:
+        """Whether it takes from anybody."""
+        return abs(self.shares_after[0] - self.shares_before[0]) > LITTLE
+
+
+class Sensitivity(NamedTuple):
+    """Numbers of one mission by what they do, the largest effect first.
+
+    `worst_row` has the worst utilization of all rows that are judged and can fail, `requirement` sets its allowable.
+    `row` is the one that was asked for, whose effects order the numbers; None without one. `unchanging` are keys of
+    numbers that change neither. `relaxed` is empty where shares are not balanced. `overrides` is what
+    from outside the file bears on it.
+    """
+
+    file: str
+    name: str
+    model: str
+    status: str
+    worst_row: str
+    requirement: str
+    utilization: float
+    row: str | None
+    row_utilization: float | None
+    slopes: tuple[Slope, ...]
+    unchanging: tuple[str, ...]
+    skipped: tuple[Skipped, ...]
+    is_balanced: bool = False
+    relaxed: tuple[Relaxed, ...] = ()
+    changes: tuple[SetValue, ...] = ()
+    overrides: tuple[Override, ...] = ()
+
+    @property
+    def asked(self) -> float:
+        """Utilization of what was asked for: the row, else the worst."""
+        return self.utilization if self.row_utilization is None else self.row_utilization
+
+    def to_limit(self, slope: Slope) -> float | None:
+        """Change of a number, by itself, that uses up the margin: the utilization is 1 there; signed, in its unit.
+
+        The utilization goes on as it goes here: with a power of the number, or exponentially with a level or an
+        angle. Exact where it does, as of the aperture time or of an error; None beyond a millionfold or half a turn.
+        """
+        if not slope.effect or self.asked <= 0:
+            return None
+        change = -math.log(self.asked) * self.asked / slope.effect  # in `per`s, of the logarithm of the utilization
+        if slope.is_proportional:
+            power = EVEN * change
+            return slope.value * math.expm1(power) if abs(power) <= _FURTHEST else None
+        is_near = (
+            abs(change * slope.per) <= math.pi if slope.unit == "rad" else abs(change * slope.measure) <= _FURTHEST
+        )
+        return change * slope.per if is_near else None
+
+    @property
+    def shown(self) -> tuple[Slope, ...]:
+        """Numbers that a reader wants to see: they change it by a ten-thousandth of itself, or more."""
+        return tuple(slope for slope in self.slopes if abs(slope.even_effect) >= LITTLE * self.asked)
+
+
+# ---------------------------------------------------------------- differences
+class Stated(NamedTuple):
+    """A number that the file states as `text`.
+
+    `step` is half of the difference that is taken, `per` the change that an effect is said for, in SI, and `per_text`
+    the same in words. `part` is how much of a change that is, by one measure for all: a part of the number, of a
+    radian, of a power, or of the smaller slant range. `others` are numbers that change with it: shares sum to 1.
+    `is_scale` marks the elements of a covariance, of which the value is a factor on all sigmas.
+    """
+
+    number: Number
+    text: str
+    value: float
+    step: float
+    per: float
+    per_text: str
+    part: float = 0.01
+    others: tuple[Number, ...] = ()
+    is_scale: bool = False
+
+    def at(self, value: float) -> Mapping[Number, float]:
+        """Give the numbers of the mission where this one has another value."""
+        left = 1 - self.value
+        rest = {one: (one.value or 0.0) * (1 - value) / left for one in self.others}
+        return {self.number: value, **rest}
 
 
 def sensitivity(
@@ -48,7 +233,7 @@ def sensitivity(
     today : date
         Day on which waivers are judged, UTC.
     progress : callable, optional
-        Is told, after each number, how many are done, and how many there are.
+        Is told how many values are done, and how many there are.
 
     Returns
     -------
@@ -65,16 +250,16 @@ def sensitivity(
     base = variation.read()
     found = check_mission(base, today, is_bare=True)
     hold_to_decisions([found], row)
-    at_file = _uses(found.rows, row)
-    if at_file is None:
-        raise QuestionError("no utilization that is judged has a value: there is nothing to follow")
+    stands = standing(found, None, frozenset())
     geometry = found.geometry
     nearest = min(geometry.transmitter.slant_range, geometry.receiver.slant_range)
     numbers, skipped = stated_numbers(tree_of(variation.mission), nearest)
+    beside = _Beside(variation, numbers, stands.row, row, today)
+    at_file = beside.uses([(None, 0)])[0] if stands.row else ""
+    if isinstance(at_file, str):
+        raise QuestionError("no utilization that is judged has a value: there is nothing to follow")
     slopes, unchanging = [], []
-    for done, number in enumerate(numbers, 1):
-        slope = _Differences(variation, base, number, row, today).slope(at_file)
-        progress(done, len(numbers))
+    for slope in beside.slopes(at_file, progress):
         if isinstance(slope, Skipped):
             skipped.append(slope)
         elif max(abs(slope.change), abs(slope.row_change or 0.0)) <= _NOTHING * max(
@@ -119,58 +304,89 @@ def _part_of(key: str, of_parts: Mapping[str, str]) -> str:
 
 
 class _Uses(NamedTuple):
-    """The worst utilization, whose it is, that of the row that was asked for, and of all rows."""
+    """The worst utilization, whose it is, that of the row that was asked for, and that of the file's worst row."""
 
     worst_row: str
     requirement: str
     worst: float
     row: float | None
-    of: Mapping[str, float]
+    of_worst: float
 
-    def is_passed(self, row_id: str) -> bool:
-        """Whether another row than this one is the worst, by more than rounding."""
-        return self.worst - self.of.get(row_id, 0.0) > _NOTHING * self.worst
-
-
-def _uses(rows: Sequence[Row], asked: str | None) -> _Uses | None:
-    """Utilizations of a check; None where one of them has no value."""
-    worst = deciding_row(rows, _BREAKS, complies=True)
-    if worst is None or worst.utilization is None or not math.isfinite(worst.utilization):
-        return None
-    of = {row.id: row.utilization for row in rows if row.utilization is not None}
-    use = None if asked is None else of.get(asked, math.inf)
-    if use == math.inf:
-        return None
-    return _Uses(worst.id, worst.binding_requirement or worst.metric, worst.utilization, use, of)
+    @property
+    def is_passed(self) -> bool:
+        """Whether another row than the worst of the file is the worst, by more than rounding."""
+        return self.worst - self.of_worst > _NOTHING * self.worst
 
 
-class _Differences:
-    """One number of a mission, and checks at values beside it."""
+class _Beside:
+    """The numbers of a mission, and checks of it at values beside theirs."""
 
-    def __init__(self, variation: Variation, base: Mission, number: Stated, row: str | None, today: date) -> None:
-        self.variation, self.base, self.number, self.row, self.today = variation, base, number, row, today
+    def __init__(
+        self, variation: Variation, numbers: Sequence[Stated], worst: str | None, row: str | None, today: date
+    ) -> None:
+        self.numbers, self.row, self.worst = numbers, row, worst
+        varied = {one.key: one for number in numbers for one in number.at(number.value)}
+        self.values = {one.key: one.value for one in varied.values()}
+        mission, names = variation.mission, dict.fromkeys(name for name in (worst, row) if name is not None)
+        columns = tuple(f"{name}.utilization" for name in names)
+        question = Question(
+            mission.data, mission.file, mission.changes, tuple(varied), columns, variation.model, today
+        )
+        self.table = Table(question._replace(breaks=frozenset()), mission, tuple(varied.values()))
 
-    def slope(self, here: _Uses) -> Slope | Skipped:
-        """Take the difference to both sides, or to the one side where there is a mission."""
-        number = self.number
-        below, above = self._at(-1), self._at(1)
-        kind = "central"
-        places = [(-1, below), (1, above)]
-        weights: tuple[float, ...] = (-0.5, 0.5)
-        if isinstance(below, str) or isinstance(above, str):
-            side = 1 if isinstance(below, str) else -1
-            kind = "forward" if side == 1 else "backward"
-            # To second order, as the central one.
-            places = [(0, here), (side, above if side == 1 else below), (2 * side, self._at(2 * side))]
-            weights = (-1.5 * side, 2.0 * side, -0.5 * side)
-        uses = []
-        for _, use in places:
-            if isinstance(use, str):
-                return Skipped(number.number.key, number.text, f"no mission beside it: {use}")
-            uses.append(use)
-        ends = [
-            use for _, use in sorted(zip((place for place, _ in places), uses, strict=True), key=lambda one: one[0])
+    def uses(self, cases: Sequence[tuple[Stated | None, int]], progress: Progress = unseen) -> list[_Uses | str]:
+        """Utilizations with one number some steps aside in each case; why there is no mission as text."""
+        values = {key: np.full(len(cases), value) for key, value in self.values.items()}
+        for place, (number, steps) in enumerate(cases):
+            if number is not None:
+                for one, value in number.at(number.value + steps * number.step).items():
+                    values[one.key][place] = value
+        found = self.table.watched(values, progress)
+        texts = ("worst_row", "binding_requirement", "reason")
+        asked = [found[f"{name}.utilization"] if name else [None] * len(cases) for name in (self.row, self.worst)]
+        return [
+            self._of_case(*line)
+            for line in zip(*(found[name] for name in texts), found["utilization"].tolist(), *asked, strict=True)
         ]
+
+    def _of_case(
+        self, worst_row: str, requirement: str, reason: str, worst: float, row: float | None, of_worst: float
+    ) -> "_Uses | str":
+        if reason:
+            return reason
+        if not math.isfinite(worst) or (row is not None and not math.isfinite(row)):
+            return "no utilization has a value there"
+        return _Uses(worst_row, requirement, worst, row, 0.0 if math.isnan(of_worst) else of_worst)
+
+    def slopes(self, here: _Uses, progress: Progress) -> Iterator[Slope | Skipped]:
+        """Take the difference to both sides of each number, or to the one side where there is a mission."""
+        sides = [(number, side) for number in self.numbers for side in (-1, 1)]
+        found = iter(self.uses(sides, progress) if sides else ())
+        both = [(next(found), next(found)) for _ in self.numbers]
+        farther = [
+            (number, 2 if isinstance(below, str) else -2)
+            for number, (below, above) in zip(self.numbers, both, strict=True)
+            if isinstance(below, str) or isinstance(above, str)
+        ]
+        at_two = dict(zip(farther, self.uses(farther) if farther else (), strict=True))
+        for number, (below, above) in zip(self.numbers, both, strict=True):
+            if not isinstance(below, str) and not isinstance(above, str):
+                yield self._slope(number, here, "central", [below, above], (-0.5, 0.5))
+                continue
+            # To second order, as the central one.
+            side, kind, near = (1, "forward", above) if isinstance(below, str) else (-1, "backward", below)
+            far = at_two[number, 2 * side]
+            if isinstance(near, str) or isinstance(far, str):
+                why = near if isinstance(near, str) else far
+                yield Skipped(number.number.key, number.text, f"no mission beside it: {why}")
+                continue
+            ordered, weights = [here, near, far], (-1.5, 2.0, -0.5)
+            yield self._slope(number, here, kind, ordered[::side], tuple(side * one for one in weights[::side]))
+
+    def _slope(
+        self, number: Stated, here: _Uses, kind: str, uses: Sequence[_Uses], weights: Sequence[float]
+    ) -> Slope:
+        """What a number does, by utilizations at rising values and their weights."""
         scale = number.per / number.step
         in_row = [use.row for use in uses if use.row is not None]
         return Slope(
@@ -185,26 +401,184 @@ class _Differences:
             difference=kind,
             change=scale * _sum(weights, [use.worst for use in uses]),
             row_change=None if self.row is None else scale * _sum(weights, in_row),
-            row_below=ends[0].worst_row,
-            row_above=ends[-1].worst_row,
-            is_mixed=any(use.is_passed(here.worst_row) for use in uses),
+            row_below=uses[0].worst_row,
+            row_above=uses[-1].worst_row,
+            is_mixed=any(use.is_passed for use in uses),
         )
-
-    def _at(self, steps: int) -> "_Uses | str":
-        """Check the mission some steps aside; why there is none as text."""
-        number = self.number
-        value = number.value + steps * number.step
-        try:
-            if number.is_scale:
-                mission = scaled(self.base, number.number.key, value)
-            else:
-                mission = self.variation.at(number.at(value))
-        except MissionError as error:
-            fault = error.faults[0]
-            return f"{fault.key}: {fault.problem}"
-        uses = _uses(check_mission(mission, self.today, is_bare=True).rows, self.row)
-        return "no utilization has a value there" if uses is None else uses
 
 
 def _sum(weights: Sequence[float], values: Sequence[float]) -> float:
     return math.fsum(weight * value for weight, value in zip(weights, values, strict=True))
+
+
+# ---------------------------------------------------------------- numbers of the file
+def stated_numbers(tree: dict[str, Any], nearest_m: float) -> tuple[list[Stated], list[Skipped]]:
+    """Find every number of a mission file, in the order of the file, and what is none.
+
+    Parameters
+    ----------
+    tree : dict
+        What the file says, as text.
+    nearest_m : float
+        Slant range of the nearer platform: a place on the Earth changes by a part of it. [m]
+    """
+    numbers: list[Stated] = []
+    skipped: list[Skipped] = []
+    for key, reader, value, above in _leaves(MISSION, tree, (), None):
+        if key.endswith(".covariance"):  # a matrix
+            numbers.append(_of_sigmas(key))
+            continue
+        if isinstance(reader, Quantity) and isinstance(value, str):
+            found = _stated(as_number(key, reader, value), value, nearest_m, above)
+            (numbers if isinstance(found, Stated) else skipped).append(found)  # type: ignore[arg-type]
+        elif reason := _no_number(key, reader, value):
+            skipped.append(Skipped(key, ", ".join(map(str, value if isinstance(value, list) else [value])), reason))
+    return numbers, skipped
+
+
+Leaf = tuple[str, Reader, Any, Mapping[str, Any] | None]
+
+
+def _leaves(reader: Reader, value: Any, path: tuple[str, ...], above: Mapping[str, Any] | None) -> Iterator[Leaf]:
+    """Go through all that a file says: key, reader and value; of shares all of them."""
+    reader = form_of(reader, value)
+    parts: Sequence[tuple[str, Any]] = ()
+    if isinstance(value, dict):
+        parts = list(value.items())
+    elif isinstance(value, list) and isinstance(reader, ListOf | Triple):
+        parts = [(str(index), item) for index, item in enumerate(value)]
+    below = [(name, reader.below(name), item) for name, item in parts]
+    if not any(inner for _, inner, _ in below):
+        if value is not INVALID:
+            yield ".".join(path), _component(reader), value, above
+        return
+    for name, inner, item in below:
+        if inner is not None:
+            yield from _leaves(inner, item, (*path, name), value if reader is SHARES else None)
+
+
+def _component(reader: Reader) -> Reader:
+    """One reader of a scalar that stands for each axis."""
+    return reader.component if isinstance(reader, Triple) else reader
+
+
+def _stated(number: Number, text: str, nearest_m: float, shares: Mapping[str, Any] | None) -> Stated | Skipped:
+    value = number.value or 0.0
+    if number.reader is LATITUDE or number.key.endswith("longitude"):
+        step = RELATIVE_STEP * nearest_m / _EARTH
+        return Stated(number, text, value, step, step, f"{math.degrees(step):.2g} deg")
+    if number.reader in (DIRECTION, ELEVATION):
+        return Stated(number, text, value, DIRECTION_STEP, math.radians(1), "1 deg", part=math.radians(1))
+    if number.dimension in _LEVELS:
+        return Stated(number, text, value, LEVEL_STEP, 1.0, "1 dB", part=math.log(10) / 10)
+    if value == 0:
+        return Skipped(number.key, text, "is 0: there is no part of it")
+    step = RELATIVE_STEP * value
+    others: tuple[Number, ...] = ()
+    if shares is not None:
+        place, _, own = number.key.rpartition(".")
+        others = tuple(
+            as_number(f"{place}.{name}", number.reader, share) for name, share in shares.items() if name != own
+        )
+        if value == 1:
+            return Skipped(number.key, text, "is the whole: no other share could give what it takes")
+    return Stated(number, text, value, step, 0.01 * value, "1 %", others=others)
+
+
+def _of_sigmas(key: str) -> Stated:
+    """All sigmas of a covariance matrix: its elements do not change alone."""
+    return Stated(Number(key, FACTOR, 1.0, ""), "its sigmas", 1.0, RELATIVE_STEP, 0.01, "1 %", is_scale=True)
+
+
+def _no_number(key: str, reader: Reader, value: Any) -> str:
+    """Say what a key holds instead of a number; empty for names and remarks, which change nothing."""
+    if isinstance(reader, Whole | Version):
+        return "is a whole number"
+    if isinstance(reader, Choice):
+        return "is a choice"
+    if key.rpartition(".")[2] == "sensor" or ".sensor." in key:
+        return "is a part of the catalogue; solve --for compares parts"
+    if key == "collection.center_time":
+        return "is an instant"
+    if key.endswith(".correlation"):
+        return "is a matrix: its elements do not change alone"
+    return ""
+
+
+# ---------------------------------------------------------------- shares that follow what is declared
+def is_balanced(mission: Mission) -> bool:
+    """Whether the phase is divided as the declared errors need it."""
+    split = mission.allocation.split
+    return (split.quadratic_phase_error if isinstance(split, MetricSplits) else split) == "balanced"
+
+
+def relaxed_errors(mission: Mission, found: MissionFindings, today: date) -> Iterator[Relaxed]:
+    """Double one declared error after the other, and see what that leaves to the others.
+
+    Parameters
+    ----------
+    mission : Mission
+        Its phase is divided by `balanced`.
+    found : MissionFindings
+        Of a check of it.
+    today : date
+        Day on which waivers are judged, UTC.
+    """
+    for key in _declared_errors(mission):
+        try:
+            doubled = scaled(mission, key, _RELAXED)
+        except QuestionError:  # all of it is 0
+            continue
+        after = check_mission(doubled, today, is_bare=True)
+        yield Relaxed(
+            key=key,
+            shares_before=_shares(found),
+            shares_after=_shares(after),
+            transmitter=_of_others("transmitter", found.rows, after.rows),
+            receiver=_of_others("receiver", found.rows, after.rows),
+        )
+
+
+def _declared_errors(mission: Mission) -> Iterator[str]:
+    """Keys of the declared errors: of each platform by kind, with those of parts of the catalogue."""
+    for name in PLATFORMS:
+        error = getattr(mission.platforms, name).motion_error
+        yield from _keys_of(error, f"platforms.{name}.motion_error", ("covariance", "position", "velocity"))
+        yield from _keys_of(error, f"platforms.{name}.motion_error", ("acceleration", "vibration"))
+        if error.imu is not None:
+            figures = [figure for figure in error.imu._fields if figure != "source"]
+            yield from _keys_of(error.imu, f"platforms.{name}.motion_error.imu", figures)
+        yield from (f"platforms.{name}.motion_error.random.{index}" for index in range(len(error.random)))
+    if mission.common_motion_error is not None:
+        yield from _keys_of(
+            mission.common_motion_error, "common_motion_error", ("position", "velocity", "acceleration")
+        )
+    yield from _keys_of(mission.timing_error, "timing_error", mission.timing_error._fields)
+    yield from (f"other_errors.{index}" for index in range(len(mission.other_errors)))
+
+
+def _keys_of(section: Any, key: str, names: Sequence[str]) -> Iterator[str]:
+    yield from (f"{key}.{name}" for name in names if getattr(section, name) is not None)
+
+
+def _shares(found: MissionFindings) -> tuple[float, float]:
+    return found.allocation.qpe.transmitter, found.allocation.qpe.receiver
+
+
+def _of_others(owner: str, before: Sequence[Row], after: Sequence[Row]) -> tuple[str, float, float] | None:
+    """Worst utilization of a platform, before and after, of judged rows whose declared value stays as it is."""
+    now = {row.id: row for row in after}
+    kept = [
+        (now[row.id].utilization or 0.0, row.id, row.utilization)
+        for row in before
+        if row.owner in (owner, "clock" if owner == "receiver" else owner)
+        and row.utilization is not None
+        and math.isfinite(row.utilization)
+        and STATUS[row.status].is_judged
+        and row.id in now
+        and abs((now[row.id].declared or 0.0) - (row.declared or 0.0)) <= _SAME * abs(row.declared or 0.0)
+    ]
+    use, row_id, _ = max(kept, default=(math.inf, "", 0.0))
+    if not math.isfinite(use):
+        return None
+    return row_id, max(before for _, _, before in kept), use

@@ -1,26 +1,38 @@
 """Solve a mission for one of its numbers: every value at which compliance begins or ends.
 
 The range is looked at in places, and between two places where compliance differs, the border is bracketed. Where the
-worst utilization turns between places, the turn is looked for first: compliance may change there and back. What
-arrays hold is checked together, as a sweep does; what is said of a crossing or a nearest miss is what `check` says.
+worst utilization turns between places, the turn is looked for first: compliance may change there and back. All of
+these look at many values at once, in the case table. Values in SI and radians; factors are plain numbers.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from datetime import date
+from functools import partial
 from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.design.quantities import FACTOR, Number, QuestionError, Range, number_of, range_of, tree_of
 from bisar_budget.design.scaled import scaled
-from bisar_budget.design.solution import Crossing, Solution, State
-from bisar_budget.design.sweep import GEOMETRY, REASON, VERDICT, Engine, Question
-from bisar_budget.design.variation import ALIKE, Variation, breaking, hold_to_decisions, standing
+from bisar_budget.design.table import (
+    ALIKE,
+    GEOMETRY,
+    REASON,
+    VERDICT,
+    Question,
+    Table,
+    Variation,
+    breaking,
+    hold_to_decisions,
+)
 from bisar_budget.faults import MissionError, SetValue
+from bisar_budget.findings.images import Verdict
 from bisar_budget.findings.mission import MissionFindings
+from bisar_budget.findings.requirement import Override
 from bisar_budget.mission.model import Mission
 from bisar_budget.workers import Progress, unseen
 
@@ -31,8 +43,116 @@ _NARROW = 2e-7  # of the value, between the two sides of a crossing before they 
 _GOLDEN = (math.sqrt(5) - 1) / 2
 _STEPS_TO_TURN = 20  # a golden section to 7e-5 of two places
 _TURNS = 16  # that are looked for
+_LEVELS, _LEVELS_READ = 5, 2  # steps of a search that are looked ahead; where each case is read, it costs more
 
-Evaluate = Callable[[float], State]
+# With what is known of values it has an outcome, or a set of values that it needs to know more of.
+Search = Callable[[Mapping[float, "State"]], Any]
+
+
+class State(NamedTuple):
+    """How the mission stands at one value.
+
+    `row` has the highest utilization of the rows that decide, `requirement` is what sets its allowable; None where
+    nothing is judged. `reason` says why there is no mission at this value; empty where there is one. Resolutions are
+    peak to first null on the ground. [m]
+    """
+
+    value: float
+    complies: bool
+    status: str
+    row: str | None = None
+    requirement: str | None = None
+    utilization: float | None = None
+    range_resolution_m: float | None = None
+    cross_range_resolution_m: float | None = None
+    reason: str = ""
+
+
+class Crossing(NamedTuple):
+    """A border of compliance: the last value that complies and the first beyond it that does not.
+
+    `inside` and `outside` are 1e-6 of the value apart, `is_upper` is whether values below comply. `is_verified` is
+    whether `check` of the mission with each of the two, as text, says so.
+    """
+
+    inside: State
+    outside: State
+    is_upper: bool
+    is_verified: bool
+
+
+class Imaged(NamedTuple):
+    """What the image says of the row that binds at a solution.
+
+    `at` is the solution as text; `verdict` is None where a row has no image. `reason` says why there is no verdict,
+    or what it rests on; empty where there is nothing to say.
+    """
+
+    row: str
+    at: str
+    verdict: Verdict | None
+    reason: str
+
+    @property
+    def is_optimistic(self) -> bool:
+        """Whether the image, with autofocus or without, shows more than the limit promises."""
+        return self.verdict is not None and "optimistic" in (self.verdict.verdict, self.verdict.verdict_autofocus)
+
+
+class Solution(NamedTuple):
+    """The crossings of one mission in a range, in rising order.
+
+    `key` is what was solved for, `unit` that of its values, `is_scale` whether they are factors of all numbers
+    below the key. `low` and `high` are the ends of the range, `is_circle` whether they are one direction. `nearest`
+    is the nearest miss where nothing complies, or where everything does the value with the least left. `given` is
+    the value of the file. `texts` has every value as the file would have it. `is_constant` is whether the number
+    changes no utilization that decides. `skipped` counts the places of the range at which there is no mission.
+    `imaged` is what images say at the best crossing, if any were formed. `overrides` is what from outside the file
+    bears on it.
+    """
+
+    file: str
+    name: str
+    key: str
+    unit: str
+    is_scale: bool
+    target: str
+    row: str | None
+    model: str
+    low: float
+    high: float
+    is_circle: bool
+    given: State | None
+    crossings: tuple[Crossing, ...]
+    nearest: State
+    is_constant: bool
+    skipped: int
+    texts: Mapping[float, str]
+    changes: tuple[SetValue, ...] = ()
+    imaged: Imaged | None = None
+    overrides: tuple[Override, ...] = ()
+
+    @property
+    def value(self) -> float | None:
+        """Largest value at which compliance ends or begins; None if it does so nowhere."""
+        return max((crossing.inside.value for crossing in self.crossings), default=None)
+
+    @property
+    def best(self) -> Crossing | None:
+        """The crossing of that value."""
+        return max(self.crossings, key=lambda crossing: crossing.inside.value, default=None)
+
+    @property
+    def is_monotonic(self) -> bool:
+        """Whether compliance changes once at most."""
+        return len(self.crossings) <= 1
+
+    @property
+    def status(self) -> str:
+        """`crossing`, or `all` or `none` of the range complies."""
+        if self.crossings:
+            return "crossing"
+        return "all" if self.nearest.complies else "none"
 
 
 def solve(
@@ -69,7 +189,7 @@ def solve(
     today : date
         Day on which waivers are judged, UTC.
     progress : callable, optional
-        Is told, after each value of the scan that is checked by itself, how many are done, and how many there are.
+        Is told how many values are done, and how many there are.
 
     Returns
     -------
@@ -82,12 +202,13 @@ def solve(
         The question cannot be asked of this mission; says why.
     """
     search = _Search(mission, key, between, row, target, model, is_scale, today)
-    scanned = search.scanned(progress)
-    crossings = tuple(search.crossing(low, high) for low, high in pairwise(scanned) if low.complies != high.complies)
+    scanned, given = search.scanned(progress)
+    borders = [(low, high) for low, high in pairwise(scanned) if low.complies != high.complies]
+    crossings = search.crossings(borders)
     missions = [state for state in scanned if not state.reason]
     if not missions:
         raise QuestionError(f"{key}: no value of the range makes a mission: {scanned[0].reason}")
-    nearest = search.evaluate(_nearest(missions).value)
+    nearest = _nearest(missions)
     return Solution(
         file=mission.file,
         name=mission.name,
@@ -100,7 +221,7 @@ def solve(
         low=search.range.low,
         high=search.range.high,
         is_circle=search.range.is_circle,
-        given=search.given,
+        given=given,
         crossings=crossings,
         nearest=nearest,
         is_constant=_is_constant(missions),
@@ -152,34 +273,26 @@ class _Search:
         is_scale: bool,
         today: date,
     ) -> None:
-        self.variation, self.key, self.row, self.today = Variation(mission, model), key, row, today
-        self.breaks = breaking(target)
-        self.is_scale = is_scale
-        self.base = self.variation.read()
+        variation = Variation(mission, model)
+        self.base, self.breaks = variation.read(), breaking(target)
         if is_scale:
-            self.number = Number("the factor", FACTOR, 1.0, "")
+            self.number, of_table = Number("the factor", FACTOR, 1.0, ""), Number(key, FACTOR, 1.0, "")
             scaled(self.base, key, 1.0)  # says what is wrong with the key
         else:
-            self.number = number_of(tree_of(self.variation.mission), key, _OF_ALL).said_like(between)
+            self.number = of_table = number_of(tree_of(mission), key, _OF_ALL).said_like(between)
         self.range: Range = range_of(self.number, between)
-        found = check_mission(self.base, today, is_bare=True)
-        hold_to_decisions([found, *self._at_the_end()], row)
-        self.given = None if self.number.value is None else self._state(self.number.value, found)
-        self.engine = self._engine(found, target)
 
-    def _engine(self, found: MissionFindings, target: str) -> Engine | None:
-        """What checks many values together; None where no array holds them."""
-        if self.is_scale or (self.row is not None and all(row.id != self.row for row in found.rows)):
-            return None
-        mission, model = self.variation.mission, self.variation.model
-        question = Question(mission.data, mission.file, mission.changes, (self.key,), (), model, self.today)
-        engine = Engine(question._replace(row=self.row, target=target), mission)
-        return None if engine.not_held else engine
+        def at_the_end() -> Iterator[MissionFindings]:
+            """The number may be an error that the file does not declare."""
+            with suppress(MissionError):
+                end = self.range.high
+                last = scaled(self.base, key, end) if is_scale else variation.at({self.number: end})
+                yield check_mission(last, today, is_bare=True)
 
-    def _at_the_end(self) -> Iterator[MissionFindings]:
-        """Findings at the end of the range: the number may be an error that the file does not declare."""
-        with suppress(MissionError):
-            yield check_mission(self.at(self.range.high), self.today, is_bare=True)
+        hold_to_decisions([check_mission(self.base, today, is_bare=True), *at_the_end()], row)
+        question = Question(mission.data, mission.file, mission.changes, (key,), (), model, today)
+        self.table = Table(question._replace(row=row, breaks=self.breaks), mission, [of_table])
+        self.levels = _LEVELS_READ if self.table.to_read else _LEVELS
 
     def places(self) -> list[float]:
         """Values that the scan looks at, in rising order; that of the file is among them."""
@@ -189,26 +302,17 @@ class _Search:
             places = sorted({*places, value})
         return places
 
-    def at(self, value: float) -> Mission:
-        """The mission with another value, or raises `MissionError`."""
-        if self.is_scale:
-            return scaled(self.base, self.key, value)
-        return self.variation.at({self.number: value})
+    def scanned(self, progress: Progress) -> tuple[list[State], State | None]:
+        """Look at every place of the range, and where the utilization turns; beside it the state of the file."""
+        places, value = self.places(), self.number.value
+        states = self.states(places if value is None else [*places, value], progress)
+        given = None if value is None else states.pop()
+        return sorted([*states, *self._turned(states)], key=lambda state: state.value), given
 
-    def scanned(self, progress: Progress) -> list[State]:
-        """Look at every place of the range, and where the utilization turns."""
-        places = self.places()
-        return _with_turns(self.states(places, progress), self.evaluate)
-
-    def states(self, values: Sequence[float], progress: Progress) -> list[State]:
+    def states(self, values: Sequence[float], progress: Progress = unseen) -> list[State]:
         """Check the mission with each of many values."""
-        if self.engine is None:
-            states = []
-            for done, value in enumerate(values, 1):
-                states.append(self.evaluate(value))
-                progress(done, len(values))
-            return states
-        found = self.engine.part(0, len(values), {self.key: np.array(values)}, progress).values
+        (number,) = self.table.numbers
+        found = self.table.watched({number.key: np.array(values)}, progress)
         columns = (*VERDICT, *GEOMETRY[:2], REASON)
         lines = zip(values, *(found[column.name].tolist() for column in columns), strict=True)
         return [self._of_line(*line) for line in lines]
@@ -222,47 +326,33 @@ class _Search:
         complies, utilization = status not in self.breaks, None if math.isnan(use) else use
         return State(value, complies, status, row or None, bound_by or None, utilization, range_m, cross_m)
 
-    def evaluate(self, value: float) -> State:
-        """Check the mission with another value."""
-        try:
-            return self._state(value, check_mission(self.at(value), self.today, is_bare=True))
-        except MissionError as error:
-            fault = error.faults[0]
-            return State(value, complies=False, status="error", reason=f"{fault.key}: {fault.problem}")
-
-    def _state(self, value: float, found: MissionFindings) -> State:
-        resolution = found.resolution
-        return State(value, *standing(found, self.row, self.breaks), resolution.range, resolution.cross_range)
-
-    def crossing(self, low: State, high: State) -> Crossing:
-        """Bracket the border between two places, write both sides with few digits, check them as they are written."""
-        is_upper = low.complies
+    def crossings(self, borders: Sequence[tuple[State, State]]) -> tuple[Crossing, ...]:
+        """Bracket borders between two places, write both sides with few digits, check them as they are written."""
         least = 1e-9 * (self.range.high - self.range.low)  # around 0, where no part of the value is small
-        while high.value - low.value > _NARROW * max(abs(low.value), abs(high.value), least):
-            middle = (low.value + high.value) / 2
-            if not low.value < middle < high.value:
-                break
-            state = self.evaluate(middle)
-            low, high = (state, high) if state.complies == low.complies else (low, state)
-        texts = [self.number.text(low.value, is_up=False), self.number.text(high.value, is_up=True)]
-        below, above = (self._checked(text) for text in texts)
-        is_verified = below.complies == low.complies and above.complies == high.complies
-        if not is_verified:  # compliance changes again within the digits that are written
-            below, above = low, high
-        inside, outside = (below, above) if is_upper else (above, below)
-        return Crossing(inside, outside, is_upper, is_verified)
+        narrow = self._searched([partial(_bracketed, low, high, least, self.levels) for low, high in borders])
+        texts = [
+            text
+            for low, high in narrow
+            for text in (self.number.text(low.value, is_up=False), self.number.text(high.value, is_up=True))
+        ]
+        written = iter(self.states([self.number.read(text) for text in texts]) if texts else ())
+        return tuple(_crossing(low, high, next(written), next(written)) for low, high in narrow)
 
-    def _checked(self, text: str) -> State:
-        """Check the mission with a value as it would stand in the file, in full."""
-        value = self.number.read(text)
-        if self.is_scale:
-            return self.evaluate(value)
-        try:
-            mission = self.variation.read([SetValue(self.key, text)])
-            return self._state(value, check_mission(mission, self.today, is_bare=True))
-        except MissionError as error:
-            fault = error.faults[0]
-            return State(value, complies=False, status="error", reason=f"{fault.key}: {fault.problem}")
+    def _turned(self, states: Sequence[State]) -> list[State]:
+        """Where the utilization turns between places without a change of compliance, a state that differs in it."""
+        searches = [partial(_turn, *turn, self.levels - 1) for turn in _turns(states)[:_TURNS]]
+        return [state for state in self._searched(searches) if state is not None]
+
+    def _searched(self, searches: Sequence[Search]) -> list[Any]:
+        """Go on with all searches at once, until each has what it looks for."""
+        known: dict[float, State] = {}
+        while True:
+            found = [search(known) for search in searches]
+            needed = {value for one in found if isinstance(one, set) for value in one} - known.keys()
+            if not needed:
+                return found
+            values = sorted(needed)
+            known.update(zip(values, self.states(values), strict=True))
 
     def texts(self, crossings: Sequence[Crossing], nearest: State) -> dict[float, str]:
         """Every value that is said, as the file would have it."""
@@ -272,32 +362,52 @@ class _Search:
         return {value: self.number.text(value) for value in values}
 
 
-def _with_turns(states: Sequence[State], evaluate: Evaluate) -> list[State]:
-    """Add, where the utilization turns between places without a change of compliance, a place that differs in it."""
-    found = list(states)
-    turns = 0
+def _bracketed(
+    low: State, high: State, least: float, levels: int, known: Mapping[float, State]
+) -> tuple[State, State] | set[float]:
+    """Halve the interval with a border in it until it is narrow; without a state, the values that may come next."""
+    while high.value - low.value > _NARROW * max(abs(low.value), abs(high.value), least):
+        middle = (low.value + high.value) / 2
+        if not low.value < middle < high.value:
+            break
+        if middle not in known:
+            return _halves(low.value, high.value, levels)
+        state = known[middle]
+        low, high = (state, high) if state.complies == low.complies else (low, state)
+    return low, high
+
+
+def _halves(low: float, high: float, levels: int) -> set[float]:
+    """Every value that so many halvings may look at."""
+    middle = (low + high) / 2
+    if not levels or not low < middle < high:
+        return set()
+    return {middle, *_halves(low, middle, levels - 1), *_halves(middle, high, levels - 1)}
+
+
+def _turns(states: Sequence[State]) -> list[tuple[float, float, State]]:
+    """Places between which the utilization turns without a change of compliance, and the state between them."""
+    found = []
     for before, here, after in zip(states, states[1:], states[2:], strict=False):
         uses = [state.utilization for state in (before, here, after)]
         if not before.complies == here.complies == after.complies or any(use is None for use in uses):
             continue
         first, middle, last = (_sign(here) * use for use in uses if use is not None)
         ends = [end for end in (first, last) if not _is_alike(end, middle)]  # a turn that rounding makes is none
-        if ends and max(ends) < middle and turns < _TURNS:
-            turns += 1
-            if (turned := _turn(evaluate, before.value, after.value, here)) is not None:
-                found.append(turned)
-    return sorted(found, key=lambda state: state.value)
+        if ends and max(ends) < middle:
+            found.append((before.value, after.value, here))
+    return found
 
 
-def _sign(state: State) -> float:
-    """Of what complies the highest utilization may not, of the rest the lowest may."""
-    return 1.0 if state.complies else -1.0
-
-
-def _turn(evaluate: Evaluate, low: float, high: float, here: State) -> State | None:
-    """Where the utilization turns between two places, the first value whose compliance differs; None if none does."""
+def _turn(
+    low: float, high: float, here: State, levels: int, known: Mapping[float, State]
+) -> State | set[float] | None:
+    """The first state around a turn whose compliance differs, None if none does, or the values that may come next."""
     for _ in range(_STEPS_TO_TURN):
-        left, right = (evaluate(high - _GOLDEN * (high - low)), evaluate(low + _GOLDEN * (high - low)))
+        values = _golden(low, high)
+        if not known.keys() >= set(values):
+            return _sections(low, high, levels)
+        left, right = (known[value] for value in values)
         for state in (left, right):
             if state.complies != here.complies and not state.reason:
                 return state
@@ -306,3 +416,30 @@ def _turn(evaluate: Evaluate, low: float, high: float, here: State) -> State | N
         is_left = _sign(here) * left.utilization > _sign(here) * right.utilization
         low, high = (low, right.value) if is_left else (left.value, high)
     return None
+
+
+def _golden(low: float, high: float) -> tuple[float, float]:
+    return high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+
+
+def _sections(low: float, high: float, levels: int) -> set[float]:
+    """Every value that so many golden sections may look at."""
+    if not levels:
+        return set()
+    left, right = _golden(low, high)
+    return {left, right, *_sections(low, right, levels - 1), *_sections(left, high, levels - 1)}
+
+
+def _crossing(low: State, high: State, below: State, above: State) -> Crossing:
+    """The border between two states, which stand beside it as they are written."""
+    is_upper = low.complies
+    is_verified = below.complies == low.complies and above.complies == high.complies
+    if not is_verified:  # compliance changes again within the digits that are written
+        below, above = low, high
+    inside, outside = (below, above) if is_upper else (above, below)
+    return Crossing(inside, outside, is_upper, is_verified)
+
+
+def _sign(state: State) -> float:
+    """Of what complies the highest utilization may not, of the rest the lowest may."""
+    return 1.0 if state.complies else -1.0

@@ -8,7 +8,7 @@ from typing import Any
 
 import yaml
 
-from bisar_budget.faults import Changed, InvalidValueError, KeyPath, SetValue, shown
+from bisar_budget.faults import Changed, InvalidValueError, KeyPath, SetNumber, SetValue, shown
 from bisar_budget.mission.readers import INVALID, is_place
 from bisar_budget.mission.tree import MAX_BYTES, Tree, UnusableError, events
 
@@ -119,7 +119,9 @@ def _put(container: Any, name: str | int, value: Any) -> None:
 
 
 def _value(tree: Tree, change: SetValue, path: KeyPath) -> Any:
-    """Read the text of the value as the file's own would be; its faults name the option."""
+    """Read the text of the value as the file's own would be; its faults name the option. A number is as it is."""
+    if isinstance(change, SetNumber):
+        return change.number
     try:
         next_event = events(change.text)
         while type(event := next_event()) is not yaml.DocumentStartEvent:

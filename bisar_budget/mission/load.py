@@ -11,7 +11,7 @@ from typing import BinaryIO, cast
 from bisar_budget.faults import Fault, MissionError, SetValue, changes_words, file_fault, sentences
 from bisar_budget.mission.model import MISSION, Mission, PartFile, flies_on_earth, names_files, names_parts
 from bisar_budget.mission.readers import INVALID
-from bisar_budget.mission.tree import MAX_BYTES, UnusableError, read_tree
+from bisar_budget.mission.tree import MAX_BYTES, Tree, UnusableError, read_tree
 from bisar_budget.resources import UnreadableError, held, standard_input
 
 _Find = Callable[[str], tuple[str, bytes]]
@@ -84,7 +84,19 @@ def parse_mission(
     MissionError
         Not a usable mission; carries every fault.
     """
-    tree = read_tree(data, file)
+    return mission_of(read_tree(data, file), data, file, model, beside, changes, find)
+
+
+def mission_of(
+    tree: Tree,
+    data: bytes | str,
+    file: str,
+    model: str | None = None,
+    beside: Callable[[str], bytes] | None = None,
+    changes: Sequence[SetValue] = (),
+    find: _Find | None = None,
+) -> Mission:
+    """Turn the tree of a mission file into a `Mission`, and change the tree; all else as `parse_mission`."""
     if changes:
         from bisar_budget.mission.changes import apply_changes
 

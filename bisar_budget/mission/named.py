@@ -6,8 +6,9 @@ from hashlib import sha256
 from typing import NamedTuple
 
 from bisar_budget.faults import MissionError, SetValue
-from bisar_budget.mission.load import folder_of, parse_mission
+from bisar_budget.mission.load import folder_of, mission_of, parse_mission
 from bisar_budget.mission.model import Mission
+from bisar_budget.mission.tree import Tree
 
 
 class Named(NamedTuple):
@@ -16,10 +17,12 @@ class Named(NamedTuple):
     paths: tuple[tuple[str, bytes], ...] = ()
     parts: tuple[tuple[str, str, bytes], ...] = ()
 
-    def parse(self, data: bytes, file: str, model: str | None = None, *, changes: Sequence[SetValue] = ()) -> Mission:
-        """Read a mission that names nothing else; arguments and faults are those of `parse_mission`."""
+    def parse(
+        self, tree: Tree, data: bytes, file: str, model: str | None = None, *, changes: Sequence[SetValue] = ()
+    ) -> Mission:
+        """Read a mission that names nothing else; arguments and faults are those of `mission_of`."""
         parts = {name: (of, content) for name, of, content in self.parts}
-        return parse_mission(data, file, model, dict(self.paths).__getitem__, changes, parts.__getitem__)
+        return mission_of(tree, data, file, model, dict(self.paths).__getitem__, changes, parts.__getitem__)
 
     @property
     def sha256(self) -> str:

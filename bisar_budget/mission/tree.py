@@ -53,7 +53,8 @@ class Tree:
     """What the file says: nested dict, list and str, with the parser's event of every key and value.
 
     What cannot be read is reported and stands in the tree as `INVALID`. `changes` are the options that put values
-    into it, each at the highest path that it changed. `what` the file is to be is said of one that is too much.
+    into it, each at the highest path that it changed; of a case of a sweep those are floats. `what` the file is to be
+    is said of one that is too much.
     """
 
     def __init__(self, what: str = "mission") -> None:
@@ -63,6 +64,13 @@ class Tree:
         self.values: dict[KeyPath, Any] = {}  # events, which hold the marks of start and end
         self.faults: list[Fault] = []
         self.changes: dict[KeyPath, SetValue] = {}
+
+    def copied(self) -> "Tree":
+        """The same, into which other values can be put."""
+        tree = Tree(self.what)
+        tree.root, tree.faults = _copied(self.root), list(self.faults)
+        tree.keys, tree.values, tree.changes = dict(self.keys), dict(self.values), dict(self.changes)
+        return tree
 
     def fault(self, mark: Any, path: KeyPath, problem: str, **more: str) -> None:
         """Note a fault at a place of the file; without a mark, at its start. Of too many only the first are said."""
@@ -238,6 +246,12 @@ def read_tree(data: bytes | str, file: str, what: str = "mission") -> Tree:
     if not isinstance(tree.root, dict):
         raise MissionError(file, tuple(tree.faults))
     return tree
+
+
+def _copied(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _copied(item) for key, item in value.items()}
+    return [_copied(item) for item in value] if isinstance(value, list) else value
 
 
 def _dotted(path: KeyPath) -> str:

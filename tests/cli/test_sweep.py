@@ -18,7 +18,7 @@ import pytest
 
 from bisar_budget.cli import sweep as command
 from bisar_budget.design import sweep as engine
-from bisar_budget.design.swept import Part, Swept
+from bisar_budget.design.table import Part, Swept
 from tests.conftest import ROOT, heed_signals, mission_text
 
 SECTION_V = str(ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml")
@@ -66,7 +66,7 @@ def test_the_head_of_the_table_says_of_which_mission_it_is(run) -> None:
 def test_the_summary_counts_what_check_exits_with_0_on(run) -> None:
     """By hand: the utilization is 11.78 (T / 6 s)², so of 1, 2, ... 6 s one is below 1.748 s."""
     found = run("sweep", SECTION_V, "--vary", f"{TIME}=1:6s:6")
-    assert found.stderr.splitlines()[-1].startswith("Rigling & Moses, Section V: 6 cases, 1 comply (16.7 %), ")
+    assert found.stderr.splitlines()[-1].startswith("Rigling & Moses, Section V: 6 cases, 1 comply (16.7 %)")
     assert "\r" not in found.stderr  # no bar in a pipe
     for case in rows(found.stdout):
         assert float(case["utilization"]) == pytest.approx(11.78124183 * (float(case[f"{TIME} [s]"]) / 6) ** 2)

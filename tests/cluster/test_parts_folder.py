@@ -21,7 +21,7 @@ from bisar_budget.cluster.parts_folder import ClusterError, PartsFolder, parts_f
 from bisar_budget.design.cases import grid
 from bisar_budget.design.quantities import tree_of
 from bisar_budget.design.sweep import Asked, Chunks
-from bisar_budget.design.swept import Part
+from bisar_budget.design.table import Part
 from bisar_budget.mission.load import load_mission
 from tests.conftest import ROOT, mission_text
 
@@ -47,9 +47,9 @@ def test_a_part_is_read_as_it_was_written(tmp_path: Path) -> None:
         "c": np.array([""] * 5, object),
     }
     folder = new_folder(tmp_path)
-    folder.put(Part(10, 15, values, 3))
+    folder.put(Part(10, 15, values))
     (part,) = folder.parts([10])
-    assert (part.start, part.stop, part.by_case, list(part.values)) == (10, 15, 3, ["a", "b", "c"])
+    assert (part.start, part.stop, list(part.values)) == (10, 15, ["a", "b", "c"])
     assert np.asarray(part.values["a"], float).tobytes() == values["a"].tobytes()
     assert part.values["b"].dtype == part.values["c"].dtype == object
     assert part.values["b"].tolist() == values["b"].tolist()
@@ -72,7 +72,7 @@ def test_words_of_cases_are_part_of_the_question() -> None:
 
 def test_only_whole_parts_of_the_sweep_are_there(tmp_path: Path) -> None:
     def part(start: int, stop: int) -> Part:
-        return Part(start, stop, {"a": np.zeros(stop - start)}, 0)
+        return Part(start, stop, {"a": np.zeros(stop - start)})
 
     folder = new_folder(tmp_path)
     for start in (0, 10, 20, 30, 40):
@@ -108,7 +108,7 @@ def test_parts_of_an_earlier_form_are_refused(tmp_path: Path) -> None:
 def test_a_bit_that_flipped_on_a_disk_is_seen(tmp_path: Path) -> None:
     """Its value went into the table; gone on with, the part was refused again and again."""
     folder = new_folder(tmp_path)
-    folder.put(Part(0, 2000, {"a": np.linspace(0, 1, 2000)}, 0))
+    folder.put(Part(0, 2000, {"a": np.linspace(0, 1, 2000)}))
     (file,) = tmp_path.glob("part-*")
     data = bytearray(file.read_bytes())
     data[len(data) // 2] ^= 1
@@ -128,17 +128,17 @@ def test_pipes_and_devices_are_no_parts(tmp_path: Path) -> None:
     with parts_folder(str(tmp_path), QUESTION, CHUNKS, is_resumed=True) as folder:
         assert not folder.done
         for start in (0, 10):
-            folder.put(Part(start, start + 10, {"a": np.zeros(10)}, 0))
+            folder.put(Part(start, start + 10, {"a": np.zeros(10)}))
         assert sum(part.stop - part.start for part in folder.parts([0, 10])) == 20
         with pytest.raises(ClusterError, match=r"^cannot write .*: Is a directory$"):
-            folder.put(Part(20, 30, {"a": np.zeros(10)}, 0))
+            folder.put(Part(20, 30, {"a": np.zeros(10)}))
     assert not list(tmp_path.glob(".part*"))
 
 
 def test_what_somebody_else_put_there_stays(tmp_path: Path) -> None:
     (tmp_path / "p").mkdir()
     folder = new_folder(tmp_path / "p")
-    folder.put(Part(0, 1, {"a": np.zeros(1)}, 0))
+    folder.put(Part(0, 1, {"a": np.zeros(1)}))
     (tmp_path / "p" / "notes.txt").write_text("mine")
     folder.remove()
     assert [file.name for file in (tmp_path / "p").iterdir()] == ["notes.txt"]

@@ -10,7 +10,7 @@ import pytest
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.design import compare
-from bisar_budget.design.compared import Comparison
+from bisar_budget.design.compare import Comparison
 from bisar_budget.design.quantities import QuestionError
 from bisar_budget.faults import SetValue
 from bisar_budget.findings.images import Verdict

@@ -5,7 +5,6 @@ import math
 from collections.abc import Callable
 from datetime import date
 from itertools import pairwise
-from typing import Any
 
 import pytest
 
@@ -15,7 +14,8 @@ from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.design import solve as solving
 from bisar_budget.design.quantities import QuestionError
 from bisar_budget.design.scaled import scaled
-from bisar_budget.design.solution import Solution, State
+from bisar_budget.design.solve import Solution, State
+from bisar_budget.design.table import breaking, standing
 from bisar_budget.faults import SetValue
 from bisar_budget.mission.changes import read_changes
 from bisar_budget.mission.load import load_mission, parse_mission
@@ -144,8 +144,14 @@ def test_a_pair_of_crossings_between_two_places_is_found() -> None:
 
     places = [index / 16 for index in range(17)]
     for evaluate in (dips, bumps):
-        assert len({evaluate(place).complies for place in places}) == 1
-        scanned = solving._with_turns([evaluate(place) for place in places], evaluate)
+        states = [evaluate(place) for place in places]
+        assert len({state.complies for state in states}) == 1
+        ((low, high, here),) = solving._turns(states)
+        known: dict[float, State] = {}
+        while isinstance(found := solving._turn(low, high, here, 4, known), set):
+            known |= {value: evaluate(value) for value in found}
+        assert found is not None
+        scanned = sorted([*states, found], key=lambda state: state.value)
         assert sum(one.complies != other.complies for one, other in pairwise(scanned)) == 2
 
 
@@ -165,33 +171,16 @@ def test_a_pair_of_crossings_between_two_places_is_found() -> None:
         ("one_stationary_spotlight", "platforms.receiver.azimuth", {}),
     ],
 )
-def test_arrays_find_what_checks_find(name: str, key: str, more: dict[str, str], monkeypatch) -> None:
+def test_what_is_said_of_a_value_is_what_check_says(name: str, key: str, more: dict[str, str]) -> None:
+    """Both sides of every crossing, the nearest and the file's own value, each as a file would have it."""
     file = str(MISSIONS / f"{name}.yaml")
-    looked: list[int] = []
-    part = solving.Engine.part
-
-    def counted(self: Any, start: int, stop: int, *given: Any) -> Any:
-        looked.append(stop - start)
-        return part(self, start, stop, *given)
-
-    monkeypatch.setattr(solving.Engine, "part", counted)
-    together = solve(key, file=file, **more)
-    assert looked
-    monkeypatch.setattr(solving._Search, "_engine", lambda *_: None)
-    assert_alike(together, solve(key, file=file, **more))
-
-
-def assert_alike(found: Solution, other: Solution) -> None:
-    """Two searches of one mission: the same crossings within their brackets, bound by the same rows."""
-    assert found._replace(crossings=(), texts={}, nearest=found.given) == other._replace(
-        crossings=(), texts={}, nearest=found.given
-    )
-    assert found.nearest == other.nearest
-    for crossing, same in zip(found.crossings, other.crossings, strict=True):
-        assert crossing.is_upper == same.is_upper
-        for side, of_same in ((crossing.inside, same.inside), (crossing.outside, same.outside)):
-            assert side.value == pytest.approx(of_same.value, rel=1e-6)
-            assert (side.status, side.row, side.requirement) == (of_same.status, of_same.row, of_same.requirement)
+    found = solve(key, file=file, **more)
+    states = [found.nearest, *(state for one in found.crossings for state in (one.inside, one.outside))]
+    for state in states:
+        mission = load_mission(file, more.get("model"), [SetValue(key, found.texts[state.value])])
+        stands = standing(check_mission(mission, DAY), more.get("row"), breaking(more.get("target", "fail")))
+        assert (state.complies, state.status, state.row, state.requirement) == stands[:4]
+        assert state.utilization == pytest.approx(stands.utilization, rel=1e-6)
 
 
 def test_how_far_one_correction_serves_is_not_searched(monkeypatch) -> None:

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from bisar_budget.design.cases import Cases, grid, grid_of, table, table_of
 from bisar_budget.design.quantities import QuestionError
 from bisar_budget.design.sweep import sweep
-from bisar_budget.design.swept import Column, Part, Swept, Values
+from bisar_budget.design.table import Column, Part, Swept, Values
 from bisar_budget.faults import SetValue
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.tree import read_tree
@@ -56,7 +56,7 @@ def swept(cases: Cases, size: int) -> Swept:
     def parts() -> Iterator[Part]:
         for start in range(0, 24, size):
             stop = min(start + size, 24)
-            yield Part(start, stop, {name: values[start:stop] for name, values in found.items()}, 0)
+            yield Part(start, stop, {name: values[start:stop] for name, values in found.items()})
 
     keys = tuple(number.key for number in cases.varied)
     return Swept("A =name", "ab" * 32, keys, cases.shape, 24, columns, parts())

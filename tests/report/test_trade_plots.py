@@ -15,7 +15,7 @@ from matplotlib.image import imread
 
 from bisar_budget.design.cases import grid
 from bisar_budget.design.quantities import QuestionError
-from bisar_budget.design.swept import Column, Part, Swept
+from bisar_budget.design.table import Column, Part, Swept
 from bisar_budget.faults import SetValue
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.load import load_mission
@@ -63,7 +63,7 @@ def trade(*texts: str, column: str | None = None, is_polar: bool = False) -> Tra
     gathered = Gathered(Described(swept, cases, MISSION, "1"), column=column)
     middle = cases.count // 2
     for start, stop in ((0, middle), (middle, cases.count)):
-        gathered.add(Part(start, stop, {name: one[start:stop] for name, one in values.items()}, 0))
+        gathered.add(Part(start, stop, {name: one[start:stop] for name, one in values.items()}))
     return gathered.trade(is_polar=is_polar)
 
 

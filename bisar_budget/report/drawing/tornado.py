@@ -3,7 +3,7 @@
 All bars are for the same part: 1 % of a number, of a radian, of a power, of the smaller slant range.
 """
 
-from bisar_budget.design.slopes import EVEN, Sensitivity, Slope
+from bisar_budget.design.sensitivity import EVEN, Sensitivity, Slope
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.report.drawing.axes import Scale, box_entry, grid, head, legend, short, x_axis
 from bisar_budget.report.drawing.figure import drawing_file

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from bisar_budget.design.slopes import LITTLE, Relaxed, Sensitivity, Slope
+from bisar_budget.design.sensitivity import LITTLE, Relaxed, Sensitivity, Slope
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style

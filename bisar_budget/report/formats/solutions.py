@@ -4,8 +4,8 @@ import json
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from bisar_budget.design.compared import Comparison, PartState
-from bisar_budget.design.solution import Crossing, Imaged, Solution, State
+from bisar_budget.design.compare import Comparison, PartState
+from bisar_budget.design.solve import Crossing, Imaged, Solution, State
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.requirement import NAMES
 from bisar_budget.findings.status import STATUS

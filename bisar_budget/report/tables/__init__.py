@@ -8,7 +8,7 @@ from bisar_budget.memory import OF_TABLES, hold_room
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from bisar_budget.design.swept import Part
+    from bisar_budget.design.table import Part
     from bisar_budget.report.tables.described import Described
 
 

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from bisar_budget.design.swept import Column, Part, Values
+from bisar_budget.design.table import Column, Part, Values
 from bisar_budget.report.tables.described import Described
 from bisar_budget.report.words.escapes import spreadsheet_text
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from bisar_budget import __version__
 from bisar_budget.design.cases import Cases, Grid
-from bisar_budget.design.swept import Swept
+from bisar_budget.design.table import Swept
 from bisar_budget.mission.model import Mission
 from bisar_budget.report.tables import MissingTablesError
 from bisar_budget.report.tables.described import Described

@@ -7,7 +7,7 @@ import numpy as np
 
 from bisar_budget.design.cases import Cases, in_unit
 from bisar_budget.design.quantities import Number
-from bisar_budget.design.swept import Column, Part, Swept, Values
+from bisar_budget.design.table import Column, Part, Swept, Values
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.requirement import Override
 from bisar_budget.mission.model import Mission

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from bisar_budget.design.cases import Grid
-from bisar_budget.design.swept import Column, Part, Values
+from bisar_budget.design.table import Column, Part, Values
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report.tables.described import Described
 

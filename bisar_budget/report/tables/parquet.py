@@ -6,7 +6,7 @@ Texts are dictionaries; what has no value is null. The metadata of the file is w
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from bisar_budget.design.swept import Column, Part, Values
+from bisar_budget.design.table import Column, Part, Values
 from bisar_budget.report.tables.described import Described
 
 _ROWS = 1 << 17  # of a group, at least: readers take one at a time
