@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from datetime import date
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -537,3 +537,19 @@ def _verdict(checked: judged.Checked, row_id: str | None, breaks: Container[str]
         "utilization": np.where(has_one, uses[worst, each], math.nan),
         "binding_requirement": np.where(has_one, requirement, unmet),
     }
+
+
+def _within(number: Number, values: Any) -> NDArray[np.bool_]:
+    """Whether each value is one that the file may have."""
+    gt, ge, lt, le = number.reader.bounds
+    return cast("NDArray[np.bool_]", (values > gt) & (values >= ge) & (values < lt) & (values <= le))
+
+
+def _gated(mission: Mission, model: str) -> Mission:
+    return mission._replace(allocation=mission.allocation._replace(model=model))
+
+
+def _of_row(name: str) -> tuple[str, str]:
+    """Row and field of a column."""
+    row, _, field = name.rpartition(".")
+    return row, field
