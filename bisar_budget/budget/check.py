@@ -124,7 +124,7 @@ def _checked(analysis: Analysis, gating: str, scene: CheckedScene | None) -> lis
     model, other = analysis.models(gating)
     allocation = analysis.allocation
     rows = [
-        *error_rows(analysis, model, other, allocation),
+        *error_rows(analysis, gating, allocation),
         *vibration_rows(mission, allocation, gating),
         *_instrument_rows(analysis, gating, allocation),
         *aggregate_rows(analysis, model, other, allocation),
