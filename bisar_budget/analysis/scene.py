@@ -47,7 +47,7 @@ PROBES = 3
 FLOOR_RAD, SHARE = 1e-4, 3e-4  # of the largest difference: what one error may differ by and be taken as small
 FINEST = 1e-3  # rad, of the azimuth of a largest difference: a cosine loses half its square
 MAY_FOLD = 0.7  # of what gradients span without an error: with less left of it a point may have no image nearby
-AT_ONCE = 512  # cases; more arrays of places do not stay in a cache
+AT_ONCE, TOGETHER = 512, 1024  # cases, and large errors at places: arrays of more do not stay in a cache
 
 _BOUND = 1 + UTILIZATION_TOLERANCE
 _ARC = math.pi / RIM_POINTS
@@ -169,7 +169,8 @@ class ScenePhases:
         chosen = range(len(self.members)) if indices is None else indices
         groups = [group.of(of) for group in self.groups]
         one = combined_phase([(self.ids[i], phases[i]) for i in chosen], self.combine, groups)
-        return np.asarray(np.broadcast_to(one, phases.shape[1:]))
+        # A phase without end, of an error that has no image there, has none with what it is correlated with.
+        return np.where(np.isnan(np.broadcast_to(one, phases.shape[1:])), math.inf, one)
 
     def differences(self, radius: Floats, azimuth: Floats, of: Places) -> Floats:
         """Phase of each error there less that at the centre; by the worse sign of the large ones. [rad]"""
@@ -185,20 +186,27 @@ class ScenePhases:
         small = self.there(there, of).phases - self.centre.take(of, axis=1)
         found, turns = small.copy(), np.full(of.shape, math.inf)
         error, place = np.nonzero(exact)
-        if error.size:
-            case, count = of[place], error.size
-            lanes = self._lanes.of(np.concatenate([(self._rows[:, error] * self.errors.cases + case)]).reshape(-1))
-            lanes = replace(lanes, case=np.tile(place, 2))
-            sizes, every = np.tile(np.abs(self.sizes[error, case]), 2), np.arange(2 * count)
-            none = np.zeros(2 * count)
-            paths = PointPaths(there, lanes, np.array(there.way(lanes, none, (none, none))))
-            paths.to(every, sizes)
-            known = paths.known(every, sizes).reshape(6, 2, count)
-            np.minimum.at(turns, place, np.nan_to_num(known[5]).min(axis=0))
-            differs = np.abs(known[3] - self._by_sign[:, error, case])
-            worst = np.where(np.isnan(differs), math.inf, differs).max(axis=0)
-            found[error, place] = np.copysign(worst, small[error, place])
+        for start in range(0, error.size, TOGETHER):
+            some = slice(start, start + TOGETHER)
+            self._exactly(there, of, error[some], place[some], (found, turns))
         return small, found, turns
+
+    def _exactly(
+        self, there: ExactRanges, of: Places, error: Places, place: Places, kept: tuple[Floats, Floats]
+    ) -> None:
+        """Put what exact ranges say into the differences and turns of some errors at places."""
+        (found, turns), case, count = kept, of[place], error.size
+        lanes = self._lanes.of((self._rows[:, error] * self.errors.cases + case).reshape(-1))
+        lanes = replace(lanes, case=np.tile(place, 2))
+        sizes, every = np.tile(np.abs(self.sizes[error, case]), 2), np.arange(2 * count)
+        none = np.zeros(2 * count)
+        paths = PointPaths(there, lanes, np.array(there.way(lanes, none, (none, none))))
+        paths.to(every, sizes)
+        known = paths.known(every, sizes).reshape(6, 2, count)
+        np.minimum.at(turns, place, np.nan_to_num(known[5]).min(axis=0))
+        differs = np.abs(known[3] - self._by_sign[:, error, case])
+        worst = np.where(np.isnan(differs), math.inf, differs).max(axis=0)
+        found[error, place] = np.copysign(worst, found[error, place])
 
     @cached_property
     def _rows(self) -> Places:
@@ -467,7 +475,7 @@ def scene_edges(errors: DeclaredErrors, limits: Mapping[str, Floats], split: Spl
     found = SceneEdges(phases, radius, rim, largest, names, np.array(limit), np.zeros((len(held), errors.cases)))
     counts = phases.points(radius, errors.each)
     for count in (RIM_POINTS, 2 * RIM_POINTS):
-        cases = np.flatnonzero((counts == count) & ~errors.is_left_out)
+        cases = np.flatnonzero(counts == count)
         for start in range(0, cases.size, AT_ONCE):
             _evaluate(found, members, cases[start : start + AT_ONCE])
     return found
@@ -541,7 +549,7 @@ class Correction:
         while size <= self.total and high < self.farthest:
             low, below, high = high, size, self._beyond(high, size)
             size = self._largest(high)
-        return None if size <= self.total else where(self._largest, self.total, (low, below), (high, size))[0]
+        return None if size <= self.total else where(self._largest, self.total, (low, below), (high, size))
 
     def _served_of_small(self) -> float | None:
         """The same, were effects of all errors proportional to them.
@@ -558,13 +566,12 @@ class Correction:
                 low, inside, high = high, size, self._beyond(high, size)
                 size = size_at(high)
             if size > total:
-                low, high = where(size_at, total, (low, inside), (high, size))
-            around = self._rims(low if size > total else high)
-            difference = float(around.difference[0])
-            if difference <= total * (1 + PRECISION):
-                return None if size <= total else low
-            azimuth, size, high = float(around.azimuth[0]), difference, low if size > total else high
-        return where(lambda one: float(self._rims(one).difference[0]), total, (0.0, 0.0), (high, size))[0]
+                high = where(size_at, total, (low, inside), (high, size))
+            around = self._rims(high)
+            if float(around.difference[0]) <= total * (1 + PRECISION):
+                return None if size <= total else high
+            azimuth, size = float(around.azimuth[0]), float(around.difference[0])
+        return where(lambda one: float(self._rims(one).difference[0]), total, (0.0, 0.0), (high, size))
 
     def _beyond(self, radius: float, size: float) -> float:
         """Radius to look at after one whose difference is inside the total. [m]"""
@@ -583,13 +590,13 @@ class Correction:
 
 def where(
     size_at: Callable[[float], float], total: float, inside: tuple[float, float], outside: tuple[float, float]
-) -> tuple[float, float]:
-    """Radii, to a thousandth, between which a size passes a total: the secant between both, drawn near (Illinois)."""
+) -> float:
+    """Radius, to a thousandth, up to which a size is inside a total: by secants, drawn near (Illinois)."""
     (low, below), (high, above) = inside, outside
     goal = total * (1 - PRECISION / 2)
     below, above = below - goal, above - goal
     if below > 0:  # as near as asked for
-        return low, low
+        return low
     was_inside = None
     while high - low > PRECISION * high:
         share = 0.5 if math.isinf(above) else below / (below - above)
@@ -597,7 +604,7 @@ def where(
         over = size_at(middle) - goal
         is_inside = over <= total - goal
         if is_inside and over > -(total - goal):
-            return middle, middle
+            return middle
         if is_inside:
             low, below = middle, over
             above = above / 2 if was_inside else above  # twice on one side: draw the other nearer
@@ -605,7 +612,7 @@ def where(
             high, above = middle, over
             below = below / 2 if was_inside is False else below
         was_inside = is_inside
-    return low, high
+    return low
 
 
 # ---------------------------------------------------------------------- in words

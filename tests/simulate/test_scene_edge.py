@@ -362,13 +362,13 @@ def test_edge_and_radius_are_those_of_a_circle_of_720_places() -> None:
 @pytest.mark.parametrize("start", [0.0, 0.9, 0.99999])
 def test_the_radius_where_a_size_passes_a_total_is_between_its_bounds(power: float, start: float) -> None:
     """Size = radius to a power, which is 1 at 1: to a thousandth of the size, also from just inside the total."""
-    low, _ = where(lambda radius: radius**power, 1.0, (start, start**power), (2.0, 2.0**power))
+    low = where(lambda radius: radius**power, 1.0, (start, start**power), (2.0, 2.0**power))
     assert start <= low <= 1
     assert low**power >= 1 - 1.1e-3 * max(1.0, power)
 
 
 def test_a_radius_is_found_below_a_place_without_an_image() -> None:
-    low, _ = where(lambda radius: radius if radius < 0.7 else math.inf, 1.0, (0.0, 0.0), (2.0, math.inf))
+    low = where(lambda radius: radius if radius < 0.7 else math.inf, 1.0, (0.0, 0.0), (2.0, math.inf))
     assert 0.699 <= low < 0.7
 
 
