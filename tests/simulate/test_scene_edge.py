@@ -372,6 +372,18 @@ def test_a_radius_is_found_below_a_place_without_an_image() -> None:
     assert 0.699 <= low < 0.7
 
 
+def test_an_error_without_an_image_is_not_lost_among_those_it_is_correlated_with() -> None:
+    """Its phase is infinite: zero, or minus, times that was no number, and then no difference at all."""
+    covariance = {"position": [3, 3, 3], "velocity": [0.2, 0.2, 0.2], "correlation": np.eye(6).tolist()}
+    error = {"covariance": covariance}
+    edge = Edge(parse_mission(mission_text(platforms__receiver__motion_error=error, allocation__combine="rss")))
+    here, phases = np.zeros(1, dtype=int), np.ones((6, 1))
+    assert edge.phases.together(phases, here)[0] == pytest.approx(math.sqrt(6))
+    phases[2] = math.inf
+    with np.errstate(invalid="ignore"):  # as a check has it
+        assert edge.phases.together(phases, here)[0] == math.inf
+
+
 def test_an_arc_of_the_rim_without_an_image_between_two_places_is_found() -> None:
     """A height error of 49 m ends the image of the rim on an arc of 5 degrees: the row had passed over it."""
     from tests.families import mission_text as of_family
