@@ -1,4 +1,4 @@
-"""The scene's edge: how far a quadratic phase error there differs from the one at the centre.
+"""The scene's edge: how far a quadratic phase error there differs from the one at the centre, in many cases at once.
 
 The paper's errors are spatially invariant; in the full model they are not. At a point p of the scene both platforms
 have other lines of sight: exact ranges are taken there, with p in place of the
@@ -8,26 +8,26 @@ exact ranges and against images at 250 m and 1 km: `tests/simulate/test_scene_ed
 What gates is the difference against the total budget, without the gain of autofocus: that is what must be left of any
 error after a correction. Without autofocus it is what the edge has more than the centre, where the rows stand; then,
 and with a correction that has its own bound, an edge whose phase itself exceeds a limit is a warning.
+
+A place is a point of the ground of one of the cases; `of` says of which. Rows of arrays are errors.
 """
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from operator import add
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from bisar_budget import phrases
-from bisar_budget.analysis.allocation import Allocation
-from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.allocation import Split
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT, UTILIZATION_TOLERANCE
-from bisar_budget.effects.combine import combine_phases
-from bisar_budget.effects.correlation import phase_parts
+from bisar_budget.effects.combined import combined, combined_phase, many_correlated
+from bisar_budget.effects.declared import DeclaredErrors
 from bisar_budget.geometry import BistaticGeometry, GroundVector
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import ExactRanges, joined
+from bisar_budget.ranges.exact_ranges import ExactRanges, Floats, Lanes, Places, SmallErrors, Truths, joined
 from bisar_budget.ranges.point_paths import PointPaths
 from bisar_budget.units import format_quantity
 
@@ -39,18 +39,585 @@ CLIMBS = 5  # until then, each in a quarter of the arc before
 NARROW = 10.0  # of a place's clearances; below, it is looked at whatever its difference
 MIN_SINE = math.sin(math.radians(MIN_GRADIENT_ANGLE_DEG))
 NEAREST_M = 1.0  # of a platform to a place; nearer, no image
-_FARTHEST = 0.5  # of the nearest slant range: the search for a radius ends there
-_PRECISION = 1e-3  # of the radius
-_ALIKE = 5e-3  # of the total: so near to it, large errors need no search of their own
-_TURNS = 2  # of the azimuth along which it is searched; then it is the whole circle's
+FARTHEST = 0.5  # of the nearest slant range: the search for a radius ends there
+PRECISION = 1e-3  # of the radius
+ALIKE = 5e-3  # of the total: so near to it, large errors need no search of their own
+TURNS = 2  # of the azimuth along which it is searched; then it is the whole circle's
 PROBES = 3
 FLOOR_RAD, SHARE = 1e-4, 3e-4  # of the largest difference: what one error may differ by and be taken as small
 FINEST = 1e-3  # rad, of the azimuth of a largest difference: a cosine loses half its square
 MAY_FOLD = 0.7  # of what gradients span without an error: with less left of it a point may have no image nearby
+AT_ONCE, TOGETHER = 512, 1024  # cases, and large errors at places: arrays of more do not stay in a cache
+
+_BOUND = 1 + UTILIZATION_TOLERANCE
+_ARC = math.pi / RIM_POINTS
+_SIDES = np.array([[-1.0], [1.0]])
+HeightAt = Callable[[Floats, Places], Floats]  # heights at azimuths, of some climbers
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class ScenePlaces:
+    """Quadratic phase of each error at places, signed, (errors, places); how far they are from the centre's. [rad]
+
+    There is an image where both `clearances`, (2, places), are above 1: the sine between range and Doppler gradient,
+    and the range gradient, over the least of each. The sine has the centre's sign: below zero, they are parallel on
+    the way.
+    """
+
+    phases: Floats
+    size: Floats
+    clearances: Floats
+
+    @property
+    def has_image(self) -> Truths:
+        """Whether an image can be formed there."""
+        return np.asarray((self.clearances > 1).all(axis=0))
+
+    @property
+    def heights(self) -> Floats:
+        """What circles are climbed by, (3, places): the clearances, negative, and the size."""
+        return np.array((*-self.clearances, self.size))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rims:
+    """Circles about centres: where the largest difference is, that difference, and the phases around it. [rad]
+
+    Small errors are looked at, `phases` (errors, points, circles). Where a part has no image the difference is
+    infinite.
+    """
+
+    azimuth: Floats
+    difference: Floats
+    phases: Floats
+
+    def of(self, some: Places) -> "Rims":
+        """Some of the circles."""
+        return Rims(self.azimuth[some], self.difference[some], self.phases[..., some])
+
+
+class Heights(NamedTuple):
+    """Heights and their azimuths; of heights alike the larger azimuth is the higher."""
+
+    height: Floats
+    azimuth: Floats
+
+    @property
+    def highest(self) -> "Heights":
+        """The highest along the first axis."""
+        height = self.height.max(axis=0)
+        return Heights(height, np.where(self.height == height, self.azimuth, -math.inf).max(axis=0))
+
+    def with_others(self, *others: "Heights") -> "Heights":
+        """The highest of these and others, one by one."""
+        return Heights(*map(np.array, zip(self, *others, strict=True))).highest
+
+    def of(self, some: Any) -> "Heights":
+        """Some of them."""
+        return Heights(self.height[some], self.azimuth[some])
+
+    def where(self, is_own: Truths, others: "Heights") -> "Heights":
+        """These in some places, in the rest others."""
+        return Heights(*(np.where(is_own, *both) for both in zip(self, others, strict=True)))
+
+    def put(self, some: Any, others: "Heights") -> None:
+        """Put others into some places."""
+        self.height[some], self.azimuth[some] = others
+
+
+class ScenePhases:
+    """Quadratic phases of the declared errors at any places of the scenes."""
+
+    def __init__(self, errors: DeclaredErrors) -> None:
+        self.errors, self.exact, self.combine = errors, errors.exact, errors.mission.allocation.combine
+        self.groups = many_correlated(errors.mission) if self.combine == "rss" else ()
+        self.members = [error for error in errors.stated if error.is_motion]
+        self.ids = [error.subject.id for error in self.members]
+        self.small = SmallErrors.of([errors.lanes(error) for error in self.members])
+        shape = (len(self.members), errors.cases)
+        self.sizes = np.array([errors.array(error.declared) for error in self.members]).reshape(shape)
+        per_unit = [errors.array(error.full.qpe) for error in self.members]
+        self.centre = np.array(per_unit).reshape(shape) * self.sizes
+        self.is_large = np.array([errors.is_large(error) for error in self.members]).reshape(shape)
+        self.nearest = errors.array(np.minimum(*(path.slant_range for path in errors.geometries.both)))
+        self.turn = np.copysign(1.0, self.exact.sine)
+
+    def ranges_at(self, radius: Floats, azimuth: Floats, of: Places) -> ExactRanges:
+        """Exact ranges of places."""
+        return self.exact.at(*at(radius, azimuth), of)
+
+    def places(self, radius: Floats, azimuth: Floats, of: Places) -> ScenePlaces:
+        """What there is at places."""
+        return self.there(self.ranges_at(radius, azimuth, of), of)
+
+    def there(self, there: ExactRanges, of: Places) -> ScenePlaces:
+        """What there is where exact ranges are taken."""
+        centre = self.centre.take(of, axis=1)
+        phases = there.quadratics_of(self.small.there(of)) * self.sizes.take(of, axis=1)
+        clearances = np.array(
+            (self.turn.take(of) * there.sine / MIN_SINE, there.range_gradient / MIN_GROUND_GRADIENT)
+        )
+        is_nowhere = (there.nearest < NEAREST_M) | ~np.isfinite(phases.sum(axis=0) + clearances.sum(axis=0))
+        if is_nowhere.any():
+            phases, clearances = np.where(is_nowhere, centre, phases), np.where(is_nowhere, 0.0, clearances)
+        return ScenePlaces(phases, self.together(phases - centre, of), clearances)
+
+    def together(self, phases: Floats, of: Places, indices: Sequence[int] | None = None) -> Floats:
+        """Phases of the errors, or of some of them, combined; those of a covariance with their correlations. [rad]"""
+        if indices is None and not self.groups:
+            return np.asarray(combined(list(phases), self.combine))
+        chosen = range(len(self.members)) if indices is None else indices
+        groups = [group.of(of) for group in self.groups]
+        one = combined_phase([(self.ids[i], phases[i]) for i in chosen], self.combine, groups)
+        # A phase without end, of an error that has no image there, has none with what it is correlated with.
+        return np.where(np.isnan(np.broadcast_to(one, phases.shape[1:])), math.inf, one)
+
+    def differences(self, radius: Floats, azimuth: Floats, of: Places) -> Floats:
+        """Phase of each error there less that at the centre; by the worse sign of the large ones. [rad]"""
+        return self.around(radius, azimuth, of, self.is_large.take(of, axis=1))[1]
+
+    def around(self, radius: Floats, azimuth: Floats, of: Places, exact: Truths) -> tuple[Floats, Floats, Floats]:
+        """The same were all errors small; with some taken exactly, (errors, places); and how gradients turn.
+
+        That is the least of what range and Doppler gradients span where each of these leads, over what they span
+        without it: 0 where there is no image.
+        """
+        there = self.ranges_at(radius, azimuth, of)
+        small = self.there(there, of).phases - self.centre.take(of, axis=1)
+        found, turns = small.copy(), np.full(of.shape, math.inf)
+        error, place = np.nonzero(exact)
+        for start in range(0, error.size, TOGETHER):
+            some = slice(start, start + TOGETHER)
+            self._exactly(there, of, error[some], place[some], (found, turns))
+        return small, found, turns
+
+    def _exactly(
+        self, there: ExactRanges, of: Places, error: Places, place: Places, kept: tuple[Floats, Floats]
+    ) -> None:
+        """Put what exact ranges say into the differences and turns of some errors at places."""
+        (found, turns), case, count = kept, of[place], error.size
+        lanes = self._lanes.of((self._rows[:, error] * self.errors.cases + case).reshape(-1))
+        lanes = replace(lanes, case=np.tile(place, 2))
+        sizes, every = np.tile(np.abs(self.sizes[error, case]), 2), np.arange(2 * count)
+        none = np.zeros(2 * count)
+        paths = PointPaths(there, lanes, np.array(there.way(lanes, none, (none, none))))
+        paths.to(every, sizes)
+        known = paths.known(every, sizes).reshape(6, 2, count)
+        np.minimum.at(turns, place, np.nan_to_num(known[5]).min(axis=0))
+        differs = np.abs(known[3] - self._by_sign[:, error, case])
+        worst = np.where(np.isnan(differs), math.inf, differs).max(axis=0)
+        found[error, place] = np.copysign(worst, found[error, place])
+
+    @cached_property
+    def _rows(self) -> Places:
+        """Places of the errors of each sign among `_lanes`, in lanes of all cases, (2, errors)."""
+        place = np.cumsum(self.is_large.any(axis=1)) - 1
+        return np.array((2 * place, 2 * place + 1))
+
+    @cached_property
+    def _lanes(self) -> Lanes:
+        """Lanes of the errors that are large in any case, in all of them, of each sign."""
+        large = np.flatnonzero(self.is_large.any(axis=1))
+        return joined([self.errors.lanes(self.members[i], sign) for i in large for sign in (1.0, -1.0)])
+
+    @cached_property
+    def _by_sign(self) -> Floats:
+        """Quadratic phases of large errors at the centre, of each sign, (2, errors, cases). [rad]"""
+        found = np.full((2, *self.is_large.shape), math.nan)
+        for i in np.flatnonzero(self.is_large.any(axis=1)):
+            found[:, i] = self.errors.quadratic_by_sign(self.members[i])
+        return found
+
+    @cached_property
+    def more(self) -> Floats:
+        """What errors have more at the centre than small ones, by the worse sign, (errors, cases). [rad]"""
+        exactly = np.array([self.errors.does("full", error).qpe for error in self.members])
+        return np.where(self.is_large, exactly - self.centre, 0.0)
+
+    # ------------------------------------------------------------------ circles
+    def points(self, radius: Floats, of: Places) -> Places:
+        """Number of even points that circles need."""
+        return np.where(radius <= WIDE * self.nearest[of], RIM_POINTS, 2 * RIM_POINTS)
+
+    def rims(self, radius: Floats, of: Places) -> Rims:
+        """Evaluate circles that need the same number of points, evenly and around their worst point.
+
+        That is where the difference is largest; and where a clearance is least, if it comes near to 1: a difference
+        grows there as its inverse, in an arc that points of a circle may miss.
+        """
+        count, circles = int(self.points(radius, of)[0]), np.arange(of.size)
+
+        def look(azimuth: Floats, circle: Places) -> ScenePlaces:
+            return self.places(radius[circle], azimuth, of[circle])
+
+        even = look(np.repeat(2 * math.pi * np.arange(count) / count, of.size), np.tile(circles, count))
+        clear, tops = _tops(even.heights.reshape(3, count, of.size), lambda *where: look(*where).heights)
+        nearest = clear.highest
+        has_image = nearest.height < -1
+        some, circle = np.nonzero((clear.height > -math.inf) & has_image)
+        if some.size:  # beside the narrowest
+            arc, azimuth = math.pi / count / 8, clear.azimuth[some, circle]
+            three = np.concatenate((azimuth - arc, azimuth, azimuth + arc))
+            before, height, after = look(three, np.tile(circle, 3)).size.reshape(3, -1)
+            top = _climbed(
+                lambda way, which: look(way, circle[which]).size, (before, after), Heights(height, azimuth), arc
+            )
+            clear.height[:] = -math.inf
+            clear.put((some, circle), top)
+            tops = Heights(*(np.concatenate(both) for both in zip(tops, clear, strict=True)))
+        top = tops.highest.where(has_image, nearest)
+        phases = even.phases.reshape(-1, count, of.size)
+        return Rims(top.azimuth % (2 * math.pi), np.where(has_image, top.height, math.inf), phases)
+
+
+def at(radius: Any, azimuth: Any) -> tuple[Any, Any]:
+    """Place on the ground, east and north. [m]"""
+    return radius * np.cos(azimuth), radius * np.sin(azimuth)
+
+
+# ---------------------------------------------------------------------- climbs
+def _tops(heights: Floats, look: Callable[[Floats, Places], Floats]) -> tuple[Heights, Heights]:
+    """Climb from each of the even points of circles, (3, points, circles), that is above its neighbours.
+
+    Heights are both clearances, less than nothing, and sizes, as `look` has them at azimuths of circles. Arrived at
+    are tops of the clearances, (2 points, circles), and of the sizes, (points, circles); minus infinity where none
+    climbed. Left out are clearances that do not seem to come below `NARROW`, and sizes that seem to stay below the
+    highest by more than a crest may be off; a valley that is milder at the points may be the deeper between them.
+    """
+    count, arc = heights.shape[1], 2 * math.pi / heights.shape[1]
+    before, after = np.roll(heights, 1, axis=1), np.roll(heights, -1, axis=1)
+    _, crests = _crest(before, after, heights, arc)
+    most = crests[2] + ROUGH * np.abs(crests[2])
+    is_start = heights >= np.maximum(before, after)
+    is_start[:2] &= crests[:2] > -NARROW
+    is_start[2] &= (most >= heights[2].max(axis=0)) & (heights[:2] < -1).all(axis=(0, 1))
+    kind, point, circle = np.nonzero(is_start)
+    top = _climbed(
+        lambda azimuth, some: look(azimuth, circle[some])[kind[some], np.arange(some.size)],
+        (before[is_start], after[is_start]),
+        Heights(heights[is_start], arc * point),
+        arc,
+    )
+    found = Heights(np.full(heights.shape, -math.inf), np.zeros(heights.shape))
+    found.put(is_start, top)
+    # As if they had been climbed one by one, from the highest crest on.
+    order = np.argsort(np.where(is_start[2], -crests[2], math.inf), axis=0, kind="stable")
+    climbed, seemed = (np.take_along_axis(one, order, axis=0) for one in (found.height[2], most))
+    is_low = seemed[1:] < np.maximum.accumulate(climbed, axis=0)[:-1]
+    climbed[1:][is_low] = -math.inf
+    np.put_along_axis(found.height[2], order, climbed, axis=0)
+    return Heights(*(one[:2].reshape(2 * count, -1) for one in found)), found.of(2)
+
+
+def _climbed(height_at: HeightAt, sides: tuple[Floats, Floats], start: Heights, arc: float) -> Heights:
+    """Climb to the highest near places of circles whose sides, an arc away, are no higher.
+
+    Linear in the radius, a height is a constant and a cosine of the azimuth. Where its crest does not tell what is
+    found there, that is looked for again in a quarter of the arc.
+    """
+    found, here, some = start, start, np.arange(start.height.size)
+    for _ in range(CLIMBS):
+        if not some.size:
+            break
+        offset, crests = _crest(*sides, here.height, arc)
+        azimuth = here.azimuth + offset
+        there = Heights(height_at(azimuth, some), azimuth)
+        found.put(some, found.of(some).with_others(there))
+        going = ~(np.abs(there.height - crests) <= LIKE_A_COSINE * np.abs(crests))
+        some, here = some[going], here.of(going).with_others(there.of(going))
+        if some.size:
+            arc /= 4
+            both = np.array((here.azimuth - arc, here.azimuth + arc))
+            around = Heights(height_at(both.reshape(-1), np.tile(some, 2)).reshape(2, -1), both)
+            found.put(some, found.of(some).with_others(around.highest))
+            sides = (around.height[0], around.height[1])
+    return found
+
+
+def _crest(before: Floats, after: Floats, middle: Floats, arc: float) -> tuple[Floats, Floats]:
+    """Offset from the middle of three points an arc apart to the crest of the cosine through them, and its height."""
+    sine = (after - before) / (2 * math.sin(arc))
+    cosine = (middle - (after + before) / 2) / (1 - math.cos(arc))
+    offset = np.minimum(np.maximum(np.arctan2(sine, cosine), -arc), arc)
+    return offset, middle - cosine + np.hypot(sine, cosine)
+
+
+class _Climb:
+    """The largest differences on circles, errors of any size counted.
+
+    They are climbed from the highest of some places of each circle, and of where it is largest of small errors.
+    """
+
+    def __init__(self, phases: ScenePhases, radius: Floats, of: Places, rims: Rims) -> None:
+        self.phases, self.radius, self.of, self.rims = phases, radius, of, rims
+        self.large = phases.is_large.take(of, axis=1)
+        self.bent = self._bent()
+        self.lowest = Heights(np.full(of.size, -math.inf), np.zeros(of.size))  # turns and azimuths, negative
+
+    def largest(self) -> Heights:
+        """The largest differences [rad]; where there is no image somewhere they are infinite."""
+        azimuth, some = self.rims.azimuth.copy(), np.flatnonzero(self.bent.any(axis=0))
+        if some.size:
+            azimuth[some] = self._azimuths(some) % (2 * math.pi)
+        differences = self.phases.differences(self.radius, azimuth, self.of)
+        return Heights(self.phases.together(differences, self.of), azimuth)
+
+    def _bent(self) -> Truths:
+        """Which of the large errors differ otherwise than small ones do: seen at three places, two harmonics show."""
+        thirds = self.rims.azimuth + 2 * math.pi * np.arange(PROBES)[:, None] / PROBES
+        radius, of, large = np.tile(self.radius, PROBES), np.tile(self.of, PROBES), np.tile(self.large, PROBES)
+        small, exact, _ = self.phases.around(radius, thirds.reshape(-1), of, large)
+        floor = np.tile(np.maximum(FLOOR_RAD, SHARE * self.rims.difference), PROBES)
+        is_bent = large & ~(np.abs(exact - small) <= floor)
+        return np.asarray(is_bent.reshape(len(large), PROBES, -1).any(axis=1))
+
+    def _look(self, some: Places, azimuths: Floats) -> Heights:
+        """The largest of differences at azimuths (n, some); the least turns are kept in mind."""
+        count = len(azimuths)
+        of, bent = np.tile(self.of[some], count), np.tile(self.bent[:, some], count)
+        _, found, turns = self.phases.around(np.tile(self.radius[some], count), azimuths.reshape(-1), of, bent)
+        seen = Heights(-turns.reshape(count, -1), -azimuths).highest
+        self.lowest.put(some, self.lowest.of(some).with_others(seen))
+        return Heights(self.phases.together(found, of).reshape(count, -1), azimuths).highest
+
+    def _azimuths(self, some: Places) -> Floats:
+        """Azimuths of the largest differences, or of places without an image, the bent errors taken exactly. [rad]
+
+        Where gradients become parallel the image ends, on an arc that may lie between the places that are looked at:
+        it is also sought where they are nearest to parallel.
+        """
+        even = np.broadcast_to(2 * _ARC * np.arange(RIM_POINTS)[:, None], (RIM_POINTS, some.size))
+        top = self._look(some, np.concatenate((self.rims.azimuth[some][None], even)))
+        arc = np.full(some.size, _ARC)
+        while (going := np.flatnonzero((arc > FINEST) & np.isfinite(top.height))).size:
+            before = top.of(going)
+            side = self._look(some[going], before.azimuth + arc[going] * _SIDES)
+            is_higher = side.height > before.height
+            top.put(going, side.where(is_higher, before))
+            arc[going] = np.where(is_higher, arc[going], arc[going] / 4)
+        arc, low = np.full(some.size, _ARC), self.lowest.of(some)
+        while (going := np.flatnonzero((arc > FINEST) & np.isfinite(top.height) & (low.height > -MAY_FOLD))).size:
+            before = low.of(going)
+            top.put(going, top.of(going).with_others(self._look(some[going], arc[going] * _SIDES - before.azimuth)))
+            seen = self.lowest.of(some[going])
+            is_lower = seen.height > before.height
+            low.put(going, seen.where(is_lower, before))
+            arc[going] = np.where(is_lower, arc[going], arc[going] / 4)
+        return top.azimuth
+
+
+@np.errstate(all="ignore")
+def differences_at(errors: DeclaredErrors, radius: float, azimuth: float) -> list[tuple[str, float]]:
+    """What the errors of one case differ by at a place from the centre, by row id, in the file's order. [rad]"""
+    phases = ScenePhases(errors)
+    found = phases.differences(np.array([radius]), np.array([azimuth]), np.zeros(1, dtype=int))
+    return list(zip(phases.ids, found[:, 0].tolist(), strict=True))
+
+
+# ---------------------------------------------------------------------- edges
+@dataclass(frozen=True, slots=True, eq=False)
+class SceneEdges:
+    """What the edges of the scenes of many cases add.
+
+    `rim` is where small errors differ most from the centre, `largest` where errors of their size do, combined as the
+    mission says [rad]; infinite where there is no image. `over` are the phases [rad], (names, cases), of the errors
+    that are inside their `limit` at the centre and over it at the edge; else 0.
+    """
+
+    phases: ScenePhases
+    radius: Floats
+    rim: Heights
+    largest: Heights
+    names: Sequence[str]
+    limit: Floats
+    over: Floats
+
+    @property
+    def difference(self) -> Floats:
+        """The largest of the phases between edge and centre. [rad]"""
+        return self.largest.height
+
+    @property
+    def has_doubt(self) -> Truths:
+        """Whether an error is over its limit at the edge alone."""
+        return np.asarray((self.over > 0).any(axis=0))
+
+
+def scene_edges(errors: DeclaredErrors, limits: Mapping[str, Floats], split: Split) -> SceneEdges | None:
+    """Evaluate the errors of many cases at the edges of their scenes; None without a declared error.
+
+    Parameters
+    ----------
+    errors : DeclaredErrors
+        Of missions with `scene.radius`.
+    limits : mapping of str to (cases,)
+        What each owner's phases are held to, autofocus gain included. [rad]
+    split : Split
+        Whose errors count against whose limit.
+    """
+    phases = ScenePhases(errors)
+    if not phases.members:
+        return None
+    owners, radius = [error.subject.owner for error in phases.members], errors.array(errors.mission.scene.radius)
+    if phases.combine == "each":
+        held = [(name, [i], limits[owner]) for i, (name, owner) in enumerate(zip(phases.ids, owners, strict=True))]
+    else:
+        held = [
+            (
+                f"{owner}.quadratic_phase_error",
+                [i for i, one in enumerate(owners) if owner == "mission" or split.includes(one, owner)],
+                limit,
+            )
+            for owner, limit in limits.items()
+        ]
+    names, members, limit = zip(*held, strict=True)
+    rim, largest = (Heights(np.full(errors.cases, math.inf), np.zeros(errors.cases)) for _ in range(2))
+    found = SceneEdges(phases, radius, rim, largest, names, np.array(limit), np.zeros((len(held), errors.cases)))
+    counts = phases.points(radius, errors.each)
+    for count in (RIM_POINTS, 2 * RIM_POINTS):
+        cases = np.flatnonzero(counts == count)
+        for start in range(0, cases.size, AT_ONCE):
+            _evaluate(found, members, cases[start : start + AT_ONCE])
+    return found
+
+
+@np.errstate(all="ignore")  # a gradient vanishes, or both are parallel to the last digit
+def _evaluate(found: SceneEdges, members: Sequence[Sequence[int]], of: Places) -> None:
+    phases = found.phases
+    rims = phases.rims(found.radius[of], of)
+    found.rim.put(of, Heights(rims.difference, rims.azimuth))
+    found.largest.put(of, _largest(phases, found.radius[of], of, rims))
+    some = np.flatnonzero(np.isfinite(found.difference[of]))
+    if some.size:
+        found.over[:, of[some]] = _over_at_the_edge(found, members, of[some], rims.of(some))
+
+
+def _largest(phases: ScenePhases, radius: Floats, of: Places, rims: Rims) -> Heights:
+    """Largest differences on circles, errors of any size counted. [rad]"""
+    found = Heights(rims.difference.copy(), rims.azimuth.copy())
+    some = np.flatnonzero(np.isfinite(rims.difference) & phases.is_large[:, of].any(axis=0))
+    if some.size:
+        found.put(some, _Climb(phases, radius[some], of[some], rims.of(some)).largest())
+    return found
+
+
+def _over_at_the_edge(found: SceneEdges, members: Sequence[Sequence[int]], of: Places, rims: Rims) -> Floats:
+    """Phases at the edge of what is inside its limit at the centre and over it there, else 0, (names, of). [rad]"""
+    phases, limit = found.phases, found.limit[:, of] * _BOUND
+    more = phases.more[:, of]
+
+    def held(at_places: Floats) -> Floats:
+        """Phases as they are held to limits, (names, ..., of)."""
+        if phases.combine == "each":
+            return np.abs(at_places)
+        return np.array([phases.together(at_places, of, indices) for indices in members])
+
+    around = held(rims.phases + more[:, None])
+    top, count = around.argmax(axis=1)[:, None], around.shape[1]
+    before, after, middle = (np.take_along_axis(around, (top + step) % count, axis=1)[:, 0] for step in (-1, 1, 0))
+    _, crests = _crest(before, after, middle, 2 * math.pi / count)
+    worst = phases.places(found.radius[of], rims.azimuth, of).phases
+    size = np.maximum(crests, held(worst + more))
+    is_over = (held(phases.centre[:, of] + more) <= limit) & (size > limit)
+    return np.where(is_over, size, 0.0)
+
+
+# ---------------------------------------------------------------------- one correction
+class Correction:
+    """How far from the centre of one case one autofocus correction serves: where differences stay inside a total.
+
+    It is searched for as far as `farthest`. [m]
+    """
+
+    def __init__(self, edges: SceneEdges, case: int, total: float) -> None:
+        self.phases, self.of, self.total = edges.phases, np.array([case]), total
+        self.radius = float(edges.radius[case])
+        self.rim = edges.rim.of(case)
+        self.farthest = max(FARTHEST * float(self.phases.nearest[case]), self.radius)
+        self.is_large = bool(self.phases.is_large[:, case].any())
+
+    @np.errstate(all="ignore")
+    def served(self) -> float | None:
+        """Radius at which the largest difference reaches the total; None if it does not by `farthest`. [m]"""
+        found = self._served_of_small()
+        if not self.is_large:
+            return found
+        high = self.farthest if found is None else found
+        low, below, size = 0.0, 0.0, self._largest(high)
+        if abs(size - self.total) <= ALIKE * self.total:
+            return found
+        while size <= self.total and high < self.farthest:
+            low, below, high = high, size, self._beyond(high, size)
+            size = self._largest(high)
+        return None if size <= self.total else where(self._largest, self.total, (low, below), (high, size))
+
+    def _served_of_small(self) -> float | None:
+        """The same, were effects of all errors proportional to them.
+
+        Along the worst azimuth, and again where the rim at the radius found has a worse one.
+        """
+        (size, azimuth), high, total = map(float, self.rim), self.radius, self.total
+        if not size:
+            return None
+        for _ in range(TURNS):
+            size_at = partial(self._size_along, azimuth)
+            low = inside = 0.0
+            while size <= total and high < self.farthest:
+                low, inside, high = high, size, self._beyond(high, size)
+                size = size_at(high)
+            if size > total:
+                high = where(size_at, total, (low, inside), (high, size))
+            around = self._rims(high)
+            if float(around.difference[0]) <= total * (1 + PRECISION):
+                return None if size <= total else high
+            azimuth, size = float(around.azimuth[0]), float(around.difference[0])
+        return where(lambda one: float(self._rims(one).difference[0]), total, (0.0, 0.0), (high, size))
+
+    def _beyond(self, radius: float, size: float) -> float:
+        """Radius to look at after one whose difference is inside the total. [m]"""
+        return min(self.farthest, radius * max(1.05, min(4.0, 1.05 * self.total / size)))
+
+    def _rims(self, radius: float) -> Rims:
+        return self.phases.rims(np.array([radius]), self.of)
+
+    def _largest(self, radius: float) -> float:
+        return float(_largest(self.phases, np.array([radius]), self.of, self._rims(radius)).height[0])
+
+    def _size_along(self, azimuth: float, radius: float) -> float:
+        place = self.phases.places(np.array([radius]), np.array([azimuth]), self.of)
+        return float(place.size[0]) if place.has_image[0] else math.inf
+
+
+def where(
+    size_at: Callable[[float], float], total: float, inside: tuple[float, float], outside: tuple[float, float]
+) -> float:
+    """Radius, to a thousandth, up to which a size is inside a total: by secants, drawn near (Illinois)."""
+    (low, below), (high, above) = inside, outside
+    goal = total * (1 - PRECISION / 2)
+    below, above = below - goal, above - goal
+    if below > 0:  # as near as asked for
+        return low
+    was_inside = None
+    while high - low > PRECISION * high:
+        share = 0.5 if math.isinf(above) else below / (below - above)
+        middle = low + share * (high - low)
+        over = size_at(middle) - goal
+        is_inside = over <= total - goal
+        if is_inside and over > -(total - goal):
+            return middle
+        if is_inside:
+            low, below = middle, over
+            above = above / 2 if was_inside else above  # twice on one side: draw the other nearer
+        else:
+            high, above = middle, over
+            below = below / 2 if was_inside is False else below
+        was_inside = is_inside
+    return low
+
+
+# ---------------------------------------------------------------------- in words
 class SceneEdge(NamedTuple):
-    """What the edge of the scene adds.
+    """What the edge of the scene of one mission adds, in words.
 
     `difference` is the largest of the quadratic phases between edge and centre, combined as the mission says [rad],
     at `azimuth` on the rim. `autofocus_radius` is that within which it stays inside the total budget [m]; None where
@@ -65,6 +632,24 @@ class SceneEdge(NamedTuple):
     searched: float
     degeneracy: Note
     doubt: Note
+
+    @classmethod
+    def of(cls, edges: SceneEdges, geometry: BistaticGeometry, total: float, *, is_searched: bool) -> "SceneEdge":
+        """That of the only case; `is_searched` says whether to search for how far one correction serves."""
+        correction = Correction(edges, 0, total)
+        (size, rim), (difference, azimuth) = (map(float, one.of(0)) for one in (edges.rim, edges.largest))
+        radius, searched, nowhere = correction.radius, correction.farthest, (math.nan, 0.0, None)
+        if math.isinf(size):
+            reason = phrases.no_image_at_the_edge(math.degrees(rim), _degeneracy(geometry, at(radius, rim)))
+            return cls(radius, *nowhere, FARTHEST * float(edges.phases.nearest[0]), reason, NOTHING)
+        if math.isinf(difference):
+            return cls(radius, *nowhere, searched, phrases.no_image(), NOTHING)
+        served, doubt, worst = correction.served() if is_searched else None, NOTHING, int(edges.over[:, 0].argmax())
+        if edges.over[worst, 0]:
+            doubt = phrases.over_at_the_edge(
+                edges.names[worst], float(edges.over[worst, 0]), float(edges.limit[worst, 0])
+            )
+        return cls(radius, difference, azimuth, served, searched if is_searched else 0.0, NOTHING, doubt)
 
     def notes(self, total: float) -> tuple[Note, ...]:
         """Where the difference is largest, and how far one autofocus correction serves."""
@@ -81,443 +666,14 @@ class SceneEdge(NamedTuple):
         return f"out to {format_quantity(self.autofocus_radius, 'm', 3, 'down')}"
 
 
-class ScenePhases:
-    """Quadratic phases of the declared errors at any point of the scene.
-
-    Of errors so small that their effects are proportional to them; `large` are the others, by their place among
-    the members.
-    """
-
-    def __init__(self, analysis: Analysis) -> None:
-        mission = analysis.mission
-        self.geometry, self.full = analysis.geometry, analysis.full
-        self.combine, self.groups = mission.allocation.combine, analysis.groups
-        self.members = [source for source in analysis.stated if source.is_motion]
-        self.sizes = [source.declared or 0.0 for source in self.members]
-        self.centre = [source.full.qpe * size for source, size in zip(self.members, self.sizes, strict=True)]
-        self.large = [
-            i
-            for i, (source, size) in enumerate(zip(self.members, self.sizes, strict=True))
-            if size and not self.full.is_small(source, abs(size))
-        ]
-        self.nearest = min(self.geometry.transmitter.slant_range, self.geometry.receiver.slant_range)
-        self.nowhere = RimPlace(self.centre, 0.0, (0.0, 0.0))  # without an image
-        self.exact, self.errors = analysis.exact, analysis.errors
-        self.turn = math.copysign(1.0, self.exact.sine[0])
-        self.lanes = [analysis.errors.lanes(source) for source in self.members]
-
-    def geometry_at(self, point: GroundVector) -> BistaticGeometry:
-        """Both platforms as a point of the ground has them."""
-        states = (self.geometry.transmitter, self.geometry.receiver)
-        transmitter, receiver = (
-            replace(s, position=(s.position[0] - point[0], s.position[1] - point[1], s.position[2])) for s in states
-        )
-        return BistaticGeometry(transmitter=transmitter, receiver=receiver)
-
-    def ranges_at(self, radius: float, azimuths: Sequence[float]) -> ExactRanges:
-        """Exact ranges of points of a circle on the ground, one a case."""
-        east, north = np.array([at(radius, azimuth) for azimuth in azimuths]).T
-        return self.exact.at(east, north, np.zeros(len(azimuths), dtype=int))
-
-    def place(self, radius: float, azimuth: float) -> "RimPlace":
-        """What there is at a point of the ground."""
-        return self.places(self.ranges_at(radius, [azimuth]))[0]
-
-    @np.errstate(all="ignore")  # a gradient vanishes, or both are parallel to the last digit
-    def places(self, there: ExactRanges) -> "list[RimPlace]":
-        """What there is where exact ranges are taken."""
-        per_unit = np.array(there.quadratics_of(self.lanes))
-        phases = np.broadcast_to(per_unit.T, (there.half.size, len(self.lanes))) * self.sizes
-        clearances = np.array((self.turn * there.sine / MIN_SINE, there.range_gradient / MIN_GROUND_GRADIENT))
-        is_seen = (there.nearest >= NEAREST_M) & np.isfinite(clearances.sum(axis=0) + phases.sum(axis=1))
-        found = []
-        for is_there, of_errors, (sine, gradient) in zip(
-            is_seen.tolist(), phases.tolist(), clearances.T.tolist(), strict=True
-        ):
-            whole = RimPlace(of_errors, self.combined(of_errors), (sine, gradient)) if is_there else self.nowhere
-            found.append(whole)
-        return found
-
-    def differences(self, radius: float, azimuth: float) -> list[float]:
-        """Phase of each error there less that at the centre; by the worse sign of the large ones. [rad]"""
-        return self.around(radius, [azimuth], self.large)[0][0]
-
-    def around(
-        self, radius: float, azimuths: Sequence[float], exact: Sequence[int]
-    ) -> list[tuple[list[float], float]]:
-        """The same at places of a circle, some of the members taken exactly, by their indices.
-
-        With what range and Doppler gradients span where these lead, over what they span without them, at least: 0
-        where there is no image.
-        """
-        there = self.ranges_at(radius, azimuths)
-        count = len(azimuths)
-        phases = np.array([place.phases for place in self.places(there)]) - self.centre
-        turns = np.ones(count)
-        if exact:
-            signs = (1.0, -1.0)
-            small = [there.effect(there.range_error(self.lanes[i])) for i in exact]
-            per_unit = [there.displacement(effect, sign) for effect in small for sign in signs]
-            lanes = joined([self.errors.lanes(self.members[i], sign) for i in exact for sign in signs])
-            lanes = lanes.of(np.repeat(np.arange(lanes.case.size), count))
-            lanes = replace(lanes, case=np.tile(np.arange(count), 2 * len(exact)))
-            paths = PointPaths(there, lanes, np.array(per_unit).swapaxes(0, 1).reshape(2, -1))
-            sizes = np.repeat(np.abs([self.sizes[i] for i in exact]), 2 * count)
-            every = np.arange(sizes.size)
-            paths.to(every, sizes)
-            known = paths.known(every, sizes).reshape(6, len(exact), 2, count)
-            turns = np.nan_to_num(known[5]).min(axis=(0, 1))
-            for i, away in zip(exact, known[3], strict=True):
-                here = [self.full.at(self.members[i], sign * abs(self.sizes[i])) for sign in signs]
-                centre = np.array([math.nan if one is None else one.quadratic for one in here])
-                differs = np.abs(away - centre[:, None])
-                worst = np.where(np.isnan(differs), math.inf, differs).max(axis=0)
-                phases[:, i] = np.copysign(worst, phases[:, i])
-        return list(zip(phases.tolist(), turns.tolist(), strict=True))
-
-    def exactly(self, phases: Sequence[float]) -> list[float]:
-        """Phases with what large errors have more at the centre than small ones, by the worse sign. [rad]"""
-        return list(map(add, phases, self._more))
-
-    @cached_property
-    def _more(self) -> list[float]:
-        more = [0.0] * len(self.members)
-        for i in self.large:
-            more[i] = self.full.does(self.members[i], self.sizes[i]).qpe - self.centre[i]
-        return more
-
-    def largest(self, rim: "Rim", radius: float) -> tuple[float, float]:
-        """Largest difference on a circle, errors of any size counted, and its azimuth. [rad], [rad]
-
-        It is climbed from the highest of some places of the circle, and of where it is largest of small errors.
-        """
-        if not self.large:
-            return rim.difference, rim.azimuth
-        bent = self._bent(rim, radius)
-        azimuth = self._climbed(rim, radius, bent) if bent else rim.azimuth
-        return self.together(self.differences(radius, azimuth)), azimuth
-
-    def _climbed(self, rim: "Rim", radius: float, bent: list[int]) -> float:
-        """Azimuth of the largest difference, or of a place without an image, some errors taken exactly. [rad]
-
-        Where gradients become parallel the image ends, on an arc that may lie between the places that are looked at:
-        it is also sought where they are nearest to parallel.
-        """
-        seen: list[tuple[float, float]] = []  # least turn, and azimuth
-
-        def look(azimuths: Sequence[float]) -> tuple[float, float]:
-            found = self.around(radius, azimuths, bent)
-            seen.extend((turn, azimuth) for (_, turn), azimuth in zip(found, azimuths, strict=True))
-            return max((self.together(sizes), azimuth) for (sizes, _), azimuth in zip(found, azimuths, strict=True))
-
-        arc = math.pi / RIM_POINTS
-        size, azimuth = look([rim.azimuth, *(2 * arc * place for place in range(RIM_POINTS))])
-        while arc > FINEST and math.isfinite(size):
-            side = look([azimuth - arc, azimuth + arc])
-            if side[0] > size:
-                size, azimuth = side
-            else:
-                arc /= 4
-        turn, lowest = min(seen)
-        arc = math.pi / RIM_POINTS
-        while math.isfinite(size) and turn < MAY_FOLD and arc > FINEST:
-            size, azimuth = max((size, azimuth), look([lowest - arc, lowest + arc]))
-            if min(seen)[0] < turn:
-                turn, lowest = min(seen)
-            else:
-                arc /= 4
-        return azimuth % (2 * math.pi)
-
-    def _bent(self, rim: "Rim", radius: float) -> list[int]:
-        """Which of the large errors differ otherwise than small ones do: seen at three places, two harmonics show."""
-        found = set[int]()
-        floor = max(FLOOR_RAD, SHARE * rim.difference)
-        thirds = [rim.azimuth + 2 * math.pi * third / PROBES for third in range(PROBES)]
-        both = (self.around(radius, thirds, which) for which in ((), self.large))
-        for (small, _), (exact, _) in zip(*both, strict=True):
-            found |= {i for i in self.large if not abs(exact[i] - small[i]) <= floor}
-        return sorted(found)
-
-    def combined(self, phases: Sequence[float]) -> float:
-        """Differences of phases to the centre's, combined: the largest, their sum or root-sum-square. [rad]"""
-        return self.together([there - c for there, c in zip(phases, self.centre, strict=True)])
-
-    def together(self, phases: Sequence[float], indices: Sequence[int] | None = None) -> float:
-        """Phases of the errors, or of some of them, combined; those of a covariance with their correlations. [rad]"""
-        if not self.groups or self.combine != "rss":
-            return combine_phases(phases if indices is None else [phases[i] for i in indices], self.combine)
-        return combine_phases([phase for _, phase in self.parts(phases, indices)], self.combine)
-
-    def parts(self, phases: Sequence[float], indices: Sequence[int] | None = None) -> list[tuple[str, float]]:
-        """What they combine from: ids and phases, of a covariance one under `rss`. [rad]"""
-        chosen = range(len(self.members)) if indices is None else indices
-        return phase_parts([(self.members[i].id, phases[i]) for i in chosen], self.combine, self.groups)
-
-    def rim(self, radius: float) -> "Rim":
-        """Evaluate a circle evenly, and around its worst point.
-
-        That is where the difference is largest; and where a clearance is least, if it comes near to 1: a difference
-        grows there as its inverse, in an arc that points of a circle may miss.
-        """
-        count = RIM_POINTS if radius <= WIDE * self.nearest else 2 * RIM_POINTS
-        places = self.places(self.ranges_at(radius, [2 * math.pi * k / count for k in range(count)]))
-        phases = [place.phases for place in places]
-
-        def size_at(azimuth: float) -> float:
-            return self.place(radius, azimuth).size
-
-        narrow = []
-        for which in (0, 1):
-
-            def nearness_at(azimuth: float, which: int = which) -> float:
-                return -self.place(radius, azimuth).clearances[which]
-
-            # None is left out: a valley that is milder at the points may be the deeper one between them.
-            narrow += _tops([-place.clearances[which] for place in places], nearness_at, -NARROW)
-        nearness, azimuth = max(narrow, default=(-math.inf, 0.0))
-        if nearness >= -1:
-            return Rim(azimuth % (2 * math.pi), math.inf, phases, self.centre)
-        tops = _tops([place.size for place in places], size_at, rough=ROUGH)
-        arc = math.pi / count / 8
-        for _, azimuth in narrow:
-            sides = (size_at(azimuth - arc), size_at(azimuth + arc))
-            tops.append(_climbed(size_at, sides, size_at(azimuth), azimuth, arc))
-        size, azimuth = max(tops)
-        return Rim(azimuth % (2 * math.pi), size, phases, self.place(radius, azimuth).phases)
-
-
-class RimPlace(NamedTuple):
-    """A place of the scene: quadratic phase of each error there, signed; how far they are from the centre's. [rad]
-
-    There is an image where both `clearances` are above 1: the sine between range and Doppler gradient, and the range
-    gradient, over the least of each. The sine has the centre's sign: below zero, they are parallel on the way.
-    """
-
-    phases: list[float]
-    size: float
-    clearances: tuple[float, float]
-
-    @property
-    def has_image(self) -> bool:
-        """Whether an image can be formed there."""
-        return min(self.clearances) > 1
-
-
-class Rim(NamedTuple):
-    """A circle about the centre: where the largest difference is, that difference, phases around it and there. [rad]
-
-    Where a part of it has no image the difference is infinite.
-    """
-
-    azimuth: float
-    difference: float
-    phases: list[list[float]]
-    worst: list[float]
-
-
-def _tops(
-    heights: Sequence[float],
-    height_at: Callable[[float], float],
-    floor: float = -math.inf,
-    rough: float | None = None,
-) -> list[tuple[float, float]]:
-    """Climb from each of the even points of a circle that is above its neighbours: heights and azimuths of the tops.
-
-    Left out are those that do not seem to rise above a floor and, given a part by which that may be off, those that
-    seem to stay below the highest by more.
-    """
-    count = len(heights)
-    arc = 2 * math.pi / count
-    starts = []
-    for k, height in enumerate(heights):
-        sides = (heights[k - 1], heights[(k + 1) % count])
-        if height >= max(sides):
-            starts.append((_crest(*sides, height, arc)[1], sides, height, arc * k))
-    tops: list[tuple[float, float]] = []
-    for crest, sides, height, azimuth in sorted(starts, reverse=True):
-        if crest > floor and (rough is None or not tops or crest + rough * abs(crest) >= max(tops)[0]):
-            tops.append(_climbed(height_at, sides, height, azimuth, arc))
-    return tops
-
-
-def _climbed(
-    height_at: Callable[[float], float], sides: tuple[float, float], height: float, azimuth: float, arc: float
-) -> tuple[float, float]:
-    """Climb to the highest near a place of a circle whose sides, an arc away, are no higher: height and azimuth.
-
-    Linear in the radius, a height is a constant and a cosine of the azimuth. Where its crest does not tell what is
-    found there, that is looked for again in a quarter of the arc.
-    """
-    found = [(height, azimuth)]
-    for _ in range(CLIMBS):
-        offset, crest = _crest(*sides, height, arc)
-        there = (height_at(azimuth + offset), azimuth + offset)
-        found.append(there)
-        if abs(there[0] - crest) <= LIKE_A_COSINE * abs(crest):
-            break
-        height, azimuth = max(there, (height, azimuth))
-        arc /= 4
-        sides = (height_at(azimuth - arc), height_at(azimuth + arc))
-        found += [(sides[0], azimuth - arc), (sides[1], azimuth + arc)]
-    return max(found)
-
-
-def _crest(before: float, after: float, middle: float, arc: float) -> tuple[float, float]:
-    """Offset from the middle of three points an arc apart to the crest of the cosine through them, and its height."""
-    sine = (after - before) / (2 * math.sin(arc))
-    cosine = (middle - (after + before) / 2) / (1 - math.cos(arc))
-    return max(-arc, min(arc, math.atan2(sine, cosine))), middle - cosine + math.hypot(sine, cosine)
-
-
-def at(radius: float, azimuth: float) -> GroundVector:
-    """Point of the ground, east and north. [m]"""
-    return (radius * math.cos(azimuth), radius * math.sin(azimuth))
-
-
-def scene_edge(analysis: Analysis, allocation: Allocation) -> SceneEdge | None:
-    """Evaluate the errors of a mission at the edge of its scene; None without a radius or a declared error.
-
-    Parameters
-    ----------
-    analysis : Analysis
-        Of a mission with `scene.radius`.
-    allocation : Allocation
-        Total budget, and limits of the owners.
-    """
-    radius = analysis.mission.scene.radius
-    edge = ScenePhases(analysis)
-    if radius is None or not edge.members:
-        return None
-    searched = _FARTHEST * edge.nearest
-    rim = edge.rim(radius)
-    if math.isinf(rim.difference):
-        why = _degeneracy(edge.geometry_at(at(radius, rim.azimuth)))
-        reason = phrases.no_image_at_the_edge(math.degrees(rim.azimuth), why)
-        return SceneEdge(radius, math.nan, 0.0, None, searched, reason, NOTHING)
-    searched = max(searched, radius)
-    difference, azimuth = edge.largest(rim, radius)
-    if math.isinf(difference):
-        return SceneEdge(radius, math.nan, 0.0, None, searched, phrases.no_image(), NOTHING)
-    reach = None
-    if analysis.is_bare:
-        searched = 0.0
-    else:
-        reach = _autofocus_radius(edge, radius, rim, allocation.qpe_total, searched)
-    doubt = _over_at_the_edge(edge, allocation, rim)
-    return SceneEdge(radius, difference, azimuth, reach, searched, NOTHING, doubt)
-
-
-def _degeneracy(there: BistaticGeometry) -> str:
+def _degeneracy(geometry: BistaticGeometry, place: GroundVector) -> str:
+    """Why a place of the ground has no image."""
+    east, north = place
+    transmitter, receiver = (
+        replace(state, position=(state.position[0] - east, state.position[1] - north, state.position[2]))
+        for state in (geometry.transmitter, geometry.receiver)
+    )
+    there = BistaticGeometry(transmitter=transmitter, receiver=receiver)
     if min(there.transmitter.slant_range, there.receiver.slant_range) < NEAREST_M:
         return phrases.platform_at_the_edge(NEAREST_M)
     return there.degeneracy() or phrases.gradients_become_parallel()
-
-
-def _autofocus_radius(edge: ScenePhases, radius: float, rim: Rim, total: float, searched: float) -> float | None:
-    """Radius at which the largest difference reaches the total; None if it does not by `searched`. [m]"""
-    found = _radius_of_small(edge, radius, rim, total, searched)
-    if not edge.large:
-        return found
-
-    def size_at(radius: float) -> float:
-        around = edge.rim(radius)
-        return around.difference if math.isinf(around.difference) else edge.largest(around, radius)[0]
-
-    high = searched if found is None else found
-    low, below, size = 0.0, 0.0, size_at(high)
-    if abs(size - total) <= _ALIKE * total:
-        return found
-    while size <= total and high < searched:
-        low, below, high = high, size, min(searched, high * max(1.05, min(4.0, 1.05 * total / size)))
-        size = size_at(high)
-    return None if size <= total else _where(size_at, total, (low, below), (high, size))[0]
-
-
-def _radius_of_small(edge: ScenePhases, radius: float, rim: Rim, total: float, searched: float) -> float | None:
-    """The same, were effects of all errors proportional to them.
-
-    Along the worst azimuth, and again where the rim at the radius found has a worse one.
-    """
-    azimuth, size, high = rim.azimuth, rim.difference, radius
-    if not size:
-        return None
-    for _ in range(_TURNS):
-        size_at = partial(_size_or_beyond, edge, azimuth)
-        low = inside = 0.0
-        while size <= total and high < searched:
-            low, inside = high, size
-            high = min(searched, high * max(1.05, min(4.0, 1.05 * total / size)))
-            size = size_at(high)
-        if size > total:
-            low, high = _where(size_at, total, (low, inside), (high, size))
-        found = edge.rim(low if size > total else high)
-        if found.difference <= total * (1 + _PRECISION):
-            return None if size <= total else low
-        azimuth, size, high = found.azimuth, found.difference, low if size > total else high
-    return _where(lambda radius: edge.rim(radius).difference, total, (0.0, 0.0), (high, size))[0]
-
-
-def _size_or_beyond(edge: ScenePhases, azimuth: float, radius: float) -> float:
-    place = edge.place(radius, azimuth)
-    return place.size if place.has_image else math.inf
-
-
-def _where(
-    size_at: Callable[[float], float], total: float, inside: tuple[float, float], outside: tuple[float, float]
-) -> tuple[float, float]:
-    """Radii, to a thousandth, between which a size passes a total: the secant between both, drawn near (Illinois)."""
-    (low, below), (high, above) = inside, outside
-    goal = total * (1 - _PRECISION / 2)
-    below, above = below - goal, above - goal
-    if below > 0:  # as near as asked for
-        return low, low
-    was_inside = None
-    while high - low > _PRECISION * high:
-        share = 0.5 if math.isinf(above) else below / (below - above)
-        middle = low + share * (high - low)
-        over = size_at(middle) - goal
-        is_inside = over <= total - goal
-        if is_inside and over > -(total - goal):
-            return middle, middle
-        if is_inside:
-            low, below = middle, over
-            above = above / 2 if was_inside else above  # twice on one side: draw the other nearer
-        else:
-            high, above = middle, over
-            below = below / 2 if was_inside is False else below
-        was_inside = is_inside
-    return low, high
-
-
-def _over_at_the_edge(edge: ScenePhases, allocation: Allocation, rim: Rim) -> Note:
-    """Say which error is inside its limit at the centre and over it at the edge; else nothing."""
-    gain, rule = allocation.autofocus_gain, edge.combine
-    centre, *around, worst_place = (edge.exactly(phases) for phases in (edge.centre, *rim.phases, rim.worst))
-    owners = ["transmitter", "receiver", "clock", "mission"]
-    if rule == "each":
-        groups = [(s.id, [i], allocation.qpe_limit(s.owner) * gain) for i, s in enumerate(edge.members)]
-    else:
-        groups = [
-            (
-                f"{owner}.quadratic_phase_error",
-                [
-                    i
-                    for i, s in enumerate(edge.members)
-                    if owner == "mission" or allocation.qpe.includes(s.owner, owner)
-                ],
-                allocation.qpe_limit(owner) * gain,
-            )
-            for owner in owners
-        ]
-    worst = ("", 0.0, 0.0)
-    for name, indices, limit in groups:
-        if edge.together(centre, indices) > limit * (1 + UTILIZATION_TOLERANCE):
-            continue  # its own row says so
-        sizes = [edge.together(there, indices) for there in around]
-        top, count = max(range(len(sizes)), key=sizes.__getitem__), len(sizes)
-        _, crest = _crest(sizes[top - 1], sizes[(top + 1) % count], sizes[top], 2 * math.pi / count)
-        phase = max(crest, edge.together(worst_place, indices))
-        if phase > limit * (1 + UTILIZATION_TOLERANCE) and phase > worst[1]:
-            worst = (name, phase, limit)
-    name, phase, limit = worst
-    return phrases.over_at_the_edge(name, phase, limit) if name else NOTHING

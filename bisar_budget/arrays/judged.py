@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.analysis.allocation import allocate
+from bisar_budget.analysis.scene import SceneEdges, scene_edges
 from bisar_budget.analysis.spread import tones
-from bisar_budget.arrays.aggregates import Aggregates, ManyTogether, is_owed
-from bisar_budget.arrays.edge import HeldTogether, ManySceneEdges, many_scene_edges
-from bisar_budget.arrays.rim import ManyScenePhases
+from bisar_budget.arrays.aggregates import Aggregates, ManyTogether
 from bisar_budget.arrays.shares import shares_of
 from bisar_budget.budget.error_rows import ErrorRows
 from bisar_budget.budget.input_doubt import declared_position_error, is_in_doubt, least_doubt
@@ -35,6 +34,7 @@ from bisar_budget.budget.requirement_states import (
     status_of,
     untaken_effects,
 )
+from bisar_budget.budget.scene_row import judged_edge
 from bisar_budget.budget.vibration_rows import Vibrations, judged_pslr, judged_spurs
 from bisar_budget.budget.waivers import is_waived
 from bisar_budget.effects.combined import combined_phase
@@ -248,7 +248,7 @@ class _Check:
         rows += self._instruments(gating)
         rows += self.aggregates.rows(gating, other)
         if self.mission.scene.radius is not None:
-            rows.append(self._spatial_variance(gating))
+            rows.append(judged_edge(self.judging, self._edges, self.total, gating))
         return rows
 
     @property
@@ -280,35 +280,9 @@ class _Check:
             yield from (one.judged for one in sums)
 
     @cached_property
-    def _edges(self) -> ManySceneEdges | None:
+    def _edges(self) -> SceneEdges | None:
         """What the edges of the scenes add; none without a declared error."""
-        phases = ManyScenePhases(self.errors)
-        if not phases.members:
-            return None
-        owners = [error.subject.owner for error in phases.members]
-        if self.combine == "each":
-            held = [HeldTogether([i], self.limits[owner]) for i, owner in enumerate(owners)]
-        else:
-            held = [
-                HeldTogether([i for i, one in enumerate(owners) if is_owed(one, owner, self.split)], limit)
-                for owner, limit in self.limits.items()
-            ]
-        return many_scene_edges(phases, held)
-
-    def _spatial_variance(self, gating: str) -> Judged:
-        """Row of the scene's edge; to the published model an error is the same all over the scene."""
-        what, edges = subject("mission", "spatial_variance"), self._edges
-        allowable = None if gating == "published" else self.total
-        if edges is None:
-            return self.judging.row(what, None, allowable)
-        doubt = edges.has_doubt
-        if gating == "published":
-            doubt = doubt | (edges.difference > self.total * BOUND)
-        judged = self.judging.row(what, edges.difference, allowable, doubt=doubt)
-        judged = judged._replace(qpe_published_rad=np.zeros(self.cases))
-        nothing = self.judging.row(what, None, allowable)
-        nothing.status[:] = CODE["not_evaluated"]
-        return judged.where(np.isinf(edges.difference), nothing)
+        return scene_edges(self.errors, self.limits, self.split)
 
     @cached_property
     def _in_doubt(self) -> dict[str, NDArray[np.bool_]]:

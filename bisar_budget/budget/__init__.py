@@ -16,6 +16,7 @@ __all__ = [
     "required",
     "requirement_states",
     "requirement_table",
+    "scene_row",
     "verdicts",
     "vibration_rows",
     "waivers",

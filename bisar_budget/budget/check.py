@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator, Sequence
 from datetime import date
-from typing import TYPE_CHECKING, NamedTuple
 
 from bisar_budget import file_warnings, phrases
 from bisar_budget.analysis.allocation import Allocation
@@ -12,7 +11,6 @@ from bisar_budget.budget.aggregates import aggregate_rows
 from bisar_budget.budget.collection_notes import collection_notes
 from bisar_budget.budget.error_rows import error_rows
 from bisar_budget.budget.input_doubt import InputDoubt, input_doubts, with_input_doubts
-from bisar_budget.budget.judgement import judged
 from bisar_budget.budget.model_doubt import model_doubt
 from bisar_budget.budget.orbit import straight_orbits
 from bisar_budget.budget.overrides import NOTHING_OUTSIDE, Outside, overrides
@@ -20,23 +18,20 @@ from bisar_budget.budget.pull_in import pull_in_caps
 from bisar_budget.budget.random_rows import islr_rows, random_rows
 from bisar_budget.budget.required import declared_kinds, with_required
 from bisar_budget.budget.requirement_table import judged_requirements
+from bisar_budget.budget.scene_row import CheckedScene
 from bisar_budget.budget.vibration_rows import pslr_row, spur_rows, vibration_rows
-from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
+from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.correlation import unused_correlations
 from bisar_budget.effects.effect import PLATFORMS, override_notes
 from bisar_budget.effects.oscillators import POOR_FIT
-from bisar_budget.effects.subject import subject
 from bisar_budget.faults import changes_words
 from bisar_budget.findings.mission import FileWarning, MissionFindings, Resolution
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import RANK
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import FlownPath
-from bisar_budget.phrases import NOTHING, Note
+from bisar_budget.phrases import Note
 from bisar_budget.units import format_quantity
-
-if TYPE_CHECKING:
-    from bisar_budget.analysis.scene import SceneEdge
 
 
 def check_mission(
@@ -67,12 +62,13 @@ def check_mission(
     """
     analysis = Analysis(mission, is_bare)
     gating = mission.gating_model
+    scene = None if mission.scene.radius is None else CheckedScene(analysis)
     if gating == "strictest":
-        checked = stricter(_checked(analysis, "published"), _checked(analysis, "full"))
+        checked = stricter(_checked(analysis, "published", scene), _checked(analysis, "full", scene))
     else:
-        checked = _checked(analysis, gating)
+        checked = _checked(analysis, gating, scene)
     doubts = input_doubts(mission)
-    asked = with_input_doubts(with_required(checked.rows, mission), doubts, mission)
+    asked = with_input_doubts(with_required(checked, mission), doubts, mission)
     verdict = judged_requirements(asked, analysis, analysis.allocation, doubts, today)
     rows = verdict.rows
     geometry = analysis.geometry
@@ -111,7 +107,7 @@ def check_mission(
         ),
         place=_place(mission),
         paths=tuple((name, path) for name, path in _paths(mission) if path.source),
-        scene=checked.scene,
+        scene=None if scene is None else scene.edge,
         notes=(*verdict.notes, *collection_notes(analysis), *_unused_keys(mission), *_overridden(mission)),
         document=mission.document,
         changes=mission.changes,
@@ -119,14 +115,8 @@ def check_mission(
     )
 
 
-class _Checked(NamedTuple):
-    """One complete check by one model, before waivers."""
-
-    rows: list[Row]
-    scene: "SceneEdge | None"
-
-
-def _checked(analysis: Analysis, gating: str) -> _Checked:
+def _checked(analysis: Analysis, gating: str, scene: CheckedScene | None) -> list[Row]:
+    """Rows of one complete check by one model, before waivers."""
     mission = analysis.mission
     model, other = analysis.models(gating)
     allocation = analysis.allocation
@@ -136,11 +126,9 @@ def _checked(analysis: Analysis, gating: str) -> _Checked:
         *_instrument_rows(analysis, gating, allocation),
         *aggregate_rows(analysis, model, other, allocation),
     ]
-    scene = None
-    if mission.scene.radius is not None:
-        scene, row = _scene_row(analysis, gating, allocation)
-        rows.append(row)
-    return _Checked([row._replace(model=gating) for row in rows], scene)
+    if scene is not None:
+        rows.append(scene.row(gating))
+    return [row._replace(model=gating) for row in rows]
 
 
 def _instrument_rows(analysis: Analysis, gating: str, allocation: Allocation) -> list[Row]:
@@ -153,52 +141,17 @@ def _instrument_rows(analysis: Analysis, gating: str, allocation: Allocation) ->
     ]
 
 
-def stricter(published: _Checked, full: _Checked) -> _Checked:
+def stricter(published: Sequence[Row], full: Sequence[Row]) -> list[Row]:
     """Of two complete checks each row of the stricter verdict, then of the higher utilization."""
-    by_id = {row.id: row for row in published.rows}
-    rows = [max((row, by_id.pop(row.id, row)), key=_strictness) for row in full.rows]
+    by_id = {row.id: row for row in published}
+    rows = [max((row, by_id.pop(row.id, row)), key=_strictness) for row in full]
     rows += by_id.values()  # an aggregate that only one of them has
-    return _Checked(rows, full.scene)
+    return rows
 
 
 def _strictness(row: Row) -> tuple[int, float, float]:
     allowable = math.inf if row.allowable is None else row.allowable
     return (-RANK[row.status], row.utilization or 0.0, -allowable)
-
-
-def _scene_row(analysis: Analysis, model: str, allocation: Allocation) -> tuple["SceneEdge | None", Row]:
-    """Row of the scene's edge; to the published model an error is the same all over the scene."""
-    from bisar_budget.analysis.scene import scene_edge
-
-    mission, total = analysis.mission, allocation.qpe_total
-    edge = scene_edge(analysis, allocation)
-    is_published = model == "published"
-    difference: float | None = None
-    doubt, notes = NOTHING, tuple[Note, ...]()
-    if edge is not None and not edge.degeneracy:
-        difference, doubt, notes = edge.difference, edge.doubt, edge.notes(total)
-        if is_published and difference > total * (1 + UTILIZATION_TOLERANCE):
-            doubt = phrases.other_model_fails("full", difference, total, "rad")
-    row = judged(
-        mission,
-        subject=subject("mission", "spatial_variance"),
-        metric="quadratic_phase_error",
-        unit="rad",
-        declared=difference,
-        allowable=None if is_published else total,
-        path=("scene", "radius"),
-        equation="full model",
-        no_limit=phrases.same_all_over_the_scene(),
-        not_evaluated=NOTHING if edge is None else edge.degeneracy,
-        is_declared=edge is not None,
-        over=phrases.edge_over(),
-        doubt=doubt,
-        limits=(None, total),
-        qpe=None if difference is None else 0.0,
-        qpe_full=difference,
-        notes=notes,
-    )
-    return edge, row
 
 
 def _of_instruments(analysis: Analysis) -> Iterator[FileWarning]:

@@ -190,6 +190,11 @@ class ErrorBlock:
         return found & (size > 0) & self._is_moving
 
     @cached_property
+    def is_declared_large(self) -> Truths:
+        """The same of the declared sizes."""
+        return self.is_large(self.declared)
+
+    @cached_property
     def _is_moving(self) -> Truths:
         found = np.zeros((len(self.sources), 1), dtype=bool)
         found[self.moves] = True
@@ -262,7 +267,7 @@ class ErrorBlock:
         """
         if self._quadratics is None:
             self._quadratics = np.full((2, *self.declared.shape), math.nan)
-            is_large = self.is_large(self.declared)
+            is_large = self.is_declared_large
             if is_large.any():
                 self._quadratics[:, is_large] = self.followed(is_large, np.abs(self.declared[is_large]))[:, 3]
         return self._quadratics
@@ -455,8 +460,7 @@ class DeclaredErrors:
     def is_large(self, error: ErrorSource) -> Truths:
         """In which cases effects of a declared error are not proportional to its size."""
         block, place = self.block_of(error)
-        found: Truths = block.is_large(block.declared)[place]
-        return found
+        return np.asarray(block.is_declared_large[place])
 
     def quadratic_by_sign(self, error: ErrorSource) -> Floats:
         """Quadratic phases of a declared error of each sign, positive first, where it is large, (2, cases). [rad]

@@ -140,6 +140,39 @@ def _beside(values: Sequence[Any], counts: Sequence[int]) -> Any:
     return np.concatenate([np.broadcast_to(value, (count,)) for value, count in zip(values, counts, strict=True)])
 
 
+class SmallErrors(NamedTuple):
+    """Small errors that all cases have.
+
+    `courses` of errors over the aperture are (courses, nodes, cases) [m/unit], and `course` is that of each error,
+    (errors,). `ways` say how far each moves the transmitter east, north and up, so the receiver, and the range by the
+    clock, (errors, 7, cases); what all cases share is there once.
+    """
+
+    courses: Floats
+    course: Places
+    ways: Floats
+
+    @classmethod
+    def of(cls, errors: Sequence[Lanes]) -> "SmallErrors":
+        """Errors whose lanes are the cases."""
+        courses: dict[Any, Floats] = {}
+        ways = np.zeros((len(errors), 7, max((np.size(part) for one in errors for part in one.direction), default=1)))
+        for index, (lanes, way) in enumerate(zip(errors, ways, strict=True)):
+            courses[lanes.unit if lanes.platforms else index] = lanes.at_nodes
+            for platform in lanes.platforms:
+                for axis, part in enumerate(lanes.direction):
+                    way[3 * platform + axis] = part
+            way[6] = not lanes.platforms
+        names = list(courses)
+        course = [names.index(one.unit if one.platforms else index) for index, one in enumerate(errors)]
+        return cls(np.array(list(courses.values())), np.array(course), ways)
+
+    def there(self, case: Places) -> "SmallErrors":
+        """The same errors where cases are chosen anew; as `Lanes.there`."""
+        courses, ways = _of([self.courses, self.ways], case)
+        return SmallErrors(courses, self.course, ways)
+
+
 class Found(NamedTuple):
     """What errors do by exact ranges; `is_found` where that is certain at once.
 
@@ -220,8 +253,7 @@ class ExactRanges:
 
     def at(self, east: Floats, north: Floats, case: Places) -> "ExactRanges":
         """Exact ranges of cases at points of the ground, (case,), in place of the centre. [m]"""
-        of = [[part.take(case, axis=1) for part in track] for track in self.tracks]
-        tracks = [(x - east, y - north, z) for x, y, z in of]
+        tracks = [(x - east, y - north, z) for x, y, z in (_of([*track], case) for track in self.tracks)]
         positions = [(x[case] - east, y[case] - north, z[case]) for x, y, z in self.positions]
         return ExactRanges(
             self.half[case], self.k[case], self.count, tracks, positions, has_direct_path=self.has_direct_path
@@ -318,38 +350,21 @@ class ExactRanges:
             moved = moved + lanes.moves[platform] * self.along(platform, lanes.direction) * lanes.at_nodes
         return np.asarray(moved)
 
-    def quadratics_of(self, errors: Sequence[Lanes]) -> list[Floats]:
-        """Quadratic phase of a small unit of errors that all cases have, that of `effect`, in a tenth of its time.
-
-        [rad/unit]
-        """
+    def quadratics_of(self, errors: SmallErrors) -> Floats:
+        """Quadratic phase of a unit of small errors, that of `effect`, (errors, cases). [rad/unit]"""
         weights = self.phase_weights[0]
-        whole = np.abs(weights).sum(axis=0)
-        of_axes: dict[tuple[int, str], Vectors] = {}
-        found = []
-        for lanes in errors:
-            course, platforms = lanes.at_nodes, lanes.platforms
-            phase: Any
-            if platforms:
-                for platform in platforms:
-                    if (platform, lanes.unit) not in of_axes:
-                        of_axes[platform, lanes.unit] = self._along_axes(platform, weights * course)
-                phase = sum(dot(of_axes[one, lanes.unit], lanes.direction) for one in platforms)
-                seen = len(platforms) * whole * course[-1]
-            else:
-                parts = weights * course
-                phase, seen = parts.sum(axis=0), np.abs(parts).sum(axis=0)
-            found.append(np.where(np.abs(phase) > ROUNDING * seen, phase, 0.0))
-        return found
-
-    def _along_axes(self, platform: int, weights: Floats) -> Vectors:
-        """What a metre at each node, weighted, does along x, y and z."""
-        by_metre = -weights / self.ranges[platform]
-        x, y, z = ((by_metre * track).sum(axis=0) for track in self.tracks[platform])
-        if self.has_direct_path:
-            a, b, c = ((weights * part).sum(axis=0) for part in self.heard_along[platform])
-            x, y, z = x + a, y + b, z + c
-        return (x, y, z)
+        along = np.empty((7, *weights.shape))  # what a metre does to the range at the nodes, along each way
+        for platform in (0, 1):
+            of_axes = along[3 * platform : 3 * platform + 3]
+            for axis in (0, 1, 2):
+                np.divide(self.tracks[platform][axis], -self.ranges[platform], out=of_axes[axis])
+            if self.has_direct_path:
+                of_axes += self.heard_along[platform]
+        along[6] = 1.0
+        by_way = np.einsum("cnp,wnp->cwp", weights * errors.courses, along)
+        phase = np.einsum("ewp,ewp->ep", errors.ways, by_way[errors.course])
+        seen = np.abs(weights).sum(axis=0) * np.abs(errors.courses).max(axis=1)
+        return np.where(np.abs(phase) > ROUNDING * seen[errors.course], phase, 0.0)
 
     @cached_property
     def phase_weights(self) -> tuple[Floats, Floats]:

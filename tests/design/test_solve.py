@@ -192,7 +192,7 @@ def test_how_far_one_correction_serves_is_not_searched(monkeypatch) -> None:
     )
     mission = parse_mission(text, "m.yaml")
     full = check_mission(mission, DAY)
-    monkeypatch.setattr(scene, "_autofocus_radius", lambda *_: pytest.fail("it is searched"))
+    monkeypatch.setattr(scene.Correction, "served", lambda *_: pytest.fail("it is searched"))
     bare = check_mission(mission, DAY, is_bare=True)
     assert [(row.id, row.status, row.utilization) for row in bare.rows] == [
         (row.id, row.status, row.utilization) for row in full.rows

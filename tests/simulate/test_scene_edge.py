@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.analysis.scene import ScenePhases, _where, at
+from bisar_budget.analysis.scene import ScenePhases, ScenePlaces, at, where
 from bisar_budget.budget.check import check_mission
 from bisar_budget.effects.models import QUADRATIC
 from bisar_budget.faults import MissionError
@@ -21,21 +21,51 @@ from tests.conftest import TODAY, findings, mission_text, row
 from tests.simulate.conftest import collection
 
 
-def squinted(squint: float):
-    """Section V at 10 GHz, both platforms turned by a squint."""
+def squinted(squint: float, **errors):
+    """Section V at 10 GHz, both platforms turned by a squint, with errors."""
     geometry = collection(squint).geometry
     platforms = {
         name: {"position": list(getattr(geometry, name).position), "velocity": list(getattr(geometry, name).velocity)}
         for name in ("transmitter", "receiver")
     }
-    return parse_mission(mission_text(platforms=platforms, allocation__model="full"))
+    return parse_mission(mission_text(platforms=platforms, allocation__model="full", **errors))
 
 
-def edge_of(mission, members) -> ScenePhases:
-    """The scene with these declared errors alone."""
-    analysis = Analysis(mission)
-    vars(analysis)["stated"] = members
-    return ScenePhases(analysis)
+def stating(row_id: str, size: float) -> dict:
+    """Keys of a mission that declares one error, by the id of its row; the others beside it are nothing."""
+    owner, *kind, axis = row_id.split(".")
+    if owner == "timing":
+        return {"timing_error": {axis: size}}
+    if axis == "terrain":
+        return {"scene__height_error": size}
+    error = {kind[0]: [size * (axis == letter) for letter in "xyz"]}
+    return {"common_motion_error": error} if owner == "mission" else {f"platforms__{owner}__motion_error": error}
+
+
+class Edge:
+    """The scene of a mission, at places given one by one or as arrays."""
+
+    def __init__(self, mission) -> None:
+        self.phases = ScenePhases(Analysis(mission).errors)
+        self.has_large = bool(self.phases.is_large.any())
+
+    @staticmethod
+    def _places(radius: float, azimuth):
+        azimuths = np.atleast_1d(np.asarray(azimuth, dtype=float))
+        return np.full(azimuths.size, radius), azimuths, np.zeros(azimuths.size, dtype=int)
+
+    def places(self, radius: float, azimuth) -> ScenePlaces:
+        return self.phases.places(*self._places(radius, azimuth))
+
+    @np.errstate(all="ignore")
+    def differences(self, radius: float, azimuth) -> np.ndarray:
+        """(errors, places)"""
+        return self.phases.differences(*self._places(radius, azimuth))
+
+    def sizes(self, radius: float, azimuth) -> np.ndarray:
+        """Differences together."""
+        differences = self.differences(radius, azimuth)
+        return self.phases.together(differences, np.zeros(differences.shape[1], dtype=int))
 
 
 def exact_at(study: Study, source, size: float, point):
@@ -67,11 +97,12 @@ def test_phases_at_the_edge_are_those_of_exact_ranges(squint: float, radius: flo
         size = analysis.full.allowable(source, QUADRATIC, math.pi / 8) if source.is_motion else None
         if size is None:
             continue
-        edge = edge_of(mission, [source._replace(declared=size)])
+        edge = Edge(squinted(squint, **stating(source.id, size)))
         centre = [exact_at(study, source, signed, (0.0, 0.0)).quadratic for signed in (size, -size)]
-        for azimuth in np.arange(8) * math.pi / 4:
+        azimuths = np.arange(8) * math.pi / 4
+        differences = edge.differences(radius, azimuths).sum(axis=0)  # of the others nothing
+        for azimuth, difference in zip(azimuths, differences, strict=True):
             point = at(radius, azimuth)
-            (difference,) = edge.differences(radius, azimuth)
             there = [exact_at(study, source, signed, point).quadratic for signed in (size, -size)]
             exact = max(abs(a - b) for a, b in zip(there, centre, strict=True))
             assert abs(difference) == pytest.approx(exact, abs=2 * 0.002 * math.pi / 8), (source.id, azimuth)
@@ -88,7 +119,7 @@ def test_images_at_the_edge_show_them(row_id: str, radius: float, azimuth: float
     study = Study(mission)
     source = next(s for s in study.sources if s.id == row_id)
     size = study.analysis.full.allowable(source, QUADRATIC, math.pi / 8)
-    edge = edge_of(mission, [source._replace(declared=size)])
+    edge = Edge(squinted(30, **stating(row_id, size)))
     measured = []
     for signed in (size, -size):
         errors, phases = study.errors(source, signed), []
@@ -101,7 +132,7 @@ def test_images_at_the_edge_show_them(row_id: str, radius: float, azimuth: float
             )
             phases.append(read_aperture(study.collection, errors, there, chip, reference).quadratic)
         measured.append(phases[1] - phases[0])
-    (difference,) = edge.differences(radius, azimuth)
+    difference = edge.differences(radius, azimuth).sum()
     assert max(map(abs, measured)) == pytest.approx(abs(difference), abs=0.005)
 
 
@@ -139,20 +170,15 @@ class TestRow:
         """Against a rim of 720 points."""
         mission = parse_mission(mission_text(scene={"radius": 500}, allocation__model="full", **self.VELOCITY))
         found = check_mission(mission, TODAY)
-        source = next(s for s in Study(mission).sources if s.id == "receiver.velocity.y")
-        edge = edge_of(mission, [source])
-        worst = max(edge.together(edge.differences(500, math.radians(degrees / 2))) for degrees in range(720))
+        worst = Edge(mission).sizes(500, np.arange(720) * math.pi / 360).max()
         assert row(found, "mission.spatial_variance").declared == pytest.approx(worst, rel=1e-3)
 
     @pytest.mark.parametrize("rule", ["each", "sum", "rss"])
     def test_differences_combine_as_the_mission_says(self, rule: str) -> None:
         errors = {"platforms__receiver__motion_error": {"velocity": [0.3, 0.6, 0]}}
         found = self.found(300, allocation__combine=rule, **errors)
-        mission = parse_mission(mission_text(**errors))
-        members = [s for s in Study(mission).sources if s.declared]
-        edge = edge_of(mission, members)
-        join = {"each": lambda d: np.abs(d).max(), "sum": lambda d: np.abs(d).sum(), "rss": np.linalg.norm}[rule]
-        worst = max(join(edge.differences(300, math.radians(degrees))) for degrees in range(360))
+        differences = Edge(parse_mission(mission_text(**errors))).differences(300, np.radians(range(360)))
+        worst = np.linalg.norm(differences, {"each": math.inf, "sum": 1, "rss": 2}[rule], axis=0).max()
         variance = row(found, "mission.spatial_variance")
         assert variance.declared == pytest.approx(worst, rel=1e-3)
         assert variance.status != "info"
@@ -166,14 +192,13 @@ class TestRow:
         errors = {"platforms__receiver__motion_error": {"covariance": covariance}}
         mission = parse_mission(mission_text(scene={"radius": 500}, allocation__combine="rss", **errors))
         variance = row(check_mission(mission, TODAY), "mission.spatial_variance")
-        sources = {s.id: s for s in Study(mission).sources}
-        names = [f"receiver.{kind}.{axis}" for kind in ("position", "velocity") for axis in "xyz"]
-        members = [sources[name]._replace(declared=size) for name, size in zip(names, sigmas, strict=True)]
-        edge = edge_of(mission, members)
-        differences = np.array([edge.differences(500, math.radians(degrees)) for degrees in range(360)])
-        worst = math.sqrt(max(np.einsum("ki,ij,kj->k", differences, correlation, differences)))
+        alone = {"position": sigmas[:3], "velocity": sigmas[3:]}
+        edge = Edge(parse_mission(mission_text(platforms__receiver__motion_error=alone)))
+        assert edge.phases.ids == [f"receiver.{kind}.{axis}" for kind in alone for axis in "xyz"]
+        differences = edge.differences(500, np.radians(range(360)))
+        worst = math.sqrt(max(np.einsum("ik,ij,jk->k", differences, correlation, differences)))
         assert variance.declared == pytest.approx(worst, rel=1e-3)
-        assert worst < np.linalg.norm(differences, axis=1).max()
+        assert worst < np.linalg.norm(differences, axis=0).max()
 
     @pytest.mark.parametrize("model", ["published", "full", "strictest"])
     def test_the_published_model_has_no_limit_but_warns(self, model: str) -> None:
@@ -215,12 +240,9 @@ class TestRow:
         assert outer.status == "not_evaluated"
         assert "on the way there range and Doppler gradients become parallel" in outer.reason
         found = findings(platforms=platforms, scene={"radius": 500})
-        mission = parse_mission(mission_text(platforms=platforms))
-        members = [s for s in Study(mission).sources if s.declared]
-        edge = edge_of(mission, members)
         assert found.scene.autofocus_radius is not None
-        circle = [edge.place(found.scene.autofocus_radius, math.radians(degrees)) for degrees in range(360)]
-        assert all(place.has_image for place in circle)
+        edge = Edge(parse_mission(mission_text(platforms=platforms)))
+        assert edge.places(found.scene.autofocus_radius, np.radians(range(360))).has_image.all()
 
     @pytest.mark.parametrize(
         ("transmitter", "receiver"),
@@ -306,41 +328,30 @@ def test_edge_and_radius_are_those_of_a_circle_of_720_places() -> None:
     """To 0.2 %: the largest difference, the radius that one correction serves, and whether there is an image."""
     seen = {"image": 0, "none": 0, "served": 0}
     for mission in random_scenes(30, seed=1):
-        members = [s for s in Study(mission).sources if s.declared]
-        if mission.allocation.combine != "each":
-            members = [s for s in members if s.is_independent]
-        edge = edge_of(mission, members)
-
-        def circle(radius: float, order=range(720), edge=edge):
-            return (edge.place(radius, math.pi * k / 360) for k in order)
-
+        edge, azimuths = Edge(mission), np.arange(720) * math.pi / 360
         scene = check_mission(mission, TODAY).scene
         # Of large errors at fewer places: each is searched for by exact ranges. 1 % is what lies between two of them.
-        places = 90 if edge.large else 0
-        of_large = [edge.together(edge.differences(scene.radius, 2 * math.pi * k / 90)) for k in range(places)]
-        rim = list(circle(scene.radius))
-        has_image = all(place.has_image for place in rim) and all(map(math.isfinite, of_large))
+        fewer = azimuths[::8] if edge.has_large else azimuths[:0]
+        of_large, rim = edge.sizes(scene.radius, fewer), edge.places(scene.radius, azimuths)
+        has_image = rim.has_image.all() and np.isfinite(of_large).all()
         assert has_image == (not scene.degeneracy), mission
         seen["image" if has_image else "none"] += 1
         if not has_image:
             continue
-        if edge.large:
-            assert max(of_large) * (1 - 2e-3) <= scene.difference <= max(of_large) * 1.01
+        if edge.has_large:
+            assert of_large.max() * (1 - 2e-3) <= scene.difference <= of_large.max() * 1.01
         else:
-            assert scene.difference == pytest.approx(max(place.size for place in rim), rel=2e-3, abs=1e-9)
+            assert scene.difference == pytest.approx(rim.size.max(), rel=2e-3, abs=1e-9)
         served = scene.autofocus_radius or scene.searched
-        # The worst of the rim first: where one is not served, it ends there.
-        sizes = of_large or [place.size for place in rim]
-        order = sorted(range(len(sizes)), key=lambda k, sizes=sizes: -sizes[k])
 
-        def is_served(radius: float, edge=edge, places=places, order=order, circle=circle) -> bool:
-            if not places:
-                return all(place.has_image and place.size <= math.pi / 4 for place in circle(radius, order))
-            around = (edge.differences(radius, 2 * math.pi * k / places) for k in order)
-            return all(edge.together(differences) <= math.pi / 4 for differences in around)
+        def is_served(radius: float, edge=edge, azimuths=azimuths, fewer=fewer) -> bool:
+            if not edge.has_large:
+                circle = edge.places(radius, azimuths)
+                return bool((circle.has_image & (circle.size <= math.pi / 4)).all())
+            return bool((edge.sizes(radius, fewer) <= math.pi / 4).all())
 
         # Of large errors it is right to 0.5 % of the total, and so is what 90 places can miss.
-        assert is_served((0.998 if not places else 0.985) * served)
+        assert is_served((0.985 if edge.has_large else 0.998) * served)
         if scene.autofocus_radius is not None:
             assert not is_served(1.01 * served)
             seen["served"] += 1
@@ -351,14 +362,26 @@ def test_edge_and_radius_are_those_of_a_circle_of_720_places() -> None:
 @pytest.mark.parametrize("start", [0.0, 0.9, 0.99999])
 def test_the_radius_where_a_size_passes_a_total_is_between_its_bounds(power: float, start: float) -> None:
     """Size = radius to a power, which is 1 at 1: to a thousandth of the size, also from just inside the total."""
-    low, _ = _where(lambda radius: radius**power, 1.0, (start, start**power), (2.0, 2.0**power))
+    low = where(lambda radius: radius**power, 1.0, (start, start**power), (2.0, 2.0**power))
     assert start <= low <= 1
     assert low**power >= 1 - 1.1e-3 * max(1.0, power)
 
 
 def test_a_radius_is_found_below_a_place_without_an_image() -> None:
-    low, _ = _where(lambda radius: radius if radius < 0.7 else math.inf, 1.0, (0.0, 0.0), (2.0, math.inf))
+    low = where(lambda radius: radius if radius < 0.7 else math.inf, 1.0, (0.0, 0.0), (2.0, math.inf))
     assert 0.699 <= low < 0.7
+
+
+def test_an_error_without_an_image_is_not_lost_among_those_it_is_correlated_with() -> None:
+    """Its phase is infinite: zero, or minus, times that was no number, and then no difference at all."""
+    covariance = {"position": [3, 3, 3], "velocity": [0.2, 0.2, 0.2], "correlation": np.eye(6).tolist()}
+    error = {"covariance": covariance}
+    edge = Edge(parse_mission(mission_text(platforms__receiver__motion_error=error, allocation__combine="rss")))
+    here, phases = np.zeros(1, dtype=int), np.ones((6, 1))
+    assert edge.phases.together(phases, here)[0] == pytest.approx(math.sqrt(6))
+    phases[2] = math.inf
+    with np.errstate(invalid="ignore"):  # as a check has it
+        assert edge.phases.together(phases, here)[0] == math.inf
 
 
 def test_an_arc_of_the_rim_without_an_image_between_two_places_is_found() -> None:

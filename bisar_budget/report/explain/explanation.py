@@ -7,7 +7,7 @@ import numpy as np
 
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.analysis.scene import ScenePhases, at
+from bisar_budget.analysis.scene import at, differences_at
 from bisar_budget.analysis.spread import mainlobe_energy
 from bisar_budget.analysis.together import Together
 from bisar_budget.analysis.vibration_limits import amplitude_share, echo_phase, slow_limits
@@ -388,9 +388,8 @@ def _spatial_variance(analysis: Analysis, found: MissionFindings, row: Row) -> I
     scene = found.scene
     if scene is None or scene.degeneracy or row.declared is None:
         return
-    edge = ScenePhases(analysis)
     east, north = at(scene.radius, scene.azimuth)
-    parts = edge.parts(edge.differences(scene.radius, scene.azimuth))
+    parts = phase_parts(differences_at(analysis.errors, scene.radius, scene.azimuth), found.combine, analysis.groups)
     yield from step(
         f"Full model at the scene’s edge, {east:.6g} m east, {north:.6g} m north of the centre, less at the centre"
     )
