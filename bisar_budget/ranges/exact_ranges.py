@@ -415,19 +415,13 @@ class ExactRanges:
         """
         shifts = lanes.shifts(size)
         clock = lanes.clock(size)
-        if self.has_direct_path:  # whose own clock errors are nothing
-            clock = clock + self._heard(shifts, lanes.case)
         bend = np.abs(size) * np.where(lanes.unit == "m/s", lanes.moves[0] + lanes.moves[1], 0.0)
         return self.settled(clock, shifts, near, bend, lanes.case)
 
     def left_over(self, lanes: Lanes, size: Floats, place: tuple[Any, Any]) -> Floats:
         """Range error at the nodes that errors leave at ground points, (nodes, lanes). [m]"""
-        shifts = lanes.shifts(size)
-        clock = lanes.clock(size)
-        if self.has_direct_path:
-            clock = clock + self._heard(shifts, lanes.case)
-        one = self._measured(clock, shifts, np.arange(lanes.case.size), lanes.case)
-        return np.asarray(one[0] - _grown(one[1:8], *place)[0] - _grown(one[8:], *place)[0])
+        measured = self._measured(lanes.clock(size), lanes.shifts(size), lanes.case)
+        return _left(measured, *place, _room(measured))
 
     def _heard(self, shifts: Sequence[Any], case: Places) -> Floats:
         """What shifts of the platforms make of c·t̃ at the nodes where the direct path is the clock. [m]"""
@@ -460,35 +454,44 @@ class ExactRanges:
         determinant = a * d - b * c
         return (b * linear - d * constant) / determinant, (c * constant - a * linear) / determinant
 
-    def settled(
-        self, clock: Floats, shifts: Sequence[Any], near: tuple[Any, Any], bend: Floats, case: Places
-    ) -> Found:
+    def settled(self, clock: Floats, shifts: Sequence[Any], near: tuple[Any, Any], bend: Any, case: Places) -> Found:
         """Newton's method for the point; with the slopes of the centre where it stays within reach of that.
 
         Range errors by clocks (nodes, lanes) [m], three shifts of each platform there [m], where the search starts
         [m], the velocity errors of both platforms [m/s], and the cases of the lanes.
-
-        A range R grows by p/(R + √(R² + p)) where d is added to its vector r, with p = d·(2r + d): that has no
-        rounding of the range itself. From a point at g = (east, north) it is p - 2r̂·g + |g|².
         """
         lanes = clock.shape[1]
         start = [np.array(np.broadcast_to(one, (lanes,)), dtype=float) for one in near]
         found = Found(np.zeros(lanes, dtype=bool), *(np.full(lanes, math.nan) for _ in range(5)))
         with np.errstate(all="ignore"):
+            measured = self._measured(clock, shifts, case)
             half, most, reach = _of([self.half, self.bend, self.reach], case)
             close = np.flatnonzero(np.hypot(*start) < np.where(bend * half < most, reach, 0.0))
             if close.size:
-                self._settle_near(found, self._measured(clock, shifts, close, case), start, close, case)
+                some = measured if close.size == lanes else _some(measured, close)
+                self._settle_near(found, some, start, close, case)
             rest = np.flatnonzero(~found.is_found)
             if rest.size:
-                self._settle(found, self._measured(clock, shifts, rest, case), start, rest, case)
+                some = measured if rest.size == lanes else _some(measured, rest)
+                self._settle(found, some, start, rest, case)
         return found
 
-    def _measured(self, clock: Floats, shifts: Sequence[Any], alive: Places, case: Places) -> list[Floats]:
-        """Arrays (nodes, alive): the clock error; position, range and shift of each platform at the nodes."""
-        found = _some([clock], alive)
-        for track, ranges, shift in zip(self.tracks, self.ranges, shifts, strict=True):
-            found += [*_of([*track, ranges], case[alive]), *_some(shift, alive)]
+    def _measured(self, clock: Floats, shifts: Sequence[Any], case: Places) -> list[Floats]:
+        """What `_seen` takes of errors, (nodes, lanes): the clock error, and five of each platform.
+
+        A range R grows by p/(R + √(R² + p)) where d is added to its vector r, with p = d·(2r + d): that has no
+        rounding of the range itself. From a point at g = (east, north) it is p - 2r̂·g + |g|².
+        """
+        if self.has_direct_path:  # whose own clock errors are nothing
+            clock = clock + self._heard(shifts, case)
+        found = [clock]
+        for track, ranges, (a, b, c) in zip(self.tracks, self.ranges, shifts, strict=True):
+            x, y, z, R = _of([*track, ranges], case)
+            u, v = x + a, y + b
+            p = (x + u) * a
+            p += (y + v) * b
+            p += (z + z + c) * c
+            found += [u, v, R, p, p + R * R]
         return found
 
     def _settle_near(
@@ -497,12 +500,11 @@ class ExactRanges:
         """Search with the slopes of the centre: a third of the work, where it settles in a few steps."""
         of = case[alive]
         gradient = _of(self.gradient, of)
-        east, north = start[0][alive], start[1][alive]
+        east, north, room = start[0][alive], start[1][alive], _room(measured)
         for _ in range(FEW):
             (a, c, quadratic_east, cubic_east), (b, d, quadratic_north, cubic_north) = gradient
             determinant = a * d - b * c
-            left = measured[0] - _grown(measured[1:8], east, north)[0] - _grown(measured[8:], east, north)[0]
-            constant, linear, quadratic, cubic = self.fit @ left
+            constant, linear, quadratic, cubic = self.fit @ _left(measured, east, north, room)
             step_east = (b * linear - d * constant) / determinant
             step_north = (c * constant - a * linear) / determinant
             east, north = east + step_east, north + step_north
@@ -517,19 +519,17 @@ class ExactRanges:
             if not going.size:
                 return
             alive, of, east, north = alive[going], of[going], east[going], north[going]
-            gradient, measured = _some(gradient, going), _some(measured, going)
+            gradient, measured, room = _some(gradient, going), _some(measured, going), room[..., : going.size]
 
     def _settle(self, found: Found, measured: list[Floats], start: list[Floats], alive: Places, case: Places) -> None:
         of = case[alive]
         east, north, before = start[0][alive], start[1][alive], np.full(alive.size, math.inf)
+        room = _room(measured)
         for _ in range(ITERATIONS):
-            grown, u, v, near = _grown(measured[1:8], east, north)
-            more, x, y, far = _grown(measured[8:], east, north)
-            nearest = np.minimum(near, far).min(axis=0)
-            left, by_east, by_north = measured[0] - grown - more, u / near + x / far, v / near + y / far
-            a, c, quadratic_east, cubic_east = self.fit @ by_east  # what a step of a metre adds to what is left
-            b, d, quadratic_north, cubic_north = self.fit @ by_north
-            constant, linear, quadratic, cubic = self.fit @ left
+            seen, nearest = _seen(measured, east, north, room)
+            (constant, linear, quadratic, cubic), by_east, by_north = np.matmul(self.fit, seen)
+            a, c, quadratic_east, cubic_east = by_east  # what a step of a metre adds to what is left
+            b, d, quadratic_north, cubic_north = by_north
             determinant = a * d - b * c
             step_east = (b * linear - d * constant) / determinant
             step_north = (c * constant - a * linear) / determinant
@@ -548,8 +548,10 @@ class ExactRanges:
             going = np.flatnonzero(~is_done & (step < SHRINKS * before) & is_apart)
             if not going.size:
                 return
-            alive, of, east, north, before = alive[going], of[going], east[going], north[going], step[going]
-            measured = _some(measured, going)
+            before = step
+            if going.size < alive.size:
+                alive, of, east, north, before = alive[going], of[going], east[going], north[going], step[going]
+                measured, room = _some(measured, going), room[..., : going.size]
 
     def _keep(
         self,
@@ -590,16 +592,48 @@ def _weighted(along: Sequence[Any], weight: Any) -> Sequence[Any]:
     return along if weight else _STILL
 
 
-def _grown(platform: list[Floats], east: Any, north: Any) -> tuple[Floats, Floats, Floats, Floats]:
-    """How much longer the range of a platform is to points than it was, without rounding of the ranges themselves.
+def _room(measured: Sequence[Floats]) -> Floats:
+    """Room in which `_left` and `_seen` work."""
+    return np.empty((7, *measured[0].shape))
 
-    With it where the platform is seen from there, east and north, and how far. [m]
-    """
-    x, y, z, R, a, b, c = platform
-    u, v = x + a, y + b
-    grown = a * (x + u) + b * (y + v) + c * (z + z + c) - 2 * u * east - 2 * v * north + (east * east + north * north)
-    distance = np.sqrt(R * R + grown)
-    return grown / (R + distance), u - east, v - north, distance
+
+def _grow(platform: Sequence[Floats], east: Any, north: Any, room: Floats, distance: Floats) -> None:
+    """Fill with how much longer than the true range a platform's range to points is, and with that range. [m]"""
+    u, v, R, p, whole = platform
+    grown, other = room[:2]
+    np.multiply(u, 2 * east, out=grown)
+    np.multiply(v, 2 * north, out=other)
+    grown += other
+    np.subtract(east * east + north * north, grown, out=grown)
+    np.add(whole, grown, out=distance)
+    np.sqrt(distance, out=distance)
+    grown += p
+    np.add(distance, R, out=other)
+    grown /= other
+
+
+def _left(measured: Sequence[Floats], east: Any, north: Any, room: Floats) -> Floats:
+    """Range error at the nodes that is left at points (lanes,), (nodes, lanes). [m]"""
+    clock, first, second = measured[0], room[:3], room[3:6]
+    _grow(measured[1:6], east, north, first, room[6])
+    _grow(measured[6:], east, north, second, room[6])
+    left: Floats = np.subtract(clock, first[0], out=first[0])
+    left -= second[0]
+    return left
+
+
+def _seen(measured: Sequence[Floats], east: Floats, north: Floats, room: Floats) -> tuple[Floats, Floats]:
+    """The same, what a metre east, and north, adds to it, (3, nodes, lanes); the least range there, (lanes,). [m]"""
+    clock, seen, other, distance, nearest = measured[0], room[:3], room[3:6], room[6], math.inf
+    for platform, out in ((measured[1:6], seen), (measured[6:], other)):
+        _grow(platform, east, north, out, distance)
+        np.subtract(platform[0], east, out=out[1])
+        np.subtract(platform[1], north, out=out[2])
+        out[1:] /= distance
+        nearest = np.minimum(nearest, distance.min(axis=0))
+    seen += other
+    np.subtract(clock, seen[0], out=seen[0])
+    return seen, np.asarray(nearest)
 
 
 def _some(arrays: Sequence[Floats], some: Places) -> list[Floats]:
