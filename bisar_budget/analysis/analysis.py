@@ -65,7 +65,7 @@ class Analysis:
         """The declared errors as those of one case."""
         platforms = self.mission.platforms
         geometries = Geometries(paths_of(platforms.transmitter), paths_of(platforms.receiver))
-        return DeclaredErrors(self.mission, 1, self.exact.count, geometries, {})
+        return DeclaredErrors(self.mission, 1, len(self.exact.sampling.places), geometries, {})
 
     @cached_property
     def slow(self) -> list[OwnPhase]:
