@@ -10,7 +10,6 @@ __all__ = [
     "declared",
     "echoes",
     "effect",
-    "exact_arrays",
     "models",
     "oscillators",
     "pieces",

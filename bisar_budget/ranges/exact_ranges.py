@@ -500,11 +500,12 @@ class ExactRanges:
                 here = Found._make(one[some] for one in found)
                 moved = [[along if along.shape[-1] == 1 else along[:, some] for along in one] for one in shifts]
                 measured = self._measured(clock[:, some], moved, case[some], room)
-                given: list[Any] = [case[some], *(one[some] for one in start), *measured]
+                given = [case[some], *(one[some] for one in start), *measured]
                 for search, is_for in ((self._settle_near, is_close[some]), (self._settle, np.True_)):
                     alive = np.flatnonzero(is_for & ~here.is_found)
                     if alive.size:
-                        of, east, north, *left = given if alive.size == here.east.size else _some(given, alive)
+                        kept: list[Any] = given if alive.size == here.east.size else _some(given, alive)
+                        of, east, north, *left = kept
                         search(here, alive, of, east, north, left, room[MEASURED:, :, : alive.size])
         return found
 
