@@ -72,8 +72,6 @@ def check_arrays(
     nodes: int,
     geometries: BistaticGeometry,
     shown: Mapping[str, Subject],
-    *,
-    is_brief: bool,
 ) -> Checked:
     """Check cases that need the same number of nodes.
 
@@ -91,18 +89,15 @@ def check_arrays(
         Of the mission.
     shown : mapping of str to Subject
         Rows, by id, of which the allowable is asked though nothing is declared.
-    is_brief : bool
-        Search for limits as a brief check does: in an order that finds the one that binds early.
     """
     T, is_heard = mission.collection.aperture_time, mission.has_direct_path
     exact = ExactRanges.of(geometries.both, mission.radar.wavelength, T, nodes, cases, has_direct_path=is_heard)
-    return _Check(DeclaredErrors(mission, cases, geometries, exact, shown), today, shown, is_brief).checked()
+    return _Check(DeclaredErrors(mission, cases, geometries, exact, shown), today, shown).checked()
 
 
 class _Check:
-    def __init__(self, errors: DeclaredErrors, today: date, shown: Mapping[str, Subject], is_brief: bool) -> None:
+    def __init__(self, errors: DeclaredErrors, today: date, shown: Mapping[str, Subject]) -> None:
         self.shown = shown
-        self.is_brief = is_brief
         platforms = [getattr(errors.mission.platforms, name) for name in PLATFORMS]
         self.vibrations = [platform.motion_error.vibration for platform in platforms]
         self.errors, self.mission, self.cases, self.today = errors, errors.mission, errors.cases, today
@@ -143,7 +138,7 @@ class _Check:
         owners = (*PLATFORMS, "clock", "mission")
         self.limits = {owner: self.array(self.split.of(owner) * total) * self.gain for owner in owners}
         together = {model: ManyTogether(self.errors, model, own[model], self.split) for model in MODELS}
-        self.error_rows = ErrorRows(self.judging, self.errors, self.limits, self.gain, is_whole=not self.is_brief)
+        self.error_rows = ErrorRows(self.judging, self.errors, self.limits, self.gain, is_whole=False)
         self.aggregates = Aggregates(self.judging, self.errors, together, self.limits, self.gain)
         self.random_rows = RandomRows(
             self.judging, self.mission, self.allocation, self.random, self.errors.geometries

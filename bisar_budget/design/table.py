@@ -294,13 +294,6 @@ class Table:
         rows = {row.id: row for row in check_mission(self.mission, question.today).rows} if self.asked else {}
         here = [one for one in self.asked if one.row in rows]
         self.subjects = {one.row: rows[one.row].subject for one in here}
-        # A brief check leaves out allowables of what is not declared, and those of the model that does not gate.
-        self.is_brief = not any(
-            one.field in ("allowable_published", "allowable_full")
-            or (one.field in IN_UNIT and rows[one.row].declared is None)
-            or not rows[one.row].is_independent
-            for one in here
-        )
         self.is_alone = any(one.field not in judged.FIELDS for one in self.asked)
         # Numbers that decide more than themselves: a case that has another value than the mission is read.
         self.to_read = {
@@ -460,12 +453,8 @@ class Table:
         self, found: dict[str, Values], some: Places, mission: Mission, geometries: BistaticGeometry, nodes: int
     ) -> None:
         question = self.question
-        # A brief check finds no allowable of what is not declared; vibrations have rows of their own.
-        shown = {id: what for id, what in self.subjects.items() if not self.is_brief or what.kind == "vibration"}
         with np.errstate(all="ignore"):
-            checked = check_arrays(
-                mission, some.size, question.today, nodes, geometries, shown, is_brief=self.is_brief
-            )
+            checked = check_arrays(mission, some.size, question.today, nodes, geometries, self.subjects)
             rows = {row.subject.id: row for row in checked.rows}
             for row_id in self.subjects.keys() - rows.keys():  # nothing declares it in any of the cases
                 none = Judged.of_none(self.subjects[row_id], some.size)

@@ -9,7 +9,6 @@ __all__ = [
     "declared",
     "echoes",
     "effect",
-    "exact_arrays",
     "models",
     "oscillators",
     "pieces",

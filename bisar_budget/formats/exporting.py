@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from bisar_budget import __version__
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.effects.exact_arrays import aperture_nodes
 from bisar_budget.faults import printable
 from bisar_budget.formats.document import MissingExtraError
 from bisar_budget.formats.file_errors import ADDED, KINDS
@@ -25,6 +24,7 @@ from bisar_budget.geometry import Axes, PlatformState, Vector
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.paths.earth import Geodetic, SceneAxes, axes_at, geodetic
 from bisar_budget.paths.instant import Instant, parse_instant
+from bisar_budget.ranges.exact_ranges import aperture_nodes
 from bisar_budget.simulate.exact import exact_effect
 from bisar_budget.simulate.phase_history import phase_history
 from bisar_budget.simulate.point import Flight, SimulationError, flight, pulses_for

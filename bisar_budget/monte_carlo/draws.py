@@ -20,8 +20,9 @@ import numpy as np
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.faults import printable
 from bisar_budget.memory import is_spacious
-from bisar_budget.monte_carlo.sums import ExactPaths, Sums, paths_of
+from bisar_budget.monte_carlo.sums import Sums
 from bisar_budget.monte_carlo.variables import Floats, HeldSum, Variable
+from bisar_budget.ranges.exact_ranges import ExactRanges
 
 if TYPE_CHECKING:
     from bisar_budget.workers import MapBlocks
@@ -53,7 +54,7 @@ class Drawing(NamedTuple):
     name: str
     variables: tuple[Variable, ...]
     judged: tuple[HeldSum, ...]
-    paths: ExactPaths
+    exact: ExactRanges
     draws: int
     seed: int
     is_exact: bool
@@ -95,8 +96,8 @@ def drawing_of(
     analysis: Analysis, variables: Sequence[Variable], judged: Sequence[HeldSum], draws: int, seed: int
 ) -> Drawing:
     """Prepare draws of all variables; a sample decides whether they need exact ranges."""
-    paths, name = paths_of(analysis.exact, analysis.mission.radar.wavelength), analysis.mission.name
-    drawing = Drawing(name, tuple(variables), tuple(judged), paths, draws, seed, False, CHUNK)
+    given = (analysis.mission.name, tuple(variables), tuple(judged), analysis.exact)
+    drawing = Drawing(*given, draws, seed, False, CHUNK)
     is_exact = bool(variables and judged) and _needs_exact_ranges(drawing)
     drawn = tuple(variable for variable in variables if _counts(variable, judged, is_exact))
     return drawing._replace(variables=drawn, is_exact=is_exact)
@@ -204,7 +205,7 @@ class Drawer:
 
 
 def _sums(drawing: Drawing, size: int, *, adds: bool, keeps_motion: bool) -> Sums:
-    return Sums(drawing.paths, drawing.variables, drawing.judged, size, adds=adds, keeps_motion=keeps_motion)
+    return Sums(drawing.exact, drawing.variables, drawing.judged, size, adds=adds, keeps_motion=keeps_motion)
 
 
 def _needs_exact_ranges(drawing: Drawing) -> bool:

@@ -1,40 +1,17 @@
 """What the errors of a block of draws do together: sums of effects, or exact ranges of the paths that they make."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.effect import CLOCK_UNITS, PLATFORMS, ErrorSource
-from bisar_budget.effects.exact_arrays import (
-    TOGETHER,
-    ExactEffects,
-    column_effects,
-    direct_path_clock,
-    projection,
-    room_for,
-)
 from bisar_budget.monte_carlo.variables import Floats, HeldSum, Variable
-from bisar_budget.ranges.exact_ranges import ExactRanges
+from bisar_budget.ranges.exact_ranges import STILL, ExactRanges, Found, followed
 
 _ORDER = {"m": 0, "m/s": 1, "m/s^2": 2}
 _CLOCK = {unit: power for power, unit in enumerate(CLOCK_UNITS.values())}
-
-
-class ExactPaths(NamedTuple):
-    """Actual paths of a collection: times (nodes,) [s], tracks of both platforms (nodes, 3) [m], wavelength [m]."""
-
-    times: Floats
-    tracks: tuple[Floats, Floats]
-    wavelength: float
-    has_direct_path: bool
-
-
-def paths_of(exact: ExactRanges, wavelength_m: float) -> ExactPaths:
-    """Take from the exact ranges of a mission what draws need."""
-    transmitter, receiver = (np.concatenate(track, axis=1) for track in exact.tracks)
-    return ExactPaths(exact.times[:, 0], (transmitter, receiver), wavelength_m, exact.has_direct_path)
 
 
 class Sums:
@@ -45,8 +22,8 @@ class Sums:
 
     Parameters
     ----------
-    paths : ExactPaths
-        For exact ranges.
+    exact : ExactRanges
+        Of the mission.
     variables, judged : sequences of Variable, HeldSum
         What will be added, and what will be asked for.
     size : int
@@ -57,7 +34,7 @@ class Sums:
 
     def __init__(
         self,
-        paths: ExactPaths,
+        exact: ExactRanges,
         variables: Sequence[Variable],
         judged: Sequence[HeldSum],
         size: int,
@@ -65,17 +42,16 @@ class Sums:
         adds: bool,
         keeps_motion: bool,
     ) -> None:
-        self.paths, self.size, self.keeps_motion = paths, size, keeps_motion
+        self.exact, self.size, self.keeps_motion = exact, size, keeps_motion
         wanted = {column for one in judged for column in one.columns}
         self.phases = {variable.owner: np.zeros(size) for variable in variables} if adds else {}
         self.totals = {column: np.zeros(size) for column in sorted(wanted - {0})} if adds else {}
         self.motion: dict[str, Floats] = {}
         self.clock: dict[str, Floats] = {}
         self.phase_alone: dict[str, Floats] = {}
-        self._exact: dict[tuple[str, ...], ExactEffects] = {}
+        self._exact: dict[tuple[str, ...], Found] = {}
         self._scaled = np.empty(size)
         self._square = np.empty(size)
-        self._room: Floats | None = None
 
     def clear(self) -> None:
         """Begin another block."""
@@ -147,45 +123,20 @@ class Sums:
         elif judged.columns == (1,):
             square = (found.cubic + cubic) ** 2
         else:
-            square = np.sum(found.displacement**2, axis=-1)
+            square = found.east**2 + found.north**2
         return square
 
-    def _by_exact_ranges(self, owners: tuple[str, ...]) -> ExactEffects:
-        times, actual = self.paths.times, self.paths.tracks
+    def _by_exact_ranges(self, owners: tuple[str, ...]) -> Found:
+        times = self.exact.times[:, 0]
         powers = np.stack((np.ones_like(times), times, times**2 / 2), axis=-1)  # of (22)
         clock_powers = SPEED_OF_LIGHT * times[:, None] ** np.arange(4)
-        weights = projection(len(times))
-        motion = _sum(self.motion, owners, np.zeros((2, 3, 3, self.size)))
-        clock = _sum(self.clock, owners, np.zeros((4, self.size)))
-        found = ExactEffects(
-            np.empty((self.size, 2)), np.empty(self.size), np.empty(self.size), np.empty(self.size, dtype=bool)
-        )
-        size = max(1, TOGETHER // len(times))
-        if self._room is None:
-            self._room, self._tracks = room_for(size * len(times)), np.empty((2, 3, len(times), size))
-        for start in range(0, self.size, size):
-            some = slice(start, min(start + size, self.size))
-            transmitter, receiver = self._tracks[..., : some.stop - start]
-            for platform, measured in enumerate((transmitter, receiver)):
-                np.matmul(powers, motion[platform][..., some].swapaxes(0, 1), out=measured)
-                measured += actual[platform].T[:, :, None]
-            clock_range = clock_powers @ clock[:, some]
-            if self.paths.has_direct_path:
-                clock_range = direct_path_clock(
-                    *(np.moveaxis(one, 0, -1) for one in (transmitter, receiver)), *(one[:, None] for one in actual)
-                )
-            part = column_effects(
-                (transmitter, receiver), actual, clock_range, weights, self.paths.wavelength, None, self._room
-            )
-            for whole, value in zip(found, part, strict=True):
-                whole[some] = value
-        return found
+        motion = _sum(self.motion, owners, np.broadcast_to(0.0, (2, 3, 3, self.size)))
+        clock = _sum({} if self.exact.has_direct_path else self.clock, owners, np.broadcast_to(0.0, (4, self.size)))
+        shifts = [powers @ one.swapaxes(0, 1) if one.any() else STILL for one in motion]
+        return followed(self.exact, clock_powers @ clock, shifts, np.zeros(self.size, dtype=int))
 
 
 def _sum(parts: Mapping[str, Floats], owners: Sequence[str], nothing: Floats) -> Floats:
     """What several owners have, added up."""
-    total = nothing
-    for owner in owners:
-        if owner in parts:
-            total = total + parts[owner]
-    return total
+    found = [parts[owner] for owner in owners if owner in parts]
+    return sum(found[1:], found[0]) if found else nothing

@@ -16,7 +16,7 @@ of one case. A single case serves any number of lanes as it stands.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, reduce
+from functools import cache, cached_property, reduce
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -33,7 +33,11 @@ Truths = NDArray[np.bool_]
 # Way of a platform in half an aperture, over its slant range, up to which so many nodes change phases by less than
 # 1e-6 of themselves; beyond the last, 16 nodes are right to 1e-3 at 1.25.
 NODES = ((0.1, 6), (0.5, 10), (math.inf, 16))
+FINE = 24  # nodes of courses that are not as smooth as those of (22)
 ITERATIONS = 40
+MEASURED, WORKED_ON = 8, 15  # arrays of all samples that hold measured paths; and these with what is worked on
+TOGETHER = 1 << 16  # samples of lanes: what is made of them stays in a cache
+STEPS = 8  # in which a point is followed by errors of any course
 MEETS = 1e-5  # of the nearest range; of a platform that is nearer, rounding decides in which direction it is seen
 NEAR = 0.003  # of the nearest slant range; a point so near to the centre has slopes that differ by no more
 SKEWED = 0.01  # the same over the sine between the gradients, where they are near to parallel
@@ -44,7 +48,29 @@ CLOCK_POWERS = {"s": 0, "s/s": 1, "1/s": 2, "1/s^2": 3}  # of slow time, by the 
 EPSILON = 2e-15  # of a range sum: what rounding of a few operations leaves
 UNSEEN_RAD = 3e-5  # what the last step of the search may change a phase by beyond the part counted linearly
 
-_STILL = [np.zeros((1, 1))] * 3  # a platform that no error moves
+STILL = [np.zeros((1, 1))] * 3  # a platform that no error moves
+
+
+class Sampling(NamedTuple):
+    """When a history is sampled: slow times over −1 … 1, in half apertures, (samples,); and the weights that fit it.
+
+    The weights (4, samples) are those of `LEGENDRE_FITS`: value, slope, quadratic and cubic at the edge.
+    """
+
+    places: Floats
+    fit: Floats
+
+
+@cache
+def nodes(count: int) -> Sampling:
+    """Sampling at so many nodes of Gauss-Legendre quadrature."""
+    places, *fit = LEGENDRE_FITS[count]
+    return Sampling(np.array(places), np.array(fit))
+
+
+def aperture_nodes(aperture_time_s: float, count: int = FINE) -> Floats:
+    """Slow times of the nodes of an aperture, (count,). [s]"""
+    return nodes(count).places * (aperture_time_s / 2)
 
 
 def nodes_for(geometry: BistaticGeometry, aperture_time_s: Any, *, has_direct_path: bool = False) -> Any:
@@ -195,10 +221,10 @@ class ExactRanges:
     ----------
     half, k : (n,)
         Half the aperture time [s], and 2π over the wavelength. [rad/m]
-    count : int
-        Number of nodes.
+    sampling : Sampling
+        When the paths are sampled, at nodes or anywhere.
     tracks : sequence of Vectors
-        Positions of both platforms at the nodes, as what stands for the scene centre sees them, (count, n). [m]
+        Positions of both platforms at the nodes, as what stands for the scene centre sees them, (nodes, n). [m]
     positions : sequence of Vectors
         The same at the middle of the aperture, (n,). [m]
     has_direct_path : bool
@@ -209,16 +235,15 @@ class ExactRanges:
         self,
         half: Floats,
         k: Floats,
-        count: int,
+        sampling: Sampling,
         tracks: Sequence[Vectors],
         positions: Sequence[Vectors],
         *,
         has_direct_path: bool = False,
     ) -> None:
-        self.half, self.k, self.count, self.tracks, self.positions = half, k, count, tracks, positions
+        self.half, self.k, self.sampling, self.tracks, self.positions = half, k, sampling, tracks, positions
         self.has_direct_path = has_direct_path
-        _, *fit = LEGENDRE_FITS[count]
-        self.fit: Floats = np.array(fit)  # (4, nodes)
+        self.fit = sampling.fit
         self.ranges = [norm(track) for track in tracks]
         self.gradient = [self.fit @ one for one in self.slopes]
         (s_x, rate_x, *_), (s_y, rate_y, *_) = self.gradient
@@ -243,26 +268,27 @@ class ExactRanges:
         """Exact ranges of collections, at their scene centres: of transmitter and receiver."""
         half: Floats = np.array(np.broadcast_to(np.asarray(aperture_time, dtype=float) / 2, (cases,)))
         k: Floats = np.array(np.broadcast_to(2 * math.pi / np.asarray(wavelength, dtype=float), (cases,)))
-        times = np.array(LEGENDRE_FITS[count][0])[:, None] * half
+        sampling = nodes(count)
+        times = sampling.places[:, None] * half
         middles = []
         for path in paths:
             x, y, z = (np.broadcast_to(part, (cases,)) for part in path.position)
             middles.append((x, y, z))
         tracks = [path.place(times) for path in paths]
-        return cls(half, k, count, tracks, middles, has_direct_path=has_direct_path)
+        return cls(half, k, sampling, tracks, middles, has_direct_path=has_direct_path)
 
     def at(self, east: Floats, north: Floats, case: Places) -> "ExactRanges":
         """Exact ranges of cases at points of the ground, (case,), in place of the centre. [m]"""
         tracks = [(x - east, y - north, z) for x, y, z in (_of([*track], case) for track in self.tracks)]
         positions = [(x[case] - east, y[case] - north, z[case]) for x, y, z in self.positions]
         return ExactRanges(
-            self.half[case], self.k[case], self.count, tracks, positions, has_direct_path=self.has_direct_path
+            self.half[case], self.k[case], self.sampling, tracks, positions, has_direct_path=self.has_direct_path
         )
 
     @cached_property
     def times(self) -> Floats:
         """Slow times of the nodes, (nodes, cases). [s]"""
-        times: Floats = np.array(LEGENDRE_FITS[self.count][0])[:, None] * self.half
+        times: Floats = self.sampling.places[:, None] * self.half
         return times
 
     @cached_property
@@ -379,7 +405,7 @@ class ExactRanges:
     def effect(self, range_error: Floats) -> Effect:
         """Effect of a range error at the nodes, that of the displacement included."""
         lanes = range_error.shape[1:]  # the last axis is that of the cases
-        constant, linear, own, own_cubic = (self.fit @ range_error.reshape(self.count, -1)).reshape(4, *lanes)
+        constant, linear, own, own_cubic = (self.fit @ range_error.reshape(len(range_error), -1)).reshape(4, *lanes)
         linear = linear / self.half
         own, own_cubic = own * self.k, own_cubic * self.k
         size = np.abs(range_error).max(axis=0) * self.k
@@ -414,19 +440,14 @@ class ExactRanges:
         """
         shifts = lanes.shifts(size)
         clock = lanes.clock(size)
-        if self.has_direct_path:  # whose own clock errors are nothing
-            clock = clock + self._heard(shifts, lanes.case)
         bend = np.abs(size) * np.where(lanes.unit == "m/s", lanes.moves[0] + lanes.moves[1], 0.0)
         return self.settled(clock, shifts, near, bend, lanes.case)
 
     def left_over(self, lanes: Lanes, size: Floats, place: tuple[Any, Any]) -> Floats:
         """Range error at the nodes that errors leave at ground points, (nodes, lanes). [m]"""
-        shifts = lanes.shifts(size)
-        clock = lanes.clock(size)
-        if self.has_direct_path:
-            clock = clock + self._heard(shifts, lanes.case)
-        one = self._measured(clock, shifts, np.arange(lanes.case.size), lanes.case)
-        return np.asarray(one[0] - _grown(one[1:8], *place)[0] - _grown(one[8:], *place)[0])
+        room = self._room(lanes.case.size)
+        measured = self._measured(lanes.clock(size), lanes.shifts(size), lanes.case, room)
+        return _left(measured, *place, room[MEASURED:])
 
     def _heard(self, shifts: Sequence[Any], case: Places) -> Floats:
         """What shifts of the platforms make of c·t̃ at the nodes where the direct path is the clock. [m]"""
@@ -459,49 +480,84 @@ class ExactRanges:
         determinant = a * d - b * c
         return (b * linear - d * constant) / determinant, (c * constant - a * linear) / determinant
 
-    def settled(
-        self, clock: Floats, shifts: Sequence[Any], near: tuple[Any, Any], bend: Floats, case: Places
-    ) -> Found:
+    def settled(self, clock: Floats, shifts: Sequence[Any], near: Any, bend: Any, case: Places) -> Found:
         """Newton's method for the point; with the slopes of the centre where it stays within reach of that.
 
         Range errors by clocks (nodes, lanes) [m], three shifts of each platform there [m], where the search starts
         [m], the velocity errors of both platforms [m/s], and the cases of the lanes.
+        """
+        lanes = clock.shape[1]
+        size = max(1, min(lanes, TOGETHER // self.fit.shape[1]))
+        found = Found(np.zeros(lanes, dtype=bool), *(np.full(lanes, math.nan) for _ in range(5)))
+        start = [np.broadcast_to(np.asarray(one, dtype=float), (lanes,)) for one in near]
+        with np.errstate(all="ignore"):
+            half, most, reach = _of([self.half, self.bend, self.reach], case)
+            is_close = np.hypot(*start) < np.where(bend * half < most, reach, 0.0)
+            room = self._room(size)
+            for first in range(0, lanes, size):
+                some = slice(first, first + size)
+                here = Found._make(one[some] for one in found)
+                moved = [[along if along.shape[-1] == 1 else along[:, some] for along in one] for one in shifts]
+                measured = self._measured(clock[:, some], moved, case[some], room)
+                given = [case[some], *(one[some] for one in start), *measured]
+                for search, is_for in ((self._settle_near, is_close[some]), (self._settle, np.True_)):
+                    alive = np.flatnonzero(is_for & ~here.is_found)
+                    if alive.size:
+                        kept: list[Any] = given if alive.size == here.east.size else _some(given, alive)
+                        of, east, north, *left = kept
+                        search(here, alive, of, east, north, left, room[MEASURED:, :, : alive.size])
+        return found
+
+    def _room(self, lanes: int) -> Floats:
+        """Room in which so many lanes are worked on: the system takes longer to give it than it takes to fill it."""
+        return np.empty((WORKED_ON, self.fit.shape[1], lanes))
+
+    def _measured(self, clock: Floats, shifts: Sequence[Any], case: Places, room: Floats) -> list[Floats]:
+        """What `_seen` takes of errors, (nodes, lanes): the clock error, and five of each platform, in `room`.
 
         A range R grows by p/(R + √(R² + p)) where d is added to its vector r, with p = d·(2r + d): that has no
         rounding of the range itself. From a point at g = (east, north) it is p - 2r̂·g + |g|².
         """
-        lanes = clock.shape[1]
-        start = [np.array(np.broadcast_to(one, (lanes,)), dtype=float) for one in near]
-        found = Found(np.zeros(lanes, dtype=bool), *(np.full(lanes, math.nan) for _ in range(5)))
-        with np.errstate(all="ignore"):
-            half, most, reach = _of([self.half, self.bend, self.reach], case)
-            close = np.flatnonzero(np.hypot(*start) < np.where(bend * half < most, reach, 0.0))
-            if close.size:
-                self._settle_near(found, self._measured(clock, shifts, close, case), start, close, case)
-            rest = np.flatnonzero(~found.is_found)
-            if rest.size:
-                self._settle(found, self._measured(clock, shifts, rest, case), start, rest, case)
-        return found
-
-    def _measured(self, clock: Floats, shifts: Sequence[Any], alive: Places, case: Places) -> list[Floats]:
-        """Arrays (nodes, alive): the clock error; position, range and shift of each platform at the nodes."""
-        found = _some([clock], alive)
-        for track, ranges, shift in zip(self.tracks, self.ranges, shifts, strict=True):
-            found += [*_of([*track, ranges], case[alive]), *_some(shift, alive)]
+        if self.has_direct_path:  # whose own clock errors are nothing
+            clock = clock + self._heard(shifts, case)
+        found = [clock]
+        for track, ranges, (a, b, c), own in zip(
+            self.tracks, self.ranges, shifts, (room[:4], room[4:8]), strict=True
+        ):
+            x, y, z, R = _of([*track, ranges], case)
+            u, v, p, whole = own[..., : max(x.shape[-1], a.shape[-1])]  # what all lanes share is worked out once
+            np.add(x, a, out=u)
+            np.add(y, b, out=v)
+            np.add(x, u, out=p)
+            p *= a
+            np.add(y, v, out=whole)
+            whole *= b
+            p += whole
+            np.add(z, z, out=whole)
+            whole += c
+            whole *= c
+            p += whole
+            np.multiply(R, R, out=whole)
+            whole += p
+            found += [u, v, R, p, whole]
         return found
 
     def _settle_near(
-        self, found: Found, measured: list[Floats], start: list[Floats], alive: Places, case: Places
+        self,
+        found: Found,
+        alive: Places,
+        of: Places,
+        east: Floats,
+        north: Floats,
+        measured: list[Floats],
+        room: Floats,
     ) -> None:
         """Search with the slopes of the centre: a third of the work, where it settles in a few steps."""
-        of = case[alive]
         gradient = _of(self.gradient, of)
-        east, north = start[0][alive], start[1][alive]
         for _ in range(FEW):
             (a, c, quadratic_east, cubic_east), (b, d, quadratic_north, cubic_north) = gradient
             determinant = a * d - b * c
-            left = measured[0] - _grown(measured[1:8], east, north)[0] - _grown(measured[8:], east, north)[0]
-            constant, linear, quadratic, cubic = self.fit @ left
+            constant, linear, quadratic, cubic = self.fit @ _left(measured, east, north, room)
             step_east = (b * linear - d * constant) / determinant
             step_north = (c * constant - a * linear) / determinant
             east, north = east + step_east, north + step_north
@@ -516,19 +572,24 @@ class ExactRanges:
             if not going.size:
                 return
             alive, of, east, north = alive[going], of[going], east[going], north[going]
-            gradient, measured = _some(gradient, going), _some(measured, going)
+            gradient, measured, room = _some(gradient, going), _some(measured, going), room[..., : going.size]
 
-    def _settle(self, found: Found, measured: list[Floats], start: list[Floats], alive: Places, case: Places) -> None:
-        of = case[alive]
-        east, north, before = start[0][alive], start[1][alive], np.full(alive.size, math.inf)
+    def _settle(
+        self,
+        found: Found,
+        alive: Places,
+        of: Places,
+        east: Floats,
+        north: Floats,
+        measured: list[Floats],
+        room: Floats,
+    ) -> None:
+        before = np.full(alive.size, math.inf)
         for _ in range(ITERATIONS):
-            grown, u, v, near = _grown(measured[1:8], east, north)
-            more, x, y, far = _grown(measured[8:], east, north)
-            nearest = np.minimum(near, far).min(axis=0)
-            left, by_east, by_north = measured[0] - grown - more, u / near + x / far, v / near + y / far
-            a, c, quadratic_east, cubic_east = self.fit @ by_east  # what a step of a metre adds to what is left
-            b, d, quadratic_north, cubic_north = self.fit @ by_north
-            constant, linear, quadratic, cubic = self.fit @ left
+            seen, nearest = _seen(measured, east, north, room)
+            (constant, linear, quadratic, cubic), by_east, by_north = np.matmul(self.fit, seen)
+            a, c, quadratic_east, cubic_east = by_east  # what a step of a metre adds to what is left
+            b, d, quadratic_north, cubic_north = by_north
             determinant = a * d - b * c
             step_east = (b * linear - d * constant) / determinant
             step_north = (c * constant - a * linear) / determinant
@@ -547,8 +608,10 @@ class ExactRanges:
             going = np.flatnonzero(~is_done & (step < SHRINKS * before) & is_apart)
             if not going.size:
                 return
-            alive, of, east, north, before = alive[going], of[going], east[going], north[going], step[going]
-            measured = _some(measured, going)
+            before = step
+            if going.size < alive.size:
+                alive, of, east, north, before = alive[going], of[going], east[going], north[going], step[going]
+                measured, room = _some(measured, going), room[..., : going.size]
 
     def _keep(
         self,
@@ -575,19 +638,80 @@ def _weighted(along: Sequence[Any], weight: Any) -> Sequence[Any]:
     """A shift of a platform that lanes move or leave where it is."""
     if np.ndim(weight):
         return [weight * part for part in along]
-    return along if weight else _STILL
+    return along if weight else STILL
 
 
-def _grown(platform: list[Floats], east: Any, north: Any) -> tuple[Floats, Floats, Floats, Floats]:
-    """How much longer the range of a platform is to points than it was, without rounding of the ranges themselves.
+def _grow(platform: Sequence[Floats], east: Any, north: Any, room: Floats, distance: Floats) -> None:
+    """Fill with how much longer than the true range a platform's range to points is, and with that range. [m]"""
+    u, v, R, p, whole = platform
+    grown, other = room[:2]
+    np.multiply(u, 2 * east, out=grown)
+    np.multiply(v, 2 * north, out=other)
+    grown += other
+    np.subtract(east * east + north * north, grown, out=grown)
+    np.add(whole, grown, out=distance)
+    np.sqrt(distance, out=distance)
+    grown += p
+    np.add(distance, R, out=other)
+    grown /= other
 
-    With it where the platform is seen from there, east and north, and how far. [m]
+
+def _left(measured: Sequence[Floats], east: Any, north: Any, room: Floats) -> Floats:
+    """Range error at the nodes that is left at points (lanes,), (nodes, lanes). [m]"""
+    clock, first, second = measured[0], room[:3], room[3:6]
+    _grow(measured[1:6], east, north, first, room[6])
+    _grow(measured[6:], east, north, second, room[6])
+    left: Floats = np.subtract(clock, first[0], out=first[0])
+    left -= second[0]
+    return left
+
+
+def _seen(measured: Sequence[Floats], east: Floats, north: Floats, room: Floats) -> tuple[Floats, Floats]:
+    """The same, what a metre east, and north, adds to it, (3, nodes, lanes); the least range there, (lanes,). [m]"""
+    clock, seen, other, distance, nearest = measured[0], room[:3], room[3:6], room[6], math.inf
+    for platform, out in ((measured[1:6], seen), (measured[6:], other)):
+        _grow(platform, east, north, out, distance)
+        np.subtract(platform[0], east, out=out[1])
+        np.subtract(platform[1], north, out=out[2])
+        out[1:] /= distance
+        nearest = np.minimum(nearest, distance.min(axis=0))
+    seen += other
+    np.subtract(clock, seen[0], out=seen[0])
+    return seen, np.asarray(nearest)
+
+
+def followed(exact: ExactRanges, clock: Floats, shifts: Sequence[Any], case: Places) -> Found:
+    """Find where errors of any course move a point at the centre, in steps from no error on where need be.
+
+    Parameters
+    ----------
+    exact : ExactRanges
+        Of the cases.
+    clock : (nodes, lanes)
+        Range errors by clocks, none where the direct path is the clock. [m]
+    shifts : two of three of (nodes, lanes)
+        Of both platforms. [m]
+    case : (lanes,)
+        The case that each is an error of.
+
+    Returns
+    -------
+    Found
+        NaN where no ground point has the recorded history, or only one to which no error leads from nothing.
     """
-    x, y, z, R, a, b, c = platform
-    u, v = x + a, y + b
-    grown = a * (x + u) + b * (y + v) + c * (z + z + c) - 2 * u * east - 2 * v * north + (east * east + north * north)
-    distance = np.sqrt(R * R + grown)
-    return grown / (R + distance), u - east, v - north, distance
+    found = exact.settled(clock, shifts, (0.0, 0.0), math.inf, case)
+    missed = np.flatnonzero(~found.is_found)
+    if missed.size:
+        (clock,), shifts = _some([clock], missed), [_some(one, missed) for one in shifts]
+        near = np.zeros((2, missed.size))
+        for step in range(STEPS):
+            part = (step + 1) / STEPS
+            ahead = [[part * along for along in one] for one in shifts]
+            there = exact.settled(part * clock, ahead, near, math.inf, case[missed])
+            near = np.array((there.east, there.north)) * ((step + 2) / (step + 1))  # NaN from the first lost one on
+        for whole, later in zip(found, there, strict=True):
+            whole[missed] = later
+    return found
 
 
 def _some(arrays: Sequence[Floats], some: Places) -> list[Floats]:

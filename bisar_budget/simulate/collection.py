@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.effects.exact_arrays import aperture_nodes
 from bisar_budget.geometry import BistaticGeometry, GroundVector
 from bisar_budget.mission.model import Mission, Simulation
+from bisar_budget.ranges.exact_ranges import aperture_nodes
 from bisar_budget.simulate.exact import ExactEffect, exact_effect
 from bisar_budget.simulate.image_formation import backprojection, bytes_held, kernel_within, taylor_window
 from bisar_budget.simulate.phase_history import (

@@ -1,11 +1,13 @@
 """What a motion error of an image does, by exact ranges: paths sampled at pulses instead of nodes."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.effects.exact_arrays import located
+from bisar_budget.geometry import Vectors
+from bisar_budget.ranges.exact_ranges import ExactRanges, Sampling, followed
 from bisar_budget.simulate.phase_history import Floats, Path
 
 _ORDER = 12  # of the fit to samples anywhere else
@@ -32,25 +34,38 @@ def exact_effect(
     wavelength_m: float,
     aperture_time_s: float,
 ) -> ExactEffect:
-    """Effect of one error, its paths sampled anywhere over the aperture: see `budget/exact_arrays.py`.
+    """Effect of one error, its paths sampled anywhere over the aperture: see `ranges.exact_ranges`.
 
     Raises
     ------
     NoGroundPointError
         No ground point has the recorded range history.
     """
-    weights = _projection(slow_time / (aperture_time_s / 2))
-    measured, actual = (transmitter.measured, receiver.measured), (transmitter.actual, receiver.actual)
-    clock_range = SPEED_OF_LIGHT * np.asarray(clock_error, dtype=float)
-    found = located(measured, actual, clock_range, weights, wavelength_m)
-    if not found.found:
+    half, paths = aperture_time_s / 2, (transmitter, receiver)
+    exact = ExactRanges(
+        np.array([half]),
+        np.array([2 * math.pi / wavelength_m]),
+        _sampling(slow_time / half),
+        [_columns(one.actual) for one in paths],
+        [_columns(one.actual[slow_time.size // 2]) for one in paths],
+    )
+    clock = np.broadcast_to(SPEED_OF_LIGHT * np.asarray(clock_error, dtype=float), slow_time.shape)[:, None]
+    shifts = [_columns(one.measured - one.actual) for one in paths]
+    found = followed(exact, clock, shifts, np.zeros(1, dtype=int))
+    if not found.is_found[0]:
         raise NoGroundPointError("no ground point has the recorded range history")
-    east, north = (float(part) for part in found.displacement)
-    return ExactEffect(displacement=(east, north), quadratic=float(found.quadratic), cubic=float(found.cubic))
+    east, north, quadratic, cubic = (float(one[0]) for one in found[1:5])
+    return ExactEffect(displacement=(east, north), quadratic=quadratic, cubic=cubic)
 
 
-def _projection(place: Floats) -> Floats:
-    """Weights (4, samples) that project on P₀ … P₃ the polynomial through samples anywhere in -1 … 1."""
-    legendre = np.polynomial.legendre.legvander(place, min(_ORDER, max(3, place.size // 4)))
-    weights: Floats = np.asarray(np.linalg.pinv(legendre)[:4], dtype=float)
-    return weights
+def _columns(positions: Floats) -> Vectors:
+    """Positions (..., 3) by component, each (..., 1)."""
+    x, y, z = np.moveaxis(positions, -1, 0)[..., None]
+    return x, y, z
+
+
+def _sampling(places: Floats) -> Sampling:
+    """Samples anywhere in −1 … 1, fitted by the polynomial through them."""
+    legendre = np.polynomial.legendre.legvander(places, min(_ORDER, max(3, places.size // 4)))
+    at_edge = np.array([1.0, 1.0, 1.5, 2.5])[:, None]  # of P₂ and P₃, see `LEGENDRE_FITS`
+    return Sampling(places, at_edge * np.linalg.pinv(legendre)[:4])

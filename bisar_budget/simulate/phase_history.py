@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.effects.exact_arrays import direct_path_clock
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 
 _FEW = 8  # scatterers are added one by one
@@ -213,9 +212,9 @@ def direct_path_error(paths: tuple[Path, Path]) -> Floats:
 
     Its clock is the direct signal, which is late by the actual distance; the processor takes the measured one off.
     """
-    transmitter, receiver = paths
-    measured = (transmitter.measured, receiver.measured)
-    return direct_path_clock(*measured, transmitter.actual, receiver.actual) / SPEED_OF_LIGHT
+    a, b = paths
+    grown: Floats = np.linalg.norm(a.measured - b.measured, axis=-1) - np.linalg.norm(a.actual - b.actual, axis=-1)
+    return grown / SPEED_OF_LIGHT
 
 
 def phase_history(

@@ -32,7 +32,7 @@ from bisar_budget.theory.symbols import (
     wavelength,
 )
 
-NODES = (6, 10, 16)  # of a fit over the aperture: the longer the way of the platforms, the more
+NODES = (6, 10, 16, 24)  # of a fit over the aperture: the longer the way of the platforms, the more
 SYMPY_VERSION: str = sympy.__version__
 TARGET = Path(__file__).resolve().parent.parent / "evaluators.py"
 

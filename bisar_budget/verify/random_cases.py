@@ -14,13 +14,13 @@ from bisar_budget.analysis.spread import declared_powers, islr_db, mainlobe_ener
 from bisar_budget.analysis.vibration_limits import echo_phase, highest_echo
 from bisar_budget.budget.random_rows import HELD, ISLR, held_effect, limits_for, sizes_at
 from bisar_budget.effects.clocks import Spur
-from bisar_budget.effects.exact_arrays import aperture_nodes
 from bisar_budget.effects.models import CUBIC
 from bisar_budget.effects.random_errors import RandomError, process_of
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.vibration import sight_of
 from bisar_budget.findings.images import Verdict
 from bisar_budget.mission.model import Simulation
+from bisar_budget.ranges.exact_ranges import aperture_nodes
 from bisar_budget.simulate.collection import Errors
 from bisar_budget.simulate.phase_history import SMOOTH, Course, Floats, PathError, PathSinusoid, cell_centres
 from bisar_budget.simulate.realisations import clock_seconds, phase_courses, position_courses

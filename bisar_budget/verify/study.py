@@ -9,10 +9,10 @@ import numpy as np
 from bisar_budget.analysis.analysis import Analysis, Model
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource
-from bisar_budget.effects.exact_arrays import aperture_nodes, direct_path_clock, exact_effects
 from bisar_budget.effects.models import QUADRATIC
 from bisar_budget.effects.subject import Subject
 from bisar_budget.mission.model import Mission
+from bisar_budget.ranges.exact_ranges import FINE, STILL, ExactRanges, followed
 from bisar_budget.simulate.autofocus import ALGORITHMS
 from bisar_budget.simulate.collection import (
     CELLS,
@@ -118,16 +118,12 @@ class Study:
 
         The nodes are those of `aperture_nodes`.
         """
-        nodes = aperture_nodes(self.collection.aperture_time)
-        flown = self.collection.paths(Errors(), nodes)
-        actual = (flown[0].actual, flown[1].actual)
-        transmitter, receiver = (
-            path + courses if name == platform else path for name, path in zip(PLATFORMS, actual, strict=True)
-        )
-        clock: Floats | float = 0.0
-        if self.collection.has_direct_path:
-            clock = direct_path_clock(transmitter, receiver, *actual)
-        found = exact_effects(transmitter, receiver, *actual, clock, self.collection.wavelength)
+        paths, seen = (self.geometry.transmitter, self.geometry.receiver), self.collection
+        is_heard = seen.has_direct_path
+        exact = ExactRanges.of(paths, seen.wavelength, seen.aperture_time, FINE, has_direct_path=is_heard)
+        moved = np.ascontiguousarray(courses.T)
+        shifts = [moved if name == platform else STILL for name in PLATFORMS]
+        found = followed(exact, np.zeros(moved.shape[1:]), shifts, np.zeros(len(courses), dtype=int))
         return found.quadratic, found.cubic
 
     def worse_sign(self, sizes: Sizes, scale: float) -> float:

@@ -13,9 +13,9 @@ import numpy as np
 
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.vibration_limits import vibration_limits
+from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.echoes import SLOWEST, near_lines, worst_phases
 from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.effects.exact_arrays import direct_path_clock
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.vibration import Line, lines_of
 from bisar_budget.findings.images import Verdict
@@ -23,7 +23,7 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import Note
 from bisar_budget.simulate.collection import CELLS, Errors, PointCollection
 from bisar_budget.simulate.impulse_response import upsampled
-from bisar_budget.simulate.phase_history import Floats, PathError, PathSinusoid, cell_centres
+from bisar_budget.simulate.phase_history import Floats, PathError, PathSinusoid, cell_centres, direct_path_error
 from bisar_budget.verify import reasons
 from bisar_budget.verify.noise_image import TOLERANCE_DB, Mainlobe, added_islr
 
@@ -183,9 +183,8 @@ def _wideband(
                 for now, before in zip(flown, clean, strict=True)
             ]
             if collection.has_direct_path:  # of each platform alone
-                (t, r), (still_t, still_r) = ([one.measured for one in both] for both in (flown, clean))
-                shifts[0] -= direct_path_clock(t, still_r, still_t, still_r)
-                shifts[1] -= direct_path_clock(still_t, r, still_t, still_r)
+                shifts[0] -= SPEED_OF_LIGHT * direct_path_error((flown[0], clean[1]))
+                shifts[1] -= SPEED_OF_LIGHT * direct_path_error((clean[0], flown[1]))
             if is_common:  # the second platform makes the first one's motion, at its own limit
                 first, second = limits.values()
                 shifts[1] = shifts[0] * second / first

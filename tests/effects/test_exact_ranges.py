@@ -7,9 +7,9 @@ import pytest
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.effects.exact_arrays import aperture_nodes, direct_path_clock, exact_effects
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.ranges.exact_ranges import Lanes
+from bisar_budget.ranges import exact_ranges
+from bisar_budget.ranges.exact_ranges import FINE, STILL, ExactRanges, Lanes, aperture_nodes, followed
 from bisar_budget.simulate.exact import exact_effect
 from bisar_budget.simulate.phase_history import cell_centres
 from bisar_budget.verify.study import Study
@@ -18,19 +18,21 @@ from tests.families import DIRECT_PATH, FAMILIES
 from tests.families import mission_text as family_text
 
 
-def by_arrays(study: Study, source, sizes):
-    """Effects of one error at several sizes, at once."""
+def by_courses(study: Study, source, sizes):
+    """Effects of one error at several sizes, at once, as the simulator flies it."""
     nodes = aperture_nodes(study.collection.aperture_time)
     errors = study.errors(source, 1.0)
-    flown = study.collection.paths(errors, nodes)
-    scale = np.asarray(sizes)[:, None, None]
-    measured = [one.actual + scale * (one.measured - one.actual) for one in flown]
-    actual = [one.actual for one in flown]
-    if study.mission.has_direct_path:
-        clock = direct_path_clock(*measured, *actual)
-    else:
-        clock = SPEED_OF_LIGHT * study.collection.clock(errors, nodes) * scale[:, 0]
-    return exact_effects(*measured, *actual, clock, study.collection.wavelength)
+    scale = np.asarray(sizes)
+    shifts = [(one.measured - one.actual).T[..., None] * scale for one in study.collection.paths(errors, nodes)]
+    clock = SPEED_OF_LIGHT * np.polynomial.polynomial.polyval(nodes, errors.clock)[:, None] * scale
+    return followed(of_study(study), clock, shifts, np.zeros(len(sizes), dtype=int))
+
+
+def of_study(study: Study) -> ExactRanges:
+    """Exact ranges of a mission at many nodes."""
+    paths, seen = (study.geometry.transmitter, study.geometry.receiver), study.collection
+    is_heard = study.mission.has_direct_path
+    return ExactRanges.of(paths, seen.wavelength, seen.aperture_time, FINE, has_direct_path=is_heard)
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -49,10 +51,10 @@ def test_check_and_simulator_agree(family: str, more: str) -> None:
             continue
         farthest = full.farthest(source)
         sizes = [part * farthest for part in (0.01, -0.01, 0.1, -0.1)]
-        found = by_arrays(study, source, sizes)
+        found = by_courses(study, source, sizes)
         for index, size in enumerate(sizes):
             scalar = full.at(source, size)
-            place = found.displacement[index]
+            place = (found.east[index], found.north[index])
             if scalar is None or not np.hypot(*scalar.displacement) < 0.1 * nearest:
                 continue
             compared += 1
@@ -91,21 +93,64 @@ def test_samples_anywhere_give_the_same() -> None:
 def test_errors_without_a_point_are_marked_and_leave_the_others_alone() -> None:
     study = Study(parse_mission(mission_text()))
     source = next(s for s in study.sources if s.id == "timing.constant")
-    found = by_arrays(study, source, [1e-9, -1e-3, 2e-9])  # 300 km nearer than the scene is
-    assert found.found.tolist() == [True, False, True]
+    found = by_courses(study, source, [1e-9, -1e-3, 2e-9])  # 300 km nearer than the scene is
+    assert found.is_found.tolist() == [True, False, True]
     assert np.isnan(found.quadratic[1])
-    assert np.isfinite(found.displacement[[0, 2]]).all()
+    assert np.isfinite(found.east[[0, 2]]).all()
 
 
 def test_a_start_nearby_changes_nothing() -> None:
     study = Study(parse_mission(mission_text()))
     source = next(s for s in study.sources if s.id == "receiver.velocity.y")
-    nodes = aperture_nodes(6.0)
-    flown = study.collection.paths(study.errors(source, 0.5), nodes)
-    tracks = [one.measured for one in flown] + [one.actual for one in flown]
-    first = exact_effects(*tracks, 0.0, study.collection.wavelength)
-    again = exact_effects(*tracks, 0.0, study.collection.wavelength, near=first.displacement + 0.5)
-    assert again.displacement == pytest.approx(first.displacement, abs=1e-6)
+    exact, one = of_study(study), np.zeros(1, dtype=int)
+    flown = study.collection.paths(study.errors(source, 0.5), aperture_nodes(6.0))
+    given = np.zeros((FINE, 1)), [(path.measured - path.actual).T[..., None] for path in flown]
+    first = exact.settled(*given, (0.0, 0.0), math.inf, one)
+    again = exact.settled(*given, (first.east + 0.5, first.north + 0.5), math.inf, one)
+    assert [again.east[0], again.north[0]] == pytest.approx([first.east[0], first.north[0]], abs=1e-6)
+
+
+@pytest.mark.parametrize("together", [1, 2 * FINE, 3 * FINE])
+def test_blocks_change_nothing(monkeypatch: pytest.MonkeyPatch, together: int) -> None:
+    """Of seven lanes, the last block is shorter; one platform is still, and one lane has no point."""
+    study = Study(parse_mission(mission_text()))
+    exact, generator, case = of_study(study), np.random.default_rng(1), np.zeros(7, dtype=int)
+    shifts = [STILL, generator.normal(scale=5.0, size=(3, FINE, 7))]
+    clock = generator.normal(size=(FINE, 7))
+    clock[:, 3] = -3e5
+    for bend in (0.0, math.inf):
+        at_once = exact.settled(clock, shifts, (0.0, 0.0), bend, case)
+        with monkeypatch.context() as changed:
+            changed.setattr(exact_ranges, "TOGETHER", together)
+            in_blocks = exact.settled(clock, shifts, (0.0, 0.0), bend, case)
+        assert in_blocks.is_found.tolist() == [True] * 3 + [False] + [True] * 3
+        for one, other in zip(in_blocks, at_once, strict=True):
+            assert one == pytest.approx(other, rel=1e-9, abs=1e-9, nan_ok=True)
+
+
+def test_a_far_point_is_followed() -> None:
+    """Of errors as large as the geometry the search from the centre settles on no point, and steps find it."""
+    study = Study(parse_mission(family_text("drones", 1)))
+    exact = of_study(study)
+    nearest = float(exact.nearest[0])
+    directions = np.random.default_rng(2).normal(size=(3, 1, 400))
+    sizes = nearest * np.linspace(0.0, 0.9, 400)
+    shifts = [directions / np.linalg.norm(directions, axis=0) * sizes * np.ones((1, FINE, 1)), STILL]
+    case, clock = np.zeros(400, dtype=int), np.zeros((FINE, 400))
+    at_once = exact.settled(clock, shifts, (0.0, 0.0), math.inf, case)
+    found = followed(exact, clock, shifts, case)
+    assert (found.is_found & ~at_once.is_found).any()
+    assert not (at_once.is_found & ~found.is_found).any()
+    # What is found has no constant and no linear part left.
+    some = np.flatnonzero(found.is_found)
+    point = np.stack((found.east, found.north, 0 * found.east))[:, None, some]
+    tracks = [np.stack(track) for track in exact.tracks]
+    left = sum(
+        np.linalg.norm(track, axis=0)
+        - np.linalg.norm(track + (np.stack(shift)[..., some] if shift is not STILL else 0) - point, axis=0)
+        for track, shift in zip(tracks, shifts, strict=True)
+    )
+    assert np.abs((exact.fit @ left)[:2]).max() < 1e-5
 
 
 def test_phases_have_no_rounding_of_the_ranges() -> None:

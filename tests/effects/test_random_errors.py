@@ -11,11 +11,11 @@ import pytest
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import STANDARD_GRAVITY
-from bisar_budget.effects.exact_arrays import ExactEffects, aperture_nodes, exact_effects
 from bisar_budget.effects.random_errors import RandomError
 from bisar_budget.effects.spectra import PowerLawPiece, synchronized_parts
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
+from bisar_budget.ranges.exact_ranges import FINE, STILL, ExactRanges, Found, aperture_nodes, followed
 
 DRAWS = 20_000
 SIGMA = 0.02
@@ -53,14 +53,14 @@ def of(analysis: Analysis, row_id: str) -> RandomError:
     return next(error for error in analysis.random if error.id == row_id)
 
 
-def through_exact_ranges(mission: Mission, position_error: np.ndarray, times: np.ndarray) -> ExactEffects:
+def through_exact_ranges(mission: Mission, position_error: np.ndarray, times: np.ndarray) -> Found:
     """What a position error of the receiver does, (draws, nodes, 3), sampled at the nodes."""
     T = mission.collection.aperture_time
-    paths = [
-        np.array([getattr(mission.geometry, name).at(t)[0] for t in times]) for name in ("transmitter", "receiver")
-    ]
+    paths = (mission.geometry.transmitter, mission.geometry.receiver)
     assert np.allclose(times, aperture_nodes(T))
-    return exact_effects(paths[0], paths[1] + position_error, *paths, 0.0, mission.radar.wavelength)
+    exact = ExactRanges.of(paths, mission.radar.wavelength, T, FINE)
+    draws = len(position_error)
+    return followed(exact, np.zeros((FINE, draws)), (STILL, position_error.T), np.zeros(draws, dtype=int))
 
 
 def integrated(steps: np.ndarray, dt: float) -> np.ndarray:

@@ -8,10 +8,10 @@ import pytest
 
 from bisar_budget import evaluators
 from bisar_budget.effects.effect import image_plane
-from bisar_budget.effects.exact_arrays import aperture_nodes
 from bisar_budget.effects.pieces import PRINTED, TRUE, LinePiece, gradients_of, indicated_point
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.mission.load import load_mission
+from bisar_budget.ranges.exact_ranges import aperture_nodes
 from bisar_budget.simulate.exact import exact_effect
 from bisar_budget.simulate.phase_history import Path, PathError, path
 from bisar_budget.theory import full, published
