@@ -23,8 +23,7 @@ from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT, UTILIZATION_TOLERANCE
-from bisar_budget.effects.combine import combine_phases
-from bisar_budget.effects.correlation import phase_parts
+from bisar_budget.effects.combined import combined, phase_parts
 from bisar_budget.effects.models import lanes_of
 from bisar_budget.geometry import BistaticGeometry, GroundVector
 from bisar_budget.phrases import NOTHING, Note
@@ -246,8 +245,8 @@ class ScenePhases:
     def together(self, phases: Sequence[float], indices: Sequence[int] | None = None) -> float:
         """Phases of the errors, or of some of them, combined; those of a covariance with their correlations. [rad]"""
         if not self.groups or self.combine != "rss":
-            return combine_phases(phases if indices is None else [phases[i] for i in indices], self.combine)
-        return combine_phases([phase for _, phase in self.parts(phases, indices)], self.combine)
+            return float(combined(phases if indices is None else [phases[i] for i in indices], self.combine))
+        return float(combined([phase for _, phase in self.parts(phases, indices)], self.combine))
 
     def parts(self, phases: Sequence[float], indices: Sequence[int] | None = None) -> list[tuple[str, float]]:
         """What they combine from: ids and phases, of a covariance one under `rss`. [rad]"""
@@ -501,11 +500,7 @@ def _over_at_the_edge(edge: ScenePhases, allocation: Allocation, rim: Rim) -> No
         groups = [
             (
                 f"{owner}.quadratic_phase_error",
-                [
-                    i
-                    for i, s in enumerate(edge.members)
-                    if owner == "mission" or allocation.qpe.includes(s.owner, owner)
-                ],
+                [i for i, s in enumerate(edge.members) if allocation.qpe.includes(s.owner, owner)],
                 allocation.qpe_limit(owner) * gain,
             )
             for owner in owners

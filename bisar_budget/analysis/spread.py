@@ -16,7 +16,6 @@ import numpy as np
 
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.analysis.together import Together
 from bisar_budget.constants import MAINLOBE_ENERGY
 from bisar_budget.effects.clocks import spurs_of
 from bisar_budget.effects.echoes import SLOWEST
@@ -143,14 +142,9 @@ def spread_powers(analysis: Analysis, allocation: Allocation, owner: str, model:
     found = noise(analysis, model)
     if needs.pslr is None:
         found += [SpreadPhase(one.subject.id, one.subject.owner, one.phase**2 / 2) for one in tones(analysis.mission)]
-    powers = [
-        (one.row_id, one.variance)
-        for one in found
-        if owner == "mission" or allocation.islr.includes(one.owner, owner)
-    ]
+    powers = [(one.row_id, one.variance) for one in found if allocation.islr.includes(one.owner, owner)]
     if needs.cubic_phase_error is None:
-        together = Together(analysis, analysis.full if model == "full" else analysis.published)
-        cubic = together.cubic_without_coverage(allocation.islr, owner)
+        cubic = float(analysis.together(model).cubic_without_coverage(allocation.islr, owner)[0])
         if SMALLEST_CUBIC_RAD < cubic < math.inf:
             powers.append((subject("mission", CUBIC).id, CUBIC_POWER * cubic**2))
     return powers

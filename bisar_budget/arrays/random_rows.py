@@ -157,7 +157,7 @@ class RandomRows:
 
         is_vibration_alone &= counted("mission") == 0
         for owner in ("transmitter", "receiver", *(["clock"] if self.islr.clock is not None else []), "mission"):
-            members = [one.variance for one in spreads if owner == "mission" or self.islr.includes(one.owner, owner)]
+            members = [one.variance for one in spreads if self.islr.includes(one.owner, owner)]
             phase = counted(owner)
             is_declared = np.any([phase > 0, *(~np.isnan(one) for one in members)], axis=0)
             variance = array(sum(np.nan_to_num(one) for one in members)) + CUBIC_POWER * phase**2

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from bisar_budget.analysis import scene as scalar
 from bisar_budget.arrays.climbing import HeightAt, Heights, Places, Tops, climbed, joined, tops
 from bisar_budget.constants import MIN_GROUND_GRADIENT
-from bisar_budget.effects.combined import combined_phase, many_correlated
+from bisar_budget.effects.combined import combined_phase, correlated_errors
 from bisar_budget.effects.declared import DeclaredErrors
 from bisar_budget.ranges.exact_ranges import ExactRanges, Floats
 from bisar_budget.ranges.point_paths import PointPaths
@@ -41,7 +41,7 @@ class ManyScenePhases:
 
     def __init__(self, errors: DeclaredErrors) -> None:
         self.errors, self.exact, self.combine = errors, errors.exact, errors.mission.allocation.combine
-        self.groups = many_correlated(errors.mission)
+        self.groups = correlated_errors(errors.mission)
         self.members = [error for error in errors.stated if error.is_motion]
         self.lanes = [errors.lanes(error) for error in self.members]
         self.sizes: Floats = np.array([errors.array(error.declared) for error in self.members])

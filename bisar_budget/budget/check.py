@@ -22,7 +22,7 @@ from bisar_budget.budget.required import declared_kinds, with_required
 from bisar_budget.budget.requirement_table import judged_requirements
 from bisar_budget.budget.vibration_rows import pslr_row, spur_rows, vibration_rows
 from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
-from bisar_budget.effects.correlation import unused_correlations
+from bisar_budget.effects.combined import unused_correlations
 from bisar_budget.effects.effect import PLATFORMS, override_notes
 from bisar_budget.effects.subject import subject
 from bisar_budget.faults import changes_words
@@ -70,6 +70,8 @@ def check_mission(
     """
     analysis = Analysis(mission, is_brief, is_bare)
     gating = mission.gating_model
+    if gating != "published":  # searches start from what declared errors are known to do
+        analysis.declared(analysis.full)
     if gating == "strictest":
         checked = stricter(_checked(analysis, "published"), _checked(analysis, "full"))
     else:
@@ -137,7 +139,7 @@ def _checked(analysis: Analysis, gating: str) -> _Checked:
         *error_rows(analysis, model, other, allocation),
         *vibration_rows(mission, allocation, gating),
         *_instrument_rows(analysis, gating, allocation),
-        *aggregate_rows(analysis, model, other, allocation),
+        *aggregate_rows(analysis, gating),
     ]
     scene = None
     if mission.scene.radius is not None:

@@ -13,16 +13,10 @@ from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
-from bisar_budget.mission.model import MetricSplits, Mission
+from bisar_budget.mission.model import Mission
 
 FACTOR = 2.0
 _SAME = 1e-9  # of what is declared
-
-
-def is_balanced(mission: Mission) -> bool:
-    """Whether the phase is divided as the declared errors need it."""
-    split = mission.allocation.split
-    return (split.quadratic_phase_error if isinstance(split, MetricSplits) else split) == "balanced"
 
 
 def relaxed_errors(mission: Mission, found: MissionFindings, today: date) -> Iterator[Relaxed]:

@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from datetime import date
 from typing import NamedTuple
 
+from bisar_budget.analysis.allocation import is_balanced
 from bisar_budget.budget.check import check_mission
 from bisar_budget.design.quantities import QuestionError, tree_of
-from bisar_budget.design.relaxing import is_balanced, relaxed_errors
+from bisar_budget.design.relaxing import relaxed_errors
 from bisar_budget.design.scaled import scaled
 from bisar_budget.design.slopes import Sensitivity, Slope
 from bisar_budget.design.stated import Skipped, Stated, stated_numbers

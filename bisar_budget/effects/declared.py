@@ -277,6 +277,8 @@ class DeclaredErrors:
             none = np.full(self.cases, math.nan)
             return Does(qpe, cubic, (none, none), (none, none))
         east, north = (self.array(part) for part in self._displacement(model, error, size))
+        if model == "published":
+            east, north = (np.where(np.isinf(self.plane[2]), math.nan, part) for part in (east, north))
         found = Does(qpe, cubic, (east, north), (-east, -north))
         if model == "published":
             return found

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from bisar_budget.effects.correlation import correlated_errors, likely_error
+from bisar_budget.effects.combined import correlated_errors, likely_error
 from bisar_budget.effects.sources import error_sources
 from bisar_budget.mission.load import parse_mission
 from tests import reference
