@@ -10,8 +10,8 @@ from bisar_budget.effects.collections import Geometries, paths_of
 from bisar_budget.effects.combined import Correlated, correlated_errors
 from bisar_budget.effects.declared import DeclaredErrors
 from bisar_budget.effects.effect import ErrorSource
-from bisar_budget.effects.models import Declared, FullModel, PublishedModel
-from bisar_budget.effects.sources import error_sources, exact_ranges
+from bisar_budget.effects.models import Declared, Model
+from bisar_budget.effects.sources import exact_ranges
 from bisar_budget.effects.vibration import DeclaredPhase, slow_phases
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission, has_instruments
@@ -20,7 +20,7 @@ from bisar_budget.ranges.exact_ranges import ExactRanges
 if TYPE_CHECKING:
     from bisar_budget.effects.random_errors import RandomError
 
-Model = PublishedModel | FullModel
+__all__ = ["Analysis", "Model"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,9 +47,16 @@ class Analysis:
         return exact_ranges(self.mission, self.geometry)
 
     @cached_property
+    def errors(self) -> DeclaredErrors:
+        """Every error the mission can have, declared or not, as those of one case."""
+        platforms = self.mission.platforms
+        geometries = Geometries(paths_of(platforms.transmitter), paths_of(platforms.receiver))
+        return DeclaredErrors(self.mission, 1, geometries, self.exact)
+
+    @cached_property
     def sources(self) -> list[ErrorSource]:
-        """Every error the mission can have, declared or not, in the order of the contract."""
-        return error_sources(self.mission, self.geometry, self.exact)
+        """The same in plain numbers, in the order of the contract."""
+        return [error.in_one_case() for error in self.errors.listed]
 
     @cached_property
     def random(self) -> "list[RandomError]":
@@ -59,13 +66,6 @@ class Analysis:
         from bisar_budget.effects.random_errors import random_errors
 
         return random_errors(self.mission, self.geometry)
-
-    @cached_property
-    def errors(self) -> DeclaredErrors:
-        """The declared errors as those of one case."""
-        platforms = self.mission.platforms
-        geometries = Geometries(paths_of(platforms.transmitter), paths_of(platforms.receiver))
-        return DeclaredErrors(self.mission, 1, self.exact.count, geometries, {})
 
     @cached_property
     def slow(self) -> list[DeclaredPhase]:
@@ -88,14 +88,14 @@ class Analysis:
         return [source for source in self.sources if source.declared is not None and source.is_independent]
 
     @cached_property
-    def published(self) -> PublishedModel:
+    def published(self) -> Model:
         """Tables I and II, and (25); they do not know a direct path."""
-        return PublishedModel(self.geometry, is_blind=self.mission.has_direct_path)
+        return Model(self.errors, "published")
 
     @cached_property
-    def full(self) -> FullModel:
+    def full(self) -> Model:
         """The full model."""
-        return FullModel(self.exact, self.geometry, self.sources)
+        return Model(self.errors, "full")
 
     @cached_property
     def groups(self) -> tuple[Correlated, ...]:
@@ -113,14 +113,7 @@ class Analysis:
 
     def does(self, model: Model, source: ErrorSource) -> Declared:
         """What a declared error does by a model."""
-        key = (model.name, source.id)
-        if key not in self._does:
-            self._does[key] = model.declared(source)
-        return self._does[key]
-
-    @cached_property
-    def _does(self) -> dict[tuple[str, str], Declared]:
-        return {}
+        return Declared.of(self.errors.does(model.name, source))
 
     def declared(self, model: Model) -> dict[str, Declared]:
         """What each declared error does by a model, by row id, along the axes that the file states it in."""

@@ -24,7 +24,6 @@ from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT, UTILIZATION_TOLERANCE
 from bisar_budget.effects.combined import combined, phase_parts
-from bisar_budget.effects.models import lanes_of
 from bisar_budget.geometry import BistaticGeometry, GroundVector
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.ranges.exact_ranges import ExactRanges, joined
@@ -102,9 +101,9 @@ class ScenePhases:
         ]
         self.nearest = min(self.geometry.transmitter.slant_range, self.geometry.receiver.slant_range)
         self.nowhere = RimPlace(self.centre, 0.0, (0.0, 0.0))  # without an image
-        self.exact = analysis.exact
+        self.exact, self.errors = analysis.exact, analysis.errors
         self.turn = math.copysign(1.0, self.exact.sine[0])
-        self.lanes = [lanes_of(self.exact, source) for source in self.members]
+        self.lanes = [analysis.errors.lanes(source) for source in self.members]
 
     def geometry_at(self, point: GroundVector) -> BistaticGeometry:
         """Both platforms as a point of the ground has them."""
@@ -158,7 +157,7 @@ class ScenePhases:
             signs = (1.0, -1.0)
             small = [there.effect(there.range_error(self.lanes[i])) for i in exact]
             per_unit = [there.displacement(effect, sign) for effect in small for sign in signs]
-            lanes = joined([lanes_of(self.exact, self.members[i], sign) for i in exact for sign in signs])
+            lanes = joined([self.errors.lanes(self.members[i], sign) for i in exact for sign in signs])
             lanes = lanes.of(np.repeat(np.arange(lanes.case.size), count))
             lanes = replace(lanes, case=np.tile(np.arange(count), 2 * len(exact)))
             paths = PointPaths(there, lanes, np.array(per_unit).swapaxes(0, 1).reshape(2, -1))
@@ -183,7 +182,7 @@ class ScenePhases:
     def _more(self) -> list[float]:
         more = [0.0] * len(self.members)
         for i in self.large:
-            more[i] = self.full.declared(self.members[i]).qpe - self.centre[i]
+            more[i] = self.full.does(self.members[i], self.sizes[i]).qpe - self.centre[i]
         return more
 
     def largest(self, rim: "Rim", radius: float) -> tuple[float, float]:

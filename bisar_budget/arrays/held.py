@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT
 from bisar_budget.effects.collections import Geometries, Paths
-from bisar_budget.effects.declared import SAFE
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.subject import MOTION
 from bisar_budget.geometry import STILL
@@ -20,6 +19,8 @@ from bisar_budget.mission.instruments import RISE, STEEPEST
 from bisar_budget.mission.model import PLACE_KEYS, WHOLE, MetricSplits, Mission, Shares, flies_on_earth
 from bisar_budget.mission.platforms import BASELINE_PLACES, FARTHEST_BY, LEAST_BASELINE, MotionError, Platform
 from bisar_budget.ranges.exact_ranges import Floats, norm, positions
+
+SAFE = 1 + 1e-6  # nearer to a border of what forms an image, a case is checked by itself
 
 
 def not_held(mission: Mission, keys: Mapping[str, bool]) -> str:

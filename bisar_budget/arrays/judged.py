@@ -17,11 +17,11 @@ from bisar_budget.analysis.allocation import allocate
 from bisar_budget.analysis.spread import tones
 from bisar_budget.analysis.together import Together
 from bisar_budget.arrays.edge import HeldTogether, ManySceneEdges, many_scene_edges
-from bisar_budget.arrays.error_rows import ErrorRows
 from bisar_budget.arrays.instruments import many_random_errors
 from bisar_budget.arrays.random_rows import RandomRows
 from bisar_budget.arrays.rim import ManyScenePhases
 from bisar_budget.budget.aggregates import Aggregates, effect_parts, effect_totals, misplacing
+from bisar_budget.budget.error_rows import ErrorRows
 from bisar_budget.budget.input_doubt import declared_position_error, is_in_doubt, least_doubt
 from bisar_budget.budget.judged_rows import BOUND, CODE, Judged, Judging
 from bisar_budget.budget.orbit import FASTEST_FLIGHT
@@ -45,7 +45,7 @@ from bisar_budget.effects.vibration import slow_phases
 from bisar_budget.findings.row import DECLARE
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.model import Mission
-from bisar_budget.ranges.exact_ranges import norm
+from bisar_budget.ranges.exact_ranges import ExactRanges, norm
 
 MODELS = ("published", "full")
 _STATUSES = tuple(STATUS)
@@ -91,11 +91,14 @@ def check_arrays(
     is_brief : bool
         Search for limits as a brief check does: in an order that finds the one that binds early.
     """
-    return _Check(DeclaredErrors(mission, cases, nodes, geometries, shown), today, is_brief).checked()
+    T, is_heard = mission.collection.aperture_time, mission.has_direct_path
+    exact = ExactRanges.of(geometries.both, mission.radar.wavelength, T, nodes, cases, has_direct_path=is_heard)
+    return _Check(DeclaredErrors(mission, cases, geometries, exact, shown), today, shown, is_brief).checked()
 
 
 class _Check:
-    def __init__(self, errors: DeclaredErrors, today: date, is_brief: bool) -> None:
+    def __init__(self, errors: DeclaredErrors, today: date, shown: Mapping[str, Subject], is_brief: bool) -> None:
+        self.shown = shown
         self.is_brief = is_brief
         platforms = [getattr(errors.mission.platforms, name) for name in PLATFORMS]
         self.vibrations = [platform.motion_error.vibration for platform in platforms]
@@ -109,9 +112,6 @@ class _Check:
     def checked(self) -> Checked:
         """Judge every row by the model that gates."""
         gating = self.mission.gating_model
-        if gating != "published":  # searches start from what declared errors are known to do
-            for error in self.errors.stated:
-                self.does("full", error)
         gates = [model for model in MODELS if gating in (model, "strictest")]
         slow = slow_phases(self.mission, self.errors.geometries)
         self.together = {model: Together(self.errors, model, slow, self.random) for model in MODELS}
@@ -123,7 +123,7 @@ class _Check:
         self.total = total
         owners = (*PLATFORMS, "clock", "mission")
         self.limits = {owner: self.array(self.split.of(owner) * total) * self.gain for owner in owners}
-        self.error_rows = ErrorRows(self.judging, self.errors, self.limits, self.gain, is_brief=self.is_brief)
+        self.error_rows = ErrorRows(self.judging, self.errors, self.limits, self.gain, is_whole=not self.is_brief)
         self.aggregates = Aggregates(self.judging, self.together, self.allocation)
         self.random_rows = RandomRows(
             self.judging,
@@ -199,7 +199,8 @@ class _Check:
 
     def _rows(self, gating: str) -> list[Judged]:
         other = "published" if gating == "full" else "full"
-        rows = [*self.error_rows.rows(gating, other), *self._vibrations(gating)]
+        rows = [one.judged for one in self.error_rows.rows(gating, other)]
+        rows += self._vibrations(gating)
         rows += self._instruments(gating)
         rows += [one.judged for one in self.aggregates.rows(gating)]
         if self.mission.scene.radius is not None:
@@ -212,7 +213,7 @@ class _Check:
 
     def _vibrations(self, gating: str) -> list[Judged]:
         """Rows of vibrations, where one is declared or asked for."""
-        if not self._vibrates and not any(what.kind == "vibration" for what in self.errors.shown.values()):
+        if not self._vibrates and not any(what.kind == "vibration" for what in self.shown.values()):
             return []
         found: dict[str, Judged] = {}
         for one in self.swaying.rows(gating):

@@ -320,7 +320,6 @@ def _in_words(analysis: Analysis, model: str, one: Aggregate) -> Row:
     elif over and size is not None and what.kind != LOCATION:
         over = over.then(phrases.no_gain() if what.kind == CUBIC else phrases.one_total())
     doubt = over if one.judged.never_fails else NOTHING
-    plane = analysis.published.plane if is_published else analysis.full.plane
     return worded(
         mission,
         one.judged,
@@ -330,7 +329,7 @@ def _in_words(analysis: Analysis, model: str, one: Aggregate) -> Row:
         over=over,
         doubt=doubt or _doubt(_OTHER[model], one, said, limit),
         no_limit=phrases.no_requirement(),
-        not_evaluated=plane.degeneracy or phrases.no_image_to_place(),
+        not_evaluated=analysis.errors.degeneracy(model) or phrases.no_image_to_place(),
         info=phrases.no_requirement(),
         without_autofocus=float(np.ravel(one.without_autofocus)[0]),
         remarks=notes,

@@ -1,185 +1,196 @@
-"""One row for each error: the largest size that every requirement allows, and what is declared against it."""
+"""One row for each error: the largest size that every requirement allows, and what is declared against it.
+
+Rows are judged in arrays over cases, of a sweep or of a check, which is one case; a check then puts them into words.
+"""
 
 import math
-from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis, Model
-from bisar_budget.budget.judgement import judgement
+from bisar_budget.budget.judged_rows import BOUND, CODE, REQUIREMENTS, Floats, Judged, Judging
+from bisar_budget.budget.judgement import number, worded
 from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.constants import UTILIZATION_TOLERANCE
+from bisar_budget.effects.declared import CUBIC, END_OF_IMAGE, HELD, LOCATION, MODELS, QUADRATIC, DeclaredErrors, Does
 from bisar_budget.effects.effect import ErrorSource
-from bisar_budget.effects.models import CUBIC, END_OF_IMAGE, LOCATION, QUADRATIC, Declared
+from bisar_budget.effects.models import Declared
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import FRAME_AXES
 from bisar_budget.phrases import NOTHING, Note
 
-
-class Allowed(NamedTuple):
-    """How large one error may be by one model [unit]: by its quadratic phase alone, and by every requirement.
-
-    None: no limit. `binding` is the requirement that sets the smallest, or that the image ends there.
-    """
-
-    quadratic: float | None
-    smallest: float | None
-    binding: str | None
+OWNERS = ("transmitter", "receiver", "clock", "mission")
+_BINDING = np.array([REQUIREMENTS.index(name) for name in (*HELD, END_OF_IMAGE)] + [-1], dtype=np.int8)
 
 
-NOT_ASKED = Allowed(None, None, None)
+@dataclass(frozen=True, slots=True, eq=False)
+class ErrorRow:
+    """One error as judged in many cases; `quadratic` is the size that its quadratic phase allows, by each model."""
+
+    judged: Judged
+    source: ErrorSource
+    quadratic: Mapping[str, Floats]
 
 
-def error_rows(analysis: Analysis, model: Model, other: Model, allocation: Allocation) -> Iterator[Row]:
-    """Rows of every error, declared or not, in the order of the contract.
+class ErrorRows:
+    """Rows of the errors that are listed.
 
     Parameters
     ----------
-    analysis : Analysis
-        Of the mission.
-    model, other : Model
-        The one that gates, and the one that may doubt a pass.
-    allocation : Allocation
-        Shares of the quadratic phase.
+    judging : Judging
+        Of the cases.
+    errors : DeclaredErrors
+        Of the cases.
+    limits : mapping of str to (cases,)
+        Quadratic phase that each owner is held to, gain of autofocus included. [rad]
+    gain : (cases,)
+        Of autofocus.
+    is_whole : bool
+        Search for what the quadratic phase alone allows too, by both models.
     """
-    mission = analysis.mission
-    combine, gain = mission.allocation.combine, allocation.autofocus_gain
-    limits = {owner: allocation.qpe_limit(owner) * gain for owner in ("transmitter", "receiver", "clock", "mission")}
-    # A terminal shows allowables of undeclared errors only where nothing else is there to show.
-    is_brief = analysis.is_brief and bool(analysis.stated)
-    shown = [one for one in analysis.sources if not is_brief or (one.declared is not None and one.is_independent)]
-    held = [(source, limits[source.owner]) for source in shown]
-    allowed_of = dict(zip([source.id for source in shown], allowed_by(analysis, model, held), strict=True))
-    others_of: dict[str, Allowed] = {}
-    if not is_brief:
-        others_of = dict(zip(allowed_of, allowed_by(analysis, other, held), strict=True))
-    elif model.name == "published" and not analysis.is_bare:  # whether it holds is said beside the verdict
-        asked = [(source, QUADRATIC, limit, math.inf) for source, limit in held]
-        for source, *both in zip(shown, model.allowables(asked), other.allowables(asked), strict=True):
-            allowed_of[source.id] = allowed_of[source.id]._replace(quadratic=both[0])
-            others_of[source.id] = NOT_ASKED._replace(quadratic=both[1])
-    for source in analysis.sources:
-        limit = limits[source.owner]
-        declared = None if source.declared is None else abs(source.declared)
-        if source.id not in allowed_of:
-            yield _unseen(analysis, model, source, declared)
-            continue
-        allowed, allowed_other = allowed_of[source.id], others_of.get(source.id, NOT_ASKED)
-        published, full = (allowed, allowed_other) if model.name == "published" else (allowed_other, allowed)
-        info = over = doubt = NOTHING
-        notes = source.notes
-        qpe_published = qpe_full = cubic = displacement = None
+
+    def __init__(
+        self, judging: Judging, errors: DeclaredErrors, limits: Mapping[str, Floats], gain: Floats, *, is_whole: bool
+    ) -> None:
+        self.judging, self.errors, self.limits, self.gain, self.is_whole = judging, errors, limits, gain, is_whole
+
+    def rows(self, gating: str, other: str) -> Iterator[ErrorRow]:
+        """Rows by one model, which the other may doubt."""
+        for place in range(len(self.errors.blocks)):
+            yield from self._of_block(place, gating, other)
+
+    def _of_block(self, place: int, gating: str, other: str) -> Iterator[ErrorRow]:
+        errors, block = self.errors, self.errors.blocks[place]
+        needs, sources = errors.mission.requirements, block.sources
+        limit = np.array([self.limits[source.owner] for source in sources])
+        held = (limit, needs.cubic_phase_error, needs.location_error)
+        # Searches start from what declared errors are known to do.
+        mine, theirs = errors.of_block(gating, place), errors.of_block(other, place)
+        allowed = block.allowed(gating, held, is_whole=self.is_whole)
+        quadratic: dict[str, Floats] = {}
+        if self.is_whole:
+            by_other = block.allowed(other, (limit, None, None), is_whole=True)
+            quadratic = {gating: allowed.quadratic, other: by_other.quadratic}
+        published = mine if gating == "published" else theirs
+        is_again = np.array([[not source.is_independent] for source in sources])
+        judged = self.judging.row(
+            sources[0].subject,
+            np.abs(block.declared),
+            allowed.smallest,
+            doubt=errors.doubts(other, _is_over(theirs, held, block.is_motion)),
+            without_autofocus=np.where(self.gain > 1, np.abs(mine.qpe) / (limit / self.gain), 0.0),
+            is_info=is_again | (errors.mission.allocation.combine != "each"),
+        )
+        judged = judged._replace(
+            binding=_BINDING[allowed.binding],
+            qpe_published_rad=np.abs(published.qpe),
+            cubic_rad=np.where(np.isfinite(mine.cubic), np.abs(mine.cubic), math.nan),
+            quadratic_use=np.abs(mine.qpe) / limit,
+        )
+        is_last = gating == "full" or errors.mission.gating_model == "published"
+        if is_last and len(errors.blocks) > 1:
+            block.forget()
+        for row, source in enumerate(sources):
+            of_one = {name: sizes[row] for name, sizes in quadratic.items()}
+            yield ErrorRow(judged.at(row, source.subject), source, of_one)
+
+
+def _is_over(does: Does, held: tuple[Floats, float | None, float | None], is_motion: Any) -> Any:
+    """Whether any effect of errors is over what it is held to."""
+    limit, cubic, location = held
+    found = np.abs(does.qpe) / limit > BOUND
+    if cubic is not None:
+        found |= is_motion & (np.abs(does.cubic) / cubic > BOUND)
+    if location is not None:
+        found |= np.hypot(*does.farthest) / location > BOUND
+    return found
+
+
+# ---------------------------------------------------------------------- in words
+def error_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterator[Row]:
+    """Rows of every error of one mission, declared or not, in the order of the contract, by one of the two models."""
+    mission, errors = analysis.mission, analysis.errors
+    gain, judging = allocation.autofocus_gain, Judging(1, mission.allocation.warn_above)
+    limits = {owner: judging.array(allocation.qpe_limit(owner) * gain) for owner in OWNERS}
+    model, other = analysis.models(gating)
+    with np.errstate(all="ignore"):
+        rows = list(ErrorRows(judging, errors, limits, judging.array(gain), is_whole=True).rows(gating, other.name))
+    for one in rows:
+        source, row = one.source, one.judged
+        status, limit = row.status[0], number(limits[source.owner]) or 0.0
+        over = doubt = info = NOTHING
+        notes, fields = source.notes, dict[str, Any]()
         qpe = 0.0
-        if declared is not None:
+        if source.declared is not None:
             mine, theirs = analysis.does(model, source), analysis.does(other, source)
-            by_published, by_full = (mine, theirs) if model.name == "published" else (theirs, mine)
-            qpe, qpe_published = abs(mine.qpe), abs(by_published.qpe)
-            qpe_full = by_full.qpe if math.isfinite(by_full.qpe) else None
-            cubic = abs(mine.cubic) if math.isfinite(mine.cubic) else None
-            displacement = mine.displacement
-            if displacement is None and source.is_motion and model.plane.degeneracy:
+            by_full = mine if gating == "full" else theirs
+            qpe, qpe_full = abs(mine.qpe), by_full.qpe if math.isfinite(by_full.qpe) else None
+            fields = {
+                "qpe_published_rad": number(row.qpe_published_rad),
+                "qpe_full_rad": qpe_full,
+                "qpe_exact_rad": qpe_full,
+                "displacement_m": mine.displacement,
+            }
+            if mine.displacement is None and source.is_motion and model.plane.degeneracy:
                 notes = (*notes, model.plane.degeneracy)
-            if not source.is_independent:
-                info = _stated_elsewhere(analysis, source)
-            elif combine != "each":
-                info = phrases.aggregate_decides(combine)
-            else:
-                if allowed.smallest is not None and declared > allowed.smallest:
-                    over = _over(analysis, model, source, mine, allowed, limit, allocation)
+            if status == CODE["fail"]:
+                over = _over(analysis, model, row, source, mine, limit, allocation)
+            elif status == CODE["warn"]:
                 doubt = _doubt(analysis, other, source, theirs, limit)
-        found = judgement(
-            warn_above=mission.allocation.warn_above,
-            declared=declared,
-            allowable=allowed.smallest,
-            without_autofocus=qpe / (limit / gain) if gain > 1 else 0.0,
+            elif not source.is_independent:
+                info = _stated_elsewhere(analysis, source)
+            else:
+                info = phrases.aggregate_decides(mission.allocation.combine)
+        published, full = (number(one.quadratic[name]) for name in MODELS)
+        yield worded(
+            mission,
+            row,
+            unit=source.unit,
+            path=source.path,
+            equation=model.equation(source),
             over=over,
             doubt=doubt,
-            no_limit=model.no_limit(source) if allowed.smallest is None else NOTHING,
+            no_limit=model.no_limit(source),
             info=info,
-        )
-        yield Row(
-            subject=source.subject,
-            metric=QUADRATIC,
-            unit=source.unit,
-            declared=declared,
-            allowable=allowed.smallest,
-            allowable_published=published.quadratic,
-            allowable_full=full.quadratic,
-            qpe_published_rad=qpe_published,
-            qpe_full_rad=qpe_full,
-            displacement_m=displacement,
-            utilization=found.utilization,
-            margin=found.margin,
-            status=found.status,
-            line=mission.line(source.path),
-            reason=found.reason or None,
-            remarks=(*notes, *found.remarks),
-            equation=model.equation(source),
-            requirement_id=mission.requirement_ids.get(source.id),
+            without_autofocus=qpe / (limit / gain) if gain > 1 else 0.0,
+            limits=(published, full),
+            remarks=notes,
             evidence=source.evidence,
             is_independent=source.is_independent,
-            qpe_exact_rad=qpe_full,
-            binding_requirement=allowed.binding,
-            cubic_rad=cubic,
-            model=model.name,
+            binding_requirement=_requirement(row),
+            model=gating,
+            **fields,
         )
 
 
-def allowed_by(analysis: Analysis, model: Model, sources: Sequence[tuple[ErrorSource, float]]) -> list[Allowed]:
-    """How large errors may be by a model, the quadratic phase of each being held to a limit. [unit]"""
-    requirements, is_brief = analysis.mission.requirements, analysis.is_brief
-    found = [Allowed(None, None, None) for _ in sources]
-    held: list[list[tuple[str, float]]] = []
-    for source, limit in sources:
-        of_it = [(QUADRATIC, limit)]
-        if source.is_motion:
-            others = ((CUBIC, requirements.cubic_phase_error), (LOCATION, requirements.location_error))
-            of_it += [(name, required) for name, required in others if required is not None]
-        if is_brief:  # the one that binds is likely to be found first, and nothing beyond it is searched
-            of_it.sort(key=lambda one, source=source: model.small(source, *one))  # type: ignore[misc]
-        held.append(of_it)
-    for turn in range(3):
-        places = [place for place, of_it in enumerate(held) if turn < len(of_it)]
-        asked = []
-        for place in places:
-            name, required = held[place][turn]
-            upto = found[place].smallest
-            if upto is None or (name == QUADRATIC and not is_brief):
-                upto = math.inf
-            asked.append((sources[place][0], name, required, upto))
-        for place, (_, name, *_), size in zip(places, asked, model.allowables(asked), strict=True):
-            one = found[place]
-            if name == QUADRATIC:
-                one = one._replace(quadratic=size)
-            if size is not None and (one.smallest is None or size < one.smallest):
-                one = one._replace(smallest=size, binding=name)
-            found[place] = one
-    for place, (source, _) in enumerate(sources):
-        smallest = found[place].smallest
-        if smallest is not None and model.ends_image(source, smallest):
-            found[place] = found[place]._replace(binding=END_OF_IMAGE)
-    return found
+def _requirement(row: Judged) -> str | None:
+    """The requirement that sets the allowable of the only case."""
+    return None if row.binding[0] < 0 else REQUIREMENTS[row.binding[0]]
 
 
 def _over(
     analysis: Analysis,
     model: Model,
+    row: Judged,
     source: ErrorSource,
     mine: Declared,
-    allowed: Allowed,
     limit: float,
     allocation: Allocation,
 ) -> Note:
-    """Say which requirement the declared error breaks, should it break one."""
-    requirements = analysis.mission.requirements
-    if allowed.binding == END_OF_IMAGE and allowed.smallest is not None:
-        return phrases.beyond_the_image(allowed.smallest, source.unit)
-    if allowed.binding == CUBIC and requirements.cubic_phase_error is not None:
+    """Say which requirement the declared error breaks."""
+    requirements, binding = analysis.mission.requirements, _requirement(row)
+    if binding == END_OF_IMAGE:
+        return phrases.beyond_the_image(float(row.allowable[0]), source.unit)
+    if binding == CUBIC and requirements.cubic_phase_error is not None:
         return phrases.cubic_phase_over(mine.cubic, requirements.cubic_phase_error, model.equation(source))
-    if allowed.binding == LOCATION and requirements.location_error is not None:
+    if binding == LOCATION and requirements.location_error is not None:
         moved = None if mine.farthest is None else math.hypot(*mine.farthest)
-        by = "equation (25)" if model.name == "published" else "full model"
+        by = "equation (25)" if model.is_published else "full model"
         return phrases.location_over(moved, requirements.location_error, by)
     qpe = abs(mine.qpe)
     over = phrases.quadratic_phase_over(qpe, limit, model.equation(source))
@@ -209,26 +220,9 @@ def _doubt(analysis: Analysis, other: Model, source: ErrorSource, theirs: Declar
         return phrases.other_model_fails(other.name, moved, allowed, "m", "displacement")
     if binding == CUBIC:
         return phrases.other_model_fails(other.name, size, allowed, "rad", "cubic phase")
-    if other.name == "published":
+    if other.is_published:
         return phrases.other_model_fails(other.name, size, allowed, "rad", "QPE", source.equation)
     return phrases.other_model_fails(other.name, size, allowed, "rad", "QPE").then(_cause(source))
-
-
-def _unseen(analysis: Analysis, model: Model, source: ErrorSource, declared: float | None) -> Row:
-    """Row of an error that a terminal counts and does not show."""
-    return Row.without_numbers(
-        source.subject,
-        QUADRATIC,
-        source.unit,
-        "not_declared" if declared is None else "info",
-        declared=declared,
-        line=analysis.mission.line(source.path),
-        equation=model.equation(source),
-        requirement_id=analysis.mission.requirement_ids.get(source.id),
-        evidence=source.evidence,
-        is_independent=source.is_independent,
-        model=model.name,
-    )
 
 
 def _cause(source: ErrorSource) -> Note:

@@ -41,6 +41,11 @@ class Judged(NamedTuple):
         declared, allowable, utilization, qpe, cubic, use = (np.full(cases, math.nan) for _ in range(6))
         return cls(what, status, declared, allowable, utilization, binding, qpe, cubic, use)
 
+    def at(self, place: int, what: Subject) -> "Judged":
+        """One of several rows that were judged together, (rows, cases), by its place."""
+        own = {name: part[place] for name, part in self._asdict().items() if isinstance(part, np.ndarray)}
+        return self._replace(subject=what, **own)
+
     def where(self, is_other: Any, other: "Judged") -> "Judged":
         """This row, but in some cases the other."""
         return Judged(
@@ -103,25 +108,32 @@ class Judging(NamedTuple):
         is_unknown: Any = False,
         never_fails: bool = False,
     ) -> Judged:
-        """Judge a row: the first status that applies; where `is_unknown`, what is declared cannot be judged."""
-        none = np.full(self.cases, math.nan)
+        """Judge a row: the first status that applies; where `is_unknown`, what is declared cannot be judged.
+
+        What is declared is NaN in the cases that declare nothing.
+        """
+        shape = (self.cases,) if declared is None else declared.shape  # several rows judge alike: (rows, cases)
+        none = np.full(shape, math.nan)
         allowed = none if allowable is None else allowable
-        unknown = np.full(self.cases, -1, dtype=np.int8)
+        unknown = np.full(shape, -1, dtype=np.int8)
         if declared is None:
-            status = np.full(self.cases, CODE["not_declared"])
+            status = np.full(shape, CODE["not_declared"])
             return Judged(what, status, none, allowed, none, unknown, none, none, none, never_fails)
+        is_silent = np.isnan(declared)
         with np.errstate(all="ignore"):
-            use = np.where(np.isnan(allowed), 0.0, declared / allowed)
+            use = np.where(np.isnan(allowed) & ~is_silent, 0.0, declared / allowed)
         status = np.select(
             [
-                np.broadcast_to(is_info, (self.cases,)),
-                np.broadcast_to(is_unknown, (self.cases,)),
+                is_silent,
+                np.broadcast_to(is_info, shape),
+                np.broadcast_to(is_unknown, shape),
                 use > BOUND,
-                np.broadcast_to(doubt, (self.cases,)),
-                np.broadcast_to(without_autofocus > BOUND, (self.cases,)),
+                np.broadcast_to(doubt, shape),
+                np.broadcast_to(without_autofocus > BOUND, shape),
                 use > self.warn_above,
             ],
             [
+                CODE["not_declared"],
                 CODE["info"],
                 CODE["not_evaluated"],
                 CODE["warn" if never_fails else "fail"],

@@ -1,60 +1,55 @@
-"""What the declared errors of many cases do, by both models: the arrays beside `sources` and `models`."""
+"""What the errors of cases do, by both models, and how large each may be; a check is one case.
+
+The published model, Tables I and II and (25) of Rigling & Moses, is linear. The full model is true for errors of any
+size: where the second order provably does not matter, its effects are proportional to the error, and everywhere else
+they are those of exact ranges. An error has two signs and a bound covers both, so that phases and allowables are
+those of the worse one.
+
+Errors are kept in blocks, each an array (errors, cases): of one case all errors are one block, and of thousands of
+cases each error is one, so that what is worked on stays in a processor's cache.
+"""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Container, Sequence
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from bisar_budget import evaluators
-from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, ROUNDING, SPEED_OF_LIGHT
-from bisar_budget.effects import models
-from bisar_budget.effects.collections import Geometries, angle_between_lines, axes_of
-from bisar_budget.effects.combined import squared
-from bisar_budget.effects.effect import CLOCK_UNITS, MOTION_UNITS, PLATFORMS
-from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
-from bisar_budget.effects.subject import MOTION, Subject, subject
-from bisar_budget.geometry import FRAME_AXES
+from bisar_budget import evaluators, phrases
+from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG
+from bisar_budget.effects.collections import Geometries, angle_between_lines
+from bisar_budget.effects.effect import PLATFORMS, ErrorSource
+from bisar_budget.effects.sources import Errors
 from bisar_budget.mission.model import Mission
-from bisar_budget.ranges.exact_ranges import Effects, ExactRanges, Floats, Lanes, Places, Truths, Vectors, joined
+from bisar_budget.phrases import NOTHING, Note
+from bisar_budget.ranges import point_paths
+from bisar_budget.ranges.exact_ranges import Effect, ExactRanges, Floats, Lanes, Places, Truths, joined
 from bisar_budget.ranges.point_paths import Held, PointPaths
 
-if TYPE_CHECKING:
-    from bisar_budget.mission.covariance import Covariance
+QUADRATIC, CUBIC, LOCATION = "quadratic_phase_error", "cubic_phase_error", "location_error"
+HELD = (QUADRATIC, CUBIC, LOCATION)  # what an error is held to
+END_OF_IMAGE = "end_of_image"  # no requirement: no ground point has the range history of a larger error
+MODELS = ("published", "full")
 
-SAFE = 1 + 1e-6  # nearer to a border of what forms an image, a case is checked by itself
-_AXES: tuple[Vectors, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-_NOWHERE: Vectors = (0.0, 0.0, 0.0)
+# No navigation error: it takes the platform, within the aperture, farther than this part of its slant range.
+FARTHEST = 0.1
+SHARE = 0.004  # what the second order may add, of a phase, a displacement or a limit; the aim is 1 %
+FLOOR_RAD, FLOOR_M = 1e-3, 2e-3  # and whatever the size
 
-
-class ManyErrors(NamedTuple):
-    """One error of many cases; `moves` are the places of the platforms that it moves.
-
-    One that `is_shown_again` stands along axes that the file does not state it in, and counts nowhere.
-    """
-
-    subject: Subject
-    unit: str
-    declared: Any  # None: not stated
-    effect: Effects
-    full: Effects
-    moves: tuple[int, ...]
-    direction: Vectors
-    is_shown_again: bool = False
-
-    @property
-    def is_covered(self) -> bool:
-        """Whether the coverage factor is in what is declared."""
-        return self.subject.kind in (*MOTION, "timing")
-
-    @property
-    def is_motion(self) -> bool:
-        """Whether it moves platforms, or the clock."""
-        return self.unit != "rad"
+_TOGETHER = 1 << 13  # lanes of a block
+_ROWS = np.array([point_paths.QUADRATIC, point_paths.CUBIC, point_paths.WAY])
+_FLOORS = (FLOOR_RAD, FLOOR_RAD, FLOOR_M)
 
 
 class Does(NamedTuple):
-    """What a declared error does in each case, as `models.Declared`; displacements are NaN where there is none."""
+    """What errors of a size do in each case.
+
+    Quadratic and cubic phase at the aperture edge, of the worse sign, signed like the first order of the declared
+    one [rad]; displacement east and north by the declared sign, and by the opposite one [m]. Displacements are NaN
+    where there is none: a plane without an inverse, or no ground point that has the range history, which makes phases
+    infinite.
+    """
 
     qpe: Floats
     cubic: Floats
@@ -65,364 +60,419 @@ class Does(NamedTuple):
     def farthest(self) -> tuple[Floats, Floats]:
         """Displacement by the sign that moves farther, turned to the declared one's side. [m]"""
         (x, y), (u, v) = self.displacement, self.opposite
-        is_ahead = np.hypot(x, y) >= np.hypot(u, v)
-        return np.where(is_ahead, x, -u), np.where(is_ahead, y, -v)
+        is_ahead, is_gone = np.hypot(x, y) >= np.hypot(u, v), np.isnan(x) | np.isnan(u)
+        east, north = (np.where(is_ahead, a, -b) for a, b in ((x, u), (y, v)))
+        return np.where(is_gone, math.nan, east), np.where(is_gone, math.nan, north)
+
+    def of(self, some: Any) -> "Does":
+        """The same of some of the errors."""
+        (x, y), (u, v) = self.displacement, self.opposite
+        return Does(self.qpe[some], self.cubic[some], (x[some], y[some]), (u[some], v[some]))
+
+
+class Allowed(NamedTuple):
+    """How large errors may be by one model, by every requirement, and by the quadratic phase alone; NaN: no limit.
+
+    `binding` is the place in `HELD` of the requirement that sets the smallest, `len(HELD)` where the image ends
+    there, -1 where nothing does.
+    """
+
+    smallest: Floats
+    quadratic: Floats
+    binding: Any
+
+
+class ImagePlanes(NamedTuple):
+    """Q⁻¹ of each case: takes constant and linear range error to the displacement of the image.
+
+    The determinant is NaN where there is no inverse.
+    """
+
+    adjugate: tuple[Any, Any]
+    determinant: Any
+
+    def displacement(self, effect: Effect, size: Any) -> tuple[Floats, Floats]:
+        """Displacement on the ground by (25), with the Q of a model. [m]"""
+        (a, b), (c, d) = self.adjugate
+        scale = size / self.determinant
+        # Adding 0.0 turns -0.0, which reads as a claim about a sign, into 0.0.
+        return (
+            (a * effect.constant + b * effect.linear) * scale + 0.0,
+            (c * effect.constant + d * effect.linear) * scale + 0.0,
+        )
+
+
+def published_planes(geometry: Geometries) -> tuple[ImagePlanes, Any]:
+    """Invert Q with the range held constant, (19) and (30); and the angle between its gradients. [deg]
+
+    That Q can be singular where the true gradients are not: its second row is v/R, theirs v⊥/R.
+    """
+    ground: list[Any] = []
+    for path in geometry.both:
+        ground += [*path.position[:2], *path.velocity[:2], path.slant_range]
+    first, second, (determinant,) = evaluators.published_ground_inverse(*ground)
+    # (30): the first column holds (-rate_y, rate_x), the second (s_y, -s_x).
+    degrees = np.degrees(angle_between_lines((-second[1], first[1]), (second[0], -first[0])))
+    held = np.where(degrees < MIN_GRADIENT_ANGLE_DEG, math.nan, determinant)
+    return ImagePlanes((first, second), held), degrees
+
+
+class ErrorBlock:
+    """Some errors of all cases: arrays are (errors, cases).
+
+    Attributes
+    ----------
+    sources : sequence of ErrorSource
+        What they are.
+    declared : (errors, cases)
+        Signed sizes, coverage factor included; NaN where the file is silent.
+    effects : mapping of str to Effect
+        What a unit does by each model; of the full model, of an error too small for a second order.
+    """
+
+    def __init__(self, table: "DeclaredErrors", sources: Sequence[ErrorSource]) -> None:
+        self.table, self.exact, self.sources, self.cases = table, table.exact, sources, table.cases
+        shape = (len(sources), self.cases)
+        self.declared = np.full(shape, math.nan)
+        self.edge = np.empty(shape)  # of a position error at the aperture's, of a unit [m]
+        published, full = np.empty((4, *shape)), np.empty((4, *shape))
+        for place, source in enumerate(sources):
+            if source.declared is not None:
+                self.declared[place] = source.declared
+            self.edge[place] = table.edge.get(source.unit, 0.0)
+            for part, numbers in enumerate(zip(source.effect, source.full, strict=True)):
+                published[part, place], full[part, place] = numbers
+        self.effects = {"published": Effect(*published), "full": Effect(*full)}
+        self.is_motion = np.array([[source.is_motion] for source in sources])
+        self.moves = [place for place, source in enumerate(sources) if table.displaces(source)]
+        self._place_of = {place: order for order, place in enumerate(self.moves)}
+        self._per_unit: dict[str, Floats] = {}
+        self._quadratics: Floats | None = None
+        self._follows: PointPaths | None = None
+
+    # ---------------------------------------------------------------- small errors
+    def per_unit(self, model: str) -> Floats:
+        """What a small unit does: magnitudes of both phases [rad], and the displacement [m]; (3, errors, cases)."""
+        if model not in self._per_unit:
+            effect = self.effects[model]
+            moved = np.hypot(*self.table.planes[model].displacement(effect, 1.0))
+            moved = np.where(self.is_motion & ~np.isnan(moved), moved, 0.0)
+            self._per_unit[model] = np.array([np.abs(effect.qpe), np.abs(effect.cubic), moved])
+        return self._per_unit[model]
+
+    def grows(self, size: Floats) -> Floats:
+        """Bound of the range error that the second order of errors adds, in metres.
+
+        Of two platforms it is −Σ|P⊥(r̃ − x̂)|²/2R, at most |r̃ − x̂|²/R of the nearer one. With a direct path that of
+        the ranges is kept apart by platform: of a distant one much cancels to first order. That of the distance,
+        |P⊥r̃|²/2D, has the other sign: no more than the larger is added.
+        """
+        exact = self.exact
+        own, moved = size * self.edge, size * self.per_unit("full")[2]
+        reach = own + moved
+        square = reach * reach
+        found = square / exact.nearest_node
+        if exact.has_direct_path:
+            nearest, apart = [one.min(axis=0) for one in exact.ranges], exact.baselines.min(axis=0)
+            for place, source in enumerate(self.sources):
+                if source.owner in PLATFORMS:
+                    platform = PLATFORMS.index(source.owner)
+                    of_ranges = square[place] / nearest[platform] + moved[place] ** 2 / nearest[1 - platform]
+                    found[place] = np.maximum(of_ranges, own[place] ** 2 / apart) / 2
+        return np.asarray(found)
+
+    def is_large(self, size: Floats) -> Truths:
+        """Where effects of errors are not proportional to their size, as far as anybody can see."""
+        size = np.abs(size)
+        grown, found = self.grows(size), np.zeros(size.shape, dtype=bool)
+        for per_metre, per_unit, floor in zip(self.table.per_metre, self.per_unit("full"), _FLOORS, strict=True):
+            found |= per_metre * grown > np.maximum(floor, SHARE * per_unit * size)
+        return found & (size > 0) & self._is_moving
+
+    @cached_property
+    def _is_moving(self) -> Truths:
+        found = np.zeros((len(self.sources), 1), dtype=bool)
+        found[self.moves] = True
+        return found
+
+    # ---------------------------------------------------------------- errors of any size
+    def does(self, model: str, size: Floats) -> Does:
+        """What errors of sizes do by a model, (errors, cases); NaN of what has no size."""
+        effect = self.effects[model]
+        qpe, cubic = effect.qpe * size + 0.0, effect.cubic * size + 0.0
+        moved = self.table.planes[model].displacement(effect, size)
+        east, north = (np.where(self.is_motion, part, math.nan) for part in moved)
+        found = Does(qpe, cubic, (east, north), (0.0 - east, 0.0 - north))
+        if model == "full":
+            is_large = self.is_large(size)
+            if is_large.any():
+                self._exactly(found, size, is_large)
+        return found
+
+    def _exactly(self, found: Does, size: Floats, is_large: Truths) -> None:
+        """Put what exact ranges say into the places that are too large for a first order."""
+        sizes = size[is_large]
+        known = self.followed(is_large, np.abs(sizes))
+        ahead, back = (np.where(sizes > 0, *pair) for pair in (known, known[::-1]))
+        is_gone = np.isnan(ahead[0]) | np.isnan(back[0])  # no ground point: phases are infinite, none moves
+        for kept, row in ((found.qpe, 3), (found.cubic, 4)):
+            largest = np.copysign(np.maximum(np.abs(ahead[row]), np.abs(back[row])), kept[is_large])
+            kept[is_large] = np.where(is_gone, math.inf, largest)
+        for place, one in ((found.displacement, ahead), (found.opposite, back)):
+            place[0][is_large], place[1][is_large] = one[1:3]
+
+    def followed(self, some: Truths, sizes: Floats) -> Floats:
+        """Rows of known points of some errors by sizes, of the positive sign and of the other, (2, 6, some)."""
+        lanes = np.concatenate(self._lanes_of(some))
+        both = np.tile(sizes, 2)
+        self.paths.to(lanes, both)
+        return self.paths.known(lanes, both).reshape(6, 2, -1).swapaxes(0, 1)
+
+    @cached_property
+    def _lane(self) -> Places:
+        """Lane of each error with a positive sign, in each case; those with the other sign follow."""
+        found = np.zeros((len(self.sources), 1), dtype=int)
+        found[self.moves, 0] = 2 * self.cases * np.arange(len(self.moves))
+        return found + np.arange(self.cases)
+
+    def _lanes_of(self, some: Truths) -> tuple[Places, Places]:
+        lanes = self._lane[some]
+        return lanes, lanes + self.cases
+
+    @property
+    def paths(self) -> PointPaths:
+        """The ways of the point by the errors that displace it: of each positive sign first."""
+        if self._follows is None:
+            table, full = self.table, self.effects["full"]
+            lanes = [table.lanes(self.sources[place], sign) for place in self.moves for sign in (1.0, -1.0)]
+            of_moving = Effect._make(part[self.moves] for part in full)
+            moved = np.array(table.planes["full"].displacement(of_moving, 1.0))  # (2, moving, cases)
+            per_unit = np.stack((moved, -moved), axis=2).reshape(2, -1)
+            self._follows = PointPaths(self.exact, joined(lanes), per_unit)
+        return self._follows
+
+    def forget(self) -> None:
+        """Let go of the ways: they are large."""
+        self._follows = None
+
+    def quadratic_by_sign(self) -> Floats:
+        """Quadratic phases of the declared errors of each sign, positive first, where they are large. [rad]
+
+        (2, errors, cases), not a number where they leave no image.
+        """
+        if self._quadratics is None:
+            self._quadratics = np.full((2, *self.declared.shape), math.nan)
+            is_large = self.is_large(self.declared)
+            if is_large.any():
+                self._quadratics[:, is_large] = self.followed(is_large, np.abs(self.declared[is_large]))[:, 3]
+        return self._quadratics
+
+    # ---------------------------------------------------------------- how large they may be
+    @cached_property
+    def farthest(self) -> Floats:
+        """Size beyond which an error is none of navigation; infinite: it has no effect whatever its size."""
+        slant = [path.slant_range for path in self.table.geometries.both]
+        found = np.full(self.declared.shape, math.inf)
+        for place in self.moves:
+            source = self.sources[place]
+            reached = [slant[one] for one in source.platforms]
+            if reached:
+                nearer = np.minimum(*reached) if len(reached) > 1 else reached[0]
+                found[place] = FARTHEST * nearer / self.edge[place]
+            else:
+                course = self.exact.clock_course(source.unit)
+                found[place] = FARTHEST * np.minimum(*slant) / np.abs(course).max(axis=0)
+        return found
+
+    def allowed(self, model: str, limits: Sequence[Any], *, is_whole: bool) -> Allowed:
+        """How large errors may be by a model.
+
+        Parameters
+        ----------
+        model : str
+            `published` or `full`.
+        limits : three of (errors, cases) or (cases,) or None
+            What quadratic, cubic phase [rad] and displacement [m] are held to; None: to nothing.
+        is_whole : bool
+            Search for the size that the quadratic phase alone allows too.
+        """
+        held = [place for place, limit in enumerate(limits) if limit is not None]
+        limit = np.array([self._limit(place, limits[place]) for place in held])
+        per_unit = self.per_unit(model)[held]
+        with np.errstate(all="ignore"):
+            small = np.where((per_unit > 0) & ~np.isnan(limit), limit / per_unit, math.inf)
+        order = np.argsort(small, axis=0, kind="stable")  # the one that binds is likely to be found first
+        smallest, binding = np.full(small.shape[1:], math.inf), np.full(small.shape[1:], -1, dtype=np.int8)
+        for turn in order:
+            requirement = np.array(held)[turn]
+            first, of = (np.take_along_axis(one, turn[None], axis=0)[0] for one in (small, limit))
+            found = self.reaching(model, requirement, of, first, smallest)
+            is_less = found < smallest
+            smallest, binding = np.where(is_less, found, smallest), np.where(is_less, requirement, binding)
+        quadratic = smallest
+        if is_whole and len(held) > 1:  # also where another requirement binds
+            is_other = binding > 0
+            beyond = self.reaching(model, np.zeros_like(order[0]), np.where(is_other, limit[0], math.nan), small[0])
+            quadratic = np.where(is_other, beyond, np.where(binding == 0, smallest, math.inf))
+        if model == "full":
+            binding = np.where(self.ends_image(smallest), len(HELD), binding)
+        smallest, quadratic = (np.where(np.isfinite(one), one, math.nan) for one in (smallest, quadratic))
+        return Allowed(smallest, quadratic, binding)
+
+    def ends_image(self, size: Floats) -> Truths:
+        """Whether allowables, as found, are where the image ends: the search stopped there short of its limit."""
+        found = np.zeros(size.shape, dtype=bool)
+        if self._follows is not None:
+            ends = self._follows.end.reshape(-1, 2, self.cases) == size[self.moves][:, None]
+            found[self.moves] = ends.any(axis=1) & np.isfinite(size[self.moves])
+        return found
+
+    def _limit(self, place: int, limit: Any) -> Floats:
+        """A limit of each error; what only is a phase is held to that of the quadratic."""
+        whole = np.broadcast_to(limit, self.declared.shape)
+        return whole if place == 0 else np.where(self.is_motion, whole, math.nan)
+
+    def reaching(self, model: str, requirement: Places, limit: Floats, small: Floats, upto: Any = math.inf) -> Floats:
+        """Smallest sizes, of either sign, at which errors reach limits; infinite: none does `upto`.
+
+        `requirement` is the place of each limit in `HELD`; `small` is the size were effects those of small errors. By
+        the full model none is looked for that takes its platform farther than a tenth of the slant range, or than the
+        declared one does.
+        """
+        if model == "published" or not self.moves:
+            return np.where(small <= upto, small, math.inf)
+        most = np.minimum(upto, np.fmax(self.farthest, np.abs(self.declared)))
+        first = np.minimum(small, most)
+        with np.errstate(all="ignore"):
+            adds = np.array(self.table.per_metre)[requirement, np.arange(self.cases)] * self.grows(first)
+            is_searched = self._is_moving & (adds > SHARE * limit)
+        found = np.where(small <= most, small, math.inf)
+        if is_searched.any():
+            of = requirement[is_searched]
+            slopes = np.array([self.effects["full"].qpe, self.effects["full"].cubic, self.per_unit("full")[2]])
+            held = Held(_ROWS[of], limit[is_searched], np.choose(of, slopes[:, is_searched]))
+            numbers = first[is_searched], most[is_searched]
+            found[is_searched] = self.paths.either_reaching(self._lanes_of(is_searched), held, *numbers)
+        return found
 
 
 class DeclaredErrors:
-    """The errors of cases that need the same number of nodes: what they are, and what each does.
+    """The errors of cases that need the same number of nodes.
 
-    `listed` are those that are declared, and those whose allowable is asked; `stated` the declared ones.
-    `is_left_out` grows by the cases in which something is not certain.
+    Parameters
+    ----------
+    mission : Mission
+        Some of its numbers may be arrays (cases,).
+    cases : int
+        How many.
+    geometries : Geometries
+        Of the cases.
+    exact : ExactRanges
+        Of the cases.
+    shown : container of str, optional
+        Ids of rows: of what is not declared, nothing else is listed; omitted: everything is.
+
+    Attributes
+    ----------
+    listed, stated : list of ErrorSource
+        All of them, and the declared ones along the axes that the file states them in.
     """
 
     def __init__(
-        self, mission: Mission, cases: int, nodes: int, geometries: Geometries, shown: Mapping[str, Subject]
+        self,
+        mission: Mission,
+        cases: int,
+        geometries: Geometries,
+        exact: ExactRanges,
+        shown: Container[str] | None = None,
     ) -> None:
-        self.mission, self.cases, self.geometries, self.shown = mission, cases, geometries, shown
+        self.mission, self.cases, self.geometries, self.exact = mission, cases, geometries, exact
+        self.has_direct_path = mission.has_direct_path
         self.is_left_out = np.zeros(cases, dtype=bool)
         self.each = np.arange(cases)
-        wavelength, T = mission.radar.wavelength, mission.collection.aperture_time
-        self.has_direct_path = mission.has_direct_path
-        self.exact = ExactRanges.of(
-            geometries.both, wavelength, T, nodes, cases, has_direct_path=self.has_direct_path
-        )
-        self.plane = self._published_plane()
-        self._limits_of_size()
-        self.listed = list(self._errors())
-        self.stated = [error for error in self.listed if error.declared is not None and not error.is_shown_again]
-        self._known: dict[tuple[str, str], Does] = {}
-        self._quadratics: dict[str, Floats] = {}
-        self._paths: dict[str, PointPaths] = {}
+        published, self.published_angle_deg = published_planes(geometries)
+        self.planes = {"published": published, "full": ImagePlanes(exact.adjugate, exact.determinant)}
+        half = exact.half
+        (a, b), (c, d) = ([element / exact.determinant for element in row] for row in exact.adjugate)
+        (q_0, q_1), (c_0, c_1) = exact.phases_per_term
+        self.edge: dict[str, Any] = {"m": 1.0, "m/s": half, "m/s^2": half**2 / 2}
+        # A range error of a metre at most, whatever its course: its fit has a value of 1 at most, a slope of 1.5, a
+        # quadratic and a cubic of 2.5 and 4 at most; so much phase and displacement follow.
+        self.per_metre: list[Floats] = [
+            2.5 * exact.k + np.abs(q_0) + 1.5 / half * np.abs(q_1),
+            4 * exact.k + np.abs(c_0) + 1.5 / half * np.abs(c_1),
+            np.hypot(a, c) + 1.5 / half * np.hypot(b, d),
+        ]
+        self.listed = list(Errors(mission, geometries, exact, shown).listed())
+        self.stated = [error for error in self.listed if error.declared is not None and error.is_independent]
+        size = max(1, _TOGETHER // (2 * cases))
+        starts = range(0, len(self.listed), size)
+        self.blocks = [ErrorBlock(self, self.listed[start : start + size]) for start in starts]
+        self._place = {error.id: divmod(place, size) for place, error in enumerate(self.listed)}
+        self._does: dict[tuple[str, int], Does] = {}
 
     def array(self, value: Any) -> Floats:
         """One number for each case."""
         found: Floats = np.array(np.broadcast_to(np.asarray(value, dtype=float), (self.cases,)))
         return found
 
-    def _published_plane(self) -> tuple[Any, Any, Any]:
-        ground: list[Any] = []
-        for path in (self.geometries.transmitter, self.geometries.receiver):
-            ground += [*path.position[:2], *path.velocity[:2], path.slant_range]
-        first, second, (determinant,) = evaluators.published_ground_inverse(*ground)
-        angle = angle_between_lines((-second[1], first[1]), (second[0], -first[0]))
-        is_degenerate = np.degrees(angle) < MIN_GRADIENT_ANGLE_DEG * SAFE
-        if self.mission.gating_model != "full":
-            self.is_left_out |= is_degenerate
-        return first, second, np.where(is_degenerate, math.inf, determinant)  # no displacement that casts a doubt
+    def displaces(self, error: ErrorSource) -> bool:
+        """Whether an error moves platforms or a clock that is listened to: what only is a phase displaces nothing."""
+        return error.is_motion and not self.is_heard_out(error)
 
-    def _errors(self) -> Iterator[ManyErrors]:
-        """Every error that is declared, or whose allowable is asked."""
-        mission, T = self.mission, self.mission.collection.aperture_time
-        wavelength, factor = mission.radar.wavelength, mission.allocation.coverage_factor
-        legs: dict[tuple[int, str], tuple[list[Effects], list[Effects]]] = {}
-        up: list[tuple[Effects, Effects]] = []
-        paths = (self.geometries.transmitter, self.geometries.receiver)
-        for place, (name, path) in enumerate(zip(PLATFORMS, paths, strict=True)):
-            rows = evaluators.published_motion(*path.position, *path.velocity, path.slant_range, wavelength, T)
-            error = getattr(mission.platforms, name).motion_error
-            axes = axes_of(mission, name, path)
-            for index, (kind, unit) in enumerate(MOTION_UNITS.items()):
-                covariance = error.covariance if kind != "acceleration" else None
-                values = error.stated(kind)
-                own = [subject(name, kind, letter) for letter in "xyz"]
-                asked = [one.id in self.shown for one in own]
-                common = mission.common_motion_error is not None and (
-                    getattr(mission.common_motion_error, kind) is not None
-                    or any(subject("mission", kind, letter).id in self.shown for letter in "xyz")
-                )
-                is_terrain = kind == "position" and mission.scene.height_error is not None
-                if values is None and not any(asked) and not common and not is_terrain:
-                    continue
-                published = [Effects._make(row) for row in rows[3 * index : 3 * index + 3]]
-                powers = self.exact.powers[unit]
-                full = [self.exact.effect(self.exact.along(place, axis) * powers) for axis in _AXES]
-                legs[place, kind] = (published, full)
-                if is_terrain:
-                    up.append((published[2], full[2]))
-                if error.frame == "scene":
-                    for axis in range(3):
-                        if values is not None or asked[axis]:
-                            declared = None if values is None else values[axis] * factor
-                            yield ManyErrors(
-                                own[axis], unit, declared, published[axis], full[axis], (place,), _AXES[axis]
-                            )
-                    continue
-                for axis in range(3):
-                    if asked[axis]:
-                        on_axis = None
-                        if covariance is not None:
-                            along = [direction[axis] for direction in axes]
-                            on_axis = factor * _along_covariance(covariance, kind, along)
-                        elif values is not None:
-                            on_axis = factor * _along_scene_axis(values, axes, axis, error.distribution)
-                        yield ManyErrors(
-                            own[axis],
-                            unit,
-                            on_axis,
-                            published[axis],
-                            full[axis],
-                            (place,),
-                            _AXES[axis],
-                            is_shown_again=True,
-                        )
-                if values is None:
-                    continue
-                for axis_name, direction, value in zip(FRAME_AXES[error.frame], axes, values, strict=True):
-                    yield ManyErrors(
-                        subject(name, kind, axis_name, error.frame),
-                        unit,
-                        value * factor,
-                        _along(published, direction),
-                        _along(full, direction),
-                        (place,),
-                        direction,
-                    )
-        yield from self._of_clock(factor)
-        if mission.common_motion_error is not None:
-            yield from self._common(legs, factor)
-        if mission.scene.height_error is not None:
-            published_up, full_up = (
-                Effects._make(map(sum, zip(*both, strict=True))) for both in zip(*up, strict=True)
-            )
-            what = subject("mission", "terrain")
-            yield ManyErrors(what, "m", mission.scene.height_error, published_up, full_up, (0, 1), _AXES[2])
-        one = Effects(0.0, 0.0, 1.0, 0.0)
-        for other in mission.other_errors:
-            what = subject("mission", "other", other.name)
-            yield ManyErrors(what, "rad", other.quadratic_phase_error, one, one, (), _NOWHERE)
+    def is_heard_out(self, error: ErrorSource) -> bool:
+        """Whether an error is one of a clock that the direct path stands in for."""
+        return error.owner == "clock" and self.has_direct_path
 
-    def _of_clock(self, factor: Any) -> Iterator[ManyErrors]:
-        rows = evaluators.published_clock(
-            SPEED_OF_LIGHT, self.mission.radar.wavelength, self.mission.collection.aperture_time
-        )
-        for power, (term, unit) in enumerate(CLOCK_UNITS.items()):
-            value, what = getattr(self.mission.timing_error, term), subject("clock", "timing", term)
-            if value is not None or what.id in self.shown:
-                declared = None if value is None else value * factor
-                full = self.exact.effect(self._clock_course(unit))
-                yield ManyErrors(what, unit, declared, Effects._make(rows[power]), full, (), _NOWHERE)
-
-    def _common(
-        self, legs: Mapping[tuple[int, str], tuple[list[Effects], list[Effects]]], factor: Any
-    ) -> Iterator[ManyErrors]:
-        for kind, unit in MOTION_UNITS.items():
-            values = getattr(self.mission.common_motion_error, kind)
-            for axis, letter in enumerate("xyz"):
-                what = subject("mission", kind, letter)
-                if values is None and what.id not in self.shown:
-                    continue
-                published, full = (
-                    _sum([legs[place, kind][of_model][axis] for place in (0, 1)]) for of_model in (0, 1)
-                )
-                if kind == "position" and letter != "z":  # a shift of the scene
-                    full = full._replace(qpe=0.0, cubic=0.0)
-                declared = None if values is None else values[axis] * factor
-                yield ManyErrors(what, unit, declared, published, full, (0, 1), _AXES[axis])
-
-    # ---------------------------------------------------------------- what they do
-    def _limits_of_size(self) -> None:
-        """Bounds of what the second order adds, as `FullModel` has them."""
+    def lanes(self, error: ErrorSource, sign: float = 1.0) -> Lanes:
+        """A unit of an error, with a sign, in each case."""
         exact = self.exact
-        half = exact.half
-        (a, b), (c, d) = ([element / exact.determinant for element in row] for row in exact.adjugate)
-        (q_0, q_1), (c_0, c_1) = exact.phases_per_term
-        self.edge = {"m": 1.0, "m/s": half, "m/s^2": half**2 / 2}
-        self.per_metre = {
-            LOCATION: np.hypot(a, c) + 1.5 / half * np.hypot(b, d),
-            QUADRATIC: 2.5 * exact.k + np.abs(q_0) + 1.5 / half * np.abs(q_1),
-            CUBIC: 4 * exact.k + np.abs(c_0) + 1.5 / half * np.abs(c_1),
-        }
+        if error.platforms:
+            moves = (float(0 in error.platforms), float(1 in error.platforms))
+            return Lanes(self.each, sign * exact.powers[error.unit], moves, error.direction, error.unit)
+        if error.is_motion:
+            return Lanes(self.each, sign * exact.clock_course(error.unit))
+        # A phase as such: a quadratic that displaces nothing.
+        return Lanes(self.each, sign * ((exact.times / exact.half) ** 2 - 1 / 3) / exact.k)
 
-    def adds(self, error: ManyErrors, size: Any, requirement: str) -> Any:
-        """Bound of what the second order adds to a phase [rad] or a displacement [m]; see `FullModel`."""
-        own, moved = size * self.edge.get(error.unit, 0.0), size * self.per_unit("full", error, LOCATION)
-        if self.has_direct_path and error.subject.owner in PLATFORMS:
-            return self.per_metre[requirement] * self._adds_heard(error.moves[0], own, moved)
-        return self.per_metre[requirement] * (own + moved) * (own + moved) / self.exact.nearest_node
+    def block_of(self, error: ErrorSource) -> tuple[ErrorBlock, int]:
+        """The block that has an error, and its place there."""
+        block, place = self._place[error.id]
+        return self.blocks[block], place
 
-    def _adds_heard(self, platform: int, own: Any, moved: Any) -> Any:
-        """The same of the ranges less the direct path; see `FullModel`. [m]"""
-        nearest = [ranges.min(axis=0) for ranges in self.exact.ranges]
-        of_ranges = (own + moved) ** 2 / nearest[platform] + moved**2 / nearest[1 - platform]
-        return np.maximum(of_ranges, own**2 / self.exact.baselines.min(axis=0)) / 2
+    def does(self, model: str, error: ErrorSource) -> Does:
+        """What a declared error does by a model, (cases,)."""
+        block, place = self._place[error.id]
+        return self.of_block(model, block).of(place)
 
-    def per_unit(self, model: str, error: ManyErrors, requirement: str) -> Any:
-        """What a small unit of an error does: magnitude of a phase [rad], or displacement [m]."""
-        effect = error.full if model == "full" else error.effect
-        if requirement == QUADRATIC:
-            return np.abs(effect.qpe)
-        if requirement == CUBIC:
-            return np.abs(effect.cubic)
-        return np.hypot(*self._displacement(model, error, 1.0))
+    def of_block(self, model: str, block: int) -> Does:
+        """What the declared errors of a block do by a model, (errors, cases)."""
+        key = (model, block)
+        if key not in self._does:
+            self._does[key] = self.blocks[block].does(model, self.blocks[block].declared)
+        return self._does[key]
 
-    def _displacement(self, model: str, error: ManyErrors, size: Any) -> tuple[Any, Any]:
-        if model == "full":
-            return self.exact.displacement(error.full, size)
-        (a, b), (c, d), determinant = self.plane
-        effect, scale = error.effect, size / determinant
-        return ((a * effect.constant + b * effect.linear) * scale, (c * effect.constant + d * effect.linear) * scale)
-
-    def does(self, model: str, error: ManyErrors) -> Does:
-        """What a declared error does by a model; cases in which that is not certain are left out."""
-        key = (model, error.subject.id)
-        if key not in self._known:
-            self._known[key] = self._does(model, error)
-        return self._known[key]
-
-    def _does(self, model: str, error: ManyErrors) -> Does:
-        size, effect = self.array(error.declared), error.full if model == "full" else error.effect
-        qpe, cubic = self.array(effect.qpe * size), self.array(effect.cubic * size)
-        if not error.is_motion:
-            none = np.full(self.cases, math.nan)
-            return Does(qpe, cubic, (none, none), (none, none))
-        east, north = (self.array(part) for part in self._displacement(model, error, size))
-        if model == "published":
-            east, north = (np.where(np.isinf(self.plane[2]), math.nan, part) for part in (east, north))
-        found = Does(qpe, cubic, (east, north), (-east, -north))
-        if model == "published":
-            return found
-        some = np.flatnonzero(self.is_large(error))
-        if some.size:
-            self._exactly(error, found, size[some], some)
+    def is_large(self, error: ErrorSource) -> Truths:
+        """In which cases effects of a declared error are not proportional to its size."""
+        block, place = self.block_of(error)
+        found: Truths = block.is_large(block.declared)[place]
         return found
 
-    def is_large(self, error: ManyErrors) -> Truths:
-        """In which cases effects of a declared error are not proportional to its size; as `is_small`, negated."""
-        size, found = np.abs(self.array(error.declared)), np.zeros(self.cases, dtype=bool)
-        for requirement, floor in (
-            (QUADRATIC, models.FLOOR_RAD),
-            (CUBIC, models.FLOOR_RAD),
-            (LOCATION, models.FLOOR_M),
-        ):
-            of_it = self.per_unit("full", error, requirement) * size
-            found |= self.adds(error, size, requirement) > np.maximum(floor, models.SHARE * of_it)
-        return np.asarray(found & (size != 0))
-
-    def quadratic_by_sign(self, error: ManyErrors) -> Floats:
+    def quadratic_by_sign(self, error: ErrorSource) -> Floats:
         """Quadratic phases of a declared error of each sign, positive first, where it is large, (2, cases). [rad]
 
         Not a number where it leaves no image.
         """
-        self.does("full", error)
-        return self._quadratics[error.subject.id]
-
-    def _exactly(self, error: ManyErrors, found: Does, size: Floats, some: Places) -> None:
-        """Put what exact ranges say into the cases that are too large for a first order."""
-        paths, lanes, sizes = (
-            self._paths_of(error),
-            np.concatenate((some, some + self.cases)),
-            np.tile(np.abs(size), 2),
-        )
-        paths.to(lanes, sizes)
-        by_sign = paths.known(lanes, sizes).reshape(6, 2, -1).swapaxes(0, 1)
-        quadratics = self._quadratics.setdefault(error.subject.id, np.full((2, self.cases), math.nan))
-        quadratics[:, some] = by_sign[0][3], by_sign[1][3]
-        ahead, back = np.where(size > 0, by_sign, by_sign[::-1])
-        is_gone = np.isnan(ahead[0]) | np.isnan(back[0])  # no ground point: phases are infinite, none moves
-        for kept, row in ((found.qpe, 3), (found.cubic, 4)):
-            largest = np.copysign(np.maximum(np.abs(ahead[row]), np.abs(back[row])), kept[some])
-            kept[some] = np.where(is_gone, math.inf, largest)
-        for place, one in ((found.displacement, ahead), (found.opposite, back)):
-            place[0][some], place[1][some] = np.where(is_gone, math.nan, one[1:3])
-
-    def _paths_of(self, error: ManyErrors) -> PointPaths:
-        """The ways of the point by an error, which all that asks for them shares: positive sign first."""
-        name = error.subject.id
-        if name not in self._paths:
-            lanes = joined([self.lanes(error, sign) for sign in (1.0, -1.0)])
-            both = [self.exact.displacement(error.full, sign) for sign in (1.0, -1.0)]
-            per_unit = np.array([[self.array(part) for part in one] for one in both])
-            self._paths[name] = PointPaths(self.exact, lanes, np.concatenate(per_unit, axis=1))
-        return self._paths[name]
-
-    def lanes(self, error: ManyErrors, sign: float = 1.0) -> Lanes:
-        """A unit of an error, with a sign, in each case."""
-        if not error.moves:
-            return Lanes(self.each, sign * self._clock_course(error.unit))
-        moves = (float(0 in error.moves), float(1 in error.moves))
-        return Lanes(self.each, sign * self.exact.powers[error.unit], moves, error.direction, error.unit)
-
-    def _clock_course(self, unit: str) -> Floats:
-        """Range error of a unit of a clock error at the nodes; nothing where the direct path is the clock."""
-        power = list(CLOCK_UNITS.values()).index(unit)
-        metres: Floats = SPEED_OF_LIGHT * self.exact.times**power
-        return metres * 0.0 if self.has_direct_path else metres
+        block, place = self.block_of(error)
+        return block.quadratic_by_sign()[:, place]
 
     def doubts(self, model: str, is_over: Any) -> Any:
         """Where a model that does not gate casts a doubt; the published one does not know a direct path."""
         return False if model == "published" and self.has_direct_path else is_over
 
-    def is_heard_out(self, error: ManyErrors) -> bool:
-        """Whether an error is one of a clock that the direct path stands in for."""
-        return self.has_direct_path and error.is_motion and not error.moves
-
-    def forget(self, error: ManyErrors) -> None:
-        """Let go of the ways by an error that nobody will ask for again: they are large."""
-        self._paths.pop(error.subject.id, None)
-
-    def first_reaching(
-        self, error: ManyErrors, requirement: str, limit: Floats, first: Floats, farthest: Floats, some: Places
-    ) -> Floats:
-        """Smallest size, of either sign, at which an error of some cases reaches a limit; infinite: none does.
-
-        `limit`, what the search looks at `first`, and the `farthest` size are (cases,); found are (some,).
-        """
-        signed = {QUADRATIC: error.full.qpe, CUBIC: error.full.cubic}.get(requirement)
-        slope = self.array(self.per_unit("full", error, LOCATION) if signed is None else signed)[some]
-        held = Held(models.HELD[requirement], limit[some], slope)
-        both = (some, some + self.cases)
-        return self._paths_of(error).either_reaching(both, held, first[some], farthest[some])
-
-    def ends_image(self, error: ManyErrors, size: Floats) -> Truths:
-        """Whether allowables, as found, are where the image ends; as `FullModel.ends_image`."""
-        paths = self._paths.get(error.subject.id)
-        if paths is None:
-            return np.zeros(self.cases, dtype=bool)
-        return np.asarray((paths.end.reshape(2, -1) == size).any(axis=0))
-
-    def farthest(self, error: ManyErrors) -> Any:
-        """Size beyond which an error is none of navigation; infinite: it has no effect whatever its size."""
-        if self.is_heard_out(error):
-            return math.inf
-        slant = [path.slant_range for path in (self.geometries.transmitter, self.geometries.receiver)]
-        if not error.moves:
-            return models.FARTHEST * np.minimum(*slant) / np.abs(self._clock_course(error.unit)).max(axis=0)
-        reached = [slant[place] for place in error.moves]
-        return models.FARTHEST * (np.minimum(*reached) if len(reached) > 1 else reached[0]) / self.edge[error.unit]
-
-
-def _along_scene_axis(
-    declared: Sequence[Any], axes: tuple[Vectors, Vectors, Vectors], axis: int, distribution: str
-) -> Any:
-    """Size along one axis of the scene of errors along those of another frame; as `sources` has it."""
-    parts = [value * direction[axis] for value, direction in zip(declared, axes, strict=True)]
-    if distribution == "normal":
-        size = np.sqrt(parts[0] ** 2 + parts[1] ** 2 + parts[2] ** 2)
-    else:
-        size = np.abs(parts[0]) + np.abs(parts[1]) + np.abs(parts[2])
-    return np.copysign(size, parts[0] + parts[1] + parts[2])
-
-
-def _along_covariance(covariance: "Covariance", kind: str, direction: Sequence[Any]) -> Any:
-    """Sigma of position or velocity error along a direction given in the frame's axes; as `Covariance.along`."""
-    parts = [sigma * along for sigma, along in zip(covariance.of(kind), direction, strict=True)]
-    return np.sqrt(squared(covariance.block(kind), parts))
-
-
-def _along(effects: Sequence[Effects], direction: Vectors) -> Effects:
-    """Effect of a unit error along a direction, without what rounding leaves."""
-    found = []
-    for parts in zip(*effects, strict=True):
-        terms = [part * way for part, way in zip(parts, direction, strict=True)]
-        total = terms[0] + terms[1] + terms[2]
-        seen = np.abs(terms[0]) + np.abs(terms[1]) + np.abs(terms[2])
-        found.append(np.where(np.abs(total) > ROUNDING * seen, total, 0.0))
-    return Effects._make(found)
-
-
-def _sum(effects: Sequence[Effects]) -> Effects:
-    found = []
-    for a, b in zip(*effects, strict=True):
-        found.append(np.where(np.abs(a + b) > ROUNDING * (np.abs(a) + np.abs(b)), a + b, 0.0))
-    return Effects._make(found)
+    def degeneracy(self, model: str) -> Note:
+        """Why a model has no displacement in the first case; nothing where it has one."""
+        degrees = np.ravel(self.published_angle_deg)[0]
+        if model == "full" or degrees >= MIN_GRADIENT_ANGLE_DEG:
+            return NOTHING
+        return phrases.no_displacement(float(degrees))

@@ -6,7 +6,9 @@ counts what the displacement of the image adds (`ranges.exact_ranges`).
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
 
 from bisar_budget import evaluators, phrases
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG
@@ -14,6 +16,7 @@ from bisar_budget.effects.subject import MOTION, Subject
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import BistaticGeometry, GroundVector, Vector, angle_between_lines
 from bisar_budget.phrases import NOTHING, Note
+from bisar_budget.ranges.exact_ranges import Effect
 
 if TYPE_CHECKING:
     from bisar_budget.mission.instruments import Overridden
@@ -33,23 +36,13 @@ def override_notes(platform: str, overridden: Sequence["Overridden"], *figures: 
     )
 
 
-class Effect(NamedTuple):
-    """What one unit of an error does, signed like the range error.
-
-    Constant [m/unit] and linear [(m/s)/unit] term of the range error; quadratic and cubic phase at the
-    aperture edge [rad/unit]. By the published model they are coefficients at the aperture midpoint. By the full
-    model they are fitted over the aperture, of an error too small for a second order, and its phases hold what the
-    displacement of the image adds.
-    """
-
-    constant: float
-    linear: float
-    qpe: float
-    cubic: float
+def number(column: Any) -> float:
+    """The number of the only case."""
+    return float(column) if isinstance(column, float) else float(np.ravel(column)[0])
 
 
 class ErrorSource(NamedTuple):
-    """One error: what it is, how large it is declared, what one unit of it does.
+    """One error: what it is, how large it is declared, what one unit of it does; in one case, or in many as arrays.
 
     `declared` is signed and includes the
     coverage factor; None where the file is silent. `is_independent` marks the errors as the file states
@@ -60,11 +53,11 @@ class ErrorSource(NamedTuple):
 
     subject: Subject
     unit: str
-    declared: float | None
+    declared: Any
     path: KeyPath
     effect: Effect
     full: Effect
-    direction: Vector
+    direction: Any
     equation: str
     no_limit: Note
     evidence: str | None = None
@@ -75,6 +68,14 @@ class ErrorSource(NamedTuple):
     def id(self) -> str:
         """That of its row."""
         return self.subject.id
+
+    def in_one_case(self) -> "ErrorSource":
+        """The same with plain numbers in the place of arrays of one case."""
+        effect, full = (Effect._make(map(number, one)) for one in (self.effect, self.full))
+        declared = None if self.declared is None else number(self.declared)
+        return self._replace(
+            declared=declared, effect=effect, full=full, direction=tuple(map(number, self.direction))
+        )
 
     @property
     def owner(self) -> str:
@@ -94,7 +95,12 @@ class ErrorSource(NamedTuple):
     @property
     def is_position(self) -> bool:
         """Whether it is an error of a platform's measured path, or of both."""
-        return self.direction != NOWHERE
+        return self.is_motion and self.owner != "clock"
+
+    @property
+    def platforms(self) -> tuple[int, ...]:
+        """Places of the platforms whose position it is an error of."""
+        return tuple(place for place, name in enumerate(PLATFORMS) if self.is_position and self.moves(name))
 
     @property
     def is_common(self) -> bool:

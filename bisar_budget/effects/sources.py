@@ -1,53 +1,40 @@
-"""Every error a mission can have.
+"""Every error a mission can have, in one case or in many.
 
-The list is complete: an error that the file does not declare is in it too, because a designer comes for its
-allowable.
+A check lists all of them: an error that the file does not declare is there too, because a designer comes for its
+allowable. A sweep lists those that are declared, and those of which something is asked.
 """
 
-import math
-from collections.abc import Iterator
-from functools import cache
-from typing import Any
+from collections.abc import Container, Iterator, Sequence
+from functools import cache, cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bisar_budget import evaluators, phrases
 from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
-from bisar_budget.effects.common import common_sources
+from bisar_budget.effects.collections import Geometries, axes_of
+from bisar_budget.effects.combined import squared
 from bisar_budget.effects.effect import (
     CLOCK_UNITS,
     MOTION_UNITS,
     NOWHERE,
     PLATFORMS,
-    Effect,
     ErrorSource,
     override_notes,
 )
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.faults import KeyPath
-from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, PlatformState, Vector
+from bisar_budget.geometry import FRAME_AXES, BistaticGeometry
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import ExactRanges, nodes_for
+from bisar_budget.ranges.exact_ranges import Effect, ExactRanges, Vectors, nodes_for
 
-_AXES: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+if TYPE_CHECKING:
+    from bisar_budget.mission.covariance import Covariance
 
-
-def error_sources(
-    mission: Mission, geometry: BistaticGeometry, exact: ExactRanges | None = None
-) -> list[ErrorSource]:
-    """List every position, velocity, acceleration, clock and other error, declared or not, in a fixed order."""
-    sources: list[ErrorSource] = []
-    full = _small_effects(exact or exact_ranges(mission, geometry))
-    states = (geometry.transmitter, geometry.receiver)
-    for name, state, of_platform in zip(PLATFORMS, states, (full[:9], full[9:18]), strict=True):
-        sources += _motion(mission, name, state, of_platform)
-    sources += _clock(mission, full[18:])
-    sources += common_sources(mission, sources)
-    sources += _terrain(mission, sources)
-    sources += _other(mission)
-    return sources
+_AXES: tuple[Vectors, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+_UNIT = Effect(constant=0.0, linear=0.0, qpe=1.0, cubic=0.0)  # of what only is a phase
 
 
 def exact_ranges(mission: Mission, geometry: BistaticGeometry, count: int | None = None) -> ExactRanges:
@@ -58,78 +45,212 @@ def exact_ranges(mission: Mission, geometry: BistaticGeometry, count: int | None
     return ExactRanges.of(paths, mission.radar.wavelength, T, count, has_direct_path=is_heard)
 
 
-def _small_effects(exact: ExactRanges) -> list[Effect]:
-    """Effects of small units: of each platform position, velocity, acceleration along x, y, z; of clock terms."""
-    at_nodes: list[Any] = []
-    times: Any = exact.times
-    for platform, (track, R) in enumerate(zip(exact.tracks, exact.ranges, strict=True)):
-        if exact.has_direct_path:
-            kinds: Any = evaluators.direct_motion(*track, R, *exact.heard_along[platform], times)
-        else:
-            kinds = evaluators.full_motion(*track, R, times)
-        at_nodes += [along for of_kind in kinds for along in of_kind]
-    silent = 0.0 if exact.has_direct_path else 1.0  # the direct path is the clock
-    at_nodes += [silent * SPEED_OF_LIGHT * exact.times**power for power in range(len(CLOCK_UNITS))]
-    effects = exact.effect(np.concatenate(at_nodes, axis=1))
-    return [Effect._make(one) for one in np.array(effects).T.tolist()]
+class Errors:
+    """The errors of cases of one mission, as their file states them.
 
+    Parameters
+    ----------
+    mission : Mission
+        Some of its numbers may be arrays (cases,).
+    geometry : Geometries
+        Of the cases.
+    exact : ExactRanges
+        Of the cases.
+    shown : container of str, optional
+        Ids of rows: of what is not declared, nothing else is listed; omitted: everything is.
+    """
 
-def _motion(mission: Mission, name: str, state: PlatformState, full_effects: list[Effect]) -> Iterator[ErrorSource]:
-    wavelength, T = mission.radar.wavelength, mission.collection.aperture_time
-    rows = evaluators.published_motion(*state.position, *state.velocity, state.slant_range, wavelength, T)
-    error: MotionError = getattr(mission.platforms, name).motion_error
-    factor = mission.allocation.coverage_factor
-    in_scene = error.frame == "scene"
-    axes = state.frame(error.frame)
-    for kind_index, (kind, unit) in enumerate(MOTION_UNITS.items()):
-        of_kind = slice(3 * kind_index, 3 * kind_index + 3)
-        effects, full = list(map(Effect._make, rows[of_kind])), full_effects[of_kind]
+    def __init__(
+        self, mission: Mission, geometry: Geometries, exact: ExactRanges, shown: Container[str] | None = None
+    ) -> None:
+        self.mission, self.geometry, self.exact, self.shown = mission, geometry, exact, shown
+        self.factor = mission.allocation.coverage_factor
+        self._legs: dict[tuple[int, str], tuple[list[Effect], list[Effect]]] = {}
+
+    def listed(self) -> Iterator[ErrorSource]:
+        """Every position, velocity, acceleration, clock and other error, in the order of the contract."""
+        for place, name in enumerate(PLATFORMS):
+            for kind, unit in MOTION_UNITS.items():
+                yield from self._of_motion(place, name, kind, unit)
+        yield from self._of_clock()
+        yield from self._of_both_platforms()
+        yield from self._of_terrain()
+        yield from self._others()
+
+    def _is_listed(self, what: Subject, declared: Any) -> bool:
+        return declared is not None or self.shown is None or what.id in self.shown
+
+    @cached_property
+    def _published(self) -> list[Any]:
+        wavelength, T = self.mission.radar.wavelength, self.mission.collection.aperture_time
+        return [
+            evaluators.published_motion(*path.position, *path.velocity, path.slant_range, wavelength, T)
+            for path in self.geometry.both
+        ]
+
+    def legs(self, place: int, kind: str) -> tuple[list[Effect], list[Effect]]:
+        """Effects of a unit of a kind of error of one platform along x, y, z, by Tables I and II and in full."""
+        if (place, kind) not in self._legs:
+            first = 3 * list(MOTION_UNITS).index(kind)
+            published = [Effect._make(row) for row in self._published[place][first : first + 3]]
+            along = np.stack([self.exact.along(place, axis) for axis in _AXES], axis=1)
+            found = self.exact.effect(along * self.exact.powers[MOTION_UNITS[kind]][:, None])
+            full = [Effect._make(one) for one in zip(*found, strict=True)]
+            self._legs[place, kind] = published, full
+        return self._legs[place, kind]
+
+    def _of_motion(self, place: int, name: str, kind: str, unit: str) -> Iterator[ErrorSource]:
+        error: MotionError = getattr(self.mission.platforms, name).motion_error
+        values = error.stated(kind)
+        own = _scene_axes(name, kind)
+        if not any(self._is_listed(what, values) for what, *_ in own):
+            return
+        in_scene = error.frame == "scene"
+        published, full = self.legs(place, kind)
+        axes = axes_of(self.mission, name, self.geometry.both[place])
         covariance = error.covariance if kind != "acceleration" else None
-        values: Vector | None = getattr(error, kind) if covariance is None else covariance.of(kind)
-        declared = None if values is None else tuple([value * factor for value in values])
         key = "covariance" if covariance is not None else error.key_of(kind)
         path: KeyPath = ("platforms", name, "motion_error", key)
-        notes = override_notes(name, error.overridden, kind)
-        for axis, (what, own_path, equation, no_limit) in enumerate(_scene_axes(name, kind)):
+        notes, evidence = override_notes(name, error.overridden, kind), error.evidence(kind)
+        for axis, (what, own_path, equation, no_limit) in enumerate(own):
+            # Of errors that the file states along other axes those of the scene are listed where all are.
+            if self.shown is not None and what.id not in self.shown and not (in_scene and values is not None):
+                continue
             on_axis = None
-            if declared is not None:
+            if values is not None:
                 if in_scene:
-                    on_axis = declared[axis]
+                    on_axis = values[axis] * self.factor
                 elif covariance is None:
-                    on_axis = _along_scene_axis(declared, axes, axis, error.distribution)
+                    on_axis = self.factor * _along_scene_axis(values, axes, axis, error.distribution)
                 else:
-                    on_axis = factor * covariance.along(kind, [direction[axis] for direction in axes])
+                    on_axis = self.factor * _along_covariance(covariance, kind, [one[axis] for one in axes])
             if covariance is not None:
                 own_path = (*path, *covariance.path(kind, axis))
             yield ErrorSource(
                 subject=what,
                 unit=unit,
                 declared=on_axis,
-                path=own_path if in_scene and declared is not None and key != "sensor" else path,
-                effect=effects[axis],
+                path=own_path if in_scene and values is not None and key != "sensor" else path,
+                effect=published[axis],
                 full=full[axis],
                 direction=_AXES[axis],
                 equation=equation,
                 no_limit=no_limit,
-                evidence=error.evidence(kind),
+                evidence=evidence,
                 is_independent=in_scene,
                 notes=notes,
             )
-        if in_scene or declared is None:
-            continue
+        if in_scene or values is None:
+            return
         for index, (axis_name, direction) in enumerate(zip(FRAME_AXES[error.frame], axes, strict=True)):
             yield ErrorSource(
                 subject=subject(name, kind, axis_name, error.frame),
                 unit=unit,
-                declared=declared[index],
+                declared=values[index] * self.factor,
                 path=(*path, *((index,) if covariance is None else covariance.path(kind, index))),
-                effect=_along(effects, direction),
+                effect=_along(published, direction),
                 full=_along(full, direction),
                 direction=direction,
                 equation=_equation(kind, None),
                 no_limit=_no_limit(kind, f"the {error.frame} frame's {axis_name} axis"),
-                evidence=error.evidence(kind),
+                evidence=evidence,
                 notes=notes,
+            )
+
+    def _of_clock(self) -> Iterator[ErrorSource]:
+        wavelength, T = self.mission.radar.wavelength, self.mission.collection.aperture_time
+        rows = evaluators.published_clock(SPEED_OF_LIGHT, wavelength, T)
+        for (term, unit), row in zip(CLOCK_UNITS.items(), rows, strict=True):
+            value, what = getattr(self.mission.timing_error, term), subject("clock", "timing", term)
+            if self._is_listed(what, value):
+                yield ErrorSource(
+                    subject=what,
+                    unit=unit,
+                    declared=None if value is None else value * self.factor,
+                    path=("timing_error", term),
+                    effect=Effect._make(row),
+                    full=self.exact.effect(self.exact.clock_course(unit)),
+                    direction=NOWHERE,
+                    equation="Table I row 1, step of Table II" if term == "quadratic" else "Table I row 1",
+                    no_limit=phrases.no_quadratic_term_of_clock(term),
+                )
+
+    def _of_both_platforms(self) -> Iterator[ErrorSource]:
+        """Errors that both platforms have in common: the effects of both legs add with their signs.
+
+        A bias of one GNSS service moves both measured paths by the same vector. The range error, and with it Table I
+        and the full model, is linear in the errors, so the common effect is the sum of the two platforms' own.
+        """
+        error = self.mission.common_motion_error
+        if error is None:
+            return
+        for kind, unit in MOTION_UNITS.items():
+            values = getattr(error, kind)
+            for axis, letter in enumerate("xyz"):
+                what = subject("mission", kind, letter)
+                if not self._is_listed(what, values):
+                    continue
+                published, full = (
+                    _sum([self.legs(place, kind)[model][axis] for place in (0, 1)]) for model in (0, 1)
+                )
+                if kind == "position" and letter != "z":
+                    # A horizontal shift of both platforms is a shift of the scene: x̂ is the error itself, and β̃ₙ and
+                    # ½s̈·x̂ cancel. What a sum of rounded numbers leaves would be a limit out of nothing.
+                    full = full._replace(qpe=0.0 * full.qpe, cubic=0.0 * full.cubic)
+                *_, equation, no_limit = _scene_axes(PLATFORMS[0], kind)[axis]
+                if kind != "position":
+                    cause = "velocities" if kind == "velocity" else "lines of sight"
+                    no_limit = phrases.no_common_component(cause, letter)
+                yield ErrorSource(
+                    subject=what,
+                    unit=unit,
+                    declared=None if values is None else values[axis] * self.factor,
+                    path=("common_motion_error", kind, axis),
+                    effect=published,
+                    full=full,
+                    direction=_AXES[axis],
+                    equation=f"{equation}, both platforms",
+                    no_limit=no_limit,
+                    evidence=error.source,
+                    notes=(phrases.held_to_the_total("both platforms"),),
+                )
+
+    def _of_terrain(self) -> Iterator[ErrorSource]:
+        """A scene that is higher than the processor takes it for: both platforms measured too high by as much."""
+        height = self.mission.scene.height_error
+        if height is None:
+            return
+        published, full = (
+            Effect._make(map(sum, zip(*(self.legs(place, "position")[model][2] for place in (0, 1)), strict=True)))
+            for model in (0, 1)
+        )
+        yield ErrorSource(
+            subject=subject("mission", "terrain"),
+            unit="m",
+            declared=height,
+            path=("scene", "height_error"),
+            effect=published,
+            full=full,
+            direction=_AXES[2],
+            equation="full model",
+            no_limit=phrases.no_quadratic_term_of_height(),
+            notes=(phrases.held_to_the_total("no platform"),),
+        )
+
+    def _others(self) -> Iterator[ErrorSource]:
+        for index, other in enumerate(self.mission.other_errors):
+            yield ErrorSource(
+                subject=subject("mission", "other", other.name),
+                unit="rad",
+                declared=other.quadratic_phase_error,
+                path=("other_errors", index, "quadratic_phase_error"),
+                effect=_UNIT,
+                full=_UNIT,
+                direction=NOWHERE,
+                equation="as declared",
+                no_limit=NOTHING,
+                evidence=other.source,
+                notes=(phrases.held_to_the_total("no platform"),),
             )
 
 
@@ -148,28 +269,38 @@ def _scene_axes(name: str, kind: str) -> tuple[tuple[Subject, KeyPath, str, Note
 
 
 def _along_scene_axis(
-    declared: tuple[float, ...], axes: tuple[Vector, Vector, Vector], axis: int, distribution: str
-) -> float:
+    declared: Sequence[Any], axes: tuple[Vectors, Vectors, Vectors], axis: int, distribution: str
+) -> Any:
     """Size along one axis of the scene of errors stated along the axes of another frame.
 
     The three are independent, so one-sigma values add as squares and bounds add as magnitudes: a signed
     rotation would let them cancel. The sign is that of the signed rotation.
     """
-    parts = [value * direction[axis] for value, direction in zip(declared, axes, strict=True)]
-    size = math.hypot(*parts) if distribution == "normal" else sum(abs(part) for part in parts)
-    return math.copysign(size, sum(parts))
+    a, b, c = (value * direction[axis] for value, direction in zip(declared, axes, strict=True))
+    size = np.sqrt(a * a + b * b + c * c) if distribution == "normal" else np.abs(a) + np.abs(b) + np.abs(c)
+    return np.copysign(size, a + b + c)
 
 
-def _along(effects: list[Effect], direction: Vector) -> Effect:
+def _along_covariance(covariance: "Covariance", kind: str, direction: Sequence[Any]) -> Any:
+    """Sigma of position or velocity error along a direction given in the frame's axes: √(dᵀCd)."""
+    parts = [sigma * along for sigma, along in zip(covariance.of(kind), direction, strict=True)]
+    return np.sqrt(squared(covariance.block(kind), parts))
+
+
+def _along(effects: Sequence[Effect], direction: Vectors) -> Effect:
     """Effect of a unit error along a direction: the projection of the three scene effects."""
-    u, v, w = direction
-    # What is left of terms that cancel exactly is rounding, and would make a limit out of nothing.
-    return Effect._make(
-        [
-            term if abs(term := a * u + b * v + c * w) > ROUNDING * (abs(a * u) + abs(b * v) + abs(c * w)) else 0.0
-            for a, b, c in zip(*effects, strict=True)
-        ]
-    )
+    terms = [[part * way for part, way in zip(parts, direction, strict=True)] for parts in zip(*effects, strict=True)]
+    return Effect._make(map(_total, terms))
+
+
+def _sum(effects: Sequence[Effect]) -> Effect:
+    return Effect._make(map(_total, zip(*effects, strict=True)))
+
+
+def _total(terms: Sequence[Any]) -> Any:
+    """Sum of terms; what is left of those that cancel exactly is rounding, and would make a limit out of nothing."""
+    total = sum(terms)
+    return np.where(np.abs(total) > ROUNDING * sum(np.abs(term) for term in terms), total, 0.0)
 
 
 def _equation(kind: str, axis: int | None) -> str:
@@ -185,58 +316,3 @@ def _no_limit(kind: str, axis: str) -> Note:
         return phrases.no_quadratic_term_of_position()
     cause = "velocity" if kind == "velocity" else "line of sight"
     return phrases.no_component(cause, axis)
-
-
-def _clock(mission: Mission, full_effects: list[Effect]) -> Iterator[ErrorSource]:
-    rows = evaluators.published_clock(SPEED_OF_LIGHT, mission.radar.wavelength, mission.collection.aperture_time)
-    for (term, unit), row, full in zip(CLOCK_UNITS.items(), rows, full_effects, strict=True):
-        value: float | None = getattr(mission.timing_error, term)
-        yield ErrorSource(
-            subject=subject("clock", "timing", term),
-            unit=unit,
-            declared=None if value is None else value * mission.allocation.coverage_factor,
-            path=("timing_error", term),
-            effect=Effect._make(row),
-            full=full,
-            direction=NOWHERE,
-            equation="Table I row 1, step of Table II" if term == "quadratic" else "Table I row 1",
-            no_limit=phrases.no_quadratic_term_of_clock(term),
-        )
-
-
-def _terrain(mission: Mission, sources: list[ErrorSource]) -> Iterator[ErrorSource]:
-    """A scene that is higher than the processor takes it for: both platforms measured too high by as much."""
-    height = mission.scene.height_error
-    if height is None:
-        return
-    of_platforms = [subject(name, "position", "z") for name in PLATFORMS]
-    up = [source for source in sources if source.subject in of_platforms]
-    yield ErrorSource(
-        subject=subject("mission", "terrain"),
-        unit="m",
-        declared=height,
-        path=("scene", "height_error"),
-        effect=Effect._make(map(sum, zip(*(source.effect for source in up), strict=True))),
-        full=Effect._make(map(sum, zip(*(source.full for source in up), strict=True))),
-        direction=_AXES[2],
-        equation="full model",
-        no_limit=phrases.no_quadratic_term_of_height(),
-        notes=(phrases.held_to_the_total("no platform"),),
-    )
-
-
-def _other(mission: Mission) -> Iterator[ErrorSource]:
-    for index, other in enumerate(mission.other_errors):
-        yield ErrorSource(
-            subject=subject("mission", "other", other.name),
-            unit="rad",
-            declared=other.quadratic_phase_error,
-            path=("other_errors", index, "quadratic_phase_error"),
-            effect=Effect(constant=0.0, linear=0.0, qpe=1.0, cubic=0.0),
-            full=Effect(constant=0.0, linear=0.0, qpe=1.0, cubic=0.0),
-            direction=NOWHERE,
-            equation="as declared",
-            no_limit=NOTHING,
-            evidence=other.source,
-            notes=(phrases.held_to_the_total("no platform"),),
-        )

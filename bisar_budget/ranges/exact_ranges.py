@@ -22,7 +22,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.constants import ROUNDING
+from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
 from bisar_budget.evaluators import LEGENDRE_FITS, full_ground_inverse
 from bisar_budget.geometry import BistaticGeometry
 
@@ -41,6 +41,7 @@ SKEWED = 0.01  # the same over the sine between the gradients, where they are ne
 BENT = 0.05  # of what Doppler turns by at the centre: velocity errors turn it by less, or its slopes are others
 FEW = 4
 SHRINKS = 0.5  # square of each step of the search over that of the one before; else it does not settle
+CLOCK_POWERS = {"s": 0, "s/s": 1, "1/s": 2, "1/s^2": 3}  # of slow time, by the unit of a clock error
 EPSILON = 2e-15  # of a range sum: what rounding of a few operations leaves
 UNSEEN_RAD = 3e-5  # what the last step of the search may change a phase by beyond the part counted linearly
 
@@ -85,8 +86,14 @@ def nodes_for(geometry: BistaticGeometry, aperture_time_s: float, *, has_direct_
     return next(count for limit, count in NODES if way <= limit)
 
 
-class Effects(NamedTuple):
-    """What a small unit of an error does in each lane, as `Effect`."""
+class Effect(NamedTuple):
+    """What one unit of an error does, signed like the range error; numbers, or arrays of cases.
+
+    Constant [m/unit] and linear [(m/s)/unit] term of the range error; quadratic and cubic phase at the
+    aperture edge [rad/unit]. By the published model they are coefficients at the aperture midpoint. By the full
+    model they are fitted over the aperture, of an error too small for a second order, and its phases hold what the
+    displacement of the image adds.
+    """
 
     constant: Any
     linear: Any
@@ -323,6 +330,11 @@ class ExactRanges:
         """Position error at the nodes of a unit of an error: 1, τ or τ²/2 of (22)."""
         return {"m": np.ones_like(self.times), "m/s": self.times, "m/s^2": self.times**2 / 2}
 
+    def clock_course(self, unit: str) -> Floats:
+        """Range error at the nodes of a unit of a clock error; nothing if the direct path is the clock. [m/unit]"""
+        metres: Floats = SPEED_OF_LIGHT * self.times ** CLOCK_POWERS[unit]
+        return metres * 0.0 if self.has_direct_path else metres
+
     def along(self, platform: int, direction: Vectors) -> Floats:
         """What a metre along a direction does to the range of a platform at the nodes, −u·d; if heard, −(u − b)·d."""
         found: Floats = -dot(self.tracks[platform], direction) / self.ranges[platform]
@@ -378,9 +390,10 @@ class ExactRanges:
         )
         return quadratic, cubic
 
-    def effect(self, range_error: Floats) -> Effects:
+    def effect(self, range_error: Floats) -> Effect:
         """Effect of a range error at the nodes, that of the displacement included."""
-        constant, linear, own, own_cubic = self.fit @ range_error
+        lanes = range_error.shape[1:]  # the last axis is that of the cases
+        constant, linear, own, own_cubic = (self.fit @ range_error.reshape(self.count, -1)).reshape(4, *lanes)
         linear = linear / self.half
         own, own_cubic = own * self.k, own_cubic * self.k
         size = np.abs(range_error).max(axis=0) * self.k
@@ -389,14 +402,14 @@ class ExactRanges:
         seen = size + np.abs(q_0 * constant) + np.abs(q_1 * linear)
         seen_cubic = size + np.abs(c_0 * constant) + np.abs(c_1 * linear)
         # What is left of terms that cancel exactly is rounding, and would make a limit out of nothing.
-        return Effects(
+        return Effect(
             constant,
             np.where(np.abs(linear) * self.half <= ROUNDING * size / self.k, 0.0, linear),
             np.where(np.abs(qpe) <= ROUNDING * seen, 0.0, qpe),
             np.where(np.abs(cubic) <= ROUNDING * seen_cubic, 0.0, cubic),
         )
 
-    def displacement(self, effect: Effects, size: Any) -> tuple[Any, Any]:
+    def displacement(self, effect: Effect, size: Any) -> tuple[Any, Any]:
         """Displacement on the ground by so many units. [m]"""
         scale = size / self.determinant
         (a, b), (c, d) = self.adjugate

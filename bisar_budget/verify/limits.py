@@ -175,7 +175,7 @@ def _cases(study: Study) -> Iterator[tuple[str, Case]]:
     for source in study.sources:
         if not source.is_motion:
             yield source.id, partial(phase_cases.other, study, source)
-        elif study.allowed(source).smallest is not None:
+        elif study.allowed(source)[0] is not None:
             yield source.id, partial(phase_cases.quadratic, study, source)
     slow: dict[Subject, Case] = {}
     for name in PLATFORMS:

@@ -74,8 +74,8 @@ def slow_vibration(study: Study, row_id: str, name: str, line: Line) -> Verdict:
 
 def _bound_elsewhere(study: Study, source: ErrorSource) -> Verdict:
     """Limit of an error that no quadratic phase bounds: by the cubic phase, or by the location."""
-    allowed = study.allowed(source)
-    size = allowed.smallest or 0.0
+    allowed, binding = study.allowed(source)
+    size = allowed or 0.0
     blank = Verdict(id=source.id, model=study.model, boundary_error=size, unit=source.unit)
     requirements = study.mission.requirements
     try:
@@ -86,7 +86,7 @@ def _bound_elsewhere(study: Study, source: ErrorSource) -> Verdict:
     except (ValueError, np.linalg.LinAlgError) as error:
         return _without_image(study, blank, error)
     blank = blank._replace(**predicted(effect), measured_qpe_rad=abs(reading.quadratic))
-    if allowed.binding == CUBIC and requirements.cubic_phase_error is not None:
+    if binding == CUBIC and requirements.cubic_phase_error is not None:
         return blank._replace(
             budget_rad=requirements.cubic_phase_error,
             measured_cubic_rad=abs(reading.cubic),

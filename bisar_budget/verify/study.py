@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from bisar_budget.analysis.analysis import Analysis, Model
-from bisar_budget.budget.error_rows import Allowed, allowed_by
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource
 from bisar_budget.effects.exact_arrays import aperture_nodes, direct_path_clock, exact_effects
@@ -69,7 +68,7 @@ class Study:
     @property
     def declared(self) -> list[ErrorSource]:
         """Declared errors that an image can show; `other` errors are phases without a motion."""
-        is_heard_out = self.analysis.full.is_heard_out
+        is_heard_out = self.analysis.errors.is_heard_out
         return [s for s in self.analysis.stated if s.declared and s.is_motion and not is_heard_out(s)]
 
     def members(self, owner: str) -> list[ErrorSource]:
@@ -81,11 +80,13 @@ class Study:
         sizes = (model.allowable(source, QUADRATIC, limit) for model in self.models)
         return min((size for size in sizes if size is not None), default=None)
 
-    def allowed(self, source: ErrorSource) -> Allowed:
+    def allowed(self, source: ErrorSource) -> tuple[float | None, str | None]:
         """Allowable of an error's row by all requirements, autofocus included, and which one binds."""
         limit = self.allocation.qpe_limit(source.owner) * self.allocation.autofocus_gain
-        found = [allowed_by(self.analysis, model, [(source, limit)])[0] for model in self.models]
-        return min(found, key=lambda one: math.inf if one.smallest is None else one.smallest)
+        needs = self.mission.requirements
+        limits = (limit, needs.cubic_phase_error, needs.location_error)
+        found = [model.allowed(source, limits) for model in self.models]
+        return min(found, key=lambda one: math.inf if one[0] is None else one[0])
 
     def errors(self, source: ErrorSource, size: float) -> Errors:
         """Return one error of a given size and nothing else."""
@@ -177,7 +178,7 @@ class Study:
 
     def _worst(self, model: Model, source: ErrorSource, size: float) -> float:
         """Quadratic phase of the worse sign of an error, with the sign of a small one. [rad]"""
-        found = model.declared(source._replace(declared=size)).qpe
+        found = model.does(source, size).qpe
         return found if math.isfinite(found) else math.inf
 
     def at_limit(self, of: Subject, limit: float) -> Errors:

@@ -4,8 +4,8 @@ from datetime import date
 
 import pytest
 
-from bisar_budget.analysis import analysis as analysis_module
 from bisar_budget.budget.check import check_mission
+from bisar_budget.effects.sources import Errors
 from bisar_budget.findings.mission import Report
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.monte_carlo.probability import monte_carlo
@@ -19,17 +19,17 @@ from tests.conftest import mission_text
 def counted(monkeypatch) -> dict[str, int]:
     """How often errors were listed and exact ranges set up."""
     count = {"error_sources": 0, "exact ranges": 0}
-    listed, set_up = analysis_module.error_sources, ExactRanges.__init__
+    listed, set_up = Errors.listed, ExactRanges.__init__
 
-    def error_sources(*arguments, **named):
+    def error_sources(errors):
         count["error_sources"] += 1
-        return listed(*arguments, **named)
+        return listed(errors)
 
     def init(*arguments, **named) -> None:
         count["exact ranges"] += 1
         set_up(*arguments, **named)
 
-    monkeypatch.setattr(analysis_module, "error_sources", error_sources)
+    monkeypatch.setattr(Errors, "listed", error_sources)
     monkeypatch.setattr(ExactRanges, "__init__", init)
     return count
 

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
+from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.effects.combined import correlated_errors, likely_error
-from bisar_budget.effects.sources import error_sources
 from bisar_budget.mission.load import parse_mission
 from tests import reference
 from tests.conftest import findings, mission_text, row
@@ -112,7 +112,7 @@ def test_likely_error_has_one_sigma_of_phase_at_a_distance_of_one_sigma() -> Non
         mission_text(platforms__receiver__motion_error={"covariance": covariance}, allocation__coverage_factor=2)
     )
     (group,) = correlated_errors(mission)
-    sources = {source.id: source for source in error_sources(mission, mission.geometry)}
+    sources = {source.id: source for source in Analysis(mission).sources}
     members = [sources[row_id] for row_id in group.ids]
     error = np.array(likely_error(group, members))
     sizes = np.array([source.declared for source in members])

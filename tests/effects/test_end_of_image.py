@@ -6,17 +6,12 @@ Exact ranges are those of `tests.reference`, which have nothing from the package
 import csv
 import io
 import json
-from collections.abc import Mapping
 
 import numpy as np
 import pytest
 
-from bisar_budget.arrays.judged import Checked, check_arrays
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.judged_rows import REQUIREMENTS
-from bisar_budget.effects.collections import Geometries, paths_of
 from bisar_budget.effects.models import END_OF_IMAGE, QUADRATIC
-from bisar_budget.effects.subject import Subject
 from bisar_budget.findings.mission import MissionFindings, Report
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.load import parse_mission
@@ -83,37 +78,6 @@ def test_where_a_requirement_is_reached_first_it_binds(family: str, seed: int) -
         assert size is not None
         assert size < one.allowable
         assert not analysis.full.ends_image(source, size)
-
-
-def by_arrays(mission: Mission, shown: Mapping[str, Subject], *, is_brief: bool) -> Checked:
-    """The mission as the one case of arrays."""
-    platforms = mission.platforms
-    geometries = Geometries(paths_of(platforms.transmitter), paths_of(platforms.receiver))
-    (nodes,) = geometries.nodes(np.array([mission.collection.aperture_time]), has_direct_path=mission.has_direct_path)
-    with np.errstate(all="ignore"):
-        return check_arrays(mission, 1, TODAY, int(nodes), geometries, shown, is_brief=is_brief)
-
-
-@pytest.mark.parametrize("is_brief", [False, True])
-@pytest.mark.parametrize(("family", "seed"), WHERE)
-def test_arrays_call_it_the_same(family: str, seed: int, is_brief: bool) -> None:
-    """Row by row: what sets each allowable that both have."""
-    mission = mission_of(family, seed)
-    found = check_mission(mission, TODAY, is_brief=is_brief)
-    rows = {one.id: one for one in found.rows if one.allowable is not None and one.subject.kind != "vibration"}
-    checked = by_arrays(
-        mission, {} if is_brief else {one.id: one.subject for one in rows.values()}, is_brief=is_brief
-    )
-    assert not checked.is_left_out.any()
-    bound = {}
-    for one in checked.rows:
-        if one.subject.id in rows and not np.isnan(one.allowable[0]):
-            place = one.binding[0]
-            bound[one.subject.id] = one.metric if place < 0 else REQUIREMENTS[place]
-            assert one.allowable[0] == pytest.approx(rows[one.subject.id].allowable, rel=1e-9)
-    want = {row_id: one.binding_requirement or one.metric for row_id, one in rows.items()}
-    assert bound == want
-    assert is_brief or END_OF_IMAGE in bound.values()
 
 
 @pytest.fixture(scope="module")

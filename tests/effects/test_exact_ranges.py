@@ -8,7 +8,6 @@ import pytest
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.exact_arrays import aperture_nodes, direct_path_clock, exact_effects
-from bisar_budget.effects.models import lanes_of
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.ranges.exact_ranges import Lanes
 from bisar_budget.simulate.exact import exact_effect
@@ -46,7 +45,7 @@ def test_check_and_simulator_agree(family: str, more: str) -> None:
     compared, geometry = 0, study.geometry
     nearest = min(geometry.transmitter.slant_range, geometry.receiver.slant_range)
     for source in study.sources:
-        if not source.is_motion or full.is_heard_out(source):
+        if not source.is_motion or errors.is_heard_out(source):
             continue
         farthest = full.farthest(source)
         sizes = [part * farthest for part in (0.01, -0.01, 0.1, -0.1)]
@@ -113,7 +112,7 @@ def test_phases_have_no_rounding_of_the_ranges() -> None:
     """Errors a micrometre apart lie on a line; a range of 4e7 m in doubles is 4e-9 m off, which would be 1e-6 rad."""
     analysis = Analysis(parse_mission(family_text("geostationary_drone", 3)))
     source = next(one for one in analysis.sources if one.id == "transmitter.position.x")
-    lanes = lanes_of(analysis.exact, source).of(np.zeros(10, dtype=int))
+    lanes = analysis.errors.lanes(source).of(np.zeros(10, dtype=int))
     near = analysis.full.plane.displacement(source.full, 1.0)
     found = analysis.exact.phases(lanes, 1 + np.arange(10) * 1e-6, near)
     phases = np.array((found.quadratic, found.cubic)).T

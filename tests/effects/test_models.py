@@ -88,7 +88,7 @@ def test_the_two_signs_of_section_v_are_those_of_the_physics() -> None:
     source = next(s for s in analysis.sources if s.id == "receiver.velocity.z")
     sizes = sorted(abs(analysis.full.at(source, size).quadratic) for size in (1.9, -1.9))
     assert sizes == pytest.approx([0.02, 0.78], abs=0.01)
-    declared = analysis.full.declared(source._replace(declared=1.9)).qpe
+    declared = analysis.full.does(source, 1.9).qpe
     assert abs(declared) == pytest.approx(0.78, abs=0.01)
 
 
@@ -111,7 +111,7 @@ def test_what_a_declared_error_does_is_what_exact_ranges_do(place, velocity, kin
     source = next(s for s in analysis.sources if s.id == f"receiver.{kind}.{axis}")
     allowable = analysis.full.allowable(source, QUADRATIC, 0.4)
     size = share * (allowable or 0.1 * analysis.full.farthest(source))
-    found = analysis.full.declared(source._replace(declared=size))
+    found = analysis.full.does(source, size)
     if found.farthest is None or math.hypot(*found.farthest) > 500:
         return  # brute force follows no branch
     (point, q, c), (_, q_back, c_back) = phases(analysis, source.id, size)
@@ -145,7 +145,7 @@ def test_the_cubic_phase_counts_the_fifth_order() -> None:
     for axis in "xyz":
         source = next(s for s in analysis.sources if s.id == f"receiver.velocity.{axis}")
         size = 0.2
-        found = analysis.full.declared(source._replace(declared=size))
+        found = analysis.full.does(source, size)
         worst = max(abs(c) for _, _, c in phases(analysis, source.id, size))
         assert abs(found.cubic) == pytest.approx(worst, rel=0.005, abs=0.002)
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.check import check_mission
 from bisar_budget.constants import STANDARD_GRAVITY
-from bisar_budget.effects.sources import error_sources
 from bisar_budget.faults import MissionError
 from bisar_budget.findings.mission import Report
 from bisar_budget.mission.instruments import PowerLaw
@@ -227,7 +227,7 @@ class TestCatalogue:
         """Position and velocity of a GNSS part had none, and pointed at a key that the file does not have."""
         text = receiver("motion_error: {sensor: [stim300, mosaic-x5-rtk], velocity: 1 cm/s, source: survey 3}")
         mission = parse_mission(text)
-        sources = {one.id: one for one in error_sources(mission, mission.geometry)}
+        sources = {one.id: one for one in Analysis(mission).sources}
         part = read_part(str(resource("specs", "sensors") / "mosaic-x5-rtk.yaml"))
         position, velocity = sources["receiver.position.x"], sources["receiver.velocity.x"]
         assert position.evidence == evidence(part, "position")

@@ -128,8 +128,8 @@ def effect(analysis: Analysis, found: MissionFindings, source: ErrorSource, mode
 def _coefficient(mission: Mission, source: ErrorSource, order: int) -> float:
     """β̃ of one unit; β̃₂ and β̃₃ from their phases at the aperture edge, (2π/λ)·β·(T/2)ⁿ."""
     if order < 2:
-        return source.effect[order]
-    phase = source.effect.qpe if order == 2 else source.effect.cubic
+        return float(source.effect[order])
+    phase: float = source.effect.qpe if order == 2 else source.effect.cubic
     return phase * mission.radar.wavelength / (2 * math.pi * (mission.collection.aperture_time / 2) ** order)
 
 

@@ -83,7 +83,7 @@ def full_chain(analysis: Analysis, source: ErrorSource, size: float, each: str) 
         Said of what is not declared.
     """
     each = each.replace(" of ", ", for ")
-    if analysis.full.is_heard_out(source):
+    if analysis.errors.is_heard_out(source):
         yield from step(f"Full model{each}: {analysis.full.no_limit(source)}")
         return
     left = worse(analysis, source, size)
