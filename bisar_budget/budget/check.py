@@ -131,7 +131,6 @@ class _Checked(NamedTuple):
 
 def _checked(analysis: Analysis, gating: str) -> _Checked:
     mission = analysis.mission
-    model, other = analysis.models(gating)
     allocation = analysis.allocation
     rows = [
         *error_rows(analysis, gating, allocation),
