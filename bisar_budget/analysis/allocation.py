@@ -1,16 +1,15 @@
 """Division of the budgets between transmitter, receiver and clock, and the gain of autofocus."""
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from bisar_budget import evaluators
-from bisar_budget.effects.correlation import combined_phase, correlated_errors
-from bisar_budget.effects.effect import ErrorSource
+from bisar_budget.analysis.together import Together
 from bisar_budget.mission.model import MetricSplits, Mission, Shares
-
-if TYPE_CHECKING:
-    from bisar_budget.effects.vibration import OwnPhase
+from bisar_budget.ranges.exact_ranges import Floats
 
 BALANCED_RANGE = (0.05, 0.95)  # neither platform is left without a budget
 
@@ -32,8 +31,8 @@ class Split(NamedTuple):
         return self.transmitter if owner == "transmitter" else self.receiver
 
     def includes(self, owner: str, of: str) -> bool:
-        """Whether an owner's errors count against the share of `of`."""
-        return owner == of or (owner == "clock" and of == "receiver" and self.clock is None)
+        """Whether an owner's errors count against the share of `of`; against the mission's all do."""
+        return of in ("mission", owner) or (owner == "clock" and of == "receiver" and self.clock is None)
 
 
 EQUAL = Split(transmitter=0.5, receiver=0.5)
@@ -86,66 +85,64 @@ def effective_n_pull(mission: Mission) -> float | None:
     return stated * (stated <= cap) + cap * (stated > cap)  # the smaller one, of arrays too
 
 
-def allocate(
-    mission: Mission, stated: Sequence[ErrorSource], phases: Mapping[str, float], own: Sequence["OwnPhase"] = ()
-) -> Allocation:
+def is_balanced(mission: Mission) -> bool:
+    """Whether the shares of the phase follow from what is declared."""
+    split = mission.allocation.split
+    return (split.quadratic_phase_error if isinstance(split, MetricSplits) else split) == "balanced"
+
+
+def allocate(mission: Mission, gates: Iterable[Together]) -> Allocation:
     """Divide the budgets of a mission as its `allocation.split` says.
 
     Parameters
     ----------
     mission : Mission
-        As loaded.
-    stated : sequence of ErrorSource
-        Declared errors, along the axes that the file states them in.
-    phases : mapping of str to float
-        Quadratic phase of each by the gating model, by row id: `balanced` weighs them. [rad]
-    own : sequence of OwnPhase
-        Phases of slow vibrations, sensors and clocks, which it weighs too.
+        Some of its numbers may be arrays (cases,); shares that are `balanced` then are, too.
+    gates : iterable of Together
+        Declared errors by each model that gates. `balanced` weighs their phases, and nothing else asks for them.
     """
     split = mission.allocation.split
-    metrics = split if isinstance(split, MetricSplits) else None
+    qpe, pslr, islr = (
+        (split.quadratic_phase_error, split.pslr, split.islr) if isinstance(split, MetricSplits) else (split,) * 3
+    )
     return Allocation(
         qpe_total=mission.requirements.quadratic_phase_error,
-        qpe=_divide(metrics.quadratic_phase_error if metrics else split, mission, stated, phases, own),
-        pslr=_divide_power(metrics.pslr if metrics else split),
-        islr=_divide_power(metrics.islr if metrics else split),
+        qpe=_balanced(list(gates)) if qpe == "balanced" else _split(qpe),
+        pslr=_split(pslr),
+        islr=_split(islr),
         n_pull=effective_n_pull(mission),
         n_pull_stated=mission.autofocus.n_pull,
     )
 
 
-def _divide_power(split: object) -> Split:
-    return _split(split) if isinstance(split, Shares) else EQUAL  # `balanced` weighs phase, not power
+def _balanced(gates: Sequence[Together]) -> Split:
+    """Shares as the declared errors need them; by several models the larger phase of each error."""
+    weights = []
+    for owner in ("transmitter", "receiver"):
+        by_model = zip(*(together.owed(EQUAL, owner) for together in gates), strict=True)
+        phases = [(of_one[0].row_id, _largest([one.qpe_rad for one in of_one])) for of_one in by_model]
+        # An error that leaves no image has no finite phase: it takes all that it may.
+        weights.append(np.minimum(gates[0].combined(phases), 1e300))
+    total = weights[0] + weights[1]
+    with np.errstate(invalid="ignore"):
+        share: Any = np.where(total == 0, 0.5, np.clip(weights[0] / total, *BALANCED_RANGE))
+    if share.size == 1:
+        share = float(share[0])
+    return Split(transmitter=share, receiver=1 - share)
 
 
-def _divide(
-    split: object,
-    mission: Mission,
-    stated: Sequence[ErrorSource],
-    phases: Mapping[str, float],
-    own: Sequence["OwnPhase"],
-) -> Split:
-    if isinstance(split, Shares):
-        return _split(split)
-    if split != "balanced":
-        return EQUAL
-    weight = {}
-    for platform in ("transmitter", "receiver"):
-        rule = mission.allocation.combine
-        members = [(s.id, phases[s.id]) for s in stated if EQUAL.includes(s.owner, platform)]
-        members += [(one.row_id, one.qpe_rad) for one in own if EQUAL.includes(one.owner, platform)]
-        weight[platform] = combined_phase(members, rule, correlated_errors(mission))
-    # An error that leaves no image has no finite phase: it takes all that it may.
-    weight = {name: min(size, 1e300) for name, size in weight.items()}
-    total = weight["transmitter"] + weight["receiver"]
-    if total == 0:
-        return EQUAL
-    low, high = BALANCED_RANGE
-    transmitter = min(high, max(low, weight["transmitter"] / total))
-    return Split(transmitter=transmitter, receiver=1 - transmitter)
+def _largest(phases: Sequence[Floats]) -> Floats:
+    """The phase with the largest magnitude, signed. [rad]"""
+    if len(phases) == 1:
+        return phases[0]
+    of_all = np.array(phases)
+    largest = np.abs(of_all).argmax(axis=0)
+    return np.asarray(np.take_along_axis(of_all, largest[None], axis=0)[0])
 
 
-def _split(shares: Shares) -> Split:
+def _split(shares: object) -> Split:
+    if not isinstance(shares, Shares):
+        return EQUAL  # `balanced` weighs phase, not power
     return Split(
         transmitter=shares.transmitter,
         receiver=shares.receiver,

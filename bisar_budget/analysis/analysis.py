@@ -1,17 +1,17 @@
 """What a mission's checks share: its geometry, every error it can have, and what the models say of them."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 from bisar_budget.analysis.allocation import Allocation, allocate
-from bisar_budget.effects.correlation import Correlated, correlated_errors
+from bisar_budget.analysis.together import Together
+from bisar_budget.effects.combined import Correlated, correlated_errors
 from bisar_budget.effects.declared import DeclaredErrors
 from bisar_budget.effects.effect import ErrorSource
 from bisar_budget.effects.models import Declared, Model
 from bisar_budget.effects.random_errors import RandomError, random_errors
 from bisar_budget.effects.sources import exact_ranges
-from bisar_budget.effects.vibration import OwnPhase, slow_phases
+from bisar_budget.effects.vibration import DeclaredPhase, slow_phases
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission, has_instruments
 from bisar_budget.ranges.exact_ranges import ExactRanges
@@ -56,22 +56,19 @@ class Analysis:
         return random_errors(self.mission) if has_instruments(self.mission) else []
 
     @cached_property
-    def slow(self) -> list[OwnPhase]:
+    def slow(self) -> list[DeclaredPhase]:
         """Phases of the declared vibrations below one cycle per aperture."""
-        return [
-            one._replace(qpe_rad=float(one.qpe_rad), cubic_rad=float(one.cubic_rad), moves=float(one.moves))
-            for one in slow_phases(self.mission, self.geometry)
-        ]
+        return slow_phases(self.mission, self.geometry)
 
-    def own_phases(self, model: str) -> list[OwnPhase]:
-        """Phases of what has no displacement of its own: slow vibrations, declared errors of sensors and clocks."""
-        found = list(self.slow)
-        factor = self.mission.allocation.coverage_factor
-        for error in self.random:
-            if error.declared is not None:
-                quadratic, cubic = (part * error.declared for part in error.effect(model)[:2])
-                found.append(OwnPhase(error.id, error.owner, quadratic, cubic, factor))
-        return found
+    def together(self, model: str) -> Together:
+        """The declared errors together, by a model."""
+        if model not in self._together:
+            self._together[model] = Together(self.errors, model, self.slow, self.random)
+        return self._together[model]
+
+    @cached_property
+    def _together(self) -> dict[str, Together]:
+        return {}
 
     @cached_property
     def stated(self) -> list[ErrorSource]:
@@ -89,9 +86,14 @@ class Analysis:
         return Model(self.errors, "full")
 
     @cached_property
-    def groups(self) -> Sequence[Correlated]:
+    def groups(self) -> tuple[Correlated, ...]:
         """Covariances of the mission."""
         return correlated_errors(self.mission)
+
+    @property
+    def gates(self) -> list[str]:
+        """Names of the models whose limits the mission is held to: one, or both where the stricter decides."""
+        return [name for name in ("published", "full") if self.mission.gating_model in (name, "strictest")]
 
     def models(self, gating: str) -> tuple[Model, Model]:
         """The model that gates, `published` or `full`, and the other one."""
@@ -108,12 +110,4 @@ class Analysis:
     @cached_property
     def allocation(self) -> Allocation:
         """Budgets as divided; `balanced` weighs phases by the gating model, under `strictest` the larger of both."""
-        gating = self.mission.gating_model
-        both: tuple[Model, ...] = (self.published, self.full)
-        models = [model for model in both if gating in (model.name, "strictest")]
-        phases = {
-            source.id: max((self.does(model, source).qpe for model in models), key=abs) for source in self.stated
-        }
-        by_model = [self.own_phases(model.name) for model in models]
-        own = [max(of_one, key=lambda one: one.qpe_rad) for of_one in zip(*by_model, strict=True)]
-        return allocate(self.mission, self.stated, phases, own)
+        return allocate(self.mission, (self.together(model) for model in self.gates))

@@ -23,7 +23,7 @@ import numpy as np
 from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Split
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT, UTILIZATION_TOLERANCE
-from bisar_budget.effects.combined import combined, combined_phase, many_correlated
+from bisar_budget.effects.combined import combined, combined_phase, correlated_errors
 from bisar_budget.effects.declared import DeclaredErrors
 from bisar_budget.geometry import BistaticGeometry, GroundVector
 from bisar_budget.phrases import NOTHING, Note
@@ -130,7 +130,7 @@ class ScenePhases:
 
     def __init__(self, errors: DeclaredErrors) -> None:
         self.errors, self.exact, self.combine = errors, errors.exact, errors.mission.allocation.combine
-        self.groups = many_correlated(errors.mission) if self.combine == "rss" else ()
+        self.groups = correlated_errors(errors.mission) if self.combine == "rss" else ()
         self.members = [error for error in errors.stated if error.is_motion]
         self.ids = [error.subject.id for error in self.members]
         self.small = SmallErrors.of([errors.lanes(error) for error in self.members])
@@ -169,8 +169,7 @@ class ScenePhases:
         chosen = range(len(self.members)) if indices is None else indices
         groups = [group.of(of) for group in self.groups]
         one = combined_phase([(self.ids[i], phases[i]) for i in chosen], self.combine, groups)
-        # A phase without end, of an error that has no image there, has none with what it is correlated with.
-        return np.where(np.isnan(np.broadcast_to(one, phases.shape[1:])), math.inf, one)
+        return np.asarray(np.broadcast_to(one, phases.shape[1:]))
 
     def differences(self, radius: Floats, azimuth: Floats, of: Places) -> Floats:
         """Phase of each error there less that at the centre; by the worse sign of the large ones. [rad]"""

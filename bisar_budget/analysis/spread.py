@@ -17,7 +17,6 @@ import numpy as np
 
 from bisar_budget.analysis.allocation import Allocation, Split
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.analysis.together import Together
 from bisar_budget.constants import MAINLOBE_ENERGY
 from bisar_budget.effects.clocks import spurs_of
 from bisar_budget.effects.echoes import SLOWEST
@@ -156,7 +155,7 @@ def spread_powers(
     `cubic` is the cubic phase of an owner at one sigma [rad]; there is none where it is too small to show, or where
     an error has no image.
     """
-    powers = [one for one in found if owner == "mission" or split.includes(one.owner, owner)]
+    powers = [one for one in found if split.includes(one.owner, owner)]
     if mission.requirements.cubic_phase_error is None:
         phase = np.asarray(cubic(owner))
         shows = (phase > SMALLEST_CUBIC_RAD) & np.isfinite(phase)
@@ -173,7 +172,7 @@ def declared_powers(analysis: Analysis, allocation: Allocation, owner: str, mode
     return spread_powers(mission, found, allocation.islr, owner, cubic_at_one_sigma(analysis, allocation, model))
 
 
-def cubic_at_one_sigma(analysis: Analysis, allocation: Allocation, model: str) -> Callable[[str], float]:
+def cubic_at_one_sigma(analysis: Analysis, allocation: Allocation, model: str) -> Callable[[str], Any]:
     """Cubic phase of each owner by a model, without coverage factor. [rad]"""
-    together = Together(analysis, analysis.full if model == "full" else analysis.published)
-    return lambda owner: together.cubic_without_coverage(allocation.islr, owner)
+    together = analysis.together(model)
+    return lambda owner: together.cubic_without_coverage(allocation.islr, owner)[0]

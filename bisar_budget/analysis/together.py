@@ -1,93 +1,138 @@
-"""Declared errors of a mission together: their phases and displacements, whose share they count against."""
+"""Declared errors of many cases together: their phases and displacements, and whose share they count against."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
-from bisar_budget.analysis.allocation import Allocation, Split
-from bisar_budget.analysis.analysis import Analysis, Model
-from bisar_budget.effects.correlation import combined_phase
-from bisar_budget.effects.effect import ErrorSource
-from bisar_budget.effects.models import Declared
+import numpy as np
+
+from bisar_budget.effects.combined import (
+    Correlated,
+    Moves,
+    Phases,
+    combined_displacement,
+    combined_phase,
+    correlated_errors,
+    displacement_parts,
+    phase_parts,
+)
+from bisar_budget.effects.declared import DeclaredErrors
+from bisar_budget.effects.vibration import DeclaredPhase
 from bisar_budget.geometry import GroundVector
+from bisar_budget.ranges.exact_ranges import Floats
 
-Phases = list[tuple[str, float]]
-Moves = list[tuple[str, GroundVector]]
+if TYPE_CHECKING:
+    from bisar_budget.analysis.allocation import Split
 
 
 class Together:
-    """Declared errors of a mission by one model, along the axes that the file states them in."""
+    """Declared errors of many cases by one model, along the axes that the file states them in.
 
-    def __init__(self, analysis: Analysis, model: Model) -> None:
-        self.model, self.groups = model, analysis.groups
-        self.allocation_rules = analysis.mission.allocation
-        self.found: Mapping[str, Declared] = analysis.declared(model)
-        self.stated = analysis.stated
-        self.motion = [source for source in self.stated if source.is_motion]
-        self.own = analysis.own_phases(model.name)
-        self.extrapolated = {error.id: error.extrapolated for error in analysis.random if error.extrapolated}
+    Parameters
+    ----------
+    errors : DeclaredErrors
+        Of the cases.
+    model : str
+        `published` or `full`.
+    slow : sequence of DeclaredPhase
+        Vibrations below one cycle per aperture.
+    random : sequence of RandomError
+        Errors of sensors and clocks, declared or not.
+    """
 
-    def members(self, allocation: Allocation, owner: str) -> list[ErrorSource]:
-        """Those that count against the share of an owner; against the mission's all."""
-        return [s for s in self.stated if owner == "mission" or allocation.qpe.includes(s.owner, owner)]
+    def __init__(
+        self, errors: DeclaredErrors, model: str, slow: Sequence[DeclaredPhase], random: Sequence[Any]
+    ) -> None:
+        self.errors, self.model, self.slow, self.random = errors, model, slow, random
+        self.rule = errors.mission.allocation.combine
+        self.motion = [error for error in errors.stated if error.is_motion]
 
-    def phases(self, members: Sequence[ErrorSource]) -> Phases:
-        """Quadratic phase of each, signed. [rad]"""
-        return [(source.id, self.found[source.id].qpe) for source in members]
-
-    def owed(self, allocation: Allocation, owner: str) -> Phases:
-        """Quadratic phases that count against the share of an owner, those that displace nothing too. [rad]"""
-        own = [one for one in self.own if owner == "mission" or allocation.qpe.includes(one.owner, owner)]
-        return [*self.phases(self.members(allocation, owner)), *((one.row_id, one.qpe_rad) for one in own)]
-
-    def all_cubics(self) -> Phases:
-        """Cubic phases of motion, the clock, slow vibrations and sensors. [rad]"""
-        return [*self.cubics(), *((one.row_id, one.cubic_rad) for one in self.own)]
-
-    def cubic_without_coverage(self, split: Split, owner: str) -> float:
-        """Cubic phase of what counts against an owner's share, at the declared sigmas; all, for the mission. [rad]
-
-        Added with `combine: sum`, else by root-sum-square: powers add.
-        """
-        return combined_phase(self.cubics_without_coverage(split, owner), self.rule_of_all, self.groups)
-
-    def cubics_without_coverage(self, split: Split, owner: str) -> Phases:
-        """Cubic phase of each error that counts against an owner's share, at the declared sigma, signed. [rad]"""
-        factor = self.allocation_rules.coverage_factor
-        found = [
-            (source.id, self.found[source.id].cubic / (factor if source.is_covered else 1.0))
-            for source in self.motion
-            if owner == "mission" or split.includes(source.owner, owner)
-        ]
-        found += [
-            (one.row_id, one.cubic_rad / one.coverage)
-            for one in self.own
-            if owner == "mission" or split.includes(one.owner, owner)
-        ]
-        return found
+    @cached_property
+    def groups(self) -> tuple[Correlated, ...]:
+        """Covariances of the mission."""
+        return correlated_errors(self.errors.mission)
 
     @property
     def rule_of_all(self) -> str:
         """Rule by which all declared errors add up: the mission's, and root-sum-square where each stands alone."""
-        return "rss" if self.allocation_rules.combine == "each" else self.allocation_rules.combine
+        return "rss" if self.rule == "each" else self.rule
 
-    def cubics(self) -> Phases:
-        """Cubic phase of each error that moves something, signed. [rad]"""
-        return [(source.id, self.found[source.id].cubic) for source in self.motion]
+    @cached_property
+    def own(self) -> list[DeclaredPhase]:
+        """Phases of what has no displacement of its own: slow vibrations, declared errors of sensors and clocks."""
+        array, factor = self.errors.array, self.errors.mission.allocation.coverage_factor
+        found = [one._replace(qpe_rad=array(one.qpe_rad), cubic_rad=array(one.cubic_rad)) for one in self.slow]
+        for error in self.random:
+            if error.declared is not None:
+                quadratic, cubic = (array(part * error.declared) for part in error.effect(self.model)[:2])
+                found.append(DeclaredPhase(error.subject.id, error.subject.owner, quadratic, cubic, factor))
+        return found
 
-    def moves(self, rule: str) -> Moves | None:
-        """Displacement of each, to be combined by a rule; None where one has none. [m]
+    @cached_property
+    def phases(self) -> list[DeclaredPhase]:
+        """Phases of every declared error: of motion and the clock, of what is a phase alone, and `own`."""
+        found, factor = [], self.errors.mission.allocation.coverage_factor
+        for error in self.errors.stated:
+            does, coverage = self.errors.does(self.model, error), factor if error.is_covered else 1.0
+            cubic = does.cubic if error.is_motion else None
+            found.append(DeclaredPhase(error.subject.id, error.subject.owner, does.qpe, cubic, coverage))
+        return [*found, *self.own]
+
+    def owed(self, split: "Split", owner: str) -> list[DeclaredPhase]:
+        """Those that count against the share of an owner; against the mission's all."""
+        return [one for one in self.phases if split.includes(one.owner, owner)]
+
+    def combined(self, phases: Phases, rule: str = "") -> Floats:
+        """Combine phases by the mission's rule, or another. [rad]"""
+        return self.errors.array(combined_phase(phases, rule or self.rule, self.groups))
+
+    def cubics_without_coverage(self, split: "Split", owner: str) -> Phases:
+        """Cubic phase of each error that counts against an owner's share, at the declared sigma, signed. [rad]"""
+        members = self.owed(split, owner)
+        return [(one.row_id, one.cubic_rad / one.coverage) for one in members if one.cubic_rad is not None]
+
+    def cubic_without_coverage(self, split: "Split", owner: str) -> Floats:
+        """The same added up: with `combine: sum`, else by root-sum-square, since powers add. [rad]"""
+        return self.combined(self.cubics_without_coverage(split, owner), self.rule_of_all)
+
+    def moves(self, rule: str) -> Moves:
+        """Displacement of each error of motion, to be combined by a rule. [m]
 
         By the sign that moves farther. For a sum over all signs half of what lies between the two signs, and once the
         rest, which all signs have in common.
         """
-        moves: Moves = []
-        rest = (0.0, 0.0)
-        for source in self.motion:
-            found = self.found[source.id]
-            if found.displacement is None or found.opposite is None or found.farthest is None:
-                return None
-            (x, y), (u, v) = found.displacement, found.opposite
-            moves.append((source.id, found.farthest if rule != "sum" else ((x - u) / 2, (y - v) / 2)))
-            rest = (rest[0] + (x + u) / 2, rest[1] + (y + v) / 2)
-        if rule == "sum" and any(rest):
-            moves.append(("whatever the signs", rest))
-        return moves or None
+        does = {error.subject.id: self.errors.does(self.model, error) for error in self.motion}
+        if rule != "sum":
+            return [(row_id, one.farthest) for row_id, one in does.items()]
+        ahead, back = (
+            np.array([getattr(one, side) for one in does.values()]).reshape(-1, 2, self.errors.cases)
+            for side in ("displacement", "opposite")
+        )
+        rest = ((ahead + back) / 2).sum(axis=0)
+        moves = [(row_id, (east, north)) for row_id, (east, north) in zip(does, (ahead - back) / 2, strict=True)]
+        return [*moves, ("whatever the signs", (rest[0], rest[1]))] if rest.any() else moves
+
+    def moved(self, rule: str) -> Floats:
+        """Displacements combined by a rule; not a number where an error has no image to place. [m]"""
+        return self.errors.array(combined_displacement(self.moves(rule), rule, self.groups))
+
+    # ---------------------------------------------------------------- of a check, which is one case
+    def phase_parts(self, phases: Phases, rule: str = "") -> list[tuple[str, float]]:
+        """What combines of phases by the mission's rule, or another, signed. [rad]"""
+        parts = phase_parts(phases, rule or self.rule, self.groups)
+        return [(row_id, float(phase[0])) for row_id, phase in parts]
+
+    def displacement_parts(self) -> list[tuple[str, GroundVector]]:
+        """What combines of displacements by the mission's rule, east and north. [m]"""
+        parts = displacement_parts(self.moves(self.rule), self.rule, self.groups)
+        return [(row_id, (float(east[0]), float(north[0]))) for row_id, (east, north) in parts]
+
+
+def quadratics(members: Iterable[DeclaredPhase]) -> Phases:
+    """Quadratic phase of each, signed. [rad]"""
+    return [(one.row_id, one.qpe_rad) for one in members]
+
+
+def cubics(members: Iterable[DeclaredPhase]) -> Phases:
+    """Cubic phase of each that has one, signed. [rad]"""
+    return [(one.row_id, one.cubic_rad) for one in members if one.cubic_rad is not None]

@@ -16,18 +16,16 @@ from numpy.typing import NDArray
 from bisar_budget.analysis.allocation import allocate
 from bisar_budget.analysis.scene import SceneEdges, scene_edges
 from bisar_budget.analysis.spread import tones
-from bisar_budget.arrays.aggregates import Aggregates, ManyTogether
-from bisar_budget.arrays.shares import shares_of
+from bisar_budget.analysis.together import Together
+from bisar_budget.budget.aggregates import Aggregates, effect_parts, effect_totals, misplacing
 from bisar_budget.budget.error_rows import ErrorRows
 from bisar_budget.budget.input_doubt import declared_position_error, is_in_doubt, least_doubt
-from bisar_budget.budget.judged_rows import BOUND, CODE, Judged, Judging
+from bisar_budget.budget.judged_rows import CODE, Judged, Judging
 from bisar_budget.budget.orbit import FASTEST_FLIGHT
 from bisar_budget.budget.random_rows import RandomRows
 from bisar_budget.budget.required import DECLARATIONS, Missing, is_asked_for, missing_declarations
 from bisar_budget.budget.requirement_states import (
     KEYS,
-    TAKEN_BY,
-    EffectTotal,
     RequirementState,
     SeenRow,
     requirement_states,
@@ -37,13 +35,12 @@ from bisar_budget.budget.requirement_states import (
 from bisar_budget.budget.scene_row import judged_edge
 from bisar_budget.budget.vibration_rows import Vibrations, judged_pslr, judged_spurs
 from bisar_budget.budget.waivers import is_waived
-from bisar_budget.effects.combined import combined_phase
 from bisar_budget.effects.declared import DeclaredErrors
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.models import LOCATION
-from bisar_budget.effects.random_errors import displaces_unknown, random_errors
+from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.effects.subject import Subject, subject
-from bisar_budget.effects.vibration import OwnPhase, slow_phases
+from bisar_budget.effects.vibration import slow_phases
 from bisar_budget.findings.row import DECLARE
 from bisar_budget.findings.status import STATUS
 from bisar_budget.geometry import BistaticGeometry, norm
@@ -103,47 +100,29 @@ class _Check:
         self.errors, self.mission, self.cases, self.today = errors, errors.mission, errors.cases, today
         self.array, self.does, self.combine = errors.array, errors.does, errors.mission.allocation.combine
         self.judging = Judging(errors.cases, errors.mission.allocation.warn_above)
-        self.slow = [
-            one._replace(
-                qpe_rad=self.array(one.qpe_rad),
-                cubic_rad=self.array(one.cubic_rad),
-                moves=self.array(one.moves),
-                is_there=self.array(one.is_there) > 0,
-            )
-            for one in slow_phases(self.mission, errors.geometries)
-        ]
         self.random = random_errors(errors.mission, errors.geometries, errors.cases)
         self.tones = tones(self.mission, errors.geometries)
         self.stated_random = [error for error in self.random if error.declared is not None]
-
-    def _own(self, model: str) -> list[OwnPhase]:
-        """Phases of what has no displacement of its own: slow vibrations, declared errors of sensors and clocks."""
-        found, factor = list(self.slow), self.mission.allocation.coverage_factor
-        for error in self.stated_random:
-            quadratic, cubic = (self.array(part * error.declared) for part in error.effect(model)[:2])
-            found.append(OwnPhase(error.subject.id, error.subject.owner, quadratic, cubic, factor))
-        return found
 
     def checked(self) -> Checked:
         """Judge every row by the model that gates."""
         gating = self.mission.gating_model
         gates = [model for model in MODELS if gating in (model, "strictest")]
-        own = {model: self._own(model) for model in MODELS}
-        self.split = shares_of(self.errors, gates, [own[model] for model in gates])
+        slow = slow_phases(self.mission, self.errors.geometries)
+        self.together = {model: Together(self.errors, model, slow, self.random) for model in MODELS}
         total = self.array(self.mission.requirements.quadratic_phase_error)
-        self.allocation = allocate(self.mission, (), {})._replace(qpe=self.split)
+        self.allocation = allocate(self.mission, (self.together[model] for model in gates))
+        self.split = self.allocation.qpe
         self.gain = self.array(self.allocation.autofocus_gain)
         self.swaying = Vibrations(self.judging, self.mission, self.errors.geometries, self.allocation)
         self.total = total
         owners = (*PLATFORMS, "clock", "mission")
         self.limits = {owner: self.array(self.split.of(owner) * total) * self.gain for owner in owners}
-        together = {model: ManyTogether(self.errors, model, own[model], self.split) for model in MODELS}
         self.error_rows = ErrorRows(self.judging, self.errors, self.limits, self.gain, is_whole=False)
-        self.aggregates = Aggregates(self.judging, self.errors, together, self.limits, self.gain)
+        self.aggregates = Aggregates(self.judging, self.together, self.allocation)
         self.random_rows = RandomRows(
             self.judging, self.mission, self.allocation, self.random, self.errors.geometries
         )
-        self.together = together
         by_model = [self._rows(model) for model in gates]
         rows = _stricter(*by_model) if len(by_model) > 1 else by_model[0]
         rows = with_required([*self._undeclared(rows), *rows], self.mission, self.errors.geometries, self.cases)
@@ -162,8 +141,12 @@ class _Check:
     ) -> tuple[list[Judged], list[RequirementState]]:
         """Rows with what they could not be judged by, after waivers, and how each requirement stands."""
         mission = self.mission
-        untaken = untaken_effects(mission, self._effect_totals(gates))
-        is_misplaced = np.any([self._is_misplaced(rows), *self._in_doubt.values()], axis=0)
+        by_model = [(self.together[model], self.random_rows.noise(model)) for model in gates]
+        effects = [(together, effect_parts(together, spreads, self.tones)) for together, spreads in by_model]
+        untaken = untaken_effects(mission, effect_totals(effects))
+        (place,) = (row.declared for row in rows if row.subject.id == f"mission.{LOCATION}")
+        is_displaced = misplacing(self.together["full"], place).where(self.cases)
+        is_misplaced = np.any([is_displaced, *self._in_doubt.values()], axis=0)
         noise = [one.variance for model in gates for one in self.random_rows.noise(model)]
         makes_noise = [~np.isnan(one) for one in noise]
         if mission.requirements.pslr is None:
@@ -202,46 +185,12 @@ class _Check:
         )
         return found, states
 
-    def _effect_totals(self, gates: Sequence[str]) -> list[EffectTotal]:
-        """Add up cubic phases, what spreads and tones; as `effect_totals`."""
-        found: dict[str, dict[str, Any]] = {kind: {} for kind in TAKEN_BY}
-        totals: dict[str, Any] = {kind: self.array(0.0) for kind in TAKEN_BY}
-        for model in gates:
-            together = self.together[model]
-            parts: dict[str, Sequence[tuple[str, Any]]] = {
-                "cubic": together.all_cubics().phases,
-                "spread": [
-                    (one.row_id, np.sqrt(np.nan_to_num(one.variance))) for one in self.random_rows.noise(model)
-                ],
-                "tone": [(one.subject.id, self.array(one.is_there * one.phase)) for one in self.tones],
-            }
-            for kind, of_kind in parts.items():
-                groups = together.groups if kind == "cubic" else ()
-                total = self.array(combined_phase(of_kind, together.rule_of_all, groups))
-                totals[kind] = np.fmax(totals[kind], total)
-                for row_id, size in of_kind:
-                    found[kind][row_id] = np.fmax(found[kind].get(row_id, 0.0), np.abs(self.array(size)))
-        return [EffectTotal(kind, totals[kind], list(of_kind.items())) for kind, of_kind in found.items()]
-
-    def _is_misplaced(self, rows: Sequence[Judged]) -> NDArray[np.bool_]:
-        """Whether errors that vary at random, or slowly, displace the image; as `requirement_table` has it."""
-        found = np.zeros(self.cases, dtype=bool)
-        needed = self.mission.requirements.location_error
-        if needed is not None and self.slow:
-            (place,) = (np.nan_to_num(row.declared) for row in rows if row.subject.id == f"mission.{LOCATION}")
-            moves = [place, *(one.moves for one in self.slow)]
-            most = combined_phase([("", size) for size in moves], self.combine, ())
-            found = (most > self.array(needed) * BOUND) & np.any([one.moves > 0 for one in self.slow], axis=0)
-        for error in self.stated_random:
-            found |= displaces_unknown(self.mission, error)
-        return found
-
     def _rows(self, gating: str) -> list[Judged]:
         other = "published" if gating == "full" else "full"
         rows = [one.judged for one in self.error_rows.rows(gating, other)]
         rows += self._vibrations(gating)
         rows += self._instruments(gating)
-        rows += self.aggregates.rows(gating, other)
+        rows += [one.judged for one in self.aggregates.rows(gating)]
         if self.mission.scene.radius is not None:
             rows.append(judged_edge(self.judging, self._edges, self.total, gating))
         return rows

@@ -1,248 +1,366 @@
-"""What the declared errors add up to: phases of platforms and mission, cubic phase, location, autofocus pull-in."""
+"""What the declared errors add up to: phases of platforms and mission, cubic phase, location, autofocus pull-in.
+
+Rows are judged in arrays over cases, of a sweep or of a check, which is one case; a check then puts them into words.
+"""
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
-from bisar_budget.analysis.analysis import Analysis, Model
-from bisar_budget.analysis.together import Together
-from bisar_budget.budget.judgement import judged
+from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.spread import SpreadPhase, Tone
+from bisar_budget.analysis.together import Together, cubics, quadratics
+from bisar_budget.budget.judged_rows import BOUND, CODE, Floats, Judged, Judging
+from bisar_budget.budget.judgement import number, worded
 from bisar_budget.budget.pull_in import caps, needed_sentence
-from bisar_budget.constants import UTILIZATION_TOLERANCE
-from bisar_budget.effects.correlation import (
-    combined_displacement,
-    combined_phase,
+from bisar_budget.budget.requirement_states import TAKEN_BY, EffectTotal
+from bisar_budget.effects.combined import (
+    Phases,
+    combined,
     correlation_notes,
-    displacement_parts,
-    phase_parts,
 )
 from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
-from bisar_budget.effects.subject import subject
+from bisar_budget.effects.random_errors import displaces_unknown
+from bisar_budget.effects.subject import Subject, subject
+from bisar_budget.effects.vibration import DeclaredPhase
+from bisar_budget.faults import KeyPath
 from bisar_budget.findings.row import Row
-from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import NOTHING, Note
 
+PULL_IN = "autofocus_pull_in"
+_OTHER = {"published": "full", "full": "published"}
 
-def aggregate_rows(analysis: Analysis, model: Model, other: Model, allocation: Allocation) -> Iterator[Row]:
-    """Rows of the declared errors together, under the mission's rule of combination.
+Truths = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Aggregate:
+    """One row of errors together in many cases; `is_there` are the cases that have it.
+
+    `rule` combines the `phases`; those of displacements are none. `by_other` is the sum by the model that does not
+    gate, `of_all` the root-sum-square where the row is the largest part; where either breaks the limit, a pass is a
+    warning.
+    """
+
+    judged: Judged
+    rule: str
+    phases: Phases
+    by_other: Any
+    of_all: Any = math.nan
+    is_over_by_other: Any = False
+    is_over_of_all: Any = False
+    without_autofocus: Any = 0.0
+    is_there: Any = True
+
+
+class Aggregates:
+    """Errors together in many cases; numbers of the mission and its allocation may be arrays (cases,).
 
     Parameters
     ----------
-    analysis : Analysis
-        Of the mission.
-    model, other : Model
-        The one that gates, and the one that may doubt a pass.
+    judging : Judging
+        Of the cases.
+    together : mapping of str to Together
+        Declared errors by each model.
     allocation : Allocation
-        Shares of the quadratic phase.
+        Shares of the quadratic phase, and the gain of autofocus.
     """
-    mine, theirs = Together(analysis, model), Together(analysis, other)
-    if analysis.mission.allocation.combine != "each":
-        yield from _qpe_rows(analysis, mine, theirs, allocation)
-    else:
-        yield from _qpe_of_all(analysis, mine, allocation)
-    yield _cubic_row(analysis, mine, theirs)
-    yield _location_row(analysis, mine, theirs)
-    if allocation.n_pull is not None:
-        yield _pull_in_row(analysis, mine, theirs, math.pi * allocation.n_pull)
 
+    def __init__(self, judging: Judging, together: Mapping[str, Together], allocation: Allocation) -> None:
+        self.judging, self.together, self.allocation, self.array = judging, together, allocation, judging.array
+        self.errors = together["full"].errors
+        self.needs, self.combine = self.errors.mission.requirements, self.errors.mission.allocation.combine
 
-def _qpe_rows(analysis: Analysis, mine: Together, theirs: Together, allocation: Allocation) -> Iterator[Row]:
-    mission, groups = analysis.mission, analysis.groups
-    combine, gain = mission.allocation.combine, allocation.autofocus_gain
-    owners = ["transmitter", "receiver", "mission"]
-    if allocation.qpe.clock is not None:
-        owners.insert(2, "clock")  # else it counts with the receiver
-    for owner in owners:
-        phases, others = mine.owed(allocation, owner), theirs.owed(allocation, owner)
-        qpe, by_other = (combined_phase(of, combine, groups) if of else None for of in (phases, others))
-        published, full = (qpe, by_other) if mine.model.name == "published" else (by_other, qpe)
-        limit = allocation.qpe_limit(owner) * gain
-        over = NOTHING
-        if qpe is not None:
-            over = _exceeded(
-                "QPE", qpe, limit, "rad", partial(phase_parts, phases, combine, groups), mine.extrapolated
-            )
-            if over and math.isfinite(qpe):
-                over = over.then(needed_sentence(allocation.n_pull_needed(qpe, owner), caps(mission)))
-        yield _judged(
-            mission,
-            subject=subject(owner, QUADRATIC),
-            metric=QUADRATIC,
-            unit="rad",
-            declared=qpe,
-            allowable=limit,
-            path={"mission": ("platforms",), "clock": ("timing_error",)}.get(
-                owner, ("platforms", owner, "motion_error")
-            ),
-            equation="sum of the rows" if combine == "sum" else "root-sum-square of the rows",
-            gain=gain,
-            over=over,
-            doubt=_doubt(theirs.model, by_other, limit, "rad"),
-            limits=(limit, limit),
-            qpe=published,
-            qpe_full=full if full is None or math.isfinite(full) else None,
-            notes=correlation_notes(combine, [g for g in groups if owner in (g.platform, "mission")]),
+    def rows(self, model: str) -> Iterator[Aggregate]:
+        """Every row by one model, which the other may doubt, in the order of the contract."""
+        mine, theirs = self.together[model], self.together[_OTHER[model]]
+        if self.combine == "each":
+            yield self._largest_quadratic(mine, theirs)
+        else:
+            owners = ("transmitter", "receiver", "clock", "mission")
+            has_clock = self.allocation.qpe.clock is not None  # else it counts with the receiver
+            yield from (self._quadratic(mine, theirs, one) for one in owners if one != "clock" or has_clock)
+        yield self._cubic(mine, theirs)
+        yield self._location(mine, theirs)
+        if self.allocation.n_pull is not None:
+            yield self._pull_in(mine, theirs)
+
+    def _quadratic(self, mine: Together, theirs: Together, owner: str) -> Aggregate:
+        split, limit, gain = self.allocation.qpe, self.allocation.qpe_limit(owner), self.allocation.autofocus_gain
+        members = mine.owed(split, owner)
+        size, by_other = mine.combined(quadratics(members)), theirs.combined(quadratics(theirs.owed(split, owner)))
+        return self._row(
+            subject(owner, QUADRATIC),
+            self._is_declared(members),
+            quadratics(members),
+            size,
+            limit * gain,
+            theirs,
+            by_other,
+            without_autofocus=size / limit,
+            qpe_published_rad=size if mine.model == "published" else by_other,
         )
 
+    def _largest_quadratic(self, mine: Together, theirs: Together) -> Aggregate:
+        """A warning where each error stands alone and all together exceed the total; else there is no row."""
+        what, phases = subject("mission", QUADRATIC), quadratics(mine.phases)
+        size, of_all = mine.combined(phases), mine.combined(phases, "rss")
+        limit = self.allocation.qpe_total * self.allocation.autofocus_gain
+        found = self._row(what, True, phases, size, limit, theirs, of_all=of_all)
+        is_there = found.is_over_of_all & (found.judged.status == CODE["warn"])  # else its own row says what fails
+        nothing = self.judging.row(what, None, None)
+        return replace(found, judged=found.judged.where(~is_there, nothing), is_there=is_there)
 
-def _qpe_of_all(analysis: Analysis, mine: Together, allocation: Allocation) -> Iterator[Row]:
-    """Where each error stands alone: a warning if all together, by root-sum-square, exceed the total."""
-    mission, phases = analysis.mission, mine.owed(allocation, "mission")
-    limit = allocation.qpe_total * allocation.autofocus_gain
-    warning = _of_all("QPE", combined_phase(phases, "rss", analysis.groups), limit, "rad")
-    if not warning:
-        return
-    largest = combined_phase(phases, "each", analysis.groups)
-    if largest > limit * (1 + UTILIZATION_TOLERANCE):
-        return  # its own row says so
-    yield _judged(
-        mission,
-        subject=subject("mission", QUADRATIC),
-        metric=QUADRATIC,
-        unit="rad",
-        declared=largest,
-        allowable=limit,
-        path=("platforms",),
-        equation="largest of the rows",
-        gain=allocation.autofocus_gain,
-        doubt=warning,
-        limits=(limit, limit),
-    )
-
-
-def _cubic_row(analysis: Analysis, mine: Together, theirs: Together) -> Row:
-    mission, groups = analysis.mission, analysis.groups
-    combine, limit = mission.allocation.combine, mission.requirements.cubic_phase_error
-    phases = mine.all_cubics()
-    cubic, by_other = (combined_phase(of, combine, groups) if of else None for of in (phases, theirs.all_cubics()))
-    over = _exceeded(
-        "cubic phase", cubic, limit, "rad", lambda: phase_parts(phases, combine, groups), mine.extrapolated
-    )
-    doubt = _doubt(theirs.model, by_other, limit, "rad")
-    if combine == "each":
-        doubt = _of_all("cubic phase", combined_phase(phases, "rss", groups), limit, "rad") or doubt
-    row = _judged(
-        mission,
-        subject=subject("mission", CUBIC),
-        metric=CUBIC,
-        unit="rad",
-        declared=cubic,
-        allowable=limit,
-        path=("requirements", "cubic_phase_error"),
-        equation="Table I, cubic column" if mine.model.name == "published" else "full model",
-        no_limit=phrases.no_requirement(),
-        info=NOTHING if limit is not None else phrases.no_requirement(),
-        over=over.then(phrases.no_gain()),
-        doubt=doubt,
-        notes=correlation_notes(combine, groups) if combine != "each" else (),
-    )
-    return row._replace(cubic_rad=row.declared)
-
-
-def _location_row(analysis: Analysis, mine: Together, theirs: Together) -> Row:
-    mission, groups = analysis.mission, analysis.groups
-    combine, limit = mission.allocation.combine, mission.requirements.location_error
-    moves, others = mine.moves(combine), theirs.moves(combine)
-    moved, by_other = (None if of is None else combined_displacement(of, combine, groups) for of in (moves, others))
-    doubt = _doubt(theirs.model, by_other, limit, "m")
-    if combine == "each" and moves is not None:
-        doubt = _of_all("displacement", combined_displacement(moves, "rss", groups), limit, "m") or doubt
-    is_published = mine.model.name == "published"
-    return judged(
-        mission,
-        subject=subject("mission", LOCATION),
-        metric=LOCATION,
-        unit="m",
-        declared=moved,
-        allowable=limit,
-        path=("requirements", "location_error"),
-        equation="(25)" if is_published else "full model",
-        no_limit=phrases.no_requirement(),
-        not_evaluated=NOTHING
-        if moved is not None or not mine.motion
-        else mine.model.plane.degeneracy or phrases.no_image_to_place(),
-        is_declared=bool(mine.motion),
-        info=NOTHING if limit is not None else phrases.no_requirement(),
-        over=_exceeded(
-            "displacement of the image",
-            moved,
+    def _cubic(self, mine: Together, theirs: Together) -> Aggregate:
+        phases, limit = cubics(mine.phases), self.needs.cubic_phase_error
+        size = mine.combined(phases)
+        return self._row(
+            subject("mission", CUBIC),
+            self._is_declared(one for one in mine.phases if one.cubic_rad is not None),
+            phases,
+            size,
             limit,
-            "m",
-            lambda: [
-                (row_id, math.hypot(*move)) for row_id, move in displacement_parts(moves or [], combine, groups)
-            ],
-        ),
-        doubt=doubt,
-        notes=correlation_notes(combine, groups) if combine != "each" else (),
-    )
+            theirs,
+            theirs.combined(cubics(theirs.phases)),
+            mine.combined(phases, "rss") if self.combine == "each" else math.nan,
+            metric=CUBIC,
+            cubic_rad=size,
+        )
+
+    def _location(self, mine: Together, theirs: Together) -> Aggregate:
+        limit = self.needs.location_error
+        return self._row(
+            subject("mission", LOCATION),
+            bool(mine.motion),
+            (),
+            mine.moved(self.combine),
+            limit,
+            theirs,
+            theirs.moved(self.combine),
+            mine.moved("rss") if self.combine == "each" else math.nan,
+            without_value="info" if limit is None else "not_evaluated",
+            metric=LOCATION,
+        )
+
+    def _pull_in(self, mine: Together, theirs: Together) -> Aggregate:
+        phases, pull_in = quadratics(mine.phases), math.pi * np.asarray(self.allocation.n_pull)
+        return self._row(
+            subject("mission", PULL_IN),
+            self._is_declared(mine.phases),
+            phases,
+            mine.combined(phases, "sum"),
+            pull_in,
+            theirs,
+            theirs.combined(quadratics(theirs.phases), "sum"),
+            never_fails=True,
+        )
+
+    def _is_declared(self, members: Iterable[DeclaredPhase]) -> Truths:
+        """Cases in which any of these is declared."""
+        found = np.zeros(self.judging.cases, dtype=bool)
+        for one in members:
+            found |= one.is_there
+        return found
+
+    def _row(
+        self,
+        what: Subject,
+        is_declared: Any,
+        phases: Phases,
+        size: Floats,
+        limit: Any,
+        theirs: Together,
+        by_other: Any = math.nan,
+        of_all: Any = math.nan,
+        *,
+        without_value: str = "",
+        without_autofocus: Any = 0.0,
+        never_fails: bool = False,
+        **fields: Any,
+    ) -> Aggregate:
+        """Judge what errors add up to; a sum without a finite value fails: one of them has no image at all.
+
+        `without_value` is its status there, where it is another one.
+        """
+        is_over_by_other: Any = False
+        is_over_of_all: Any = False
+        if limit is not None:
+            limit = self.array(limit)
+            is_over_by_other = self.errors.doubts(theirs.model, by_other > limit * BOUND)
+            is_over_of_all = of_all > limit * BOUND
+        judged = self.judging.row(
+            what,
+            size,
+            limit,
+            doubt=is_over_by_other | is_over_of_all,
+            without_autofocus=without_autofocus,
+            is_info=limit is None,
+            never_fails=never_fails,
+        )._replace(**fields)
+        has_value = is_declared & np.isfinite(size)
+        if not has_value.all():
+            nothing = self.judging.row(what, None, limit, never_fails=never_fails)
+            status = CODE[without_value or ("fail" if limit is not None else "not_declared")]
+            nothing = nothing._replace(status=np.where(is_declared, status, nothing.status))
+            judged = judged.where(~has_value, nothing)
+        rule = "sum" if never_fails else self.combine
+        return Aggregate(judged, rule, phases, by_other, of_all, is_over_by_other, is_over_of_all, without_autofocus)
 
 
-def _pull_in_row(analysis: Analysis, mine: Together, theirs: Together, pull_in: float) -> Row:
-    phases, others = (one.owed(analysis.allocation, "mission") for one in (mine, theirs))
-    total, by_other = (math.fsum(abs(phase) for _, phase in of) if of else None for of in (phases, others))
-    return _judged(
-        analysis.mission,
-        subject=subject("mission", "autofocus_pull_in"),
-        metric=QUADRATIC,
-        unit="rad",
-        declared=total,
-        allowable=pull_in,
-        path=("autofocus", "n_pull"),
-        equation="Section VI",
-        never_fails=True,
-        over=_exceeded("QPE", total, pull_in, "rad", lambda: phases).then(phrases.one_total()),
-        doubt=_doubt(theirs.model, by_other, pull_in, "rad", phrases.other_model_is_beyond),
-    )
+# ---------------------------------------------------------------------- totals of effects
+def effect_parts(together: Together, spreads: Sequence[SpreadPhase], tones: Sequence[Tone]) -> dict[str, Phases]:
+    """Cubic phase, rms phase that spreads and peak phase of tones of each declared error by a model. [rad]"""
+    array = together.errors.array
+    return {
+        "cubic": cubics(together.phases),
+        "spread": [(one.row_id, np.sqrt(np.nan_to_num(array(one.variance)))) for one in spreads],
+        "tone": [(one.subject.id, array(one.is_there * one.phase)) for one in tones],
+    }
 
 
-def _judged(mission: Mission, *, declared: float | None, **of_row: Any) -> Row:
-    """Judge an aggregate; one without a finite value fails, since one of its errors has no image at all."""
-    if declared is None or math.isfinite(declared):
-        return judged(mission, declared=declared, **of_row)
-    known = {key: value for key, value in of_row.items() if key not in ("qpe", "qpe_full")}
-    row = judged(mission, declared=None, **known)
-    if of_row.get("info"):
-        return row
-    return row._replace(status="fail", reason=phrases.no_ground_point())
+def effect_totals(gates: Sequence[tuple[Together, Mapping[str, Phases]]]) -> list[EffectTotal]:
+    """Add up each effect of all declared errors, of the models that gate; by several the larger of each."""
+    found: dict[str, dict[str, Floats]] = {kind: {} for kind in TAKEN_BY}
+    totals: dict[str, Floats] = {}
+    for together, parts in gates:
+        for kind, of_kind in parts.items():
+            total = together.combined(of_kind, together.rule_of_all)
+            totals[kind] = np.fmax(totals.get(kind, 0.0), total)
+            for row_id, size in of_kind:
+                found[kind][row_id] = np.fmax(found[kind].get(row_id, 0.0), np.abs(size))
+    return [EffectTotal(kind, totals[kind], list(of_kind.items())) for kind, of_kind in found.items()]
 
 
-def _doubt(
-    other: Model,
-    size: float | None,
-    limit: float | None,
-    unit: str,
-    phrase: Callable[[str, float, float, str], Note] = phrases.other_model_fails,
-) -> Note:
-    """Say that the model that does not gate fails an aggregate; else nothing."""
-    if size is None or limit is None or size <= limit * (1 + UTILIZATION_TOLERANCE) or other.is_blind:
-        return NOTHING
-    return phrase(other.name, size, limit, unit)
+# ---------------------------------------------------------------------- displacements that no row holds
+class Misplacing(NamedTuple):
+    """Rows of errors that displace the image by an amount that is not computed, each with the cases in which."""
+
+    at_random: list[tuple[str, Truths]]
+    slow: list[tuple[str, Truths]]
+
+    def where(self, cases: int) -> Truths:
+        """Cases in which any of them does."""
+        of_each = (one for _, one in (*self.at_random, *self.slow))
+        return np.asarray(np.any([np.zeros(cases, dtype=bool), *of_each], axis=0))
 
 
-def _of_all(what: str, size: float, limit: float | None, unit: str) -> Note:
-    """Say that all declared errors together exceed what each alone is held to; else nothing."""
-    if limit is None or size <= limit * (1 + UTILIZATION_TOLERANCE):
-        return NOTHING
-    return phrases.all_together_over(what, size, limit, unit)
+def misplacing(together: Together, place: Floats) -> Misplacing:
+    """Find the errors that vary at random, or slowly, and displace the image.
 
-
-def _exceeded(
-    what: str,
-    size: float | None,
-    limit: float | None,
-    unit: str,
-    members: Callable[[], Sequence[tuple[str, float]]],
-    extrapolated: Mapping[str, Note] | None = None,
-) -> Note:
-    """Say how large an aggregate is, what is allowed, and which of its members is the largest; nothing if inside.
-
-    `extrapolated` says of members what they rest on beside the file.
+    A slow vibration is no doubt where the location is met with the most that it could add to the `place`, the
+    displacement of the declared errors together, not a number where there is none. [m]
     """
-    if size is None or limit is None or size <= limit:
+    mission, array = together.errors.mission, together.errors.array
+    needed = mission.requirements.location_error
+    at_random = [(one.subject.id, array(displaces_unknown(mission, one)) > 0) for one in together.random]
+    slow: list[tuple[str, Truths]] = []
+    if needed is not None and together.slow:
+        moves = [array(one.moves) for one in together.slow]
+        is_over = combined([np.nan_to_num(place), *moves], together.rule) > array(needed) * BOUND
+        slow = [(one.row_id, is_over & (size > 0)) for one, size in zip(together.slow, moves, strict=True)]
+    return Misplacing(at_random, slow)
+
+
+# ---------------------------------------------------------------------- in words
+class _Words(NamedTuple):
+    """How a row says what adds up, in which unit, and where the file states what it is held to."""
+
+    what: str
+    unit: str
+    path: KeyPath
+    equation: tuple[str, str]  # by the published and by the full model
+
+
+_EQUATIONS = {"sum": "sum of the rows", "rss": "root-sum-square of the rows", "each": "largest of the rows"}
+_PATHS: dict[str, KeyPath] = {"mission": ("platforms",), "clock": ("timing_error",)}
+
+
+def aggregate_rows(analysis: Analysis, model: str) -> Iterator[Row]:
+    """Rows of one mission's errors together, under its rule of combination, by one of the two models."""
+    judging = Judging(1, analysis.mission.allocation.warn_above)
+    together = {name: analysis.together(name) for name in _OTHER}
+    with np.errstate(all="ignore"):
+        rows = list(Aggregates(judging, together, analysis.allocation).rows(model))
+    return (_in_words(analysis, model, one) for one in rows if np.all(one.is_there))
+
+
+def _in_words(analysis: Analysis, model: str, one: Aggregate) -> Row:
+    mission, allocation, what = analysis.mission, analysis.allocation, one.judged.subject
+    groups, combine, owner = analysis.groups, mission.allocation.combine, what.owner
+    size, limit = number(one.judged.declared), number(one.judged.allowable)
+    is_published = model == "published"
+    said, over, notes, others = _said_of(what, one.rule), NOTHING, tuple[Note, ...](), dict[str, Any]()
+    if combine != "each" and what.kind != PULL_IN:
+        notes = correlation_notes(combine, [group for group in groups if owner in (group.platform, "mission")])
+    if size is None:
+        over = phrases.no_ground_point()
+    elif limit is not None and size > limit * BOUND:
+        over = phrases.aggregate_over(said.what, size, limit, said.unit, *_largest(analysis, model, one))
+    if what.kind == QUADRATIC:
+        others["limits"] = (limit, limit)
+        if combine != "each" and size is not None:
+            full = one.by_other if is_published else one.judged.declared
+            others["qpe_published_rad"] = number(one.judged.qpe_published_rad)
+            others["qpe_full_rad"] = number(full) if np.isfinite(full).all() else None
+            if over:
+                over = over.then(needed_sentence(allocation.n_pull_needed(size, owner), caps(mission)))
+    elif over and size is not None and what.kind != LOCATION:
+        over = over.then(phrases.no_gain() if what.kind == CUBIC else phrases.one_total())
+    doubt = over if one.judged.never_fails else NOTHING
+    return worded(
+        mission,
+        one.judged,
+        unit=said.unit,
+        path=said.path,
+        equation=said.equation[not is_published],
+        over=over,
+        doubt=doubt or _doubt(_OTHER[model], one, said, limit),
+        no_limit=phrases.no_requirement(),
+        not_evaluated=analysis.errors.degeneracy(model) or phrases.no_image_to_place(),
+        info=phrases.no_requirement(),
+        without_autofocus=float(np.ravel(one.without_autofocus)[0]),
+        remarks=notes,
+        **{"limits": (limit, None)} | others,
+    )
+
+
+def _said_of(what: Subject, rule: str) -> _Words:
+    if what.kind == CUBIC:
+        return _Words("cubic phase", "rad", ("requirements", CUBIC), ("Table I, cubic column", "full model"))
+    if what.kind == LOCATION:
+        return _Words("displacement of the image", "m", ("requirements", LOCATION), ("(25)", "full model"))
+    if what.kind == PULL_IN:
+        return _Words("QPE", "rad", ("autofocus", "n_pull"), ("Section VI", "Section VI"))
+    path = _PATHS.get(what.owner, ("platforms", what.owner, "motion_error"))
+    return _Words("QPE", "rad", path, (_EQUATIONS[rule], _EQUATIONS[rule]))
+
+
+def _largest(analysis: Analysis, model: str, one: Aggregate) -> tuple[str, float, Note]:
+    """Which part is the largest, its size, and what it rests on beside the file."""
+    together, kind = analysis.together(model), one.judged.subject.kind
+    if kind == LOCATION:
+        parts = [(row_id, math.hypot(*move)) for row_id, move in together.displacement_parts()]
+    else:
+        parts = together.phase_parts(one.phases, one.rule)
+    row_id, largest = max(parts, key=lambda part: abs(part[1]))
+    extrapolated = {} if kind in (LOCATION, PULL_IN) else {error.id: error.extrapolated for error in analysis.random}
+    return row_id, largest, extrapolated.get(row_id, NOTHING)
+
+
+def _doubt(other: str, one: Aggregate, said: _Words, limit: float | None) -> Note:
+    """What makes a pass a warning: all errors together, or the model that does not gate."""
+    if limit is None:
         return NOTHING
-    row_id, largest = max(members(), key=lambda member: abs(member[1]))
-    beyond = (extrapolated or {}).get(row_id, NOTHING)
-    return phrases.aggregate_over(what, size, limit, unit, row_id, largest, beyond)
+    if np.any(one.is_over_of_all):
+        what = "displacement" if one.judged.subject.kind == LOCATION else said.what
+        return phrases.all_together_over(what, float(one.of_all[0]), limit, said.unit)
+    if not np.any(one.is_over_by_other):
+        return NOTHING
+    phrase = phrases.other_model_is_beyond if one.judged.subject.kind == PULL_IN else phrases.other_model_fails
+    return phrase(other, float(one.by_other[0]), limit, said.unit)

@@ -21,7 +21,7 @@ from bisar_budget.budget.requirement_table import judged_requirements
 from bisar_budget.budget.scene_row import CheckedScene
 from bisar_budget.budget.vibration_rows import pslr_row, spur_rows, vibration_rows
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.effects.correlation import unused_correlations
+from bisar_budget.effects.combined import unused_correlations
 from bisar_budget.effects.effect import PLATFORMS, override_notes
 from bisar_budget.effects.oscillators import POOR_FIT
 from bisar_budget.faults import changes_words
@@ -118,13 +118,12 @@ def check_mission(
 def _checked(analysis: Analysis, gating: str, scene: CheckedScene | None) -> list[Row]:
     """Rows of one complete check by one model, before waivers."""
     mission = analysis.mission
-    model, other = analysis.models(gating)
     allocation = analysis.allocation
     rows = [
         *error_rows(analysis, gating, allocation),
         *vibration_rows(mission, allocation, gating),
         *_instrument_rows(analysis, gating, allocation),
-        *aggregate_rows(analysis, model, other, allocation),
+        *aggregate_rows(analysis, gating),
     ]
     if scene is not None:
         rows.append(scene.row(gating))

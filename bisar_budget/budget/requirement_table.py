@@ -9,16 +9,16 @@ import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
-from bisar_budget.analysis.analysis import Analysis, Model
+from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.spread import islr_db, mainlobe_energy, noise, spread_limit, tones
-from bisar_budget.analysis.together import Phases, Together
+from bisar_budget.analysis.together import Together
 from bisar_budget.analysis.vibration_limits import level_of
+from bisar_budget.budget.aggregates import effect_parts, effect_totals, misplacing
 from bisar_budget.budget.input_doubt import InputDoubt
 from bisar_budget.budget.requirement_states import (
     KEYS,
     TAKEN_BY,
     UNITS,
-    EffectTotal,
     RequirementState,
     SeenRow,
     UntakenEffect,
@@ -28,11 +28,8 @@ from bisar_budget.budget.requirement_states import (
     untaken_effects,
 )
 from bisar_budget.budget.waivers import Waived, apply_waivers
-from bisar_budget.constants import UTILIZATION_TOLERANCE
-from bisar_budget.effects.combine import combine_phases
-from bisar_budget.effects.correlation import Correlated, combined_phase
+from bisar_budget.effects.combined import Phases
 from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
-from bisar_budget.effects.random_errors import displaces_unknown
 from bisar_budget.findings.mission import FileWarning
 from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import Row
@@ -72,13 +69,12 @@ def judged_requirements(
         Day on which waivers are judged, UTC.
     """
     mission = analysis.mission
-    gates = gating_models(analysis)
-    untaken = untaken_effects(mission, effect_totals(analysis, gates))
+    untaken = untaken_effects(mission, effect_totals(effects_by(analysis)))
     looked_at = [_looked_at(row, mission, untaken) for row in rows]
     unknown_place = _unknown_place(analysis, rows) or (doubts[0].note if doubts else NOTHING)
     if unknown_place and mission.requirements.location_error is not None:
         looked_at = [_misplaced(row, unknown_place) for row in looked_at]
-    has_noise = any(noise(mission, analysis.random, model.name) for model in gates) or (
+    has_noise = any(noise(mission, analysis.random, model) for model in analysis.gates) or (
         mission.requirements.pslr is None and bool(tones(mission))
     )
     if not has_noise:
@@ -109,43 +105,11 @@ def is_broken(row: Row) -> bool:
     return row.status in ("fail", "not_evaluated")
 
 
-def gating_models(analysis: Analysis) -> list[Model]:
-    """Models whose limits a mission is held to: one, or both where the stricter decides."""
-    gating = analysis.mission.gating_model
-    both: tuple[Model, ...] = (analysis.published, analysis.full)
-    return [model for model in both if gating in (model.name, "strictest")]
-
-
-def effect_totals(analysis: Analysis, models: Sequence[Model]) -> list[EffectTotal]:
-    """Add up cubic phases, what spreads and tones of all declared errors; by several models the larger of each."""
-    found: dict[str, dict[str, float]] = {kind: {} for kind in TAKEN_BY}
-    totals = dict.fromkeys(TAKEN_BY, 0.0)
-    for model in models:
-        together = Together(analysis, model)
-        for kind, of_kind in effect_parts(analysis, together).items():
-            total = combined_phase(of_kind, together.rule_of_all, groups_of(kind, together))
-            totals[kind] = max(totals[kind], total)
-            for row_id, size in of_kind:
-                found[kind][row_id] = max(found[kind].get(row_id, 0.0), abs(size))
-    return [
-        EffectTotal(kind, np.array([totals[kind]]), [(row_id, np.array([size])) for row_id, size in of_kind.items()])
-        for kind, of_kind in found.items()
-    ]
-
-
-def effect_parts(analysis: Analysis, together: Together) -> dict[str, Phases]:
-    """Cubic phase, rms phase that spreads and peak phase of tones of each declared error by a model. [rad]"""
-    noises = noise(analysis.mission, analysis.random, together.model.name)
-    return {
-        "cubic": together.all_cubics(),
-        "spread": [(one.row_id, math.sqrt(one.variance)) for one in noises],
-        "tone": [(one.subject.id, one.phase) for one in tones(analysis.mission)],
-    }
-
-
-def groups_of(kind: str, together: Together) -> Sequence[Correlated]:
-    """Covariances that an effect knows: those of the cubic phase."""
-    return together.groups if kind == "cubic" else ()
+def effects_by(analysis: Analysis) -> list[tuple[Together, dict[str, Phases]]]:
+    """The declared errors by each model that gates, and the parts of each effect."""
+    mission, of_tones = analysis.mission, tones(analysis.mission)
+    both = ((analysis.together(model), noise(mission, analysis.random, model)) for model in analysis.gates)
+    return [(together, effect_parts(together, spreads, of_tones)) for together, spreads in both]
 
 
 def _looked_at(row: Row, mission: Mission, untaken: Sequence[UntakenEffect]) -> Row:
@@ -172,22 +136,15 @@ def _of_a_cubic_alone(row: Row) -> Row:
 
 
 def _unknown_place(analysis: Analysis, rows: Sequence[Row]) -> Note:
-    """Say which errors displace the image by an amount that no row holds: what varies at random, or slowly.
-
-    A slow vibration is no doubt where the location is met with the most that it could add.
-    """
-    mission, slow = analysis.mission, [one for one in analysis.slow if one.moves]
-    needed = mission.requirements.location_error
-    if slow and needed is not None:
-        reached = [row.declared or 0.0 for row in rows if row.id == f"mission.{LOCATION}"]
-        most = combine_phases([*reached, *(one.moves for one in slow)], mission.allocation.combine)
-        slow = slow if most > needed * (1 + UTILIZATION_TOLERANCE) else []
-    at_random = [error.id for error in analysis.random if displaces_unknown(mission, error)]
+    """Say which errors displace the image by an amount that no row holds: what varies at random, or slowly."""
+    place = next((row.declared for row in rows if row.id == f"mission.{LOCATION}"), None)
+    found = misplacing(analysis.together("full"), np.array([math.nan if place is None else place]))
+    at_random, slow = ([row_id for row_id, is_there in of_kind if is_there[0]] for of_kind in found)
     if not slow and not at_random:
         return NOTHING
     causes = [*(["random errors"] if at_random else []), *(["slow vibration"] if slow else [])]
     cause = f"{' and '.join(causes)} {'move' if at_random else 'moves'}"
-    return phrases.place_is_not_known([*at_random, *(one.row_id for one in slow)], cause)
+    return phrases.place_is_not_known([*at_random, *slow], cause)
 
 
 def _misplaced(row: Row, unknown_place: Note) -> Row:

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bisar_budget import units
+from bisar_budget.analysis.allocation import is_balanced
 from bisar_budget.budget.check import check_mission
 from bisar_budget.design.quantities import FACTOR, Number, QuestionError, as_number, form_of, tree_of
 from bisar_budget.design.scaled import scaled
@@ -25,7 +26,7 @@ from bisar_budget.findings.requirement import Override
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.bounds import DIRECTION, ELEVATION, LATITUDE
-from bisar_budget.mission.model import MISSION, SHARES, MetricSplits, Mission
+from bisar_budget.mission.model import MISSION, SHARES, Mission
 from bisar_budget.mission.parts import taken_figures
 from bisar_budget.mission.readers import INVALID, Choice, ListOf, Quantity, Reader, Triple, Version, Whole
 from bisar_budget.workers import Progress, unseen
@@ -506,12 +507,6 @@ def _no_number(key: str, reader: Reader, value: Any) -> str:
 
 
 # ---------------------------------------------------------------- shares that follow what is declared
-def is_balanced(mission: Mission) -> bool:
-    """Whether the phase is divided as the declared errors need it."""
-    split = mission.allocation.split
-    return (split.quadratic_phase_error if isinstance(split, MetricSplits) else split) == "balanced"
-
-
 def relaxed_errors(mission: Mission, found: MissionFindings, today: date) -> Iterator[Relaxed]:
     """Double one declared error after the other, and see what that leaves to the others.
 

@@ -1,81 +1,171 @@
-"""Errors together in many cases: the arrays beside `effects.combine` and `effects.correlation`."""
+"""Several errors at once: worst case and root-sum-square, of phases and of displacements on the ground.
 
-from collections.abc import Mapping, Sequence
+Errors that a covariance ties together count as one under root-sum-square, √(gᵀCg). With gᵢ the effect of one unit of
+error i and φᵢ = gᵢσᵢ, gᵀCg is Σ ρᵢⱼφᵢφⱼ. It does not depend on the frame: the covariance stays in its own, and the
+effects are those along that frame's axes.
+
+Phases and displacements are arrays over cases, (cases,); of one case they may be numbers.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.effects.correlation import correlated_errors
+from bisar_budget import file_warnings, phrases
+from bisar_budget.effects.effect import PLATFORMS, ErrorSource
+from bisar_budget.effects.subject import subject
+from bisar_budget.faults import Place
+from bisar_budget.geometry import FRAME_AXES
 from bisar_budget.mission.model import Mission
+from bisar_budget.mission.platforms import MotionError
+from bisar_budget.phrases import Note
 from bisar_budget.ranges.exact_ranges import Floats
 
-Phases = Sequence[tuple[str, Floats]]  # by row id, signed [rad]
-Moves = Mapping[str, tuple[Floats, Floats]]  # by row id, east and north [m]
+Phases = Sequence[tuple[str, Any]]  # by row id, signed [rad]
+Moves = Sequence[tuple[str, tuple[Any, Any]]]  # by row id, east and north [m]
 
 
-class ManyCorrelated(NamedTuple):
-    """The six errors of a covariance, by the ids of their rows, and their correlations (6, 6); as `Correlated`."""
+class Correlated(NamedTuple):
+    """The six errors of a platform's covariance, by the ids of their rows, and their correlations (6, 6)."""
 
-    id: str
+    platform: str
     ids: tuple[str, ...]
     correlation: Sequence[Sequence[Any]]
 
-    def of(self, some: NDArray[Any]) -> "ManyCorrelated":
+    @property
+    def id(self) -> str:
+        """Name of the six together."""
+        return f"{self.platform}.covariance"
+
+    def of(self, some: NDArray[Any]) -> "Correlated":
         """The same in some of the cases."""
         rows = [[rho[some] if np.ndim(rho) else rho for rho in row] for row in self.correlation]
         return self._replace(correlation=rows)
 
+    def phase(self, phases: Sequence[Any] | Floats) -> Any:
+        """√(gᵀCg) of the six phases gᵢσᵢ; infinite where one of them is. [rad]"""
+        with np.errstate(invalid="ignore"):
+            found = np.sqrt(squared(self.correlation, phases))
+        return np.where(np.isnan(found), math.inf, found)[()]
 
-def many_correlated(mission: Mission) -> tuple[ManyCorrelated, ...]:
+    def displacement(self, moves: Sequence[tuple[Any, Any]]) -> tuple[Any, Any]:
+        """The rms length of the displacement, the root of its covariance's trace, and 0: it has no direction. [m]"""
+        length = np.sqrt(sum(squared(self.correlation, along) for along in zip(*moves, strict=True)))
+        return length, 0.0 * length
+
+
+def correlated_errors(mission: Mission) -> tuple[Correlated, ...]:
     """List the covariances of a mission; nothing for nearly every one."""
-    return tuple(ManyCorrelated(one.id, one.ids, one.correlation) for one in correlated_errors(mission))
+    found = []
+    for name in PLATFORMS:
+        error: MotionError = getattr(mission.platforms, name).motion_error
+        if error.covariance is not None:
+            ids = tuple(
+                subject(name, kind, axis, error.frame).id
+                for kind in ("position", "velocity")
+                for axis in FRAME_AXES[error.frame]
+            )
+            found.append(Correlated(name, ids, error.covariance.correlation))
+    return tuple(found)
 
 
-def squared(correlation: Sequence[Sequence[Any]], parts: Sequence[Any]) -> Any:
+def squared(correlation: Sequence[Sequence[Any]], parts: Sequence[Any] | Floats) -> Any:
     """What correlated parts add up to, squared: Σ ρᵢⱼvᵢvⱼ; what rounding leaves below zero is zero."""
     rows = [sum(rho * v for rho, v in zip(row, parts, strict=True)) for row in correlation]
     return np.maximum(0.0, sum(v * row for v, row in zip(parts, rows, strict=True)))
 
 
-def combined_phase(phases: Phases, rule: str, groups: Sequence[ManyCorrelated] = ()) -> Any:
-    """Combine phases by a rule, those of a covariance with their correlations; as `combined_phase`. [rad]"""
-    left, parts = dict(phases), []
-    if rule == "rss":
-        for group in groups:
-            if left.keys() >= set(group.ids):
-                parts.append(np.sqrt(squared(group.correlation, [left.pop(row_id) for row_id in group.ids])))
-    return combined([*parts, *left.values()], rule)
+# ---------------------------------------------------------------------- what combines
+def phase_parts(phases: Phases, rule: str, groups: Sequence[Correlated]) -> list[tuple[str, Any]]:
+    """List what combines of phases: of a covariance the six errors are one part under `rss`, else six. [rad]"""
+    return _parts(phases, rule, groups, Correlated.phase)
 
 
-def combined(parts: Sequence[Floats], rule: str) -> Any:
-    """Combine phases or lengths by a rule: the largest, the sum of magnitudes or the root-sum-square."""
-    if not parts:
+def displacement_parts(moves: Moves, rule: str, groups: Sequence[Correlated]) -> list[tuple[str, Any]]:
+    """List what combines of displacements: id, and (east, north); of a covariance as `phase_parts`. [m]"""
+    return _parts(moves, rule, groups, Correlated.displacement)
+
+
+def _parts(
+    found: Sequence[tuple[str, Any]], rule: str, groups: Sequence[Correlated], as_one: Callable[..., Any]
+) -> list[tuple[str, Any]]:
+    if rule != "rss" or not groups:  # few missions have any
+        return list(found)
+    left, parts = dict(found), []
+    for group in groups:
+        if left.keys() >= set(group.ids):
+            parts.append((group.id, as_one(group, [left.pop(row_id) for row_id in group.ids])))
+    return [*parts, *left.items()]
+
+
+# ---------------------------------------------------------------------- what they combine to
+def combined_phase(phases: Phases, rule: str, groups: Sequence[Correlated] = ()) -> Any:
+    """Combine the phases of errors by a rule, those of a covariance with their correlations. [rad]"""
+    return combined([phase for _, phase in phase_parts(phases, rule, groups)], rule)
+
+
+def combined_displacement(moves: Moves, rule: str, groups: Sequence[Correlated] = ()) -> Any:
+    """Combine displacements by a rule: for `sum` the longest of all signs, those of a covariance as rms. [m]"""
+    vectors = np.array([move for _, move in displacement_parts(moves, rule, groups)])
+    if not vectors.size:
         return 0.0
-    sizes = np.abs(np.array(parts))
+    return largest_signed_sum(vectors) if rule == "sum" else combined(np.hypot(vectors[:, 0], vectors[:, 1]), rule)
+
+
+def combined(sizes: Any, rule: str) -> Any:
+    """Combine phases or lengths, (n, ...): `each` is the largest, `sum` the worst case, `rss` the root-sum-square."""
+    if not len(sizes):
+        return 0.0
+    sizes = np.abs(np.array(sizes))
     if rule == "each":
         return sizes.max(axis=0)
     return sizes.sum(axis=0) if rule == "sum" else np.sqrt((sizes**2).sum(axis=0))
 
 
-def combined_displacement(moves: Moves, rule: str, groups: Sequence[ManyCorrelated]) -> Any:
-    """Combine displacements by `each` or `rss`, those of a covariance by the trace of theirs. [m]"""
-    left, parts = dict(moves), []
-    if rule == "rss":
-        for group in groups:
-            if left.keys() >= set(group.ids):
-                of_axes = zip(*(left.pop(row_id) for row_id in group.ids), strict=True)
-                parts.append(np.sqrt(sum(squared(group.correlation, along) for along in of_axes)))
-    return combined([*parts, *(np.hypot(*move) for move in left.values())], rule)
+def largest_signed_sum(vectors: Floats) -> Any:
+    """Length of the longest of the sums ±v₁ ± v₂ … of plane vectors (n, 2, ...), exactly.
 
-
-def largest_signed_sum(vectors: Floats) -> Floats:
-    """Length of the longest of the sums ±v₁ ± v₂ …, (cases,), of vectors (n, 2, cases); as `largest_signed_sum`."""
+    All sums lie in a polygon with two sides along each vector, and the longest is one of its corners. With
+    every vector turned into the upper half plane and sorted by angle, flipping them one by one walks along
+    half of the outline; the other half is its mirror image.
+    """
     x, y = vectors[:, 0], vectors[:, 1]
     is_upper = (y > 0) | ((y == 0) & (x > 0))
     x, y = np.where(is_upper, x, -x), np.where(is_upper, y, -y)
     order = np.argsort(np.arctan2(y, x), axis=0)
     x, y = np.take_along_axis(x, order, axis=0), np.take_along_axis(y, order, axis=0)
     corners_x, corners_y = (part.sum(axis=0) - 2 * np.cumsum(part, axis=0) for part in (x, y))
-    whole = np.hypot(x.sum(axis=0), y.sum(axis=0))
-    return np.asarray(np.maximum(whole, np.hypot(corners_x, corners_y).max(axis=0)))
+    return np.hypot(corners_x, corners_y).max(axis=0, initial=0.0)
+
+
+# ---------------------------------------------------------------------- in words
+def correlation_notes(rule: str, groups: Sequence[Correlated]) -> tuple[Note, ...]:
+    """Say what an aggregate makes of covariances."""
+    if rule == "rss":
+        return tuple(phrases.counted_as_one(group.id) for group in groups)
+    return tuple(phrases.correlations_unused(group.id) for group in groups)
+
+
+def unused_correlations(mission: Mission) -> Iterator[tuple[Place | None, Note]]:
+    """Warn of correlations that no row and no aggregate looks at: line and message."""
+    if mission.allocation.combine != "each":
+        return
+    for name in PLATFORMS:
+        error: MotionError = getattr(mission.platforms, name).motion_error
+        if error.covariance is not None and error.covariance.has_correlations():
+            line = mission.line(("platforms", name, "motion_error", "covariance"))
+            yield line, file_warnings.correlations_not_used(name)
+
+
+def likely_error(group: Correlated, members: Sequence[ErrorSource]) -> tuple[float, ...]:
+    """Most probable of the errors whose quadratic phase is √(gᵀCg) by the full model: Cg/√(gᵀCg), (6,).
+
+    Along the frame's axes, coverage factor included. Without a phase, each at its sigma.
+    """
+    sizes = np.array([source.declared or 0.0 for source in members])
+    phases = sizes * [source.full.qpe for source in members]
+    total = group.phase(phases)
+    return tuple((sizes * (np.array(group.correlation) @ phases) / total if total else sizes).tolist())

@@ -101,11 +101,12 @@ def cubic_part(cycles: Any) -> Any:
     return np.abs(tone(math.pi * cycles)[1])
 
 
-class OwnPhase(NamedTuple):
-    """Phases that count in sums and have no row of a displacement: row id, owner, QPE and cubic phase. [rad]
+class DeclaredPhase(NamedTuple):
+    """Phases of one declared error, which sums count: row id, owner, quadratic and cubic phase. [rad]
 
-    A vibration is there, and its phases are not 0, only in the cases in which it is slow. `coverage` is the coverage
-    factor that both phases have in them; `moves` the most by which a slow vibration displaces the image. [m]
+    What is a quadratic phase and nothing else has no cubic one: None. A vibration is there, and its phases are not
+    0, only in the cases in which it is slow. `coverage` is the coverage factor that both phases have in them,
+    `moves` the most by which a slow vibration displaces the image. [m]
     """
 
     row_id: str
@@ -117,7 +118,7 @@ class OwnPhase(NamedTuple):
     is_there: Any = True
 
 
-def slow_phases(mission: Mission, geometry: Any = None) -> list[OwnPhase]:
+def slow_phases(mission: Mission, geometry: Any = None) -> list[DeclaredPhase]:
     """Phases of the declared vibrations below one cycle per aperture, which count with those of other errors."""
     T = mission.collection.aperture_time
     found = []
@@ -130,7 +131,7 @@ def slow_phases(mission: Mission, geometry: Any = None) -> list[OwnPhase]:
                 row_id = subject(name, "vibration", "sinusoidal", entry=index).id
                 qpe, cubic = phase * quadratic_part(cycles), phase * cubic_part(cycles)
                 moves = is_slow * _largest_displacement(mission, name, index, line, geometry or mission.geometry)
-                found.append(OwnPhase(row_id, name, qpe, cubic, moves=moves, is_there=is_slow))
+                found.append(DeclaredPhase(row_id, name, qpe, cubic, moves=moves, is_there=is_slow))
     return found
 
 

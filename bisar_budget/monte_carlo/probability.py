@@ -16,9 +16,8 @@ from typing import TYPE_CHECKING
 from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.analysis.together import Together
+from bisar_budget.analysis.together import Together, cubics, quadratics
 from bisar_budget.constants import MAX_DRAWS
-from bisar_budget.effects.correlation import combined_displacement, combined_phase
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource, ImagePlane
 from bisar_budget.findings.monte_carlo import MonteCarlo, Requirement
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
@@ -180,24 +179,18 @@ class _Predictions:
     """What needs no draws: combinations by the rules of `check`, standard uncertainties, the normal distribution."""
 
     def __init__(self, analysis: Analysis, variables: Sequence[Variable]) -> None:
-        self.together, self.variables = Together(analysis, analysis.full), variables
-        drawn = {error.id for error in analysis.random}
-        self.noise = [own for own in self.together.own if own.row_id in drawn]
+        self.together, self.variables = Together(analysis.errors, "full", (), analysis.random), variables
 
     def combined(self, judged: HeldSum, rule: str) -> float | None:
         """What a rule of `allocation.combine` holds to the limit, coverage factor included; None: no image."""
-        together = self.together
+        members = [one for one in self.together.phases if one.owner in judged.owners]
         if judged.columns == (0,):
-            members = [source for source in together.stated if source.owner in judged.owners]
-            noise = [(own.row_id, own.qpe_rad) for own in self.noise if own.owner in judged.owners]
-            phase = combined_phase([*together.phases(members), *noise], rule, together.groups)
+            size = self.together.combined(quadratics(members), rule)
         elif judged.columns == (1,):
-            noise = [(own.row_id, own.cubic_rad) for own in self.noise]
-            phase = combined_phase([*together.cubics(), *noise], rule, together.groups)
+            size = self.together.combined(cubics(members), rule)
         else:
-            moves = together.moves(rule)
-            return None if moves is None else combined_displacement(moves, rule, together.groups)
-        return phase if math.isfinite(phase) else None
+            size = self.together.moved(rule)
+        return float(size[0]) if math.isfinite(size[0]) else None
 
     def variances(self, judged: HeldSum) -> dict[str, float]:
         """Variance that each error, or each covariance, brings."""

@@ -99,7 +99,7 @@ def cases(study: Study) -> dict[str, Case]:
 
 def _aggregates(study: Study) -> Iterator[Row]:
     for model in study.models:
-        yield from aggregate_rows(study.analysis, *study.analysis.models(model.name), study.allocation)
+        yield from aggregate_rows(study.analysis, model.name)
 
 
 def _verify_row(mission: Mission, row_id: str) -> Verdict:

@@ -73,7 +73,7 @@ class Study:
 
     def members(self, owner: str) -> list[ErrorSource]:
         """Declared errors that count against an owner's budget."""
-        return [s for s in self.declared if owner == "mission" or self.allocation.qpe.includes(s.owner, owner)]
+        return [s for s in self.declared if self.allocation.qpe.includes(s.owner, owner)]
 
     def boundary(self, source: ErrorSource, limit: float) -> float | None:
         """Smallest size at which a gating model has an error reach a quadratic phase [rad]; None without one."""

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.effects.correlation import correlated_errors, likely_error
+from bisar_budget.effects.combined import correlated_errors, likely_error
 from bisar_budget.mission.load import parse_mission
 from tests import reference
 from tests.conftest import findings, mission_text, row

@@ -548,9 +548,9 @@ def _contributions(analysis: Analysis, found: MissionFindings) -> tuple[Contribu
     An error that no image has comes before all others, and the others are no part of a sum with it.
     """
     phases: dict[str, dict[str, float]] = {}
-    for by in (analysis.published, analysis.full):
-        phases[by.name] = {row_id: abs(effect.qpe) for row_id, effect in analysis.declared(by).items()}
-        phases[by.name] |= {own.row_id: own.qpe_rad for own in analysis.own_phases(by.name)}
+    for model in ("published", "full"):
+        of_all = analysis.together(model).phases
+        phases[model] = {one.row_id: abs(float(one.qpe_rad[0])) for one in of_all}
     subjects = {row.id: row.subject for row in found.rows}
     gating = [name for name in phases if found.model in (name, "strictest")]
     sizes = {row_id: max(phases[name][row_id] for name in gating) for row_id in phases["full"]}

@@ -8,12 +8,10 @@ import numpy as np
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.spread import declared_powers, mainlobe_energy, spread_phase, tones
-from bisar_budget.analysis.together import Together
 from bisar_budget.analysis.vibration_limits import LARGEST_ECHO, Echo, bessel, highest_echo, tone_limits
 from bisar_budget.budget.random_rows import held_effect, no_effect
 from bisar_budget.constants import STANDARD_GRAVITY
 from bisar_budget.effects.clocks import spurs_of
-from bisar_budget.effects.correlation import phase_parts
 from bisar_budget.effects.models import CUBIC, QUADRATIC
 from bisar_budget.effects.random_errors import RandomEffect, RandomError, process_of
 from bisar_budget.effects.spectra import PowerLawPiece, parts, synchronized_parts
@@ -383,11 +381,9 @@ def _tones_and_cubic(
     cubic_row = subject("mission", CUBIC).id
     if cubic_row not in members:
         return
-    together = Together(analysis, analysis.full if model == "full" else analysis.published)
-    cubic = together.cubic_without_coverage(allocation.islr, owner)
-    parts = phase_parts(
-        together.cubics_without_coverage(allocation.islr, owner), together.rule_of_all, together.groups
-    )
+    together = analysis.together("full" if model == "full" else "published")
+    cubic = float(together.cubic_without_coverage(allocation.islr, owner)[0])
+    parts = together.phase_parts(together.cubics_without_coverage(allocation.islr, owner), together.rule_of_all)
     title = "Cubic phase of the declared errors, without coverage factor"
     yield from combined(title, together.rule_of_all, parts, cubic, symbol="φ_3")
     lines = equation("v_3", "4*φ_3^2/175", {"φ_3": cubic}, members[cubic_row], "rad²")

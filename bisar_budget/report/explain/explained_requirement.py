@@ -3,12 +3,11 @@
 from collections.abc import Iterator
 
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.analysis.together import Together
+from bisar_budget.budget.aggregates import effect_totals
 from bisar_budget.budget.input_doubt import declared_position_error, input_doubts, is_in_doubt
 from bisar_budget.budget.required import missing_declarations
 from bisar_budget.budget.requirement_states import MAKES_UP, SMALL_RAD, TENTH, UntakenEffect, untaken_effects
-from bisar_budget.budget.requirement_table import effect_parts, effect_totals, gating_models, groups_of
-from bisar_budget.effects.correlation import combined_phase, phase_parts
+from bisar_budget.budget.requirement_table import effects_by
 from bisar_budget.faults import printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import JudgedRequirement
@@ -70,7 +69,7 @@ def not_judged(found: MissionFindings, row: Row) -> Iterator[Step]:
     elif code == "place-is-not-known":
         yield from _displacing(analysis, row, reason)
     else:
-        for one in untaken_effects(mission, effect_totals(analysis, gating_models(analysis))):
+        for one in untaken_effects(mission, effect_totals(effects_by(analysis))):
             if row.id in one.makers and one.makers[row.id][0]:
                 yield from _untaken(analysis, row, one)
 
@@ -90,11 +89,9 @@ def _untaken(analysis: Analysis, row: Row, one: UntakenEffect) -> Iterator[Step]
     """How large an effect is that no requirement takes, what would be negligible, and the part of a row."""
     kind = one.kind
     totals = []
-    for model in gating_models(analysis):
-        together = Together(analysis, model)
-        groups, rule = groups_of(kind, together), together.rule_of_all
-        parts = effect_parts(analysis, together)[kind]
-        totals.append((combined_phase(parts, rule, groups), rule, phase_parts(parts, rule, groups)))
+    for together, effects in effects_by(analysis):
+        rule, parts = together.rule_of_all, effects[kind]
+        totals.append((float(together.combined(parts, rule)[0]), rule, together.phase_parts(parts, rule)))
     total, rule, parts = max(totals, key=lambda found: found[0])
     yield from combined(f"{_EFFECTS[kind]}: no requirement takes it", rule, parts, total, symbol="total")
     required = analysis.mission.requirements.quadratic_phase_error
@@ -137,10 +134,10 @@ def _displacing(analysis: Analysis, row: Row, reason: Note) -> Iterator[Step]:
     """Phases of the errors that move the image by an amount that is not computed."""
     model = row.model or "published"
     names, lines = reason.values[0], []
-    for one in analysis.own_phases(model):
+    for one in analysis.together(model).own:
         if isinstance(names, list | tuple) and one.row_id in names:
-            phases = f"QPE {with_unit(one.qpe_rad, 'rad')}, cubic {with_unit(one.cubic_rad, 'rad')}"
-            lines.append(f"{printable(one.row_id)}: {phases}")
+            qpe, cubic = (with_unit(float(phase[0]), "rad") for phase in (one.qpe_rad, one.cubic_rad))
+            lines.append(f"{printable(one.row_id)}: QPE {qpe}, cubic {cubic}")
     yield from step(
         f"Not in the displacement, by an amount that is not computed: {reason.values[1]} the image too", *lines
     )

@@ -9,9 +9,9 @@ from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.scene import at, differences_at
 from bisar_budget.analysis.spread import mainlobe_energy
-from bisar_budget.analysis.together import Together
+from bisar_budget.analysis.together import Together, cubics, quadratics
 from bisar_budget.analysis.vibration_limits import amplitude_share, echo_phase, slow_limits
-from bisar_budget.effects.correlation import displacement_parts, phase_parts
+from bisar_budget.effects.combined import phase_parts
 from bisar_budget.effects.echoes import near_lines, worst_phases
 from bisar_budget.effects.effect import ErrorSource, image_plane
 from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
@@ -94,7 +94,7 @@ def chain(mission: Mission, found: MissionFindings, row: Row) -> Iterator[Step]:
 
 def _to_utilization(mission: Mission, found: MissionFindings, row: Row) -> Iterator[Step]:
     analysis = found.analysed()
-    together = Together(analysis, analysis.full if row.model == "full" else analysis.published)
+    together = analysis.together("full" if row.model == "full" else "published")
     source = next((source for source in analysis.sources if source.id == row.id), None)
     if source is not None:
         yield from declaration(mission, source)
@@ -365,8 +365,7 @@ def _near_lines(mission: Mission, platform: str, index: int, total: float) -> It
 def _phase_aggregate(together: Together, found: MissionFindings, row: Row) -> Iterator[Step]:
     owner, is_pull_in = row.owner, row.subject.kind == "autofocus_pull_in"
     rule = "sum" if is_pull_in else found.combine
-    phases = together.owed(found.allocation, owner)
-    parts = phase_parts(phases, rule, together.groups)
+    parts = together.phase_parts(quadratics(together.owed(found.allocation.qpe, owner)), rule)
     yield from combined("QPE of the declared errors", rule, parts, row.declared)
     if is_pull_in:
         values = {"N_pull": found.allocation.n_pull or 0.0}
@@ -377,7 +376,7 @@ def _phase_aggregate(together: Together, found: MissionFindings, row: Row) -> It
 
 
 def _cubic_aggregate(together: Together, found: MissionFindings, row: Row) -> Iterator[Step]:
-    parts = phase_parts(together.all_cubics(), found.combine, together.groups)
+    parts = together.phase_parts(cubics(together.phases))
     yield from combined("Cubic phase of the declared errors", found.combine, parts, row.declared)
     if row.allowable is not None:
         yield from step("Allowable", f"requirements.cubic_phase_error = {row.allowable:.6g} rad")
@@ -399,7 +398,7 @@ def _spatial_variance(analysis: Analysis, found: MissionFindings, row: Row) -> I
 
 def _location_aggregate(mission: Mission, together: Together, found: MissionFindings, row: Row) -> Iterator[Step]:
     rule = "the longest sum over all signs of the vectors" if found.combine == "sum" else RULES[found.combine]
-    parts = displacement_parts(together.moves(found.combine) or [], found.combine, together.groups)
+    parts = together.displacement_parts()
     title = "(25), (30)" if row.model == "published" else "Full model, each by the sign that moves farther"
     if found.combine == "sum":
         vectors = [
