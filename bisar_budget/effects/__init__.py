@@ -3,9 +3,7 @@
 # What other rooms may use.
 __all__ = [
     "clocks",
-    "combine",
     "combined",
-    "correlation",
     "declared",
     "echoes",
     "effect",
