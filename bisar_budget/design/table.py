@@ -16,15 +16,15 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.arrays import judged
-from bisar_budget.arrays.held import is_held, is_image
-from bisar_budget.arrays.judged import check_arrays, statuses
-from bisar_budget.arrays.varied import picked, stacked, varied
+from bisar_budget.budget import judged_cases
 from bisar_budget.budget.check import check_mission
+from bisar_budget.budget.judged_cases import check_arrays, statuses
 from bisar_budget.budget.judged_rows import CODE, REQUIREMENTS, Judged
 from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.design.held import is_held, is_image
 from bisar_budget.design.quantities import FACTOR, Number, QuestionError, number_of, tree_of
 from bisar_budget.design.scaled import scaled
+from bisar_budget.design.varied import picked, stacked, varied
 from bisar_budget.faults import MissionError, SetNumber, SetValue
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import unknown_id
@@ -294,7 +294,7 @@ class Table:
         rows = {row.id: row for row in check_mission(self.mission, question.today).rows} if self.asked else {}
         here = [one for one in self.asked if one.row in rows]
         self.subjects = {one.row: rows[one.row].subject for one in here}
-        self.is_alone = any(one.field not in judged.FIELDS for one in self.asked)
+        self.is_alone = any(one.field not in judged_cases.FIELDS for one in self.asked)
         # Numbers that decide more than themselves: a case that has another value than the mission is read.
         self.to_read = {
             one.key
@@ -458,8 +458,8 @@ class Table:
             rows = {row.subject.id: row for row in checked.rows}
             for row_id in self.subjects.keys() - rows.keys():  # nothing declares it in any of the cases
                 none = Judged.of_none(self.subjects[row_id], some.size)
-                (*_, row) = judged.with_required([none], mission, geometries, some.size)
-                rows[row_id] = judged.waived(row, mission, question.today)
+                (*_, row) = judged_cases.with_required([none], mission, geometries, some.size)
+                rows[row_id] = judged_cases.waived(row, mission, question.today)
             columns = _verdict(checked, question.row, question.breaks)
             geometry = (
                 geometries.range_resolution(mission.radar.bandwidth, SPEED_OF_LIGHT),
@@ -470,18 +470,19 @@ class Table:
             columns |= {column.name: number for column, number in zip(GEOMETRY, geometry, strict=True)}
             for one in self.asked:
                 if one.row in rows:
-                    columns[one.name] = judged.field(rows[one.row], one.field)
+                    columns[one.name] = judged_cases.field(rows[one.row], one.field)
                 elif one.is_text:
                     columns[one.name] = "not_declared"
-        sure = ~checked.is_left_out & (question.row in (None, *(row.subject.id for row in checked.rows)))
-        for name, column in columns.items():
-            found[name][some[sure]] = np.broadcast_to(column, some.shape)[sure]
-        for place in some[~sure].tolist():
+        if question.row in (None, *(row.subject.id for row in checked.rows)):
+            for name, column in columns.items():
+                found[name][some] = np.broadcast_to(column, some.shape)
+            return
+        for place in some.tolist():
             if (case := self._read(found, place)) is not None:
                 self._by_itself(found, place, case)
 
     def _by_itself(self, found: dict[str, Values], place: int, mission: Mission) -> None:
-        """Check a case of which arrays are not certain, or do not hold a column, as `check` does."""
+        """Check a case by itself, of which a row or a column is asked that arrays do not have."""
         checked = check_mission(mission, self.question.today, is_bare=True)
         stands = standing(checked, self.question.row, self.question.breaks)
         geometry, resolution = checked.geometry, checked.resolution
@@ -497,7 +498,7 @@ class Table:
             found[one.name][place] = math.nan if value is None else value
 
 
-def _verdict(checked: judged.Checked, row_id: str | None, breaks: Container[str]) -> dict[str, Any]:
+def _verdict(checked: judged_cases.Checked, row_id: str | None, breaks: Container[str]) -> dict[str, Any]:
     """Status, worst row, utilization and requirement of each case."""
     rows = [one for one in checked.rows if row_id in (None, one.subject.id)]
     does_break = np.array([name in breaks for name in STATUS])

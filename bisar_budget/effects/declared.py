@@ -393,7 +393,6 @@ class DeclaredErrors:
     ) -> None:
         self.mission, self.cases, self.geometries, self.exact = mission, cases, geometries, exact
         self.has_direct_path = mission.has_direct_path
-        self.is_left_out = np.zeros(cases, dtype=bool)
         self.each = np.arange(cases)
         published, self.published_angle_deg = published_planes(geometries)
         self.planes = {"published": published, "full": ImagePlanes(exact.adjugate, exact.determinant)}

@@ -24,7 +24,6 @@ FLOORS = [
     {"findings"},
     {"monte_carlo"},
     {"budget"},
-    {"arrays"},
     {"simulate"},
     {"verify"},
     {"formats"},
@@ -153,8 +152,8 @@ for name in [one.name for one in FORMATS.values() if one.is_illustrated == {is_f
     assert ("bisar_budget.mission.covariance" in loaded) == (name == "drones_same_gnss")
 
 
-# Rooms whose modules are beside those of another: many cases at once, the command, the derivation.
-BESIDE = {"arrays", "cli", "theory"}
+# Rooms whose modules are beside those of another: the command, the derivation.
+BESIDE = {"cli", "theory"}
 
 
 def test_no_name_has_two_meanings() -> None:

@@ -1,8 +1,4 @@
-"""Rows of many cases, judged at once: the arrays beside `budget`.
-
-A case is judged as `check_mission` judges it, by the same formulas and searches. Where they do not hold it (a search
-takes very many steps), the case is left out and says so.
-"""
+"""All rows of many cases of a mission, judged together by the formulas and searches of a check."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -35,7 +31,7 @@ from bisar_budget.budget.requirement_states import (
 from bisar_budget.budget.scene_row import judged_edge
 from bisar_budget.budget.vibration_rows import Vibrations, judged_pslr, judged_spurs
 from bisar_budget.budget.waivers import is_waived
-from bisar_budget.effects.declared import DeclaredErrors
+from bisar_budget.effects.declared import MODELS, DeclaredErrors
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.models import LOCATION
 from bisar_budget.effects.random_errors import random_errors
@@ -47,16 +43,14 @@ from bisar_budget.geometry import BistaticGeometry, norm
 from bisar_budget.mission.model import Mission
 from bisar_budget.ranges.exact_ranges import ExactRanges
 
-MODELS = ("published", "full")
 _STATUSES = tuple(STATUS)
 _BROKEN = [CODE["fail"], CODE["not_evaluated"]]  # what a waiver covers
 
 
 class Checked(NamedTuple):
-    """Rows of many cases, and which of the cases are not certain; `floor` is the best status that a case can have."""
+    """Rows of many cases; `floor` is the best status that a case can have."""
 
     rows: tuple[Judged, ...]
-    is_left_out: NDArray[np.bool_]
     floor: NDArray[np.int8]
     geometries: BistaticGeometry
     requirements: tuple[RequirementState, ...]
@@ -133,7 +127,7 @@ class _Check:
             *(np.where(state.status == CODE["waived"], CODE["pass"], state.status) for state in states),
         ]
         floor = np.min(floors, axis=0)
-        return Checked(tuple(rows), self.errors.is_left_out, floor, self.errors.geometries, tuple(states))
+        return Checked(tuple(rows), floor, self.errors.geometries, tuple(states))
 
     # ---------------------------------------------------------------- requirements
     def _judged_requirements(
