@@ -4,9 +4,7 @@
 __all__ = [
     "clocks",
     "collections",
-    "combine",
     "combined",
-    "correlation",
     "declared",
     "echoes",
     "effect",
