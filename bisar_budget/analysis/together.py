@@ -1,5 +1,6 @@
 """Declared errors of many cases together: their phases and displacements, and whose share they count against."""
 
+import math
 from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -123,9 +124,10 @@ class Together:
         return [(row_id, float(phase[0])) for row_id, phase in parts]
 
     def displacement_parts(self) -> list[tuple[str, GroundVector]]:
-        """What combines of displacements by the mission's rule, east and north. [m]"""
-        parts = displacement_parts(self.moves(self.rule), self.rule, self.groups)
-        return [(row_id, (float(east[0]), float(north[0]))) for row_id, (east, north) in parts]
+        """What combines of displacements by the mission's rule: none where one of them has no image. [m]"""
+        found = displacement_parts(self.moves(self.rule), self.rule, self.groups)
+        parts = [(row_id, (float(east[0]), float(north[0]))) for row_id, (east, north) in found]
+        return [] if any(math.isnan(east) for _, (east, _) in parts) else parts
 
 
 def quadratics(members: Iterable[DeclaredPhase]) -> Phases:
