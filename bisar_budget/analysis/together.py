@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from bisar_budget.effects.combined import (
     phase_parts,
 )
 from bisar_budget.effects.declared import DeclaredErrors
+from bisar_budget.effects.random_errors import RandomError
 from bisar_budget.effects.vibration import DeclaredPhase
 from bisar_budget.geometry import GroundVector
 from bisar_budget.ranges.exact_ranges import Floats
@@ -42,7 +43,7 @@ class Together:
     """
 
     def __init__(
-        self, errors: DeclaredErrors, model: str, slow: Sequence[DeclaredPhase], random: Sequence[Any]
+        self, errors: DeclaredErrors, model: str, slow: Sequence[DeclaredPhase], random: Sequence[RandomError]
     ) -> None:
         self.errors, self.model, self.slow, self.random = errors, model, slow, random
         self.rule = errors.mission.allocation.combine
