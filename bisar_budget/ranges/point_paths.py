@@ -244,7 +244,7 @@ class PointPaths:
         reached = np.abs(held.value(last))
         slope = (reached - np.abs(held.value(before))) / (last[0] - before[0])
         ahead = np.where(slope > 0, last[0] + (held.limit - reached) / slope, math.inf)
-        ahead = np.where(index == 1, _on_parabola(held, last[0], reached), ahead)
+        ahead = np.where(index == 1, _on_parabola(held.limit, np.abs(held.per_unit), last[0], reached), ahead)
         is_sure = (last[0] <= ahead) & (ahead < (1 + 1.5 * ALMOST) * last[0]) & (last[5] > 0.5)
         return np.where(is_sure, ahead, math.inf)
 
@@ -300,8 +300,11 @@ class PointPaths:
             if step % 3 == 2:
                 size = (low[0] + high[0]) / 2
             is_first = low[0] == 0
-            bent = _on_parabola(of, high[0], b)
-            size = np.where(is_first & np.isfinite(bent), bent, size)
+            # A phase grows by a parabola from zero: of the slope there, or through both ends of the interval.
+            through = (a / low[0] * high[0] - b / high[0] * low[0]) / (high[0] - low[0])
+            bent = _on_parabola(of.limit, np.where(is_first, np.abs(of.per_unit), through), high[0], b)
+            is_inside = (bent > low[0]) & (bent < high[0]) & (is_first | (step % 3 < 2))
+            size = np.where(is_inside | (is_first & np.isfinite(bent)), bent, size)
             is_close = b - of.limit < ALMOST * of.limit
             chord = chord + (chord - a / low[0]) * (high[0] - low[0]) / high[0]
             back = np.where(chord > 0, high[0] - (b - of.limit) / chord, 0.0)
@@ -326,13 +329,12 @@ class PointPaths:
         return found
 
 
-def _on_parabola(held: Held, size: Floats, value: Floats) -> Floats:
+def _on_parabola(limit: Floats, slope: Floats, size: Floats, value: Floats) -> Floats:
     """Size at which a parabola from zero, of a slope there and a value at a size, reaches a limit; or infinite."""
-    slope = np.abs(held.per_unit)
     bend = (value / size - slope) / size
-    root = slope * slope + 4 * bend * held.limit
-    does = (root >= 0) & (slope + root > 0)
-    return np.where(does, 2 * held.limit / (slope + np.sqrt(np.where(does, root, 1.0))), math.inf)
+    root = slope * slope + 4 * bend * limit
+    does = (root >= 0) & (slope + np.sqrt(np.where(root >= 0, root, 0.0)) > 0)
+    return np.where(does, 2 * limit / (slope + np.sqrt(np.where(does, root, 1.0))), math.inf)
 
 
 def _is_on_the_way(last: Floats, found: Floats, near: tuple[Floats, Floats]) -> Truths:
