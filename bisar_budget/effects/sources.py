@@ -91,8 +91,8 @@ class ErrorListing:
         if (place, kind) not in self._legs:
             first = 3 * list(MOTION_UNITS).index(kind)
             published = [Effect._make(row) for row in self._published[place][first : first + 3]]
-            along = np.stack([self.exact.along(place, axis) for axis in _AXES], axis=1)
-            found = self.exact.effect(along * self.exact.powers[MOTION_UNITS[kind]][:, None])
+            along = np.stack([self.exact.along(place, axis) for axis in _AXES])
+            found = self.exact.effect(along * self.exact.powers[MOTION_UNITS[kind]])
             full = [Effect._make(one) for one in zip(*found, strict=True)]
             self._legs[place, kind] = published, full
         return self._legs[place, kind]

@@ -403,12 +403,11 @@ class ExactRanges:
         return quadratic, cubic
 
     def effect(self, range_error: Floats) -> Effect:
-        """Effect of a range error at the nodes, that of the displacement included."""
-        lanes = range_error.shape[1:]  # the last axis is that of the cases
-        constant, linear, own, own_cubic = (self.fit @ range_error.reshape(len(range_error), -1)).reshape(4, *lanes)
+        """Effect of range errors at the nodes, (..., nodes, cases), that of the displacement included."""
+        constant, linear, own, own_cubic = np.moveaxis(self.fit @ range_error, -2, 0)
         linear = linear / self.half
         own, own_cubic = own * self.k, own_cubic * self.k
-        size = np.abs(range_error).max(axis=0) * self.k
+        size = np.abs(range_error).max(axis=-2) * self.k
         (q_0, q_1), (c_0, c_1) = self.phases_per_term
         qpe, cubic = own + (q_0 * constant + q_1 * linear), own_cubic + (c_0 * constant + c_1 * linear)
         seen = size + np.abs(q_0 * constant) + np.abs(q_1 * linear)
