@@ -83,18 +83,18 @@ class Allowed(NamedTuple):
 
 
 class ImagePlanes(NamedTuple):
-    """Q⁻¹ of each case: takes constant and linear range error to the displacement of the image.
-
-    The determinant is NaN where there is no inverse.
-    """
+    """Q⁻¹ of each case: takes constant and linear range error to the displacement of the image."""
 
     adjugate: tuple[Any, Any]
     determinant: Any
+    is_singular: Any = False
 
     def displacement(self, effect: Effect, size: Any) -> tuple[Floats, Floats]:
-        """Displacement on the ground by (25), with the Q of a model. [m]"""
+        """Displacement on the ground by (25), with the Q of a model; not a number where it has no inverse. [m]"""
         (a, b), (c, d) = self.adjugate
         scale = size / self.determinant
+        if np.any(self.is_singular):
+            scale = np.where(self.is_singular, math.nan, scale)
         # Adding 0.0 turns -0.0, which reads as a claim about a sign, into 0.0.
         return (
             (a * effect.constant + b * effect.linear) * scale + 0.0,
@@ -113,8 +113,7 @@ def published_planes(geometry: BistaticGeometry) -> tuple[ImagePlanes, Any]:
     first, second, (determinant,) = evaluators.published_ground_inverse(*ground)
     # (30): the first column holds (-rate_y, rate_x), the second (s_y, -s_x).
     degrees = np.degrees(angle_between_lines((-second[1], first[1]), (second[0], -first[0])))
-    held = np.where(degrees < MIN_GRADIENT_ANGLE_DEG, math.nan, determinant)
-    return ImagePlanes((first, second), held), degrees
+    return ImagePlanes((first, second), determinant, degrees < MIN_GRADIENT_ANGLE_DEG), degrees
 
 
 class ErrorBlock:

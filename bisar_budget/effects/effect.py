@@ -4,18 +4,16 @@ Effects are those of Rigling & Moses (Tables I and II), and of the full model, w
 counts what the displacement of the image adds (`ranges.exact_ranges`).
 """
 
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from bisar_budget import evaluators, phrases
-from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG
+from bisar_budget import phrases
 from bisar_budget.effects.subject import MOTION, Subject
 from bisar_budget.faults import KeyPath
-from bisar_budget.geometry import BistaticGeometry, GroundVector, Vector, angle_between_lines
-from bisar_budget.phrases import NOTHING, Note
+from bisar_budget.geometry import GroundVector, Vector
+from bisar_budget.phrases import Note
 from bisar_budget.ranges.exact_ranges import Effect
 
 if TYPE_CHECKING:
@@ -135,21 +133,3 @@ class ImagePlane(NamedTuple):
             (a * effect.constant + b * effect.linear) * scale + 0.0,
             (c * effect.constant + d * effect.linear) * scale + 0.0,
         )
-
-
-def image_plane(geometry: BistaticGeometry) -> ImagePlane:
-    """Invert Q with the range held constant, (19) and (30).
-
-    That Q can be singular where the true gradients are not: its second row is v/R, theirs v⊥/R.
-    """
-    ground = []
-    for platform in (geometry.transmitter, geometry.receiver):
-        ground += [*platform.position[:2], *platform.velocity[:2], platform.slant_range]
-    first, second, (determinant,) = evaluators.published_ground_inverse(*ground)
-    # (30): the first column holds (-rate_y, rate_x), the second (s_y, -s_x).
-    range_gradient, doppler_gradient = (-second[1], first[1]), (second[0], -first[0])
-    degrees = math.degrees(angle_between_lines(range_gradient, doppler_gradient))
-    degeneracy = NOTHING
-    if degrees < MIN_GRADIENT_ANGLE_DEG:
-        degeneracy = phrases.no_displacement(degrees)
-    return ImagePlane((first, second), determinant, degeneracy)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bisar_budget import evaluators
-from bisar_budget.effects.effect import image_plane
+from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.effects.pieces import PRINTED, TRUE, LinePiece, gradients_of, indicated_point
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.mission.load import load_mission
@@ -35,7 +35,7 @@ def monostatic(geometry: BistaticGeometry) -> BistaticGeometry:
 
 
 def test_the_first_column_of_the_inverse_is_small_beside_the_second() -> None:
-    first, second = np.linalg.norm(np.array(image_plane(SECTION_V.geometry).inverse), axis=0)
+    first, second = np.linalg.norm(np.array(Analysis(SECTION_V).published.plane.inverse), axis=0)
     by_value, by_rate = stated("{} m per metre and {} m per metre a second")
     assert first == pytest.approx(by_value, abs=0.005)  # as many digits as are printed
     assert second == pytest.approx(by_rate, abs=0.5)

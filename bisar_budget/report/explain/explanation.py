@@ -13,7 +13,7 @@ from bisar_budget.analysis.together import Together, cubics, quadratics
 from bisar_budget.analysis.vibration_limits import amplitude_share, echo_phase, slow_limits
 from bisar_budget.effects.combined import phase_parts
 from bisar_budget.effects.echoes import near_lines, worst_phases
-from bisar_budget.effects.effect import ErrorSource, image_plane
+from bisar_budget.effects.effect import ErrorSource
 from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.vibration import cubic_part, lines_of, quadratic_part, sight_of
 from bisar_budget.faults import KeyPath, changes_words, printable
@@ -148,7 +148,7 @@ def collection_chain(found: MissionFindings) -> Iterator[Step]:
         *equation("east", east, values, s[1], ""),
         *equation("north", north, values, -s[0], ""),
     )
-    determinant = image_plane(found.geometry).determinant
+    determinant = found.analysed().published.plane.determinant
     yield from step("(30), range held constant", *equation("det Q", formulas.DETERMINANT, values, determinant, "1/s"))
 
 
