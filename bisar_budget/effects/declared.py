@@ -10,6 +10,7 @@ cases each error is one, so that what is worked on stays in a processor's cache.
 """
 
 import math
+import weakref
 from collections.abc import Container, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -130,7 +131,9 @@ class ErrorBlock:
     """
 
     def __init__(self, table: "DeclaredErrors", sources: Sequence[ErrorSource]) -> None:
-        self.table, self.exact, self.sources, self.cases = table, table.exact, sources, table.cases
+        # A table holds its blocks: if they held it too, arrays of a sweep would wait for the garbage collector.
+        self.table: DeclaredErrors = weakref.proxy(table)
+        self.exact, self.sources, self.cases = table.exact, sources, table.cases
         shape = (len(sources), self.cases)
         self.declared = np.full(shape, math.nan)
         self.edge = np.empty(shape)  # of a position error at the aperture's, of a unit [m]
