@@ -93,9 +93,7 @@ class ImagePlanes(NamedTuple):
     def displacement(self, effect: Effect, size: Any) -> tuple[Floats, Floats]:
         """Displacement on the ground by (25), with the Q of a model; not a number where it has no inverse. [m]"""
         (a, b), (c, d) = self.adjugate
-        scale = size / self.determinant
-        if np.any(self.is_singular):
-            scale = np.where(self.is_singular, math.nan, scale)
+        scale = size / np.where(self.is_singular, math.nan, self.determinant)
         # Adding 0.0 turns -0.0, which reads as a claim about a sign, into 0.0.
         return (
             (a * effect.constant + b * effect.linear) * scale + 0.0,
