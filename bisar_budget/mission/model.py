@@ -151,7 +151,7 @@ _OF_ONE = tuple(f"{name}.{kind}" for name in Platforms._fields for kind in OF_PL
 
 
 class Requirements(NamedTuple):
-    """Requirements that the image has to meet, and the errors that the file has to declare for it."""
+    """What the image has to hold, and what the file has to say for it."""
 
     quadratic_phase_error: Annotated[
         float, Key(PHASE_REQUIREMENT, "Total for any one error, at the aperture edge; default π/4.")
@@ -257,7 +257,7 @@ class AllocationRules(NamedTuple):
 
 
 class Autofocus(NamedTuple):
-    """The autofocus algorithm, and how much phase it can correct."""
+    """What autofocus can correct."""
 
     algorithm: Annotated[str, Key(Choice("pga", "map_drift"))] = "pga"
     n_pull: Annotated[
