@@ -1,4 +1,4 @@
-"""What goes wrong with input, said so that it can be mended: where, what, the value given, what is accepted."""
+"""Faults of input, said so that they can be mended: where, what, the value given, what is accepted."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -103,7 +103,7 @@ class SetValue(NamedTuple):
 
     @property
     def option(self) -> str:
-        """What a message about the value begins with."""
+        """The beginning of a message about the value."""
         return f"--set {printable(self.key)}"
 
 

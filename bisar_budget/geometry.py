@@ -283,7 +283,7 @@ class BistaticGeometry:
         )
 
     def sights(self, *, has_direct_path: bool) -> tuple[Vectors, Vectors]:
-        """What a metre of the transmitter's motion, and of the receiver's, takes from the range at mid-aperture. [-]
+        """The range at mid-aperture that a metre of the transmitter's motion, and of the receiver's, takes away. [-]
 
         The lines of sight u_t, u_r; where the direct path is the clock u_t − b, u_r + b, b to the transmitter.
         """

@@ -1,4 +1,4 @@
-"""What there is to work with: files that travel with the package and those of a user, and processors."""
+"""Resources to work with: files that travel with the package and those of a user, and processors."""
 
 import os
 import stat
@@ -24,7 +24,7 @@ FILES_READ: set[tuple[int, int]] = set()
 
 
 class FilesHeld:
-    """What the files that a command reads were when it first read them: all of its formats and reports are of that.
+    """The files of a command as it first read them: all of its formats and reports are of that.
 
     Contents are kept up to 64 MB together, then hashes: a larger file that changes meanwhile is refused.
     """

@@ -32,7 +32,7 @@ class SettingsError(Exception):
 
 
 class Settings(NamedTuple):
-    """What the table says; `file` is where it stands, for messages."""
+    """The keys and values of the table; `file` is where it stands, for messages."""
 
     file: str
     values: Mapping[str, Any]

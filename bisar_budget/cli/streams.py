@@ -1,4 +1,4 @@
-"""What the commands read and write: names of files, standard streams, files replaced whole, exit codes."""
+"""Input and output of the commands: names of files, standard streams, files replaced whole, exit codes."""
 
 import io
 import os

@@ -1,4 +1,4 @@
-"""What takes long: said before, and seen to go on."""
+"""Announcements and progress of work that takes long."""
 
 import sys
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""What a file says of a collection, in the terms of a mission: scene, band, aperture, both paths, and errors.
+"""A collection as a file states it, in the terms of a mission: scene, band, aperture, both paths, and errors.
 
 Slow time counts when a pulse is at the scene point. A pulse leaves the transmitter R_t/c before that and reaches the
 receiver R_r/c after it; each place of a path is that of its platform at its own time. The range sum of a mission at

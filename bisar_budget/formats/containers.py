@@ -24,7 +24,7 @@ _ROOTS = {"CPHD": "CPHD", "CRSDsar": "CRSD", "CRSDtx": "CRSD", "CRSDrcv": "CRSD"
 
 
 class Container(NamedTuple):
-    """What is read of a file: its format, its XML with the byte at which that begins, and how long each block is.
+    """Parts of a file that are read: its format, its XML with the byte at which that begins, and each block's length.
 
     `blocks` are (byte, length) by name; empty where the file is XML alone.
     """

@@ -29,7 +29,7 @@ _NEGATIVE = 2.5e-6  # of an eigenvalue of correlations that are written with six
 
 
 class FileErrors(NamedTuple):
-    """Of both platforms, or common to them; clock terms of a mission; and what no key of a mission says."""
+    """Errors of both platforms, or common to them; clock terms of a mission; and what no key of a mission says."""
 
     transmitter: DeclaredMotionError | None = None
     receiver: DeclaredMotionError | None = None
@@ -207,7 +207,7 @@ def _of_two(both: Element, seen: Seen) -> FileErrors:
 def _with_added(
     both: Element, found: dict[str, DeclaredMotionError | None]
 ) -> tuple[dict[str, DeclaredMotionError | None], list[str]]:
-    """What a file of our own says beside the sigmas: kinds that are not declared, accelerations, distributions."""
+    """Apply what our own file says beside the sigmas: kinds that are not declared, accelerations, distributions."""
     remarks = []
     for parameter in both.all("AddedParameters/Parameter"):
         program, _, key = parameter.node.get("name", "").partition(" ")

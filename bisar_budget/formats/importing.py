@@ -50,7 +50,7 @@ class _Pulses(NamedTuple):
 
     @property
     def unused_words(self) -> str:
-        """What is said of vectors that are not used, empty where there are none."""
+        """Words on vectors that are not used, empty where there are none."""
         if not self.unused:
             return ""
         count = self.sent.size + self.unused

@@ -1,4 +1,4 @@
-"""What a mission names, read once and taken along: to processes on machines that do not have its files."""
+"""Files that a mission names, read once and taken along: to processes on machines that do not have them."""
 
 from collections.abc import Sequence
 from contextlib import suppress

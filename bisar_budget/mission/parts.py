@@ -308,7 +308,7 @@ def _part_of(tree: Tree) -> Any:
 
 
 def _no_kind(root: Mapping[str, Any], likely: str) -> Problem:
-    """What is wrong with the kind that a file states, or does not; `likely` is that of its figures."""
+    """The problem with the kind that a file states, or lacks; `likely` is the kind of its figures."""
     hint = did_you_mean(root.get("kind", ""), tuple(SECTIONS))
     if likely:
         hint = f"Its figures are those of kind: {likely}"
@@ -383,7 +383,7 @@ def part_files(folder: str, files: Files = DISK) -> list[str]:
 
 
 def finder_of(folder: str, files: Files = DISK) -> Find:
-    """What finds the parts that a mission file in a folder names.
+    """Return a function that finds the parts that a mission file in a folder names.
 
     It raises `PartError` where there is none of a name, or its file cannot be read.
     """
@@ -468,7 +468,7 @@ def report_parts(root: Any, find: Find, report: Report) -> None:
 
 
 def _stand_in(section: Section, value: Any) -> dict[str, Any]:
-    """What a section says, if all of it is right; else the names of its parts."""
+    """Values of a section, if all of them are right; else the names of its parts."""
     values = section.each(value)
     if INVALID not in values.values():
         return values
@@ -476,7 +476,7 @@ def _stand_in(section: Section, value: Any) -> dict[str, Any]:
 
 
 class _Sources(NamedTuple):
-    """What finds the parts of a mission, and what takes their faults."""
+    """Functions that find the parts of a mission, and take their faults."""
 
     find: Find
     report: Report

@@ -50,7 +50,7 @@ class _UnusablePathError(Exception):
 
 
 def reader_of(folder: str, files: Files = DISK) -> Beside:
-    """What reads files beside a mission file in a folder.
+    """Return a function that reads files beside a mission file in a folder.
 
     It raises `PathFileError` where a file cannot be read, is no regular file, or is larger than 500 MB.
     """
@@ -154,7 +154,7 @@ def _with_path(mission: Mission, platform: Platform, axes: earth.SceneAxes | Non
 
 
 def _of_file(file: str | None, error: PathFileError) -> Problem:
-    """What is wrong with a file, which is the value of a key and is named once."""
+    """The problem with a file, which is the value of a key and is named once."""
     said = str(error)
     said = f"{file} {said}" if file is not None and said.startswith("has ") else said
     return Problem(said, error.accepted, error.hint, names_value=file is not None and said.startswith(file))

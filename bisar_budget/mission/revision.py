@@ -221,7 +221,7 @@ def _existing(path: str) -> tuple[str, str]:
 
 
 def _why_not(found: _Object) -> str:
-    """What git says instead of a file: `symlink` with the way out of the tree, or why a link has no end."""
+    """Return why git gives no file: `symlink` with the way out of the tree, or why a link has no end."""
     if found.kind == b"symlink":
         return f"is a link out of the repository, to {printable(os.fsdecode(found.content))}, in"
     if found.kind == b"submodule":

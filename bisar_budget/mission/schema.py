@@ -42,7 +42,7 @@ def part_schema() -> dict[str, Any]:
 
 
 def _rules(figures: Sequence[str]) -> dict[str, Any]:
-    """What a part's figures are held to together: one of them is there, and each has a source.
+    """Schema rules for a part's figures together: one of them is there, and each has a source.
 
     Of an oscillator exactly one form is there, and a mask has its frequency. Zeros are for the tool to see.
     """

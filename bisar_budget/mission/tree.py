@@ -50,7 +50,7 @@ class UnusableError(Exception):
 
 
 class Tree:
-    """What the file says: nested dict, list and str, with the parser's event of every key and value.
+    """Content of the file: nested dict, list and str, with the parser's event of every key and value.
 
     What cannot be read is reported and stands in the tree as `INVALID`. `changes` are the options that put values
     into it, each at the highest path that it changed; of a case of a sweep those are floats. `what` the file is to be

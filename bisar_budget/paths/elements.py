@@ -60,7 +60,7 @@ class Elements(NamedTuple):
 
 
 def teme(elements: Elements) -> Callable[[Instant], Vector]:
-    """What places an object in the true equator and mean equinox of date, by SGP4. [m]
+    """Return a function that places an object in the true equator and mean equinox of date, by SGP4. [m]
 
     Raises
     ------

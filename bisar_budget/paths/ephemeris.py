@@ -300,7 +300,7 @@ def _segment(block: _EphemerisBlock, name: str) -> _Segment:
 
 
 def _not_stated(metadata: Mapping[str, tuple[int, str]]) -> str:
-    """What of the interpolation is our choice, since the message does not say it."""
+    """Words on the part of the interpolation that is our choice, since the message does not say it."""
     kind, degree = (metadata.get(key, (0, ""))[1].upper() for key in ("INTERPOLATION", "INTERPOLATION_DEGREE"))
     if not kind:
         return " (the file states no interpolation)"

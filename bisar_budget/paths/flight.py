@@ -1,4 +1,4 @@
-"""What a file knows of a platform's path, and the polynomial of slow time that a budget flies.
+"""A platform's path as a file knows it, and the polynomial of slow time that a budget flies.
 
 Exact ranges, images and every other command take a path as a polynomial over the aperture. An orbit gives a place at
 any time: its polynomial interpolates. A log gives measured places: its polynomial smooths them by least squares. Both

@@ -87,7 +87,7 @@ def render(format_name: str, report: "Report", style: Style) -> str:
 
 
 class Piece(NamedTuple):
-    """What a format says of one mission; `unusable` is the file if it cannot be used."""
+    """The text of a format for one mission; `unusable` is the file if it cannot be used."""
 
     status: str
     text: str

@@ -43,7 +43,7 @@ class MemoryLimitError(ValueError):
 
 
 class Errors(NamedTuple):
-    """What is wrong in one image: both platforms, the clock's t̃₀ … t̃₃ of (1), and any other history of it.
+    """Errors in one image: of both platforms, the clock's t̃₀ … t̃₃ of (1), and any other history of the clock.
 
     [s], [1], [1/s], [1/s²]; `clock_course` [s].
     """
@@ -58,7 +58,7 @@ class Errors(NamedTuple):
         return self._replace(transmitter=error) if platform == "transmitter" else self._replace(receiver=error)
 
     def smooth(self) -> "Errors":
-        """What is no vibration."""
+        """The same errors without vibration, and with what is smooth of other histories."""
         slow = self.slow()
         return slow._replace(transmitter=_still(slow.transmitter), receiver=_still(slow.receiver))
 

@@ -195,7 +195,7 @@ class _Needed(NamedTuple):
 
 
 def _needed(history: PhaseHistory, nearest: Floats, farthest: Floats, pixels: int) -> _Needed | None:
-    """What pixels between two range sums, (pulses,) [m], can need; None if it is too much for so few.
+    """Samples that pixels between two range sums, (pulses,) [m], can need; None if too many for so few pixels.
 
     A profile repeats: where more is needed than it has, repeats are laid out.
     """

@@ -1,4 +1,4 @@
-"""What a motion error of an image does, by exact ranges: paths sampled at pulses instead of nodes."""
+"""Effect of a motion error on an image, by exact ranges: paths sampled at pulses instead of nodes."""
 
 import math
 from dataclasses import dataclass

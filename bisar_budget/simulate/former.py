@@ -32,7 +32,7 @@ Told = Callable[[int], None]
 
 
 class Former(Protocol):
-    """What `simulate_point` asks of an image former. Places are east, north [m]; images are at baseband."""
+    """The interface of an image former for `simulate_point`. Places are east, north [m]; images are at baseband."""
 
     @property
     def bytes_held(self) -> float:
@@ -42,7 +42,7 @@ class Former(Protocol):
         """Where it puts a point, given its displaced point and its differential range over slow time. [m]"""
 
     def left(self, place: GroundVector, left: Floats, recorded: Floats) -> Floats:
-        """What is left of the range history there, given what exact ranges leave at the displaced point. [m]"""
+        """The range history that is left at a place, given what exact ranges leave at the displaced point. [m]"""
 
     def cells(self, centre: GroundVector) -> tuple[float, float]:
         """Resolution along x′ and y′, peak to first null. [m]"""
@@ -82,7 +82,7 @@ class ExactRangeFormer(NamedTuple):
         return displaced
 
     def left(self, place: GroundVector, left: Floats, recorded: Floats) -> Floats:
-        """What is left there."""
+        """The range history that is left at a place."""
         return left
 
     def cells(self, centre: GroundVector) -> tuple[float, float]:
@@ -104,7 +104,7 @@ class ExactRangeFormer(NamedTuple):
         return np.stack((nearer * self.bandwidth / SPEED_OF_LIGHT, turned / self.wavelength), axis=1)
 
     def _change(self, places: Floats) -> Floats:
-        """Of the range sum over the aperture. [m]"""
+        """Change of the range sum over the aperture. [m]"""
         total: Floats = np.zeros(len(places))
         for one in (self.flown.transmitter, self.flown.receiver):
             for when, sign in ((0, -1), (2, 1)):
@@ -163,7 +163,7 @@ class PlaneWaves(NamedTuple):
         return float(east), float(north)
 
     def left(self, place: GroundVector, left: Floats, recorded: Floats) -> Floats:
-        """What is left there: the far field's own error is in it."""
+        """The range history that is left at a place: the far field's own error is in it."""
         rest: Floats = recorded + self.sight @ np.asarray(place)
         return rest
 

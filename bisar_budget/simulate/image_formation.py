@@ -140,7 +140,7 @@ def kernel_within(memory_limit: float) -> Kernel:
 
 
 def bytes_held(kernel: Kernel) -> float:
-    """What backprojection takes beside data and image. [B]"""
+    """Memory that backprojection takes beside data and image. [B]"""
     return _HELD["numpy" if kernel == "numpy" else "cubic"]
 
 

@@ -47,7 +47,7 @@ class Course:
         return np.stack([np.interp(slow_time, self.times, along) for along in self.values.T], axis=1)
 
     def smooth(self, order: int = SMOOTH) -> "Course":
-        """What moves and defocuses a response: the polynomial fitted to it, without what is faster."""
+        """The part that moves and defocuses a response: the polynomial fitted to it, without what is faster."""
         place = 2 * (self.times - self.times[0]) / (self.times[-1] - self.times[0]) - 1
         fit = np.polynomial.legendre.legfit(place, self.values, order)
         return Course(self.times, np.polynomial.legendre.legval(place, fit).T)

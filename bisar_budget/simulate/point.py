@@ -65,7 +65,7 @@ class SimulationError(Exception):
 
 
 class Response(NamedTuple):
-    """What the images show of one target.
+    """One target as the images show it.
 
     `effect` is what the errors do to it by exact ranges, its displacement counted from the target; `shown` is where
     the image former puts it in the rotated images, `shown_in_scene` in the one along (x, y) (east, north). [m]
@@ -142,7 +142,7 @@ class Patch(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """What the images of a mission take, known before any is formed."""
+    """Patches, samples and memory that the images of a mission take, known before any is formed."""
 
     rotated: Patch
     in_scene: Patch
@@ -391,7 +391,7 @@ def flight(mission: Mission, slow_time: Floats, *, vibrating: bool) -> Flight:
 
 
 def _formers(mission: Mission, image_former: str, flown: Flown, smooth: tuple[Path, Path]) -> tuple[Former, Former]:
-    """Of the rotated images, and of the one along (x, y)."""
+    """Image formers of the rotated images, and of the one along (x, y)."""
     radar = mission.radar
     kernel = kernel_within((mission.simulation or Simulation()).memory_limit)
     exact = ExactRangeFormer(flown, radar.bandwidth, radar.wavelength, image_former == "matched_filter", kernel)
@@ -405,7 +405,7 @@ def _formers(mission: Mission, image_former: str, flown: Flown, smooth: tuple[Pa
 
 
 def _middle(places: Sequence[GroundVector] | Floats) -> GroundVector:
-    """Of the box around some places, which a patch is centred on."""
+    """Middle of the box around some places, on which a patch is centred."""
     low, high = np.min(places, axis=0), np.max(places, axis=0)
     return float(low[0] + high[0]) / 2, float(low[1] + high[1]) / 2
 

@@ -29,7 +29,7 @@ class Flown(NamedTuple):
     receiver: Floats
 
     def gradients(self, points: Floats) -> tuple[Floats, Floats]:
-        """Of the range sum at the midpoint, and of its change over the aperture, at points (..., 2): (..., 2)."""
+        """Gradients of the midpoint's range sum and of its change over the aperture, at points (..., 2): (..., 2)."""
         platforms = np.concatenate((self.transmitter, self.receiver))
         ground = points[..., None, :] - platforms[:, :2]
         square = ground[..., 0] ** 2 + ground[..., 1] ** 2 + platforms[:, 2] ** 2

@@ -75,7 +75,7 @@ class FlownErrors(NamedTuple):
     clock: Course | None  # [s]
 
     def smooth(self) -> "FlownErrors":
-        """What moves and defocuses a response."""
+        """The parts of the errors that move and defocus a response."""
         return FlownErrors(*(one and one.smooth() for one in self))
 
 

@@ -1,4 +1,4 @@
-"""What stands in a simulated scene: point targets and clutter, as the command line gives them."""
+"""Contents of a simulated scene: point targets and clutter, as the command line gives them."""
 
 import csv
 import math

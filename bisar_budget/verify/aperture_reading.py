@@ -1,4 +1,4 @@
-"""What a chip says about each part of the aperture: the phase that an error leaves there, read from the image.
+"""A chip read for each part of the aperture: the phase that an error leaves there, taken from the image.
 
 Every pulse contributes to every pixel what exact ranges by the measured paths say. A polynomial of the phase over the
 aperture is fitted to the pixels themselves, so that the ends of the patch, where a finite image cuts sidelobes off,
@@ -141,7 +141,7 @@ class _Pixels:
             self.kernel = np.cos(2 * math.pi * np.outer(_KERNEL, frequency)) @ weights / 257
 
     def contributions(self, slow_time: Floats, left: Floats | None = None) -> NDArray[np.complex64]:
-        """What pulses (m,) add, (m, n), at baseband.
+        """Contributions of pulses (m,) to pixels (n,), (m, n), at baseband.
 
         `left` (m,) is a range error that displaces the range responses, and has no part in the phase. [m]
         """
@@ -175,7 +175,7 @@ class _Pixels:
 
 
 def _weights(collection: PointCollection, slow_time: Floats) -> Floats:
-    """Of a Taylor window over the aperture."""
+    """Weights of a Taylor window over the aperture."""
     fine = taylor_window(1024)
     weights: Floats = np.interp(slow_time, cell_centres(collection.aperture_time, fine.size), fine)
     return weights

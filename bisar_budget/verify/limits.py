@@ -116,7 +116,7 @@ def _conditions(mission: Mission) -> Iterator[str]:
 
 
 def _order(one: Subject) -> tuple[int, int]:
-    """Of a platform's vibrations as `check` has it: lines, lines together, noise."""
+    """Sort key of a platform's vibrations, in the order of `check`: lines, lines together, noise."""
     return (("sinusoidal", "sinusoidal.sum", "wideband").index(one.axis), one.entry or 0)
 
 

@@ -56,7 +56,7 @@ class AddedIslr(NamedTuple):
 
 
 class Mainlobe:
-    """What lies within the first nulls of an error-free response.
+    """The part of an error-free response that lies within its first nulls.
 
     Parameters
     ----------

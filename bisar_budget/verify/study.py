@@ -110,7 +110,7 @@ class Study:
         return superposed(self.errors(source, scale * size) for source, size in sizes)
 
     def effect(self, sizes: Sizes, scale: float = 1.0) -> ExactEffect:
-        """What several errors do by exact ranges."""
+        """Effect of several errors by exact ranges."""
         return self.collection.effect(self.together(sizes, scale))
 
     def exact_phases(self, platform: str, courses: Floats) -> tuple[Floats, Floats]:

@@ -1,1 +1,1 @@
-"""What changed between two missions."""
+"""Changes between two missions."""

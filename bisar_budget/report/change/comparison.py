@@ -1,4 +1,4 @@
-"""What a change does to missions: how much of each limit it erodes, what it loosens, what a gate refuses of it."""
+"""Effects of a change on missions: how much of each limit it erodes, what it loosens, what a gate refuses of it."""
 
 from collections.abc import Iterator, Sequence
 from fnmatch import fnmatchcase
@@ -47,7 +47,7 @@ class Change(NamedTuple):
 
     @property
     def words(self) -> str:
-        """What it does to the limit, for a gate that refuses it."""
+        """The effect on the limit in words, for a gate that refuses it."""
         if self.is_newly_failing:
             return _worse(_status(self.after))
         before, after = self.use
@@ -158,7 +158,7 @@ class MissionChange(NamedTuple):
 
 
 class ChangeSet(NamedTuple):
-    """What a change does to all missions of a run.
+    """The effects of a change on all missions of a run.
 
     `gone` are mission files that the change removes, `new` those that it adds, `settings` what of the project's
     settings holds less than before, and `outside` files outside of the repository, which have one version.

@@ -1,4 +1,4 @@
-"""What a change does to missions, as text, Markdown or JSON `bisar-budget/diff/1`."""
+"""Effects of a change on missions, as text, Markdown or JSON `bisar-budget/diff/1`."""
 
 import json
 from collections.abc import Sequence
@@ -47,7 +47,7 @@ def _refusals(of: MissionChange | ChangeSet, gate: Gate | None) -> list[Refusal]
 
 
 def _refused_lines(refusals: Sequence[Refusal]) -> list[str]:
-    """What a gate refuses, and what of it is let through, a block each."""
+    """Lines of all that a gate refuses and of all that is let through, a block each."""
     lines: list[str] = []
     for title, is_allowed in (("Refused", False), ("Let through by --allow", True)):
         texts = [f"  {one.id}: {one.words}" for one in refusals if one.is_allowed is is_allowed]
@@ -181,7 +181,7 @@ def as_markdown(comparison: ChangeSet, gate: Gate | None, all_rows: bool = False
 
 
 def _refused_items(refusals: Sequence[Refusal]) -> list[str]:
-    """What a gate refuses, and what of it is let through, an item each."""
+    """List items for each thing that a gate refuses, marked as refused or as let through."""
     marks = {False: "**refused**", True: "let through by --allow:"}
     return [f"- {marks[one.is_allowed]} {_arrow(one.id, one.words)}" for one in refusals]
 

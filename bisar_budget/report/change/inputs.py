@@ -68,7 +68,7 @@ def _text(event: object) -> object:
 
 
 def _value(mission: Mission, path: KeyPath) -> Any:
-    """What a path means; None where the mission has no such attribute."""
+    """The value at a path; None where the mission has no such attribute."""
     value: Any = mission
     for part in path:
         if isinstance(value, Mapping):

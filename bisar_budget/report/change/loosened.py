@@ -1,4 +1,4 @@
-"""What a change loosens: a mission may meet its requirements because it is held to less of them.
+"""Things that a change loosens: a mission may meet its requirements because it is held to less of them.
 
 Numbers do not show it: a requirement that is gone has no row, and an error that is gone uses nothing of its limit.
 """
@@ -38,7 +38,7 @@ class Loosened(NamedTuple):
 
     @property
     def words(self) -> str:
-        """What it does, for a gate that refuses it."""
+        """The change in words, before and after, for a gate that refuses it."""
         return f"{self.before} -> {self.after}"
 
 

@@ -1,4 +1,4 @@
-"""What a compliance report says of a sweep: its question, its command, what complies where."""
+"""The part of a compliance report about a sweep: its question, its command, what complies where."""
 
 import math
 from collections.abc import Iterator
@@ -119,7 +119,7 @@ def _uses(uses: NDArray[Any]) -> str:
 
 
 def _parts(trade: Trade) -> Iterator[StudyPart]:
-    """Of each word, or else of each row that is the worst somewhere, how many cases comply; the most cases first."""
+    """Numbers of cases that comply, by word, or else by row that is the worst somewhere; the most cases first."""
     status = trade.values["status"].ravel()
     complies = np.array([name != "error" and not STATUS[name].fails for name in status.tolist()])
     by_word = per_word(trade)

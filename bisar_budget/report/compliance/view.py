@@ -1,4 +1,4 @@
-"""What a compliance report shows, as plain data for the templates, which escape it each for their language."""
+"""The content of a compliance report, as plain data for the templates, which escape it each for their language."""
 
 from datetime import date
 from typing import NamedTuple
@@ -44,14 +44,14 @@ class MatrixRow(NamedTuple):
 
 
 class Remark(NamedTuple):
-    """What rows of the matrix say besides their numbers."""
+    """A remark that rows of the matrix carry besides their numbers."""
 
     rows: tuple[str, ...]
     text: str
 
 
 class Share(NamedTuple):
-    """What an owner may use of the quadratic phase error, before and after autofocus. [rad]
+    """The share of the quadratic phase error that an owner may use, before and after autofocus. [rad]
 
     `start` and `part` place it in a bar of length 1 for the whole budget.
     """
@@ -141,7 +141,7 @@ class General(NamedTuple):
 
 
 class Evidence(NamedTuple):
-    """What an image says of one limit."""
+    """The evidence of an image about one limit."""
 
     id: str
     limit: str

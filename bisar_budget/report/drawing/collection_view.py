@@ -49,7 +49,7 @@ class SeenPlatform(NamedTuple):
 
 
 class View(NamedTuple):
-    """What one drawing shows; `margins` are left and right, above, and below the things in a panel. [px]"""
+    """The content of one drawing; `margins` are left and right, above, and below the things in a panel. [px]"""
 
     is_plan: bool
     axes: tuple[str, str]
@@ -147,7 +147,7 @@ def _enlargement(view: View, main: _Panel) -> _Panel | None:
 
 
 def _symbols(view: View, panels: Sequence[_Panel]) -> Iterator[str]:
-    """What is not written beside the symbols themselves."""
+    """Explanations of the symbols that are not written beside the symbols themselves."""
     if any(not p.is_still and not _is_end_on(p) for p in view.platforms):
         yield "Arrows at the platforms: direction of flight, not speed."
     if any(_shows_path(panel, p) for panel in panels for p in view.platforms):
@@ -263,7 +263,7 @@ def _draw_panel(canvas: Canvas, panel: _Panel, view: View, is_detail: bool, enla
 def _labels(
     panel: _Panel, view: View, visible: Sequence[SeenPlatform], has_scene: bool, enlarged: _Panel | None
 ) -> Iterator[DrawnLabel]:
-    """What is written, and where it belongs; things on one spot share a label."""
+    """Labels, with their text and where they belong; things on one spot share a label."""
     frame, scene = panel.frame, panel.pixel(_SCENE)
     # From the side, what is written of a platform stays above the ground.
     above = frame if view.is_plan else frame._replace(bottom=min(frame.bottom, scene[1]))

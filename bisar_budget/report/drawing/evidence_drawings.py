@@ -1,4 +1,4 @@
-"""What images say of a limit, to be looked at: cuts as SVG, chips as PNG, and the words that go with them."""
+"""Evidence of images about a limit, to be looked at: cuts as SVG, chips as PNG, and the words that go with them."""
 
 import struct
 import zlib

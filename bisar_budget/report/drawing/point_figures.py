@@ -1,4 +1,4 @@
-"""What Figures 3 to 7 of Rigling & Moses show of a mission of one's own, as numbers: what a plot draws, no more.
+"""Numbers of Figures 3 to 7 of Rigling & Moses for a mission of one's own: what a plot draws, no more.
 
 All places are in the axes of the scene, (x, y) east and north of its centre, or in the axes (x′, y′) of (10), turned
 about the same centre: a response stands where the errors put it, not at the middle of a patch.
@@ -49,7 +49,7 @@ class ImagePanel(NamedTuple):
 
     @property
     def limits(self) -> Limits:
-        """Of the axes: the picture, and the true places where they are near."""
+        """Limits of the axes: they hold the picture, and the true places where they are near. [m]"""
         left, right, bottom, top = self.extent
         near = _NEAR * max(right - left, top - bottom)
         x, y = self.true_places.T

@@ -40,12 +40,12 @@ def tone_of(status: str) -> str:
 
 
 def status_words(status: str) -> str:
-    """What a legend says of a status."""
+    """The words of a legend for a status."""
     return "no such mission" if has_no_mission(status) else STATUS[status].words
 
 
 def strengths(statuses: Sequence[str], parts: Sequence[float]) -> Mapping[str, float]:
-    """Of statuses that share a colour, which has which of some parts: the first, the worst, the first of them."""
+    """The part of each status: of those that share a colour the first, the worst, has the first of `parts`."""
     used: dict[str, int] = {}
     found: dict[str, float] = {}
     for name in statuses:

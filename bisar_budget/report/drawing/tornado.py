@@ -1,4 +1,4 @@
-"""What each number of a mission does to its worst utilization, as bars to both sides, the largest above.
+"""Effects of each number of a mission on its worst utilization, as bars to both sides, the largest above.
 
 All bars are for the same part: 1 % of a number, of a radian, of a power, of the smaller slant range.
 """

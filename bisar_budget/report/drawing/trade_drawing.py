@@ -237,7 +237,7 @@ def _curve(canvas: Canvas, frame: Box, across: Scale, up: Scale, x: Floats, valu
 
 
 def _seen(points: Sequence[Point]) -> list[Point]:
-    """What is seen of a curve of many points: of each half pixel the first, lowest, highest and last."""
+    """The visible points of a curve of many: the first, lowest, highest and last of each half pixel."""
     kept: list[Point] = []
     column: list[Point] = []
     for point in (*points, (math.inf, 0.0)):
@@ -326,7 +326,7 @@ class _Plane(NamedTuple):
 
 
 def _axis_scale(axis: Axis, start: float, end: float) -> Scale:
-    """Of a map the cells of words stand side by side; numbers go from the first to the last."""
+    """The scale of an axis: on a map the cells of words stand side by side; numbers go from the first to the last."""
     if axis.words:
         return Scale(-0.5, axis.values[-1] + 0.5, start, end)
     return Scale(float(axis.values[0]), float(axis.values[-1]), start, end, axis.is_log)

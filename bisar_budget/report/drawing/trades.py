@@ -1,4 +1,4 @@
-"""What a drawing of a sweep shows, as arrays."""
+"""The content of a drawing of a sweep, as arrays."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import pairwise

@@ -26,7 +26,7 @@ def limit_steps(allocation: Allocation, owner: str, limit: float) -> Iterator[St
 
 
 def autofocus_gain(allocation: Allocation) -> Iterator[Step]:
-    """What autofocus multiplies limits with."""
+    """The steps to the gain, the factor by which autofocus multiplies limits."""
     if allocation.n_pull is None:
         yield from step("No autofocus (autofocus.n_pull): gain = 1")
         return
@@ -48,7 +48,7 @@ def combined(
     symbol: str = "combined",
     unit: str = "rad",
 ) -> Iterator[Step]:
-    """What errors add up to by a rule: names and sizes, and the sum written out; `total` None: it has no value."""
+    """The total of errors by a rule: names and sizes, and the sum written out; `total` None: it has no value."""
     title = f"{title}, {RULES[rule]}"
     # What is left of terms that cancel exactly is rounding.
     largest = max((abs(size) for _, size in parts), default=0.0)

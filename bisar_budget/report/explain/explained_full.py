@@ -21,7 +21,7 @@ _ALIKE = 1e-6  # of a phase: by less, rounding decides which sign leaves more
 
 
 class Left:
-    """What an error of a signed size leaves at the point that it moves the scene centre to."""
+    """The range error that an error of a signed size leaves at the point that it moves the scene centre to."""
 
     def __init__(self, analysis: Analysis, source: ErrorSource, size: float) -> None:
         full = analysis.full
@@ -60,7 +60,7 @@ def _without_rounding(values: Sequence[float], whole: float) -> list[float]:
 
 
 def worse(analysis: Analysis, source: ErrorSource, size: float, which: int = _QUADRATIC) -> Left:
-    """What is left by the sign that leaves more."""
+    """The range error that is left by the sign that leaves more."""
     signs = [Left(analysis, source, signed) for signed in (size, -size)]
     if signs[0].is_small or not signs[1].ranges:
         return signs[0]
@@ -116,7 +116,7 @@ def _left_of(exact: ExactRanges) -> str:
 
 
 def for_comparison(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
-    """What the full model makes of an error that the published one judges."""
+    """The result of the full model for an error that the published one judges."""
     left = worse(analysis, source, size)
     if not left.ranges:
         yield from step(f"Full model{each}, for comparison: no ground point has the range history")

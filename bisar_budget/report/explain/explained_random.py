@@ -171,7 +171,7 @@ def _oscillator(mission: Mission, error: RandomError) -> Iterator[Step]:
 
 
 def _integrals(pieces: Sequence[PowerLawPiece], mission: Mission, interval: float | None) -> Iterator[Step]:
-    """What each piece of a spectrum adds to the mean squares."""
+    """The parts that each piece of a spectrum adds to the mean squares."""
     T = mission.collection.aperture_time
     if interval is None:
         each, density = [parts((piece,), T) for piece in pieces], "S"

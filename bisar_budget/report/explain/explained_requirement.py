@@ -44,7 +44,7 @@ def finding_of(mission: Mission, found: MissionFindings, one: JudgedRequirement)
 
 
 def declarations(mission: Mission) -> Iterator[Step]:
-    """What must be declared, and what of it the file lacks."""
+    """The errors that must be declared, and those of them that the file lacks."""
     yield from _asked_for(mission)
     missing = [one.key for one in missing_declarations(mission)]
     yield from step("Not in the file", *(missing or ["nothing: all of it is declared"]))

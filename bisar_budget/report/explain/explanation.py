@@ -323,7 +323,7 @@ def _slow_vibration(mission: Mission, allocation: Allocation, row: Row, cycles: 
 
 
 def _line_of_sight(mission: Mission, platform: str, is_sinusoid: bool, entry: int, declared: float) -> Iterator[Step]:
-    """What of a vibration along three axes is along the line of sight; of any, in the range less the direct path."""
+    """The part of a vibration along three axes in the line of sight; of any, in the range less the direct path."""
     body = getattr(mission.platforms, platform)
     vibration = body.motion_error.vibration
     value = vibration.sinusoidal[entry].amplitude if is_sinusoid else vibration.wideband.rms

@@ -164,7 +164,7 @@ def symbol(name: str, language: Language) -> str:
 
 
 def _bare(node: Node) -> Node:
-    """What stands over or under a line needs no brackets."""
+    """The node without its brackets, which nothing over or under a line needs."""
     return node.parts[0] if node.kind == "brackets" else node
 
 

@@ -1,4 +1,4 @@
-"""What needs attention as workflow commands, which GitHub shows in the pull request at the line of the value.
+"""Findings that need attention as workflow commands: GitHub shows them in the pull request at the value's line.
 
 The runner shows ten errors and ten warnings of a step, so the worst come first.
 """

@@ -71,7 +71,7 @@ def _indented(value: Any, levels: int, margin: str = "") -> str:
 
 
 def fault_item(fault: Fault) -> dict[str, Any]:
-    """What is wrong with a file, as the contract has it."""
+    """A fault of a file, as the contract has it."""
     return {
         "line": fault.line,
         "column": fault.column,

@@ -143,7 +143,7 @@ def _case(row: Row, mission: MissionFindings, class_name: str, file: str) -> Ite
 
 
 def _outcome(status_name: str, message: str, text: str, line: int | None, file: str) -> Iterator[str]:
-    """What a case says besides its properties; nothing where it simply passes."""
+    """Elements of a test case besides its properties; none where it simply passes."""
     status = STATUS[status_name]
     if status.junit == "failure":
         place = f"{file}:{line}: " if line is not None else ""

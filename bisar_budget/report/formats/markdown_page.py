@@ -126,6 +126,6 @@ def _math(latex: str) -> str:
 
 
 def _description(svg: str) -> str:
-    """What a drawing says of itself, for who cannot see it."""
+    """The description that a drawing carries, for readers who cannot see it."""
     match = _DESCRIPTION.search(svg)
     return unescape(match[1]) if match else ""

@@ -1,4 +1,4 @@
-"""What needs attention as SARIF 2.1.0, which code scanning and editors show at the value in the mission file.
+"""Findings that need attention as SARIF 2.1.0: code scanning and editors show them at the value in the mission file.
 
 Only findings are results: rows that pass, judge nothing or are not declared are not in it, and a requirement is where
 no row shows how it stands. What is waived is a result with a suppression, a file that cannot be used gives

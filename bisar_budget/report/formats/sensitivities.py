@@ -1,4 +1,4 @@
-"""What the numbers of a mission do to its worst utilization: text for reading, JSON `bisar-budget/sensitivity/1`."""
+"""Effects of a mission's numbers on its worst utilization: text for reading, JSON `bisar-budget/sensitivity/1`."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""What solving for a number found: text for reading, JSON `bisar-budget/solve/1`."""
+"""Results of solving for a number: text for reading, JSON `bisar-budget/solve/1`."""
 
 import json
 from collections.abc import Iterator, Sequence

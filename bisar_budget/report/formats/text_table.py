@@ -134,7 +134,7 @@ def _head(mission: MissionFindings, style: Style) -> Iterator[tuple[str, str]]:
 
 
 def _after(mission: MissionFindings, style: Style) -> Iterator[str]:
-    """What stands below the rows: what decides them, warnings, draws and images."""
+    """Lines below the rows: what decides them, warnings, draws and images."""
     if details := list(_details(mission, style)):
         yield from ("", *details)
     yield from (line for text in _asides(mission, style) for line in wrapped(text, "  "))
@@ -231,7 +231,7 @@ def _row(row: Row, mission: MissionFindings) -> tuple[str, ...]:
 
 
 def _limited_by(row: Row) -> str:
-    """What sets the allowable: another requirement than the row's own, else the place of its equation."""
+    """The source of the allowable: another requirement than the row's own, else the place of its equation."""
     binding = binding_words(row)
     if binding:
         return binding if row.binding_requirement == END_OF_IMAGE else binding.split()[0]
@@ -251,7 +251,7 @@ def _short_reference(equation: str) -> str:
 
 
 def _details(mission: MissionFindings, style: Style) -> Iterator[str]:
-    """What decides the rows that do not simply pass, once for all that share it; with -v all about every row."""
+    """Reasons of the rows that do not simply pass, once for all that share them; with -v all about every row."""
     groups: dict[tuple[str, tuple[str, ...]], list[Row]] = {}
     for row in worst_first(mission.rows):
         if style.verbosity > 0:

@@ -1,4 +1,4 @@
-"""What a file of cases says of itself: mission, hash, tool, and what each column holds, in which unit."""
+"""The description that a file of cases carries: mission, hash, tool, and what each column holds, in which unit."""
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
@@ -54,5 +54,5 @@ class Described:
 
 
 def _said(overrides: Sequence[Override]) -> str:
-    """What from outside the file bears on statuses, in a line."""
+    """The overrides from outside the file that bear on statuses, in a line."""
     return "; ".join(printable(f"{one.name} {one.value} ({one.origin})") for one in overrides)

@@ -1,1 +1,1 @@
-"""What every format says alike, and how text is laid out and escaped."""
+"""Words that every format shares, and how text is laid out and escaped."""

@@ -1,4 +1,4 @@
-"""What every format says of a mission: its geometry, resolution, budget and model."""
+"""Words of every format about a mission: its geometry, resolution, budget and model."""
 
 import math
 from collections.abc import Iterator

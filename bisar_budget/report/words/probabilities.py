@@ -1,4 +1,4 @@
-"""What the draws of a Monte Carlo say, as lines of text."""
+"""Results of the draws of a Monte Carlo, as lines of text."""
 
 import math
 from collections.abc import Iterator

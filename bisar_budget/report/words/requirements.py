@@ -1,4 +1,4 @@
-"""What every format says of the requirements of a mission: whether each was judged and is met, and by what."""
+"""Words of every format about the requirements of a mission: whether each was judged and is met, and by what."""
 
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple, Protocol
@@ -21,11 +21,11 @@ _UNKNOWN_PLACE = "place-is-not-known"  # a reason that rows say at length
 
 
 class HasOverrides(Protocol):
-    """What was found about a mission, by a check or another study."""
+    """Findings about a mission, by a check or another study."""
 
     @property
     def overrides(self) -> tuple[Override, ...]:
-        """What from outside the file bears on it."""
+        """Settings from outside the file that bear on the mission."""
 
 
 class RequirementLine(NamedTuple):

@@ -1,4 +1,4 @@
-"""What every format says of a row: how much of its limit it uses, what sets the limit, why it stands as it does."""
+"""Words of every format about a row: how much of its limit it uses, what sets the limit, why it stands as it does."""
 
 import math
 
