@@ -100,11 +100,11 @@ class Analysis:
         return (self.full, self.published) if gating == "full" else (self.published, self.full)
 
     def does(self, model: Model, source: ErrorSource) -> Declared:
-        """What a declared error does by a model."""
+        """Effect of a declared error by a model."""
         return Declared.of(self.errors.does(model.name, source))
 
     def declared(self, model: Model) -> dict[str, Declared]:
-        """What each declared error does by a model, by row id, along the axes that the file states it in."""
+        """Effect of each declared error by a model, by row id, along the axes that the file states it in."""
         return {source.id: self.does(model, source) for source in self.stated}
 
     @cached_property

@@ -75,7 +75,7 @@ class ScenePlaces:
 
     @property
     def heights(self) -> Floats:
-        """What circles are climbed by, (3, places): the clearances, negative, and the size."""
+        """Heights that a search along circles climbs, (3, places): the clearances, negative, and the size."""
         return np.array((*-self.clearances, self.size))
 
 
@@ -147,11 +147,11 @@ class ScenePhases:
         return self.exact.at(*at(radius, azimuth), of)
 
     def places(self, radius: Floats, azimuth: Floats, of: Places) -> ScenePlaces:
-        """What there is at places."""
+        """Phases, size of their differences, and clearances at places."""
         return self.there(self.ranges_at(radius, azimuth, of), of)
 
     def there(self, there: ExactRanges, of: Places) -> ScenePlaces:
-        """What there is where exact ranges are taken."""
+        """The same where exact ranges are taken."""
         centre = self.centre.take(of, axis=1)
         phases = there.quadratics_of(self.small.there(of)) * self.sizes.take(of, axis=1)
         clearances = np.array(
@@ -229,7 +229,7 @@ class ScenePhases:
 
     @cached_property
     def more(self) -> Floats:
-        """What errors have more at the centre than small ones, by the worse sign, (errors, cases). [rad]"""
+        """Quadratic phase at the centre beyond that of a small error, by the worse sign, (errors, cases). [rad]"""
         exactly = np.array([self.errors.does("full", error).qpe for error in self.members])
         return np.where(self.is_large, exactly - self.centre, 0.0)
 
@@ -407,7 +407,7 @@ class _Climb:
 
 @np.errstate(all="ignore")
 def differences_at(errors: DeclaredErrors, radius: float, azimuth: float) -> list[tuple[str, float]]:
-    """What the errors of one case differ by at a place from the centre, by row id, in the file's order. [rad]"""
+    """Phase of each error of one case at a place less that at the centre, by row id, in the file's order. [rad]"""
     phases = ScenePhases(errors)
     found = phases.differences(np.array([radius]), np.array([azimuth]), np.zeros(1, dtype=int))
     return list(zip(phases.ids, found[:, 0].tolist(), strict=True))
@@ -416,7 +416,7 @@ def differences_at(errors: DeclaredErrors, radius: float, azimuth: float) -> lis
 # ---------------------------------------------------------------------- edges
 @dataclass(frozen=True, slots=True, eq=False)
 class SceneEdges:
-    """What the edges of the scenes of many cases add.
+    """Differences that the edges of the scenes of many cases add.
 
     `rim` is where small errors differ most from the centre, `largest` where errors of their size do, combined as the
     mission says [rad]; infinite where there is no image. `over` are the phases [rad], (names, cases), of the errors
@@ -616,7 +616,7 @@ def where(
 
 # ---------------------------------------------------------------------- in words
 class SceneEdge(NamedTuple):
-    """What the edge of the scene of one mission adds, in words.
+    """Difference that the edge of the scene of one mission adds, in words.
 
     `difference` is the largest of the quadratic phases between edge and centre, combined as the mission says [rad],
     at `azimuth` on the rim. `autofocus_radius` is that within which it stays inside the total budget [m]; None where

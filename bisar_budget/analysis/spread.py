@@ -166,7 +166,7 @@ def spread_powers(
 
 
 def declared_powers(analysis: Analysis, allocation: Allocation, owner: str, model: str) -> list[SpreadPhase]:
-    """What ISLR holds of an owner by what one mission declares."""
+    """List the phases of an owner that count against ISLR, by what one mission declares."""
     mission = analysis.mission
     found = held_by_islr(mission, analysis.random, tones(mission), model)
     return spread_powers(mission, found, allocation.islr, owner, cubic_at_one_sigma(analysis, allocation, model))

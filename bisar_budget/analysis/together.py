@@ -120,12 +120,12 @@ class Together:
 
     # ---------------------------------------------------------------- of a check, which is one case
     def phase_parts(self, phases: Phases, rule: str = "") -> list[tuple[str, float]]:
-        """What combines of phases by the mission's rule, or another, signed. [rad]"""
+        """List the parts of phases that the mission's rule, or another, combines, signed. [rad]"""
         parts = phase_parts(phases, rule or self.rule, self.groups)
         return [(row_id, float(phase[0])) for row_id, phase in parts]
 
     def displacement_parts(self) -> list[tuple[str, GroundVector]]:
-        """What combines of displacements by the mission's rule: none where one of them has no image. [m]"""
+        """List the parts of displacements that the mission's rule combines: none where one has no image. [m]"""
         found = displacement_parts(self.moves(self.rule), self.rule, self.groups)
         parts = [(row_id, (float(east[0]), float(north[0]))) for row_id, (east, north) in found]
         return [] if any(math.isnan(east) for _, (east, _) in parts) else parts

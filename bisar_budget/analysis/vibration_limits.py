@@ -34,7 +34,7 @@ LARGEST_ECHO = 2.0  # rad; beyond, echoes are above the response
 
 
 class VibrationLimits(NamedTuple):
-    """What one platform may have, by the paper's rule and from first principles, 0 to peak or rms. [m]"""
+    """Largest vibration of one platform, by the paper's rule and from first principles, 0 to peak or rms. [m]"""
 
     published: Any
     full: Any

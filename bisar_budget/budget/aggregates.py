@@ -354,7 +354,7 @@ def _largest(analysis: Analysis, model: str, one: Aggregate) -> tuple[str, float
 
 
 def _doubt(other: str, one: Aggregate, said: _Words, limit: float | None) -> Note:
-    """What makes a pass a warning: all errors together, or the model that does not gate."""
+    """Reason that makes a pass a warning: all errors together, or the model that does not gate."""
     if limit is None:
         return NOTHING
     if np.any(one.is_over_of_all):

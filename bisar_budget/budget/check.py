@@ -141,7 +141,7 @@ def _instrument_rows(analysis: Analysis, gating: str, allocation: Allocation) ->
 
 
 def stricter(published: Sequence[Row], full: Sequence[Row]) -> list[Row]:
-    """Of two complete checks each row of the stricter verdict, then of the higher utilization."""
+    """Rows of two complete checks: of each the one with the stricter verdict, then the higher utilization."""
     by_id = {row.id: row for row in published}
     rows = [max((row, by_id.pop(row.id, row)), key=_strictness) for row in full]
     rows += by_id.values()  # an aggregate that only one of them has

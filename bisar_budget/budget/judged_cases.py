@@ -219,7 +219,7 @@ class _Check:
 
     @cached_property
     def _edges(self) -> SceneEdges | None:
-        """What the edges of the scenes add; none without a declared error."""
+        """Differences that the edges of the scenes add; None without a declared error."""
         return scene_edges(self.errors, self.limits, self.split)
 
     @cached_property
@@ -305,7 +305,7 @@ def waived(row: Judged, mission: Mission, today: date) -> Judged:
 
 
 def _stricter(published: Sequence[Judged], full: Sequence[Judged]) -> list[Judged]:
-    """Of two complete checks each row of the stricter verdict, then of the higher utilization."""
+    """Rows of two complete checks: of each the one with the stricter verdict, then the higher utilization."""
     found, of_full = [], {row.subject.id: row for row in full}
     for one in published:
         other = of_full.pop(one.subject.id, None) or Judged.of_none(one.subject, one.status.size)

@@ -32,7 +32,7 @@ class Caps(NamedTuple):
 
 
 def caps(mission: Mission) -> Caps:
-    """What no autofocus of a mission goes beyond."""
+    """Bounds on N_pull that no autofocus of a mission goes beyond."""
     walk = range_walk_cap(mission)
     if mission.scene.radius is None:
         return Caps(walk)

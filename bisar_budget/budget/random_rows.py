@@ -53,7 +53,7 @@ Truths = NDArray[np.bool_]
 
 
 class Limits(NamedTuple):
-    """What the errors of an owner are held to, each alone: quadratic and cubic phase, rms of what spreads. [rad]"""
+    """Limits on the errors of an owner, each alone: quadratic and cubic phase, rms of what spreads. [rad]"""
 
     quadratic: Any
     cubic: Any
@@ -61,7 +61,7 @@ class Limits(NamedTuple):
 
 
 def limits_for(mission: Mission, allocation: Allocation, owner: str, model: str, gain: Any = 1.0) -> Limits:
-    """What the errors of an owner are held to by a model; `gain` is that of autofocus."""
+    """Limits on the errors of an owner by a model; `gain` is that of autofocus."""
     spread = spread_limit(mission, allocation, owner, model)
     return Limits(allocation.qpe_limit(owner) * gain, mission.requirements.cubic_phase_error, spread)
 
@@ -99,7 +99,7 @@ class RandomRow:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IslrRow:
-    """What spreads of one owner together, in many cases.
+    """Row of the phases of one owner that spread, taken together, in many cases.
 
     `is_there` are the cases that have the row; `variance` is that of the phase, and `limit` and `limit_of_other` the
     rms phases that are allowed by the model that gates and the other one. [rad², rad]

@@ -158,7 +158,7 @@ def _greet(address: str) -> None:
 
 
 class Workers:
-    """What works for a scheduler; `threads` of it at the last look."""
+    """Workers of a scheduler; `threads` is how many they had at the last look."""
 
     def __init__(self, client: Any, address: str, patience: float, tell: Callable[[str], None]) -> None:
         self.client, self.address, self.patience, self.tell, self.threads = client, address, patience, tell, 0

@@ -325,7 +325,7 @@ def _words(option: str, choices: Choices, texts: Sequence[str]) -> Values:
 
 
 def _wrong_word(choices: Choices, word: str) -> str:
-    """What is wrong with a word; empty if nothing is, or if more than the word says it."""
+    """Problem with a word; empty if there is none, or if reading the mission says it."""
     if word.startswith("[") or isinstance(choices.reader, TextList):
         return ""  # reading the mission says it
     try:

@@ -180,7 +180,7 @@ def _with_silence(states: Sequence[PartState]) -> Iterator[PartState]:
 
 
 def _order(state: PartState) -> tuple[bool, float, float, str]:
-    """What complies first and the smallest margin first; then the nearest miss, at last what is no mission."""
+    """Sort key: what complies first, the smallest margin first; then the nearest miss, at last what is no mission."""
     sign = -1 if state.complies else 1
     uses = (state.standing.utilization, state.own_utilization)
     worst, own = (math.inf if use is None else sign * use for use in uses)

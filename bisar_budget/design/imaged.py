@@ -14,7 +14,7 @@ from bisar_budget.workers import Progress, unseen
 
 
 class ToImage(NamedTuple):
-    """What is imaged: a mission with the solution, the row that binds, and the solution as text."""
+    """A case to image: a mission with the solution, the row that binds, and the solution as text."""
 
     mission: Mission
     row: str

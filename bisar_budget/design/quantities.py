@@ -36,7 +36,7 @@ class Number(NamedTuple):
 
     @property
     def dimension(self) -> Dimension:
-        """What kind of quantity it is."""
+        """Kind of quantity that it is."""
         return self.reader.dimension
 
     def text(self, value: float, *, is_up: bool | None = None) -> str:
@@ -74,7 +74,7 @@ Varied = Number | Choices
 
 
 def tree_of(mission: Mission) -> dict[str, Any]:
-    """What the file of a mission says with the options that changed it, as text."""
+    """Content of a mission's file with the options that changed it, as text."""
     tree = read_tree(mission.data or b"", mission.file)
     apply_changes(tree, mission.changes)
     root: dict[str, Any] = tree.root

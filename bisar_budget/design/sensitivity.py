@@ -58,7 +58,7 @@ class Skipped(NamedTuple):
 
 
 class Slope(NamedTuple):
-    """What one number of the file does.
+    """Change of the utilization by one number of the file.
 
     `text` is its value as the file has it, `value` the same in `unit`; of a covariance the factor 1 on its sigmas.
     `per_text` says how much more of it `change` is for, `per` the same in SI, signed like the value, and `measure`
@@ -109,7 +109,7 @@ class Slope(NamedTuple):
 
 
 class Relaxed(NamedTuple):
-    """What doubling one declared error costs the others where shares are balanced.
+    """Cost to the other errors of doubling one declared error where shares are balanced.
 
     `shares_before` and `shares_after` are those of transmitter and receiver. `transmitter` and `receiver` have, of
     each, the worst utilization of the judged rows that are not of this error, before and after, and the row that has
@@ -387,7 +387,7 @@ class _Beside:
     def _slope(
         self, number: Stated, here: _Uses, kind: str, uses: Sequence[_Uses], weights: Sequence[float]
     ) -> Slope:
-        """What a number does, by utilizations at rising values and their weights."""
+        """Slope for a number, by utilizations at rising values and their weights."""
         scale = number.per / number.step
         in_row = [use.row for use in uses if use.row is not None]
         return Slope(

@@ -82,7 +82,7 @@ class Crossing(NamedTuple):
 
 
 class Imaged(NamedTuple):
-    """What the image says of the row that binds at a solution.
+    """Verdict of the image on the row that binds at a solution.
 
     `at` is the solution as text; `verdict` is None where a row has no image. `reason` says why there is no verdict,
     or what it rests on; empty where there is nothing to say.
@@ -441,5 +441,5 @@ def _crossing(low: State, high: State, below: State, above: State) -> Crossing:
 
 
 def _sign(state: State) -> float:
-    """Of what complies the highest utilization may not, of the rest the lowest may."""
+    """Sign of utilization: 1 where a state complies, as the highest may not; else -1, as the lowest may."""
     return 1.0 if state.complies else -1.0

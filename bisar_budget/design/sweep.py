@@ -283,5 +283,5 @@ def part_of(question: Question, block: Block) -> Part:
 
 
 def _said(fault: Fault) -> str:
-    """What is wrong, and what would not be."""
+    """Words for a fault: what is wrong, and what would not be."""
     return fault_words(fault.problem, "", fault.accepted, "" if "Read with" in fault.hint else fault.hint)

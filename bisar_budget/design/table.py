@@ -214,7 +214,7 @@ class Variation:
 
     @cached_property
     def tree(self) -> Tree:
-        """What the file says."""
+        """Content of the file as a tree."""
         return read_tree(self.mission.data, self.mission.file)
 
     def read(self, changes: Sequence[SetValue] = ()) -> Mission:
@@ -238,7 +238,7 @@ class Variation:
 
 # ---------------------------------------------------------------- cases
 class Question(NamedTuple):
-    """What a process needs to check cases of a mission; `named` where it cannot read what the mission names.
+    """All that a process needs to check cases of a mission; `named` where it cannot read what the mission names.
 
     `keys` have numbers, `choices` words. `row` is judged instead of the mission, if given; `breaks` are the statuses
     that do not comply.

@@ -130,7 +130,7 @@ def _bare(mission: Mission) -> Mission:
 
 
 def _parts(value: Any) -> Any:
-    """What a value is made of; None of a number, an array or a word."""
+    """Parts that a value is made of; None for a number, an array or a word."""
     if isinstance(value, tuple):
         return value
     if isinstance(value, dict):

@@ -73,7 +73,7 @@ def correlated_errors(mission: Mission) -> tuple[Correlated, ...]:
 
 
 def squared(correlation: Sequence[Sequence[Any]], parts: Sequence[Any] | Floats) -> Any:
-    """What correlated parts add up to, squared: Σ ρᵢⱼvᵢvⱼ; what rounding leaves below zero is zero."""
+    """Square of the sum of correlated parts: Σ ρᵢⱼvᵢvⱼ; what rounding leaves below zero is zero."""
     rows = [sum(rho * v for rho, v in zip(row, parts, strict=True)) for row in correlation]
     return np.maximum(0.0, sum(v * row for v, row in zip(parts, rows, strict=True)))
 

@@ -44,7 +44,7 @@ _FLOORS = (FLOOR_RAD, FLOOR_RAD, FLOOR_M)
 
 
 class Does(NamedTuple):
-    """What errors of a size do in each case.
+    """Phases and displacements by errors of a given size, in each case.
 
     Quadratic and cubic phase at the aperture edge, of the worse sign, signed like the first order of the declared
     one [rad]; displacement east and north by the declared sign, and by the opposite one [m]. Displacements are NaN
@@ -152,7 +152,7 @@ class ErrorBlock:
 
     # ---------------------------------------------------------------- small errors
     def per_unit(self, model: str) -> Floats:
-        """What a small unit does: magnitudes of both phases [rad], and the displacement [m]; (3, errors, cases)."""
+        """Magnitudes of both phases [rad], and of the displacement [m], by a small unit; (3, errors, cases)."""
         if model not in self._per_unit:
             effect = self.effects[model]
             moved = np.hypot(*self.table.planes[model].displacement(effect, 1.0))
@@ -202,7 +202,7 @@ class ErrorBlock:
 
     # ---------------------------------------------------------------- errors of any size
     def does(self, model: str, size: Floats) -> Does:
-        """What errors of sizes do by a model, (errors, cases); NaN of what has no size."""
+        """Effects of errors of given sizes by a model, (errors, cases); NaN for an error without a size."""
         effect = self.effects[model]
         qpe, cubic = effect.qpe * size + 0.0, effect.cubic * size + 0.0
         moved = self.table.planes[model].displacement(effect, size)
@@ -445,12 +445,12 @@ class DeclaredErrors:
         return self.blocks[block], place
 
     def does(self, model: str, error: ErrorSource) -> Does:
-        """What a declared error does by a model, (cases,)."""
+        """Effect of a declared error by a model, (cases,)."""
         block, place = self._place[error.id]
         return self.of_block(model, block).of(place)
 
     def of_block(self, model: str, block: int) -> Does:
-        """What the declared errors of a block do by a model, (errors, cases)."""
+        """Effects of the declared errors of a block by a model, (errors, cases)."""
         key = (model, block)
         if key not in self._does:
             self._does[key] = self.blocks[block].does(model, self.blocks[block].declared)

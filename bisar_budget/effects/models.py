@@ -39,7 +39,7 @@ class ExactPhases(NamedTuple):
 
 
 class Declared(NamedTuple):
-    """What one error of a size does, as `Does` has it; None where there is no displacement."""
+    """Effect of one error of a given size, with the fields of `Does`; None where there is no displacement."""
 
     qpe: float
     cubic: float
@@ -90,7 +90,7 @@ class Model:
         return phrases.no_size_reaches_the_limit() if source.is_motion else phrases.no_quadratic_phase()
 
     def does(self, source: ErrorSource, size: float) -> Declared:
-        """What an error of a size does."""
+        """Effect of an error of a given size."""
         block, place = self.errors.block_of(source)
         sizes = np.full(block.declared.shape, math.nan)
         sizes[place] = size

@@ -42,7 +42,7 @@ _CANCELS = ROUNDING * 1e-2  # of a square: below it, its root is rounding
 
 
 class RandomEffect(NamedTuple):
-    """What a unit of an error does: quadratic and cubic phase at the aperture edge, rms of what spreads. [rad/unit]
+    """Effect of a unit of an error: quadratic and cubic phase at the aperture edge, rms of what spreads. [rad/unit]
 
     `spread` is what is left of the phase after the cubic; it is a mean power, and no coverage factor is in it.
     `covariance` is that of quadratic and cubic phase. [rad²/unit²]
@@ -86,7 +86,7 @@ class RandomError(NamedTuple):
         return NOTHING if self.noise is None else self.noise.extrapolated
 
     def effect(self, model: str) -> RandomEffect:
-        """What a unit does by a model."""
+        """Effect of a unit by a model."""
         return self.full if model == "full" else self.published
 
 

@@ -7,7 +7,7 @@ MOTION = ("position", "velocity", "acceleration")  # kinds of error that a platf
 
 
 class Subject(NamedTuple):
-    """What a row or an error is about. `subject` makes it, with its id; nobody reads an id to find out.
+    """The thing that a row or an error is about. `subject` makes it, with its id; nobody reads an id to find out.
 
     `owner` is the one whose share it counts against: transmitter, receiver, clock, or mission for what is nobody's.
     `kind` is position, velocity, acceleration, vibration, timing, terrain, other, or the name of a sum. `axis` is the

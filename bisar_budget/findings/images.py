@@ -16,7 +16,7 @@ FLOOR_DB = -40.0  # of the error-free peak: black in a chip
 
 
 class Verdict(NamedTuple):
-    """What the image says of one limit. None where a value does not exist; `reason` says why.
+    """Verdict of the image on one limit. None where a value does not exist; `reason` says why.
 
     Phases are magnitudes at the aperture edge [rad]: by Table II, by the full model's closed form, predicted from
     exact ranges, and measured, `…_inside` and `…_beyond` at 0.9 and 1.1 times the limit. Displacements are on the

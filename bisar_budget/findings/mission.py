@@ -42,7 +42,7 @@ class Resolution(NamedTuple):
 
 
 class MissionFindings(NamedTuple):
-    """What was found about one mission file that can be used.
+    """Findings about one mission file that can be used.
 
     `analysis` is that of the check, for whoever goes on from it; None where a thousand would fill memory.
     """
@@ -83,7 +83,7 @@ class MissionFindings(NamedTuple):
 
     @property
     def mission(self) -> Mission | None:
-        """What was checked, with its analysis or not at all."""
+        """The mission that was checked; None where its analysis was not kept."""
         return None if self.analysis is None else self.analysis.mission
 
     def analysed(self) -> "Analysis":

@@ -32,7 +32,7 @@ class Requirement(NamedTuple):
 
 
 class MonteCarlo(NamedTuple):
-    """What the draws say. `probability` is that all requirements hold at once; None without a requirement.
+    """Result of the draws. `probability` is that all requirements hold at once; None without a requirement.
 
     `is_exact` says that every draw went through exact ranges: the errors are too large for sums of effects.
     """

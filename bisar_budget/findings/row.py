@@ -110,7 +110,7 @@ class Row(NamedTuple):
 
     @property
     def decisive(self) -> tuple[Note, ...]:
-        """What decides its status: the reason, waivers, and what images say against its limit."""
+        """Notes that decide its status: the reason, waivers, and what images say against its limit."""
         reason = (self.reason,) if self.reason else ()
         return (*reason, *(waiver.words for waiver in self.waivers), *self.refuted)
 

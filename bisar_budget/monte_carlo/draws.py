@@ -68,7 +68,7 @@ class Drawing(NamedTuple):
 
 
 class Tally(NamedTuple):
-    """What a piece gives.
+    """Counts and sums of squares of one piece.
 
     For each requirement the draws in which it held, those that have an image, and the sum of squares over these; the
     draws in which all held.
@@ -81,7 +81,7 @@ class Tally(NamedTuple):
 
 
 class Counted(NamedTuple):
-    """What all draws give.
+    """Counts and mean squares of all draws.
 
     For each requirement the draws in which it held and the mean square, over draws that have an image; the draws in
     which all held.

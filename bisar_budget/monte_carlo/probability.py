@@ -176,13 +176,13 @@ def _requirements(mission: Mission, allocation: Allocation, variables: Sequence[
 
 
 class _Predictions:
-    """What needs no draws: combinations by the rules of `check`, standard uncertainties, the normal distribution."""
+    """Figures without draws: combinations by the rules of `check`, standard uncertainties, a normal distribution."""
 
     def __init__(self, analysis: Analysis, variables: Sequence[Variable]) -> None:
         self.together, self.variables = Together(analysis.errors, "full", (), analysis.random), variables
 
     def combined(self, judged: HeldSum, rule: str) -> float | None:
-        """What a rule of `allocation.combine` holds to the limit, coverage factor included; None: no image."""
+        """Size that a rule of `allocation.combine` holds to the limit, coverage factor included; None: no image."""
         members = [one for one in self.together.phases if one.owner in judged.owners]
         if judged.columns == (0,):
             size = self.together.combined(quadratics(members), rule)

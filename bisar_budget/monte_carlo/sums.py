@@ -137,6 +137,6 @@ class Sums:
 
 
 def _sum(parts: Mapping[str, Floats], owners: Sequence[str], nothing: Floats) -> Floats:
-    """What several owners have, added up."""
+    """Sum of the parts of several owners; `nothing` where none has any."""
     found = [parts[owner] for owner in owners if owner in parts]
     return sum(found[1:], found[0]) if found else nothing

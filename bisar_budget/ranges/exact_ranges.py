@@ -84,7 +84,7 @@ def nodes_for(geometry: BistaticGeometry, aperture_time_s: Any, *, has_direct_pa
 
 
 class Effect(NamedTuple):
-    """What one unit of an error does, signed like the range error; numbers, or arrays of cases.
+    """Effect of one unit of an error, signed like the range error; numbers, or arrays of cases.
 
     Constant [m/unit] and linear [(m/s)/unit] term of the range error; quadratic and cubic phase at the
     aperture edge [rad/unit]. By the published model they are coefficients at the aperture midpoint. By the full
@@ -200,7 +200,7 @@ class SmallErrors(NamedTuple):
 
 
 class Found(NamedTuple):
-    """What errors do by exact ranges; `is_found` where that is certain at once.
+    """Effects of errors by exact ranges; `is_found` where they are certain at once.
 
     Displacement east, north [m]; quadratic and cubic phase at the aperture edge, signed like β̃ [rad]. `turn` is what
     range and Doppler gradients span there, over what they span at the centre.
@@ -293,7 +293,7 @@ class ExactRanges:
 
     @cached_property
     def slopes(self) -> list[Floats]:
-        """What a metre east, and north, takes from the range at the nodes: u_t + u_r on the ground. [m/m]"""
+        """Decrease of the range at the nodes per metre east, and north: u_t + u_r on the ground. [m/m]"""
         (p, q), (R, S) = self.tracks, self.ranges
         return [p[axis] / R + q[axis] / S for axis in (0, 1)]
 
@@ -365,7 +365,7 @@ class ExactRanges:
         return metres * 0.0 if self.has_direct_path else metres
 
     def along(self, platform: int, direction: Vectors) -> Floats:
-        """What a metre along a direction does to the range of a platform at the nodes, −u·d; if heard, −(u − b)·d."""
+        """Change of a platform's range at the nodes per metre along a direction, −u·d; if heard, −(u − b)·d."""
         found: Floats = -dot(self.tracks[platform], direction) / self.ranges[platform]
         return found + dot(self.heard_along[platform], direction) if self.has_direct_path else found
 
@@ -394,7 +394,7 @@ class ExactRanges:
 
     @cached_property
     def phase_weights(self) -> tuple[Floats, Floats]:
-        """What a metre at each node adds to quadratic and cubic phase, that of the displacement included. [rad/m]"""
+        """Quadratic and cubic phase per metre at each node, that of the displacement included. [rad/m]"""
         value, slope, *phases = (weights[:, None] for weights in self.fit)
         quadratic, cubic = (
             self.k * own + by_value * value + by_slope / self.half * slope
@@ -449,7 +449,7 @@ class ExactRanges:
         return _left(measured, *place, room[MEASURED:])
 
     def _heard(self, shifts: Sequence[Any], case: Places) -> Floats:
-        """What shifts of the platforms make of c·t̃ at the nodes where the direct path is the clock. [m]"""
+        """The c·t̃ at the nodes by shifts of the platforms where the direct path is the clock. [m]"""
         a, b, c = (one - other for one, other in zip(*shifts, strict=True))
         x, y, z, baseline = _of([*self._between, self.baselines], case)
         grown = a * (2 * x + a) + b * (2 * y + b) + c * (2 * z + c)
@@ -512,7 +512,7 @@ class ExactRanges:
         return np.empty((WORKED_ON, self.fit.shape[1], lanes))
 
     def _measured(self, clock: Floats, shifts: Sequence[Any], case: Places, room: Floats) -> list[Floats]:
-        """What `_seen` takes of errors, (nodes, lanes): the clock error, and five of each platform, in `room`.
+        """Parts of errors that `_seen` takes, (nodes, lanes): the clock error, and five of each platform, in `room`.
 
         A range R grows by p/(R + √(R² + p)) where d is added to its vector r, with p = d·(2r + d): that has no
         rounding of the range itself. From a point at g = (east, north) it is p - 2r̂·g + |g|².

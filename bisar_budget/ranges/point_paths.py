@@ -36,7 +36,7 @@ _NO_ERROR = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
 class Held(NamedTuple):
-    """What is held to a limit in lanes, WAY, QUADRATIC or CUBIC; the limit; what a small unit does of it, signed."""
+    """Row held to a limit in lanes, WAY, QUADRATIC or CUBIC; the limit; effect of a small unit on the row, signed."""
 
     row: Any  # one of all, or of each (lanes,)
     limit: Floats
@@ -47,7 +47,7 @@ class Held(NamedTuple):
         return Held(self.row[some] if np.ndim(self.row) else self.row, self.limit[some], self.per_unit[some])
 
     def value(self, known: Floats) -> Floats:
-        """What is held to the limit, of known points, (6, lanes): a phase, signed [rad], or a way [m]."""
+        """Value held to the limit, of known points, (6, lanes): a phase, signed [rad], or a way [m]."""
         if np.ndim(self.row):
             phase = np.where(self.row == QUADRATIC, known[QUADRATIC], known[CUBIC])
             phase = np.where(self.row == WAY, np.hypot(known[1], known[2]), phase)
@@ -102,7 +102,7 @@ class PointPaths:
         return found
 
     def known(self, some: Places, size: Floats) -> Floats:
-        """What errors of sizes do that `to` has been asked for, (6, some); not a number where the way has ended."""
+        """Known points by errors of sizes that `to` was asked for, (6, some); not a number where the way ended."""
         found = self._at(self._count(some, size) - 1, some)
         found[:, (found[0] != size) | (size >= self.end[some])] = math.nan
         return found

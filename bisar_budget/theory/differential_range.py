@@ -59,7 +59,7 @@ def measured_error(platform: PlatformSymbols) -> Matrix:
 
 
 def direct_path_clock(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Expr:
-    """What a receiver that hears the transmitter puts for c·t̃ of (1): measured less actual distance of both. [m]
+    """The c·t̃ of (1) for a receiver that hears the transmitter: measured less actual distance of both. [m]
 
     Its clock is the direct signal, which is late by the actual distance; the processor takes the measured one off.
     """
@@ -147,7 +147,7 @@ def error_track(platform: PlatformSymbols) -> Matrix:
 
 
 def _first_order(platform: PlatformSymbols) -> Expr:
-    """What (1) holds of a platform for a scatterer at the scene centre, to first order in its error. [m]"""
+    """Part of a platform in (1) for a scatterer at the scene centre, to first order in its error. [m]"""
     return _grown(observed_differential_range((platform,)).subs(dict.fromkeys(scatterer, 0)), (platform,))
 
 

@@ -257,7 +257,7 @@ def evaluators() -> tuple[Evaluator, ...]:
 
 
 def _of_random_errors() -> tuple[Evaluator, ...]:
-    """What noise over an aperture does; mean squares where it is a process."""
+    """Evaluators for the effect of noise over an aperture; mean squares where it is a process."""
     figures = random_errors.inertial()
     columns = "Columns: quadratic and cubic phase at the aperture edge, what is left after the cubic. "
     parts = "Columns: of the quadratic and the cubic phase at the aperture edge, of what is left after the cubic. "

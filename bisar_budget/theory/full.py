@@ -120,7 +120,7 @@ def direct_range_error_at(platform: PlatformSymbols) -> Expr:
 
 
 def direct_sight(platform: PlatformSymbols) -> Matrix:
-    """What a metre of each error takes from the range where the direct path is the clock: u_t − b or u_r + b."""
+    """Decrease of the range per metre of each error where the direct path is the clock: u_t − b or u_r + b."""
     own = dict(zip(platform.position, platform.slant_range * platform.look[0], strict=True))
     return Matrix([-direct_range_error(platform).coeff(e).subs(own) for e in dr.error_track(platform)])
 
@@ -175,7 +175,7 @@ def motion_of_phase(phase: Expr) -> Expr:
 
 
 def quartic_as_quadratic() -> Expr:
-    """What a unit of x⁴ adds to the quadratic coefficient of the cubic fitted to it over −1 … 1: 6/7.
+    """Quadratic coefficient of the cubic fitted to x⁴ over −1 … 1: 6/7.
 
     Its projection on the second Legendre polynomial, the only one up to the third that holds an x².
     """
@@ -196,7 +196,7 @@ def cubic_phase(coefficients: Sequence[Expr]) -> Expr:
 
 
 def displacement_coefficients() -> tuple[Expr, ...]:
-    """What a displacement (x̂, ŷ) adds to β₀ … β₄: +s⁽ⁿ⁾·x̂/n!. [m/sⁿ]"""
+    """Change of β₀ … β₄ by a displacement (x̂, ŷ): +s⁽ⁿ⁾·x̂/n!. [m/sⁿ]"""
     return tuple(s.dot(DISPLACEMENT) / factorial(n) for n, s in enumerate(ground_history()))
 
 

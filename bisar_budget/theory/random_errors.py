@@ -142,7 +142,7 @@ def inertial() -> tuple[Figure, ...]:
 
 # ---------------------------------------------------------------------- Gauss-Markov
 def _with_exponential(polynomial: Poly, rate: Expr) -> Expr:
-    """What times exp(rate·x) has the derivative polynomial·exp(rate·x): by parts, over and over."""
+    """Factor of exp(rate·x) in the antiderivative of polynomial·exp(rate·x): by parts, over and over."""
     total, sign = Integer(0), 1
     for order in range(polynomial.degree() + 1):
         total += sign * polynomial.as_expr() / rate ** (order + 1)
@@ -270,7 +270,7 @@ def interpolated_noise() -> Expr:
 # ---------------------------------------------------------------------- for a reader
 @cache
 def table() -> Table:
-    """What a figure of an inertial sensor does at the aperture edge."""
+    """Table of the phases at the aperture edge by each figure of an inertial sensor."""
     rows = tuple(
         TableRow(
             number=None,
