@@ -1,4 +1,4 @@
-"""What a mission's checks share: its geometry, every error it can have, and what the models say of them."""
+"""The analysis that a mission's checks share: geometry, every error it can have, and what the models say of them."""
 
 from dataclasses import dataclass
 from functools import cached_property

@@ -19,9 +19,9 @@ from bisar_budget.analysis.allocation import Allocation, Split
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import MAINLOBE_ENERGY
 from bisar_budget.effects.clocks import spurs_of
+from bisar_budget.effects.declared import CUBIC
 from bisar_budget.effects.echoes import SLOWEST
 from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.effects.models import CUBIC
 from bisar_budget.effects.random_errors import RandomError
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.vibration import counted, lines_of

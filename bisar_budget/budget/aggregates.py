@@ -1,4 +1,4 @@
-"""What the declared errors add up to: phases of platforms and mission, cubic phase, location, autofocus pull-in.
+"""Sums of the declared errors: phases of platforms and mission, cubic phase, location, autofocus pull-in.
 
 Rows are judged in arrays over cases, of a sweep or of a check, which is one case; a check then puts them into words.
 """
@@ -25,7 +25,7 @@ from bisar_budget.effects.combined import (
     combined,
     correlation_notes,
 )
-from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
+from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.random_errors import displaces_unknown
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.vibration import DeclaredPhase

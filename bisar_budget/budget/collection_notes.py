@@ -1,4 +1,4 @@
-"""What a collection's geometry does to what a report says of it."""
+"""Notes on a collection that follow from its geometry."""
 
 from collections.abc import Iterator
 

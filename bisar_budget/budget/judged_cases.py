@@ -31,9 +31,8 @@ from bisar_budget.budget.requirement_states import (
 from bisar_budget.budget.scene_row import judged_edge
 from bisar_budget.budget.vibration_rows import Vibrations, judged_pslr, judged_spurs
 from bisar_budget.budget.waivers import is_waived
-from bisar_budget.effects.declared import MODELS, DeclaredErrors
+from bisar_budget.effects.declared import LOCATION, MODELS, DeclaredErrors
 from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.effects.models import LOCATION
 from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.vibration import slow_phases

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.constants import UTILIZATION_TOLERANCE
-from bisar_budget.effects.models import CUBIC, END_OF_IMAGE, LOCATION, QUADRATIC
+from bisar_budget.effects.declared import CUBIC, END_OF_IMAGE, LOCATION, QUADRATIC
 from bisar_budget.effects.subject import Subject
 from bisar_budget.findings.status import RANK
 

@@ -1,4 +1,4 @@
-"""What bounds autofocus beside its algorithm: range walk, and the room that the smear needs.
+"""Bounds of autofocus beside its algorithm: range walk, and the room that the smear needs.
 
 A phase of π·N at the aperture edge walks λN/2 in range, N·B/2f₀ cells, and smears a point over 4N cross-range cells.
 Measured on images of points (`tests/simulate/test_pull_in_caps.py`): one-dimensional autofocus works up to half a

@@ -1,4 +1,4 @@
-"""What `requirements.declare` asks the file to declare: what is missing cannot be shown to comply."""
+"""Errors that `requirements.declare` asks the file to declare: what is missing cannot be shown to comply."""
 
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from typing import NamedTuple

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.constants import UTILIZATION_TOLERANCE
-from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
+from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.findings.status import RANK, STATUS
 from bisar_budget.mission.model import Mission
 

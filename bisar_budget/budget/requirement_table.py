@@ -29,7 +29,7 @@ from bisar_budget.budget.requirement_states import (
 )
 from bisar_budget.budget.waivers import Waived, apply_waivers
 from bisar_budget.effects.combined import Phases
-from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
+from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.findings.mission import FileWarning
 from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import Row

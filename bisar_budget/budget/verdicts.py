@@ -1,4 +1,4 @@
-"""What follows from images for the rows of a check, and which of the images are worth showing."""
+"""Consequences of images for the rows of a check, and which of the images are worth showing."""
 
 from collections.abc import Mapping, Sequence
 from datetime import date

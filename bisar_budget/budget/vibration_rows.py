@@ -29,9 +29,9 @@ from bisar_budget.budget.judged_rows import BOUND, REQUIREMENTS, Floats, Judged,
 from bisar_budget.budget.judgement import number, worded
 from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.effects.clocks import Spur, spurs_of
+from bisar_budget.effects.declared import CUBIC, QUADRATIC
 from bisar_budget.effects.echoes import NEAR_CYCLES, SLOWEST, near_groups, worst_phases
 from bisar_budget.effects.effect import PLATFORMS, override_notes
-from bisar_budget.effects.models import CUBIC, QUADRATIC
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.tones import tone
 from bisar_budget.effects.vibration import counted, lines_of, projected

@@ -1,4 +1,4 @@
-"""What each number of a mission does to its worst utilization, by differences of whole checks.
+"""The change of the worst utilization by each number of a mission, by differences of whole checks.
 
 Every number that the file states, or takes from a part, is changed by itself, and all of these cases are checked
 together. Where the shares of a budget follow what is declared, it is also seen what an error that is relaxed costs

@@ -1,4 +1,4 @@
-"""What errors do to range history and image, by the published model, the full one and exact ranges."""
+"""Effects of errors on range history and image, by the published model, the full one and exact ranges."""
 
 # What other rooms may use.
 __all__ = [

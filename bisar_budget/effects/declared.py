@@ -1,4 +1,4 @@
-"""What the errors of cases do, by both models, and how large each may be; a check is one case.
+"""Effects of the errors of cases by both models, and how large each may be; a check is one case.
 
 The published model, Tables I and II and (25) of Rigling & Moses, is linear. The full model is true for errors of any
 size: where the second order provably does not matter, its effects are proportional to the error, and everywhere else

@@ -1,4 +1,4 @@
-"""What one unit of an error does to the range history and the image, by the published and the full model.
+"""Effect of one unit of an error on the range history and the image, by the published and the full model.
 
 Effects are those of Rigling & Moses (Tables I and II), and of the full model, which lets the line of sight turn and
 counts what the displacement of the image adds (`ranges.exact_ranges`).

@@ -8,12 +8,8 @@ import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.effects.declared import (
-    CUBIC,
     END_OF_IMAGE,
-    FARTHEST,
     HELD,
-    LOCATION,
-    QUADRATIC,
     SHARE,
     DeclaredErrors,
     Does,
@@ -22,8 +18,6 @@ from bisar_budget.effects.effect import ErrorSource, ImagePlane, number
 from bisar_budget.geometry import GroundVector
 from bisar_budget.phrases import Note
 from bisar_budget.ranges.exact_ranges import Effect
-
-__all__ = ["CUBIC", "END_OF_IMAGE", "FARTHEST", "LOCATION", "QUADRATIC", "Declared", "ExactPhases", "Model"]
 
 
 class ExactPhases(NamedTuple):

@@ -1,4 +1,4 @@
-"""What an error or a row is about, and its name."""
+"""The subject of an error or a row, and its name."""
 
 from functools import cache
 from typing import NamedTuple

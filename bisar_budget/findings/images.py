@@ -1,4 +1,4 @@
-"""What images say, as frozen data: verdicts on limits, and the pictures behind them.
+"""Findings of images, as frozen data: verdicts on limits, and the pictures behind them.
 
 Field names of verdicts are the JSON contract's of `verify`. Axes of pictures are those of the rotated image: x′ along
 the bistatic look direction φ_b, y′ across it, counter-clockwise.

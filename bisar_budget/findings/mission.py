@@ -1,4 +1,4 @@
-"""What was found about one mission file, and about all of a run."""
+"""Findings about one mission file, and about all of a run."""
 
 from datetime import date
 from typing import TYPE_CHECKING, NamedTuple

@@ -1,4 +1,4 @@
-"""What the draws of a Monte Carlo say."""
+"""Findings of the draws of a Monte Carlo."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""What a plot of a sweep shows, as arrays: one axis for each key that varies."""
+"""Contents of a plot of a sweep, as arrays: one axis for each key that varies."""
 
 from collections.abc import Mapping
 from datetime import date

@@ -1,4 +1,4 @@
-"""What the errors of a block of draws do together: sums of effects, or exact ranges of the paths that they make."""
+"""Effects of the errors of a block of draws together: sums, or exact ranges of the paths that they make."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

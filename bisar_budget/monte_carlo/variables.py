@@ -1,4 +1,4 @@
-"""What is drawn, and what the draws are held to. Needs NumPy, as all of this room does."""
+"""Variables that are drawn, and what the draws are held to. Needs NumPy, as all of this room does."""
 
 from typing import NamedTuple
 

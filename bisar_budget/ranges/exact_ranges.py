@@ -1,4 +1,4 @@
-"""What errors of any size do by exact ranges, in many cases at once: no expansion.
+"""Effects of errors of any size by exact ranges, in many cases at once: no expansion.
 
 The data hold the ranges of the true path; the processor subtracts those of the measured one. What is left is fitted
 over the whole aperture by Legendre polynomials Pₙ, at the nodes of Gauss-Legendre quadrature (`LEGENDRE_FITS`). The

@@ -8,9 +8,9 @@ from functools import partial
 
 from bisar_budget.analysis.vibration_limits import tone_limits
 from bisar_budget.budget.aggregates import aggregate_rows
+from bisar_budget.effects.declared import QUADRATIC
 from bisar_budget.effects.echoes import SLOWEST
 from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.effects.models import QUADRATIC
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.vibration import lines_of
 from bisar_budget.faults import printable

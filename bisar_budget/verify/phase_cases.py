@@ -9,8 +9,8 @@ from bisar_budget.analysis.allocation import range_walk_cap
 from bisar_budget.analysis.vibration_limits import slow_limits
 from bisar_budget.budget.collection_notes import COARSE_CELL_RAD, phase_across_a_cell
 from bisar_budget.budget.pull_in import ROOM
+from bisar_budget.effects.declared import CUBIC
 from bisar_budget.effects.effect import ErrorSource
-from bisar_budget.effects.models import CUBIC
 from bisar_budget.effects.vibration import Line
 from bisar_budget.findings.images import Verdict
 from bisar_budget.geometry import GroundVector

@@ -14,7 +14,7 @@ from bisar_budget.analysis.spread import declared_powers, islr_db, mainlobe_ener
 from bisar_budget.analysis.vibration_limits import echo_phase, highest_echo
 from bisar_budget.budget.random_rows import HELD, ISLR, held_effect, limits_for, sizes_at
 from bisar_budget.effects.clocks import Spur
-from bisar_budget.effects.models import CUBIC
+from bisar_budget.effects.declared import CUBIC
 from bisar_budget.effects.random_errors import RandomError, process_of
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.vibration import sight_of

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.effects.models import QUADRATIC
+from bisar_budget.effects.declared import QUADRATIC
 from bisar_budget.faults import MissionError
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import Mission

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.effects.models import QUADRATIC
+from bisar_budget.effects.declared import QUADRATIC
 from bisar_budget.effects.spectra import PowerLawPiece, synchronized_parts
 from bisar_budget.faults import MissionError
 from bisar_budget.findings.mission import MissionFindings

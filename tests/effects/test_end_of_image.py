@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.effects.models import END_OF_IMAGE, QUADRATIC
+from bisar_budget.effects.declared import END_OF_IMAGE, QUADRATIC
 from bisar_budget.findings.mission import MissionFindings, Report
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.load import parse_mission

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.effects.models import CUBIC, FARTHEST, LOCATION, QUADRATIC
+from bisar_budget.effects.declared import CUBIC, FARTHEST, LOCATION, QUADRATIC
 from bisar_budget.mission.load import parse_mission
 from tests.conftest import findings, mission_text, row
 

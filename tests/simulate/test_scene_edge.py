@@ -8,7 +8,7 @@ import pytest
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.scene import ScenePhases, ScenePlaces, at, where
 from bisar_budget.budget.check import check_mission
-from bisar_budget.effects.models import QUADRATIC
+from bisar_budget.effects.declared import QUADRATIC
 from bisar_budget.faults import MissionError
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.load import parse_mission

@@ -9,8 +9,8 @@ from collections.abc import Iterator, Sequence
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import ROUNDING
+from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import ErrorSource
-from bisar_budget.effects.models import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.geometry import GroundVector
 from bisar_budget.ranges.exact_ranges import ExactRanges
 from bisar_budget.report.explain.formulas import Step, Sum, number, step, with_unit

@@ -12,7 +12,7 @@ from bisar_budget.analysis.vibration_limits import LARGEST_ECHO, Echo, bessel, h
 from bisar_budget.budget.random_rows import held_effect, no_effect
 from bisar_budget.constants import STANDARD_GRAVITY
 from bisar_budget.effects.clocks import spurs_of
-from bisar_budget.effects.models import CUBIC, QUADRATIC
+from bisar_budget.effects.declared import CUBIC, QUADRATIC
 from bisar_budget.effects.random_errors import RandomEffect, RandomError, process_of
 from bisar_budget.effects.spectra import PowerLawPiece, parts, synchronized_parts
 from bisar_budget.effects.subject import subject
