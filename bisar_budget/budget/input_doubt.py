@@ -4,13 +4,11 @@ A path by an orbit or a log says how far the truth may be from it: by the age of
 its ephemeris, the residual of its smoothed log. A position error that is smaller cannot be that of this path.
 """
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from bisar_budget import phrases
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.subject import Subject
-from bisar_budget.findings.row import Row
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import FlownPath, MotionError, Platform
 from bisar_budget.phrases import Note
@@ -59,16 +57,6 @@ def least_doubt(path: FlownPath, declared: Any) -> Any:
     if declared is None:
         return LEAST_M if path.is_doubted else path.doubt_m
     return declared + (LEAST_M - declared) * (declared < LEAST_M)
-
-
-def with_input_doubts(rows: Sequence[Row], doubts: Sequence[InputDoubt], mission: Mission) -> list[Row]:
-    """Turn rows of position errors of a path in doubt into `not_evaluated`; one that fails stays so."""
-    found = list(rows)
-    for doubt in doubts:
-        for place, row in enumerate(found):
-            if row.status != "fail" and is_in_doubt(row.subject, doubt.owner, mission):
-                found[place] = row._replace(status="not_evaluated", reason=doubt.note)
-    return found
 
 
 def is_in_doubt(what: Subject, owner: str, mission: Mission) -> bool:

@@ -29,7 +29,6 @@ def worded(
     not_evaluated: Note = NOTHING,  # why a declared value cannot be judged
     info: Note = NOTHING,  # why the row judges nothing
     without_autofocus: float = 0.0,  # utilization without its gain
-    limits: tuple[float | None, float | None] = (None, None),  # by the published and the full model
     **others: Any,  # further fields of the row
 ) -> Row:
     """Put a row as judged, of one case, into words: they follow from its status, and decide nothing."""
@@ -50,9 +49,13 @@ def worded(
             remarks = (*remarks, phrases.near_the_limit_with_autofocus(utilization))
     fields: dict[str, Any] = {
         "allowable": allowable,
+        "allowable_published": number(row.allowable_published),
+        "allowable_full": number(row.allowable_full),
+        "qpe_published_rad": number(row.qpe_published_rad),
+        "qpe_full_rad": number(row.qpe_full_rad),
+        "qpe_exact_rad": number(row.qpe_exact_rad),
         "cubic_rad": number(row.cubic_rad),
-        "allowable_published": limits[0],
-        "allowable_full": limits[1],
+        "islr_db": number(row.islr_db),
         "utilization": utilization,
         "margin": number(row.margin),
         "line": mission.line(path),

@@ -18,12 +18,10 @@ def model_doubt(analysis: Analysis, rows: Sequence[Row]) -> Note:
     Parameters
     ----------
     analysis : Analysis
-        Of the mission; where it is bare, nothing is compared.
+        Of the mission.
     rows : sequence of Row
         As judged: those that the published model judges are looked at, of errors as stated and not zero.
     """
-    if analysis.is_bare:
-        return NOTHING
     stated = {source.id for source in analysis.stated if source.declared}
     apart = [row for row in rows if row.model == "published" and row.id in stated and _is_apart(row)]
     if not apart:

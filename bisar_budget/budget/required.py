@@ -3,11 +3,15 @@
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from bisar_budget import phrases
+import numpy as np
+from numpy.typing import NDArray
+
+from bisar_budget.budget.judged_rows import CODE, Judged, Why
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.findings.requirement import DeclaredKinds
-from bisar_budget.findings.row import DECLARE, Row
+from bisar_budget.findings.row import DECLARE
+from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import Platform
 
@@ -125,38 +129,32 @@ def _missing(mission: Mission, still: Container[str]) -> Iterator[Missing]:
                 yield Missing(name, kind, f"platforms.{name}.{key}")
 
 
-def with_required(rows: Sequence[Row], mission: Mission) -> list[Row]:
+def with_required(rows: Sequence[Judged], mission: Mission, geometry: BistaticGeometry, cases: int) -> list[Judged]:
     """Put the row of what must be declared before the others, where something must.
 
     Rows of errors that the file should declare and does not turn from `not_declared` into `not_evaluated`.
     """
     if not mission.requirements.declare:
         return list(rows)
-    missing = missing_declarations(mission)
-    return [_declarations(mission, missing), *(_required(row, missing) for row in rows)]
+    still = np.array([np.broadcast_to(path.is_still, (cases,)) for path in geometry.both])
+    whole = Judged.of_none(DECLARATIONS, cases)._replace(metric=DECLARE)
+    whole.status[:] = CODE["pass"]
+    found = [whole, *rows]
+    for which in np.unique(still, axis=1).T:  # nearly always one: a platform that moves does in every case
+        these = (still == which[:, None]).all(axis=0)
+        names = [name for name, is_still in zip(PLATFORMS, which, strict=True) if is_still]
+        missing = missing_declarations(mission, names)
+        whole.status[these] = CODE["not_evaluated" if missing else "pass"]
+        found = [_required(row, missing, these) for row in found]
+    return found
 
 
-def _declarations(mission: Mission, missing: Sequence[Missing]) -> Row:
-    """The row that says whether all is there: of kinds, too, that have no row where nothing is declared."""
-    return Row.without_numbers(
-        DECLARATIONS,
-        DECLARE,
-        "",
-        "not_evaluated" if missing else "pass",
-        line=mission.line(("requirements", "declare")),
-        reason=phrases.declarations_are_missing([one.key for one in missing]) if missing else None,
-        equation="requirements.declare",
-        requirement_id=mission.requirement_ids.get(DECLARATIONS.id),
-        model=mission.gating_model,
-    )
-
-
-def _required(row: Row, missing: Sequence[Missing]) -> Row:
-    if row.status == "not_declared":
-        for one in missing:
-            if is_asked_for(row.subject, one):
-                return row._replace(status="not_evaluated", reason=phrases.not_declared_as_required(one.key))
-    return row
+def _required(row: Judged, missing: Sequence[Missing], these: NDArray[np.bool_]) -> Judged:
+    """Turn a row that these cases should declare and do not from `not_declared` into `not_evaluated`."""
+    is_missing = these & (row.status == CODE["not_declared"])
+    if not is_missing.any() or not any(is_asked_for(row.subject, one) for one in missing):
+        return row
+    return row.settled(is_missing, "not_evaluated", Why.NOT_DECLARED_AS_REQUIRED)
 
 
 def is_asked_for(what: Subject, missing: Missing) -> bool:

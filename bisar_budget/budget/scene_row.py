@@ -1,63 +1,71 @@
-"""The row of the scene's edge: how far phases there may differ from those at the centre.
+"""The row of the scene's edge: how far phases there may differ from those at the centre."""
 
-It is judged in arrays over cases, of a sweep or of a check, which is one case; a check then puts it into words.
-"""
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.analysis.scene import SceneEdge, SceneEdges, scene_edges
-from bisar_budget.budget.judged_rows import BOUND, CODE, Floats, Judged, Judging
-from bisar_budget.budget.judgement import number, worded
-from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.analysis.scene import SceneEdge, SceneEdges
+from bisar_budget.budget.judged_rows import BOUND, CODE, Judged, Judging
+from bisar_budget.budget.judgement import worded
 from bisar_budget.effects.subject import subject
 from bisar_budget.findings.row import Row
 from bisar_budget.phrases import NOTHING, Note
 
 
-def judged_edge(judging: Judging, edges: SceneEdges | None, total: Floats, model: str) -> Judged:
-    """Judge the scene's edges by a model; to the published one an error is the same all over the scene."""
-    what, allowable = subject("mission", "spatial_variance"), None if model == "published" else total
-    nothing = judging.row(what, None, allowable)
-    if edges is None:
-        return nothing
-    doubt = edges.has_doubt
-    if model == "published":
-        doubt = doubt | (edges.difference > total * BOUND)
-    judged = judging.row(what, edges.difference, allowable, doubt=doubt)
-    nothing.status[:] = CODE["not_evaluated"]
-    return judged._replace(qpe_published_rad=np.zeros(judging.cases)).where(np.isinf(edges.difference), nothing)
+@dataclass(frozen=True, eq=False)
+class JudgedScene:
+    """The edges of scenes in many cases: differences that they add, none without a declared error."""
+
+    analysis: Analysis
+    edges: SceneEdges | None
+
+    @cached_property
+    def edge(self) -> SceneEdge | None:
+        """The edge of the only case, with how far one autofocus correction serves."""
+        analysis, edges = self.analysis, self.edges
+        return None if edges is None else SceneEdge.of(edges, analysis.geometry, analysis.allocation.qpe_total)
+
+    def row(self, judging: Judging, model: str) -> "SceneRow":
+        """Judge the edges by a model; to the published one an error is the same all over the scene."""
+        what, edges = subject("mission", "spatial_variance"), self.edges
+        total = judging.array(self.analysis.allocation.qpe_total)
+        allowable = None if model == "published" else total
+        nothing = judging.row(what, None, allowable)._replace(allowable_full=total)
+        if edges is None:
+            return SceneRow(nothing, self)
+        doubt = edges.has_doubt
+        if model == "published":
+            doubt = doubt | (edges.difference > total * BOUND)
+        judged = judging.row(what, edges.difference, allowable, doubt=doubt)._replace(
+            qpe_published_rad=np.zeros(judging.cases), qpe_full_rad=edges.difference, allowable_full=total
+        )
+        nothing.status[:] = CODE["not_evaluated"]
+        return SceneRow(judged.where(np.isinf(edges.difference), nothing), self)
 
 
-class CheckedScene:
-    """The scene's edge of one mission with `scene.radius`; `edge` is None without a declared error."""
+@dataclass(frozen=True, slots=True, eq=False)
+class SceneRow:
+    """The row of the scene's edge in many cases."""
 
-    def __init__(self, analysis: Analysis) -> None:
-        self.mission, allocation, errors = analysis.mission, analysis.allocation, analysis.errors
-        owners, gain, self.total = (*PLATFORMS, "clock", "mission"), allocation.autofocus_gain, allocation.qpe_total
-        limits = {owner: errors.array(allocation.qpe_limit(owner) * gain) for owner in owners}
-        self.edges = scene_edges(errors, limits, allocation.qpe)
-        self.edge: SceneEdge | None = None
-        if self.edges is not None:
-            self.edge = SceneEdge.of(self.edges, analysis.geometry, self.total, is_searched=not analysis.is_bare)
+    judged: Judged
+    scene: JudgedScene
+    is_there: bool = True
 
-    def row(self, model: str) -> Row:
-        """Row of the edge by one of the two models, in words."""
-        mission, edge, total = self.mission, self.edge, self.total
-        judging = Judging(1, mission.allocation.warn_above)
-        with np.errstate(all="ignore"):
-            judged = judged_edge(judging, self.edges, judging.array(total), model)
-        difference, doubt, degeneracy = number(judged.declared), NOTHING, NOTHING
-        notes = tuple[Note, ...]()
+    def in_words(self, analysis: Analysis, model: str) -> Row:
+        """The row of the only case, by the model that judges it."""
+        edge, total = self.scene.edge, analysis.allocation.qpe_total
+        doubt, degeneracy, notes = NOTHING, NOTHING, tuple[Note, ...]()
         if edge is not None:
             doubt, degeneracy = edge.doubt, edge.degeneracy
             notes = () if degeneracy else edge.notes(total)
             if model == "published" and edge.difference > total * BOUND:
                 doubt = phrases.other_model_fails("full", edge.difference, total, "rad")
         return worded(
-            mission,
-            judged,
+            analysis.mission,
+            self.judged,
             unit="rad",
             path=("scene", "radius"),
             equation="full model",
@@ -65,8 +73,5 @@ class CheckedScene:
             doubt=doubt,
             no_limit=phrases.same_all_over_the_scene(),
             not_evaluated=degeneracy,
-            limits=(None, total),
-            qpe_published_rad=number(judged.qpe_published_rad),
-            qpe_full_rad=difference,
             remarks=notes,
         )

@@ -200,7 +200,7 @@ class Asked:
 
     def chunks(self) -> "Chunks":
         """How the cases are cut: into few where many are read by themselves, which some of them show."""
-        is_slow = self.table.is_alone or (self.cases.count > _FEW and self._share_read() > _SLOW)
+        is_slow = self.cases.count > _FEW and self._share_read() > _SLOW
         return Chunks(self.cases.count, _FEW if is_slow else _TOGETHER, is_slow)
 
     def _share_read(self) -> float:
