@@ -7,7 +7,7 @@ __all__ = [
     "collection_notes",
     "fleet",
     "input_doubt",
-    "judged_cases",
+    "judged_mission",
     "judged_rows",
     "overrides",
     "pull_in",

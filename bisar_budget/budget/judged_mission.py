@@ -22,11 +22,10 @@ from bisar_budget.budget.input_doubt import declared_position_error, is_in_doubt
 from bisar_budget.budget.judged_rows import CODE, REQUIREMENTS, Judged, Judging, Why
 from bisar_budget.budget.orbit import FASTEST_FLIGHT
 from bisar_budget.budget.random_rows import RandomRows
-from bisar_budget.budget.required import DECLARATIONS, with_required
+from bisar_budget.budget.required import DECLARATIONS, is_asked_for, missing_declarations
 from bisar_budget.budget.requirement_states import (
     KEYS,
     RequirementState,
-    SeenRow,
     UntakenEffect,
     requirement_states,
     status_of,
@@ -40,11 +39,11 @@ from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.subject import subject
 from bisar_budget.findings.row import DECLARE, Row
 from bisar_budget.findings.status import STATUS
-from bisar_budget.geometry import norm
+from bisar_budget.geometry import BistaticGeometry, norm
 from bisar_budget.mission.model import Mission
 
 _STATUSES = tuple(STATUS)
-_BROKEN = [CODE["fail"], CODE["not_evaluated"]]  # what a waiver covers
+BROKEN = [CODE["fail"], CODE["not_evaluated"]]  # what a waiver covers
 _GATES = np.array([one.gates for one in STATUS.values()])
 _OWNERS = (*PLATFORMS, "clock", "mission")
 
@@ -130,17 +129,29 @@ class _Judgement:
         families = {model: list(self._families(model)) for model in analysis.gates}
         by_model = [self._rows(model, found) for model, found in families.items()]
         rows = [*self._undeclared(by_model[-1]), *_stricter(*reversed(by_model))]
-        rows = [self._doubted(row) for row in with_required(rows, mission, analysis.geometry, self.cases)]
+        if mission.requirements.declare:
+            rows.insert(0, Judged.of_none(DECLARATIONS, self.cases)._replace(metric=DECLARE))
+        of_all = RowStatuses(rows, mission)
+        of_all.require_declarations(analysis.geometry)
+        of_all.doubt_inputs(self._in_doubt)
         untaken = untaken_effects(mission, effect_totals(analysis))
         (place,) = (row.declared for row in rows if row.subject.id == f"mission.{LOCATION}")
         displacing = misplacing(analysis.together("full"), place)
         is_misplaced = np.any([displacing.where(self.cases), *self._in_doubt.values()], axis=0)
         has_noise = self._has_noise()
-        before = [self._settled(row, untaken, has_noise, is_misplaced) for row in rows]
-        after = [waived(row, mission, self.today) for row in before]
+        own = of_all.status.copy()
+        of_all.judge_effects(untaken)
+        of_all.judge_place(is_misplaced)
+        of_all.judge_spread(has_noise)
+        before = of_all.status
+        after = of_all.waived(self.today)
         states = requirement_states(
             mission,
-            [_seen(row, last) for row, last in zip(rows, after, strict=True)],
+            # A requirement judges effects by itself, and is waived where its row is.
+            np.where((after == CODE["waived"]) & np.isin(own, BROKEN), CODE["waived"], own),
+            np.array([row.utilization for row in rows]),
+            of_all.judges(),
+            np.array([row.quadratic_use for row in rows]),
             {key: is_waived(mission, self.today, [f"mission.{key}"]) for key in KEYS},
             has_noise=has_noise,
             is_misplaced=is_misplaced,
@@ -149,8 +160,8 @@ class _Judgement:
         return JudgedMission(
             analysis=analysis,
             families=families,
-            rows=tuple(after),
-            before=tuple(before),
+            rows=of_all.rows_with(after),
+            before=of_all.rows_with(before),
             requirements=tuple(states),
             untaken=untaken,
             misplacing=displacing,
@@ -239,23 +250,13 @@ class _Judgement:
                 found[name] = platform.path.doubt_m > self.judging.array(least)
         return found
 
-    def _doubted(self, row: Judged) -> Judged:
-        """Turn a row of a position error of a path in doubt into `not_evaluated`; one that fails stays so."""
-        for name, is_doubtful in self._in_doubt.items():
-            if is_doubtful.any() and is_in_doubt(row.subject, name, self.mission):
-                row = row.settled(is_doubtful & (row.status != CODE["fail"]), "not_evaluated", Why.INPUT_IN_DOUBT)
-        return row
-
     def _undeclared(self, known: Mapping[str, Judged]) -> Iterator[Judged]:
-        """Rows of position errors that nobody declared, of paths in doubt: they are not evaluated."""
+        """Rows that are shown, and of position errors of paths in doubt, that no case declares."""
+        wanted = dict(self.shown or {})
         for name, is_doubtful in self._in_doubt.items():
-            if is_doubtful.any():
-                own = [subject(name, "position", axis) for axis in "xyz"]
-                yield from (
-                    Judged.of_none(one, self.cases)
-                    for one in own
-                    if one.id not in known and is_in_doubt(one, name, self.mission)
-                )
+            own = (subject(name, "position", axis) for axis in "xyz") if is_doubtful.any() else ()
+            wanted |= {one.id: one for one in own if is_in_doubt(one, name, self.mission)}
+        return (Judged.of_none(one, self.cases) for row_id, one in wanted.items() if row_id not in known)
 
     def _has_noise(self) -> Truths:
         """Cases that declare something that spreads, or a tone that ISLR holds."""
@@ -264,26 +265,6 @@ class _Judgement:
         if self.mission.requirements.pslr is None:
             found += [np.broadcast_to(one.is_there, (self.cases,)) for one in self.analysis.tones]
         return np.asarray(np.any([np.zeros(self.cases, bool), *found], axis=0))
-
-    def _settled(
-        self, row: Judged, untaken: Sequence[UntakenEffect], has_noise: Truths, is_misplaced: Truths
-    ) -> Judged:
-        """The row with what it could not be judged by."""
-        row_id = row.subject.id
-        makes = [one.makers[row_id] for one in untaken if row_id in one.makers]
-        if any(row_id in one.parts for one in untaken):
-            status = status_of(row.status, row_id, ~np.isnan(row.allowable), untaken)
-            is_info = (status == CODE["info"]) & (row.status != status)
-            row = row._replace(status=status, utilization=np.where(is_info, np.nan, row.utilization))
-            is_judged = (row.status == CODE["not_evaluated"]) | (row.status == CODE["fail"])
-            is_made = np.any(makes, axis=0) & is_judged
-            row = row._replace(why=np.where(is_made, np.int8(Why.EFFECT_NOT_TAKEN), row.why))
-        is_known = np.isin(row.status, [CODE["fail"], CODE["not_declared"]])
-        if row_id == f"mission.{LOCATION}" and self.mission.requirements.location_error is not None:
-            row = row.settled(is_misplaced & ~is_known, "not_evaluated", Why.NO_PLACE)
-        if row.subject.kind == "islr":  # of a cubic phase alone, ISLR is not judged
-            row = row.settled(~has_noise & ~is_known, "not_evaluated", Why.NOTHING_SPREADS)
-        return row
 
     def _floor(self) -> Codes:
         """Best status that each case can have: paths may be in doubt, and nothing declared."""
@@ -300,25 +281,96 @@ class _Judgement:
         return floor
 
 
-def _seen(row: Judged, after: Judged) -> SeenRow:
-    """A row as requirements see it: they judge its effects by themselves, and are waived where it is."""
-    is_covered = (after.status == CODE["waived"]) & np.isin(row.status, _BROKEN)
-    is_of_key = (row.binding >= 0) & (row.binding < REQUIREMENTS.index(END_OF_IMAGE))
-    judges = np.where(is_of_key, row.binding, KEYS.index(row.metric))
-    if row.metric != DECLARE:  # what is not declared judges nothing
-        judges = np.where(row.why == Why.NOT_DECLARED_AS_REQUIRED, -1, judges)
-    status = np.where(is_covered, CODE["waived"], row.status)
-    return SeenRow(row.subject.id, status, row.utilization, judges.astype(np.int8), row.quadratic_use)
+class RowStatuses:
+    """Statuses of rows in many cases, (rows, cases), as what no row says by itself changes them, and why.
 
+    Each step turns rows into rows that are not evaluated; one that fails stays so.
+    """
 
-def waived(row: Judged, mission: Mission, today: date) -> Judged:
-    """Waive a row where it fails or is not evaluated and a waiver that holds names it."""
-    is_named: Any = is_waived(mission, today, [row.subject.id])
-    if not is_named and (row.why == Why.NOT_DECLARED_AS_REQUIRED).any():
-        is_named = is_waived(mission, today, [DECLARATIONS.id]) & (row.why == Why.NOT_DECLARED_AS_REQUIRED)
-    if not np.any(is_named):
-        return row
-    return row._replace(status=np.where(is_named & np.isin(row.status, _BROKEN), CODE["waived"], row.status))
+    def __init__(self, rows: Sequence[Judged], mission: Mission) -> None:
+        self.rows, self.mission = rows, mission
+        self.subjects = [row.subject for row in rows]
+        self.status, self.why = np.array([row.status for row in rows]), np.array([row.why for row in rows])
+
+    def _settle(self, which: Sequence[bool], is_so: Any, why: Why) -> None:
+        """Some rows are not evaluated, where it is so, (rows, cases) or (cases,)."""
+        these = np.array(which, dtype=bool)[:, None] & is_so
+        self.status = np.where(these, CODE["not_evaluated"], self.status)
+        self.why = np.where(these, np.int8(why), self.why)
+
+    def require_declarations(self, geometry: BistaticGeometry) -> None:
+        """What the file should declare and does not is not evaluated; the first row says whether all is there."""
+        if not self.mission.requirements.declare:
+            return
+        still = np.array([np.broadcast_to(path.is_still, self.status.shape[1:]) for path in geometry.both])
+        for which in np.unique(still, axis=1).T:  # nearly always one: a platform that moves does in every case
+            these = (still == which[:, None]).all(axis=0)
+            names = [name for name, is_still in zip(PLATFORMS, which, strict=True) if is_still]
+            missing = missing_declarations(self.mission, names)
+            self.status[0, these] = CODE["not_evaluated" if missing else "pass"]
+            owed = [any(is_asked_for(what, one) for one in missing) for what in self.subjects]
+            self._settle(owed, these & (self.status == CODE["not_declared"]), Why.NOT_DECLARED_AS_REQUIRED)
+
+    def doubt_inputs(self, in_doubt: Mapping[str, Truths]) -> None:
+        """Position errors of a path that is in doubt by more than the file declares are not evaluated."""
+        for name, is_doubtful in in_doubt.items():
+            if is_doubtful.any():
+                owed = [is_in_doubt(what, name, self.mission) for what in self.subjects]
+                self._settle(owed, is_doubtful & (self.status != CODE["fail"]), Why.INPUT_IN_DOUBT)
+
+    def judge_effects(self, untaken: Sequence[UntakenEffect]) -> None:
+        """What makes up an effect that no requirement takes is not evaluated, and what does a little of it `info`."""
+        for place, row in enumerate(self.rows):
+            row_id = row.subject.id
+            of_row = [one for one in untaken if row_id in one.parts]
+            if not of_row:
+                continue
+            status = status_of(self.status[place], row_id, ~np.isnan(row.allowable), of_row)
+            is_judged = (status == CODE["not_evaluated"]) | (status == CODE["fail"])
+            is_made = is_judged & np.any([one.makers[row_id] for one in of_row], axis=0)
+            self.status[place] = status
+            self.why[place] = np.where(is_made, np.int8(Why.EFFECT_NOT_TAKEN), self.why[place])
+
+    def judge_place(self, is_misplaced: Truths) -> None:
+        """Where the image is displaced by an amount that no row holds, the location is not evaluated."""
+        if self.mission.requirements.location_error is not None:
+            which = [what.id == f"mission.{LOCATION}" for what in self.subjects]
+            self._settle(which, is_misplaced & self._is_open, Why.NO_PLACE)
+
+    def judge_spread(self, has_noise: Truths) -> None:
+        """Of a cubic phase alone ISLR is not evaluated."""
+        if not has_noise.all():
+            which = [what.kind == "islr" for what in self.subjects]
+            self._settle(which, ~has_noise & self._is_open, Why.NOTHING_SPREADS)
+
+    @property
+    def _is_open(self) -> Truths:
+        return np.asarray((self.status != CODE["fail"]) & (self.status != CODE["not_declared"]))
+
+    def waived(self, today: date) -> Codes:
+        """The statuses with rows waived that fail or are not evaluated and that a waiver that holds names."""
+        if not self.mission.waivers:
+            return self.status
+        is_named = np.array([[is_waived(self.mission, today, [what.id])] for what in self.subjects])
+        if is_waived(self.mission, today, [DECLARATIONS.id]):
+            is_named = is_named | (self.why == Why.NOT_DECLARED_AS_REQUIRED)
+        return np.where(is_named & np.isin(self.status, BROKEN), CODE["waived"], self.status)
+
+    def judges(self) -> Codes:
+        """Place in `KEYS` of the requirement that judges each row, -1: none, since it is not declared."""
+        binding = np.array([row.binding for row in self.rows])
+        metric = np.array([[KEYS.index(row.metric)] for row in self.rows])
+        judges = np.where((binding >= 0) & (binding < REQUIREMENTS.index(END_OF_IMAGE)), binding, metric)
+        return np.where(self.why == Why.NOT_DECLARED_AS_REQUIRED, -1, judges).astype(np.int8)
+
+    def rows_with(self, status: Codes) -> tuple[Judged, ...]:
+        """The rows with these statuses; one that has become `info` uses nothing."""
+        found = []
+        for row, code, why in zip(self.rows, status, self.why, strict=True):
+            is_info = (code == CODE["info"]) & (row.status != code)
+            use = np.where(is_info, np.nan, row.utilization) if is_info.any() else row.utilization
+            found.append(row._replace(status=code, why=why, utilization=use))
+        return tuple(found)
 
 
 def _stricter(full: Mapping[str, Judged], published: Mapping[str, Judged] | None = None) -> list[Judged]:

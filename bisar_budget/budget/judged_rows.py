@@ -87,12 +87,6 @@ class Judged(NamedTuple):
         }
         return self._replace(**columns)
 
-    def settled(self, is_so: Any, status: str, why: Why) -> "Judged":
-        """The row with another status in some cases, for a reason that its numbers do not give."""
-        return self._replace(
-            status=np.where(is_so, CODE[status], self.status), why=np.where(is_so, np.int8(why), self.why)
-        )
-
     def in_decibel(self) -> "Judged":
         """The row with its factors of amplitude in decibel; its utilization stays that of amplitudes."""
         return self._of_columns(decibels, _IN_UNIT)

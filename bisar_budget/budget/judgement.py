@@ -69,5 +69,5 @@ def worded(
 
 def number(column: Any) -> float | None:
     """The number of the only case; None where there is none."""
-    value = float(np.ravel(column)[0])
+    value = column.item() if isinstance(column, np.ndarray) else float(column)
     return None if math.isnan(value) else value

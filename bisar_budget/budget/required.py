@@ -1,17 +1,12 @@
 """Errors that `requirements.declare` asks the file to declare: what is missing cannot be shown to comply."""
 
-from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from bisar_budget.budget.judged_rows import CODE, Judged, Why
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.findings.requirement import DeclaredKinds
 from bisar_budget.findings.row import DECLARE
-from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import Platform
 
@@ -127,34 +122,6 @@ def _missing(mission: Mission, still: Container[str]) -> Iterator[Missing]:
             owes = name not in still or kind == "position" or (kind == "oscillator" and bool(dot))
             if owes and not declares(getattr(mission.platforms, name)):
                 yield Missing(name, kind, f"platforms.{name}.{key}")
-
-
-def with_required(rows: Sequence[Judged], mission: Mission, geometry: BistaticGeometry, cases: int) -> list[Judged]:
-    """Put the row of what must be declared before the others, where something must.
-
-    Rows of errors that the file should declare and does not turn from `not_declared` into `not_evaluated`.
-    """
-    if not mission.requirements.declare:
-        return list(rows)
-    still = np.array([np.broadcast_to(path.is_still, (cases,)) for path in geometry.both])
-    whole = Judged.of_none(DECLARATIONS, cases)._replace(metric=DECLARE)
-    whole.status[:] = CODE["pass"]
-    found = [whole, *rows]
-    for which in np.unique(still, axis=1).T:  # nearly always one: a platform that moves does in every case
-        these = (still == which[:, None]).all(axis=0)
-        names = [name for name, is_still in zip(PLATFORMS, which, strict=True) if is_still]
-        missing = missing_declarations(mission, names)
-        whole.status[these] = CODE["not_evaluated" if missing else "pass"]
-        found = [_required(row, missing, these) for row in found]
-    return found
-
-
-def _required(row: Judged, missing: Sequence[Missing], these: NDArray[np.bool_]) -> Judged:
-    """Turn a row that these cases should declare and do not from `not_declared` into `not_evaluated`."""
-    is_missing = these & (row.status == CODE["not_declared"])
-    if not is_missing.any() or not any(is_asked_for(row.subject, one) for one in missing):
-        return row
-    return row.settled(is_missing, "not_evaluated", Why.NOT_DECLARED_AS_REQUIRED)
 
 
 def is_asked_for(what: Subject, missing: Missing) -> bool:

@@ -38,20 +38,6 @@ _BREAKS = [RANK[name] for name in ("fail", "not_evaluated")]
 _IS_JUDGED = np.array([one.is_judged for one in STATUS.values()])
 
 
-class SeenRow(NamedTuple):
-    """A row as requirements see it.
-
-    `judges` is the place in KEYS of the requirement that it is held to, -1: none. `quadratic_use` is its quadratic
-    phase over what that may be, whatever sets its allowable; NaN where it has none.
-    """
-
-    id: str
-    status: Codes
-    utilization: Floats
-    judges: NDArray[np.int8]
-    quadratic_use: Floats
-
-
 class EffectTotal(NamedTuple):
     """One kind of effect of all declared errors: its total, and each error's part by row id. [rad]"""
 
@@ -139,7 +125,10 @@ def status_of(status: Codes, row_id: str, is_limited: Any, untaken: Sequence[Unt
 
 def requirement_states(
     mission: Mission,
-    rows: Sequence[SeenRow],
+    codes: Codes,
+    utilization: Floats,
+    judges: Codes,
+    quadratic_use: Floats,
     waived: Mapping[str, Any],
     *,
     has_noise: Any,
@@ -151,8 +140,14 @@ def requirement_states(
     ----------
     mission : Mission
         Some of its numbers may be arrays (n,).
-    rows : sequence of SeenRow
-        Judged rows, those that are waived with the status `waived`.
+    codes : (rows, n)
+        Statuses of the judged rows, of those that are waived `waived`.
+    utilization : (rows, n)
+        Theirs; not a number where there is none.
+    judges : (rows, n)
+        Place in KEYS of the requirement that each is held to, -1: none.
+    quadratic_use : (rows, n)
+        Quadratic phase of each over what that may be, whatever sets its allowable; not a number where it has none.
     waived : mapping of str to bool
         Keys of the requirements that a valid waiver names.
     has_noise : (n,) bool
@@ -160,11 +155,7 @@ def requirement_states(
     is_misplaced : (n,) bool
         Whether a declared error displaces the image by an amount that no row holds.
     """
-    codes = np.array([row.status for row in rows])
-    uses = np.array([np.nan_to_num(row.utilization, nan=0.0, posinf=np.inf) for row in rows])
-    judges = np.array([row.judges for row in rows])
-    quadratic_use = np.array([row.quadratic_use for row in rows])
-    found = []
+    uses, found = np.nan_to_num(utilization, nan=0.0, posinf=np.inf), []
     for key in required_keys(mission):
         mine = _IS_JUDGED[codes] & (judges == KEYS.index(key))
         levels, used = np.where(mine, codes, _NONE), uses
@@ -191,8 +182,3 @@ def requirement_states(
             status = np.where(np.isin(status, _BREAKS), RANK["waived"], status)
         found.append(RequirementState(key, status.astype(np.int8), decider, utilization, mine))
     return found
-
-
-def code(name: str) -> Codes:
-    """One status, as an array of one case."""
-    return np.array([RANK[name]], dtype=np.int8)

@@ -17,9 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.budget.judged_mission import JudgedMission, field, judged_mission, statuses, waived
+from bisar_budget.budget.judged_mission import JudgedMission, field, judged_mission, statuses
 from bisar_budget.budget.judged_rows import REQUIREMENTS, WHOLE, Judged
-from bisar_budget.budget.required import with_required
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.design.held import is_held, is_image
 from bisar_budget.design.quantities import FACTOR, Number, QuestionError, number_of, tree_of
@@ -446,10 +445,6 @@ class Table:
         analysis = Analysis(mission, some.size, geometry=geometries, nodes=nodes, shown=self.subjects)
         judged = judged_mission(analysis, question.today, is_whole=self.is_whole)
         rows = {row.subject.id: row for row in judged.rows}
-        for row_id in self.subjects.keys() - rows.keys():  # nothing declares it in any of the cases
-            none = Judged.of_none(self.subjects[row_id], some.size)
-            (*_, row) = with_required([none], mission, geometries, some.size)
-            rows[row_id] = waived(row, mission, question.today)
         columns = _verdict(judged, rows, question.row, question.breaks)
         with np.errstate(all="ignore"):
             geometry = (
