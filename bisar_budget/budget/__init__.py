@@ -4,16 +4,14 @@
 __all__ = [
     "aggregates",
     "check",
-    "collection_notes",
+    "doubts",
     "fleet",
-    "input_doubt",
     "judged_mission",
+    "judged_requirements",
     "judged_rows",
     "overrides",
     "pull_in",
     "random_rows",
-    "required",
-    "requirement_states",
     "requirement_table",
     "verdicts",
 ]

@@ -1,8 +1,9 @@
-"""Sums of the declared errors: phases of platforms and mission, cubic phase, location, autofocus pull-in."""
+"""Declared errors together: phases of platforms and mission, cubic phase, location, autofocus pull-in, scene edge."""
 
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,12 +11,12 @@ from numpy.typing import NDArray
 
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.scene import SceneEdge, SceneEdges
 from bisar_budget.analysis.spread import noise
 from bisar_budget.analysis.together import Together, cubics, quadratics
-from bisar_budget.budget.judged_rows import BOUND, CODE, Floats, Judged, Judging
-from bisar_budget.budget.judgement import number, worded
+from bisar_budget.budget.judged_requirements import TAKEN_BY, EffectTotal
+from bisar_budget.budget.judged_rows import BOUND, CODE, Floats, Judged, Judging, number, worded
 from bisar_budget.budget.pull_in import caps, needed_sentence
-from bisar_budget.budget.requirement_states import TAKEN_BY, EffectTotal
 from bisar_budget.effects.combined import (
     Phases,
     combined,
@@ -340,3 +341,66 @@ def _doubt(other: str, one: Aggregate, said: _Words, limit: float | None) -> Not
         return NOTHING
     phrase = phrases.other_model_is_beyond if one.judged.subject.kind == PULL_IN else phrases.other_model_fails
     return phrase(other, float(one.by_other[0]), limit, said.unit)
+
+
+# ---------------------------------------------------------------------- the scene's edge
+@dataclass(frozen=True, eq=False)
+class JudgedScene:
+    """The edges of scenes in many cases: differences that they add, none without a declared error."""
+
+    analysis: Analysis
+    edges: SceneEdges | None
+
+    @cached_property
+    def edge(self) -> SceneEdge | None:
+        """The edge of the only case, with how far one autofocus correction serves."""
+        analysis, edges = self.analysis, self.edges
+        return None if edges is None else SceneEdge.of(edges, analysis.geometry, analysis.allocation.qpe_total)
+
+    def row(self, judging: Judging, model: str) -> "SceneRow":
+        """Judge the edges by a model; to the published one an error is the same all over the scene."""
+        what, edges = subject("mission", "spatial_variance"), self.edges
+        total = judging.array(self.analysis.allocation.qpe_total)
+        allowable = None if model == "published" else total
+        nothing = judging.row(what, None, allowable)._replace(allowable_full=total)
+        if edges is None:
+            return SceneRow(nothing, self)
+        doubt = edges.has_doubt
+        if model == "published":
+            doubt = doubt | (edges.difference > total * BOUND)
+        judged = judging.row(what, edges.difference, allowable, doubt=doubt)._replace(
+            qpe_published_rad=np.zeros(judging.cases), qpe_full_rad=edges.difference, allowable_full=total
+        )
+        nothing.status[:] = CODE["not_evaluated"]
+        return SceneRow(judged.where(np.isinf(edges.difference), nothing), self)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SceneRow:
+    """The row of the scene's edge in many cases."""
+
+    judged: Judged
+    scene: JudgedScene
+    is_there: bool = True
+
+    def in_words(self, analysis: Analysis, model: str) -> Row:
+        """The row of the only case, by the model that judges it."""
+        edge, total = self.scene.edge, analysis.allocation.qpe_total
+        doubt, degeneracy, notes = NOTHING, NOTHING, tuple[Note, ...]()
+        if edge is not None:
+            doubt, degeneracy = edge.doubt, edge.degeneracy
+            notes = () if degeneracy else edge.notes(total)
+            if model == "published" and edge.difference > total * BOUND:
+                doubt = phrases.other_model_fails("full", edge.difference, total, "rad")
+        return worded(
+            analysis.mission,
+            self.judged,
+            unit="rad",
+            path=("scene", "radius"),
+            equation="full model",
+            over=phrases.edge_over(),
+            doubt=doubt,
+            no_limit=phrases.same_all_over_the_scene(),
+            not_evaluated=degeneracy,
+            remarks=notes,
+        )

@@ -6,14 +6,11 @@ from datetime import date
 
 from bisar_budget import file_warnings, phrases
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.budget.collection_notes import collection_notes
-from bisar_budget.budget.input_doubt import InputDoubt, input_doubts
+from bisar_budget.budget.doubts import InputDoubt, collection_notes, input_doubts, model_doubt, straight_orbits
 from bisar_budget.budget.judged_mission import judged_mission
-from bisar_budget.budget.model_doubt import model_doubt
-from bisar_budget.budget.orbit import straight_orbits
+from bisar_budget.budget.judged_requirements import declared_kinds
 from bisar_budget.budget.overrides import NOTHING_OUTSIDE, Outside, overrides
 from bisar_budget.budget.pull_in import pull_in_caps
-from bisar_budget.budget.required import declared_kinds
 from bisar_budget.budget.requirement_table import negligible_effects, requirements_in_words, rows_in_words
 from bisar_budget.budget.waivers import apply_waivers
 from bisar_budget.constants import SPEED_OF_LIGHT

@@ -9,8 +9,7 @@ import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis, Model
-from bisar_budget.budget.judged_rows import BOUND, CODE, REQUIREMENTS, Floats, Judged, Judging
-from bisar_budget.budget.judgement import number, worded
+from bisar_budget.budget.judged_rows import BOUND, CODE, REQUIREMENTS, Floats, Judged, Judging, number, worded
 from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.effects.declared import CUBIC, END_OF_IMAGE, HELD, LOCATION, QUADRATIC, Does

@@ -16,22 +16,22 @@ from numpy.typing import NDArray
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.scene import SceneEdges, scene_edges
 from bisar_budget.analysis.spread import noise
-from bisar_budget.budget.aggregates import Aggregates, Misplacing, effect_totals, misplacing
+from bisar_budget.budget.aggregates import Aggregates, JudgedScene, Misplacing, effect_totals, misplacing
+from bisar_budget.budget.doubts import FASTEST_FLIGHT, declared_position_error, is_in_doubt, least_doubt
 from bisar_budget.budget.error_rows import ErrorRows
-from bisar_budget.budget.input_doubt import declared_position_error, is_in_doubt, least_doubt
-from bisar_budget.budget.judged_rows import CODE, REQUIREMENTS, Judged, Judging, Why
-from bisar_budget.budget.orbit import FASTEST_FLIGHT
-from bisar_budget.budget.random_rows import RandomRows
-from bisar_budget.budget.required import DECLARATIONS, is_asked_for, missing_declarations
-from bisar_budget.budget.requirement_states import (
+from bisar_budget.budget.judged_requirements import (
+    DECLARATIONS,
     KEYS,
     RequirementState,
     UntakenEffect,
+    is_asked_for,
+    missing_declarations,
     requirement_states,
     status_of,
     untaken_effects,
 )
-from bisar_budget.budget.scene_row import JudgedScene
+from bisar_budget.budget.judged_rows import CODE, REQUIREMENTS, Judged, Judging, Why
+from bisar_budget.budget.random_rows import RandomRows
 from bisar_budget.budget.vibration_rows import Vibrations, pslr_row, spur_rows
 from bisar_budget.budget.waivers import is_waived
 from bisar_budget.effects.declared import END_OF_IMAGE, LOCATION, MODELS
@@ -256,7 +256,8 @@ class _Judgement:
         for name, is_doubtful in self._in_doubt.items():
             own = (subject(name, "position", axis) for axis in "xyz") if is_doubtful.any() else ()
             wanted |= {one.id: one for one in own if is_in_doubt(one, name, self.mission)}
-        return (Judged.of_none(one, self.cases) for row_id, one in wanted.items() if row_id not in known)
+        there = {*known, DECLARATIONS.id}
+        return (Judged.of_none(one, self.cases) for row_id, one in wanted.items() if row_id not in there)
 
     def _has_noise(self) -> Truths:
         """Cases that declare something that spreads, or a tone that ISLR holds."""

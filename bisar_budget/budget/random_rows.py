@@ -24,8 +24,7 @@ from bisar_budget.analysis.spread import (
     powers_held_by_islr,
     spread_limit,
 )
-from bisar_budget.budget.judged_rows import BOUND, CODE, REQUIREMENTS, Floats, Judged, Judging
-from bisar_budget.budget.judgement import worded
+from bisar_budget.budget.judged_rows import BOUND, CODE, REQUIREMENTS, Floats, Judged, Judging, worded
 from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.effects.declared import CUBIC, QUADRATIC
 from bisar_budget.effects.effect import override_notes

@@ -7,11 +7,17 @@ from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.spread import islr_db, mainlobe_energy, spread_limit
 from bisar_budget.analysis.vibration_limits import level_of
-from bisar_budget.budget.input_doubt import input_doubts, is_in_doubt
+from bisar_budget.budget.doubts import input_doubts, is_in_doubt
 from bisar_budget.budget.judged_mission import FamilyRow, JudgedMission
+from bisar_budget.budget.judged_requirements import (
+    DECLARATIONS,
+    TAKEN_BY,
+    UNITS,
+    RequirementState,
+    is_asked_for,
+    missing_declarations,
+)
 from bisar_budget.budget.judged_rows import Judged, Why
-from bisar_budget.budget.required import DECLARATIONS, is_asked_for, missing_declarations
-from bisar_budget.budget.requirement_states import TAKEN_BY, UNITS, RequirementState
 from bisar_budget.budget.waivers import Waived
 from bisar_budget.effects.declared import CUBIC, LOCATION, MODELS, QUADRATIC
 from bisar_budget.findings.requirement import JudgedRequirement

@@ -22,8 +22,7 @@ from bisar_budget.analysis.vibration_limits import (
     tone_limits,
     vibration_limits,
 )
-from bisar_budget.budget.judged_rows import BOUND, REQUIREMENTS, Floats, Judged, Judging
-from bisar_budget.budget.judgement import worded
+from bisar_budget.budget.judged_rows import BOUND, REQUIREMENTS, Floats, Judged, Judging, worded
 from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.effects.clocks import Spur, spurs_of
 from bisar_budget.effects.declared import CUBIC, QUADRATIC

@@ -19,8 +19,8 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
 from bisar_budget.budget.judged_rows import Judged
 from bisar_budget.design.quantities import FACTOR, Number, QuestionError, as_number, form_of, tree_of
-from bisar_budget.design.scaled import scaled
 from bisar_budget.design.table import Question, Table, Variation, hold_to_decisions, standing
+from bisar_budget.design.varied import scaled
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.faults import SetValue
 from bisar_budget.findings.requirement import Override

@@ -18,7 +18,6 @@ import numpy as np
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
 from bisar_budget.design.quantities import FACTOR, Number, QuestionError, Range, number_of, range_of, tree_of
-from bisar_budget.design.scaled import scaled
 from bisar_budget.design.table import (
     ALIKE,
     GEOMETRY,
@@ -30,6 +29,7 @@ from bisar_budget.design.table import (
     breaking,
     hold_to_decisions,
 )
+from bisar_budget.design.varied import scaled
 from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.findings.images import Verdict
 from bisar_budget.findings.requirement import Override

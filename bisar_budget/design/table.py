@@ -20,10 +20,8 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.judged_mission import JudgedMission, field, judged_mission, statuses
 from bisar_budget.budget.judged_rows import REQUIREMENTS, WHOLE, Judged
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.design.held import is_held, is_image
 from bisar_budget.design.quantities import FACTOR, Number, QuestionError, number_of, tree_of
-from bisar_budget.design.scaled import scaled
-from bisar_budget.design.varied import picked, stacked, varied
+from bisar_budget.design.varied import is_held, is_image, picked, scaled, stacked, varied
 from bisar_budget.faults import MissionError, SetNumber, SetValue
 from bisar_budget.findings.row import unknown_id
 from bisar_budget.findings.status import RANK, STATUS

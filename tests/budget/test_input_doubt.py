@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.input_doubt import LEAST_M, InputDoubt, input_doubts
+from bisar_budget.budget.doubts import LEAST_M, InputDoubt, input_doubts
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import Mission

@@ -7,7 +7,7 @@ from datetime import date
 import pytest
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.model_doubt import model_doubt
+from bisar_budget.budget.doubts import model_doubt
 from bisar_budget.findings.mission import MissionFindings, Report
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.report import Style, render

@@ -4,9 +4,15 @@ from collections.abc import Iterator
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.aggregates import effect_parts, effect_totals
-from bisar_budget.budget.input_doubt import declared_position_error, input_doubts, is_in_doubt
-from bisar_budget.budget.required import missing_declarations
-from bisar_budget.budget.requirement_states import MAKES_UP, SMALL_RAD, TENTH, UntakenEffect, untaken_effects
+from bisar_budget.budget.doubts import declared_position_error, input_doubts, is_in_doubt
+from bisar_budget.budget.judged_requirements import (
+    MAKES_UP,
+    SMALL_RAD,
+    TENTH,
+    UntakenEffect,
+    missing_declarations,
+    untaken_effects,
+)
 from bisar_budget.faults import printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import JudgedRequirement
