@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from bisar_budget.geometry import PlatformState, Vector, cross, dot, norm, unit
 from bisar_budget.paths.earth import Geodetic
-from bisar_budget.paths.polynomials import least_squares, path_of, powers_of
+from bisar_budget.paths.flight import least_squares, path_of, powers_of
 
 if TYPE_CHECKING:
     import numpy as np
