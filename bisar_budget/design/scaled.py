@@ -9,7 +9,7 @@ from bisar_budget import units
 from bisar_budget.design.quantities import QuestionError
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.model import MISSION, Mission
-from bisar_budget.mission.readers import Late, ListOf, OneOf, Quantity, Reader, Section, Triple
+from bisar_budget.mission.readers import ListOf, OneOf, Quantity, Reader, Section, Triple
 
 # What a factor does not multiply: when and how fast an error changes, and settings.
 _KEPT = (units.FREQUENCY, units.TIME, units.RATIO, units.MEMORY)
@@ -84,14 +84,8 @@ def _scaled(value: Any, reader: Reader, factor: Any, is_clock: bool) -> tuple[An
 
 def _form(reader: Reader, value: Any) -> Reader:
     """The form of a reader that gave a value that was read."""
-    while isinstance(reader, Late | OneOf):
-        if isinstance(reader, Late):
-            reader = reader.load()
-            continue
-        forms = [form.load() if isinstance(form, Late) else form for form in reader.forms]
+    if isinstance(reader, OneOf):
         kind = Triple if isinstance(value, tuple) and not hasattr(value, "_fields") else Quantity
-        matching = [form for form in forms if isinstance(form, Section) and type(value) is form.kind]
-        reader = next(iter([*matching, *(form for form in forms if isinstance(form, kind))]), forms[0])
-        if isinstance(reader, OneOf):
-            break
+        matching = [form for form in reader.forms if isinstance(form, Section) and type(value) is form.kind]
+        return next(iter([*matching, *(form for form in reader.forms if isinstance(form, kind))]), reader.forms[0])
     return reader

@@ -9,10 +9,19 @@ from typing import Any
 
 from bisar_budget.faults import Problem
 from bisar_budget.geometry import STRAIGHT, PlatformState
-from bisar_budget.mission import routes
 from bisar_budget.mission.instruments import Overridden
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.platforms import FlownPath, MotionError, Platform, Platforms, without_image
+from bisar_budget.mission.platforms import (
+    ORBIT,
+    TRAJECTORY,
+    FlownPath,
+    MotionError,
+    OrbitSource,
+    Platform,
+    Platforms,
+    TrajectorySource,
+    without_image,
+)
 from bisar_budget.mission.readers import INVALID, Report
 from bisar_budget.paths import earth
 from bisar_budget.paths.elements import read_omm, read_tle
@@ -92,7 +101,7 @@ def report_files(root: Any, read: Beside, report: Report) -> None:
     platforms = root.get("platforms")
     for name in Platforms._fields:
         platform = platforms.get(name) if isinstance(platforms, dict) else None
-        for key, section in (("orbit", routes.ORBIT), ("trajectory", routes.TRAJECTORY)):
+        for key, section in (("orbit", ORBIT), ("trajectory", TRAJECTORY)):
             named = section.each(platform.get(key)) if isinstance(platform, dict) else {}
             for form in _FILES:
                 file = named.get(form)
@@ -181,7 +190,7 @@ def _with_radial(state: PlatformState, axes: earth.SceneAxes) -> PlatformState:
         return state
 
 
-def _of_orbit(mission: Mission, route: routes.OrbitSource, axes: earth.SceneAxes, read: Beside) -> FlownPath:
+def _of_orbit(mission: Mission, route: OrbitSource, axes: earth.SceneAxes, read: Beside) -> FlownPath:
     center = mission.collection.center_time
     if center is None:
         raise _UnusablePathError(("orbit",), Problem("needs an instant", "accepted: collection.center_time"))
@@ -235,9 +244,7 @@ def _hold_to_range(doubt: PathDoubt, slant_range: float, said: Sequence[str], re
         )
 
 
-def _of_log(
-    mission: Mission, route: routes.TrajectorySource, axes: earth.SceneAxes | None, read: Beside
-) -> FlownPath:
+def _of_log(mission: Mission, route: TrajectorySource, axes: earth.SceneAxes | None, read: Beside) -> FlownPath:
     aperture_time = mission.collection.aperture_time
     try:
         data = read(route.file)
@@ -259,7 +266,7 @@ def _of_log(
     return path._replace(doubt_of="residual of the smoothed log, root mean square", is_doubted=fitted.rms > _NOISE_M)
 
 
-def _log(route: routes.TrajectorySource, data: bytes, digest: str) -> Log:
+def _log(route: TrajectorySource, data: bytes, digest: str) -> Log:
     """Read a log, or take it as it was read before."""
     key = (route.file, route.format, route.week, digest)
     log = _logs.pop(key, None) or _read_log(route, data)
@@ -269,7 +276,7 @@ def _log(route: routes.TrajectorySource, data: bytes, digest: str) -> Log:
     return log
 
 
-def _read_log(route: routes.TrajectorySource, data: bytes) -> Log:
+def _read_log(route: TrajectorySource, data: bytes) -> Log:
     """Read a log; its format is stated, or that of its name."""
     is_sbet = route.format == "sbet" or (route.format is None and route.file.lower().endswith((".out", ".sbet")))
     if is_sbet:
@@ -280,7 +287,7 @@ def _read_log(route: routes.TrajectorySource, data: bytes) -> Log:
 
 
 def _by_accuracy(
-    mission: Mission, route: routes.TrajectorySource, error: MotionError, read: Beside
+    mission: Mission, route: TrajectorySource, error: MotionError, read: Beside
 ) -> tuple[MotionError, str]:
     """Errors that the accuracy file of a log states, where the mission file states none; and its SHA-256."""
     file = route.accuracy or ""

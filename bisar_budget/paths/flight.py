@@ -9,7 +9,7 @@ import math
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev, legendre
@@ -113,7 +113,9 @@ def interpolated(place: Callable[[float], Vector], aperture_time_s: float, wides
         Longest time around the middle in which there are places.
     """
     half = min(max(aperture_time_s, _LEAST_WINDOW), widest_s) / 2
-    series = chebyshev.chebinterpolate(lambda at: np.array([place(half * one) for one in at.tolist()]), _NODES - 1)
+    nodes = chebyshev.chebpts1(_NODES)
+    places = np.array([place(half * node) for node in nodes.tolist()])
+    series: Floats = np.linalg.solve(chebyshev.chebvander(nodes, _NODES - 1), places)
     series[np.abs(series) <= _UNSEEN_M] = 0.0  # what is below rounding would be divided by high powers of the window
     state = path_of(powers_of(series, half, chebyshev.cheb2poly))
     apart = []
@@ -278,7 +280,7 @@ def least_squares(at: Floats, places: Floats, order: int) -> tuple[Floats, Float
     return coefficients, places - basis @ coefficients
 
 
-def powers_of(coefficients: Floats, half_s: float, convert: Callable[[Floats], Floats] = legendre.leg2poly) -> Floats:
+def powers_of(coefficients: Floats, half_s: float, convert: Callable[..., Any] = legendre.leg2poly) -> Floats:
     """Coefficients (order + 1, 3) of τ⁰, τ¹, … of a series over -`half_s` … `half_s`. [m], [m/s], …
 
     `convert` turns coefficients of the series into those of powers; omitted: of a Legendre series.

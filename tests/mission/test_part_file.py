@@ -17,8 +17,16 @@ from hypothesis import strategies as st
 from bisar_budget.faults import MissionError
 from bisar_budget.mission.instruments import FORMS
 from bisar_budget.mission.load import load_mission
-from bisar_budget.mission.parts import FIGURES, SECTIONS, PartError, catalogue, folders, read_entry, read_part
-from bisar_budget.mission.schema import part_schema
+from bisar_budget.mission.parts import (
+    FIGURES,
+    SECTIONS,
+    PartError,
+    catalogue,
+    folders,
+    part_schema,
+    read_entry,
+    read_part,
+)
 from bisar_budget.mission.tree import MAX_BYTES
 from tests.acceptance.test_missions import _Core
 from tests.conftest import ROOT, mission_text
