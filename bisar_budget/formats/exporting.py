@@ -13,12 +13,15 @@ import os
 import tempfile
 from datetime import UTC, datetime, timedelta
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from bisar_budget import __version__
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.faults import printable
-from bisar_budget.formats.document import MissingExtraError
+from bisar_budget.formats.containers import MissingExtraError
 from bisar_budget.formats.file_errors import ADDED, KINDS
 from bisar_budget.geometry import Axes, PlatformState, Vector
 from bisar_budget.mission.model import Mission, Simulation
@@ -30,11 +33,7 @@ from bisar_budget.simulate.phase_history import phase_history
 from bisar_budget.simulate.point import Flight, SimulationError, flight, pulses_for
 from bisar_budget.simulate.targets import Targets
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
+Floats = NDArray[np.float64]
 
 NAMESPACE = "http://api.nsgreg.nga.mil/schema/cphd/1.1.0"
 NOWHERE = Geodetic(0.0, 0.0, 0.0)  # of a scene whose mission does not say where it is
@@ -107,8 +106,6 @@ def export_phase_history(mission: Mission, targets: Targets) -> Exported:
         import_module("sarkit.cphd")
     except ImportError:
         raise MissingExtraError from None
-    import numpy as np
-
     settings = mission.simulation or Simulation()
     plan = _plan(mission, targets)
     needed = plan.pulses * plan.samples * _BYTES_PER_SAMPLE
@@ -156,8 +153,6 @@ def export_phase_history(mission: Mission, targets: Targets) -> Exported:
 
 def _plan(mission: Mission, targets: Targets) -> _Plan:
     """Choose the image area, and the samples that keep it from repeating in range and in Doppler."""
-    import numpy as np
-
     T, radar, geometry = mission.collection.aperture_time, mission.radar, mission.geometry
     nodes = aperture_nodes(T)
     slow = flight(mission, nodes, vibrating=False)
@@ -191,10 +186,8 @@ def _plan(mission: Mission, targets: Targets) -> _Plan:
     return _Plan(pulses, samples, delay, half)
 
 
-def _scene(mission: Mission, targets: Targets, half: float) -> tuple["Floats", "NDArray[np.complex128]"]:
+def _scene(mission: Mission, targets: Targets, half: float) -> tuple[Floats, NDArray[np.complex128]]:
     """Places (n, 3) [m] and amplitudes (n,) of targets and clutter."""
-    import numpy as np
-
     places = [(one.east, one.north, 0.0) for one in targets.points]
     amplitudes = [10 ** (one.level_db / 20) for one in targets.points]
     if targets.clutter_db is None:
@@ -216,16 +209,14 @@ def _scene(mission: Mission, targets: Targets, half: float) -> tuple["Floats", "
 
 
 def _vectors(
-    mission: Mission, slow_time: "Floats", flown: Flight, axes: SceneAxes, plan: _Plan
-) -> tuple["NDArray[Any]", float]:
+    mission: Mission, slow_time: Floats, flown: Flight, axes: SceneAxes, plan: _Plan
+) -> tuple[NDArray[Any], float]:
     """Parameters of each vector, and the time of the file at the middle of the aperture. [s]
 
     A pulse is at the scene centre at its slow time. It left the transmitter R_t/c before, and is received R_r/c
     later, by the measured places; so the reference time of section 6.5.1 (5) is that slow time again. A platform's
     own time therefore runs by 1 ∓ Ṙ/c of slow time, which is what its velocity is divided by.
     """
-    import numpy as np
-
     dtype = np.dtype(
         [(name, "i8" if name == "SIGNAL" else "f8", (size,) if size > 1 else ()) for name, size in _VECTOR]
     )
@@ -274,14 +265,12 @@ def _document(
     targets: Targets,
     plan: _Plan,
     axes: SceneAxes,
-    vectors: "NDArray[Any]",
+    vectors: NDArray[Any],
     start: Instant,
     offset: float,
     remarks: list[str],
 ) -> Any:
     """XML of the file, an lxml tree, with the reference geometry that sarkit computes from the vectors."""
-    import numpy as np
-
     etree: Any = import_module("lxml.etree")
     skcphd: Any = import_module("sarkit.cphd")
     band = [float(vectors["FX1"][0]), float(vectors["FX2"][0])]
@@ -449,7 +438,7 @@ def _scene_coordinates(mission: Mission, plan: _Plan, axes: SceneAxes, area: _Br
     ]
 
 
-def _layout(vectors: "NDArray[Any]") -> _Branch:
+def _layout(vectors: NDArray[Any]) -> _Branch:
     fields: Any = vectors.dtype.fields
     return [
         (
@@ -514,10 +503,8 @@ def _error_parameters(mission: Mission, axes: SceneAxes) -> _Branch:
     return [("ErrorParameters", [("Bistatic", [*sides, *rest])])]
 
 
-def _covariance(mission: Mission, whose: str, axes: SceneAxes, added: dict[str, str]) -> tuple["Floats", str]:
+def _covariance(mission: Mission, whose: str, axes: SceneAxes, added: dict[str, str]) -> tuple[Floats, str]:
     """Covariance (6, 6) of one platform in a frame of the standard, and that frame. [m², m²/s, m²/s²]"""
-    import numpy as np
-
     error = getattr(mission.platforms, whose).motion_error
     state: PlatformState = getattr(mission.geometry, whose)
     common = mission.common_motion_error
@@ -554,9 +541,7 @@ def _covariance(mission: Mission, whose: str, axes: SceneAxes, added: dict[str, 
     return both @ found @ both.T, "ECF"
 
 
-def _pos_vel_err(covariance: "Floats", frame: str) -> _Branch:
-    import numpy as np
-
+def _pos_vel_err(covariance: Floats, frame: str) -> _Branch:
     sigmas = np.sqrt(np.diag(covariance))
     scale = np.where(np.outer(sigmas, sigmas) > 0, np.outer(sigmas, sigmas), 1.0)
     correlation = np.clip(covariance / scale, -1, 1)
@@ -572,7 +557,7 @@ def _pos_vel_err(covariance: "Floats", frame: str) -> _Branch:
     ]
 
 
-def _file(tree: Any, vectors: "NDArray[Any]", signal: "NDArray[Any]") -> bytes:
+def _file(tree: Any, vectors: NDArray[Any], signal: NDArray[Any]) -> bytes:
     """A CPHD file by sarkit's writer."""
     skcphd: Any = import_module("sarkit.cphd")
     with tempfile.TemporaryFile() as stream:  # the writer needs a file of the system

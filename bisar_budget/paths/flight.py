@@ -52,7 +52,7 @@ class PathDoubt(NamedTuple):
 NO_DOUBT = PathDoubt(0.0, "")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Orbit:
     """A path that is known at any instant of a span.
 
@@ -84,7 +84,7 @@ class Log:
     start: Instant | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Fitted:
     """A path as a polynomial, its order, and how far it is from the file's places, at most and root mean square [m].
 
