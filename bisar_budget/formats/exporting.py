@@ -340,7 +340,7 @@ def _document(
 
 
 def _grow(etree: Any, root: Any, leaves: _Leaves) -> None:
-    """Put elements below the root. A step of a path may have an attribute; a polynomial is written as its constant."""
+    """Put elements below the root; a step of a path may have an attribute, a polynomial is its constant."""
     grown = {"": root}
     for path, value in leaves.items():
         here = ""
@@ -384,9 +384,8 @@ def _scene_coordinates(mission: Mission, plan: _Plan, axes: SceneAxes) -> _Leave
         "IARP/LLH/HAE": place.height,
         **_xyz("ReferenceSurface/Planar/uIAX", axes.axes[0]),
         **_xyz("ReferenceSurface/Planar/uIAY", axes.axes[1]),
-        **{
-            f"ImageArea/{corner}/{axis}": sign * half for corner, sign in (("X1Y1", -1), ("X2Y2", 1)) for axis in "XY"
-        },
+        **{f"ImageArea/X1Y1/{axis}": -half for axis in "XY"},
+        **{f"ImageArea/X2Y2/{axis}": half for axis in "XY"},
     }
     for index, (x, y) in enumerate(corners, 1):
         leaves |= _degrees(f"ImageAreaCornerPoints/IACP@index={index}", geodetic(axes.earth_fixed((x, y, 0.0))))
@@ -438,10 +437,7 @@ def _error_parameters(mission: Mission, axes: SceneAxes) -> _Leaves:
     stated = {key: abs(value) for key, value in clock.items() if value is not None}
     for whose, side in (("transmitter", "TxPlatform"), ("receiver", "RcvPlatform")):
         leaves |= _pos_vel_err(f"{side}/PosVelErr", *_covariance(mission, whose, axes, added))
-        sensor = {
-            **(stated if whose == "receiver" else {}),
-            "CollectionStartTime": 0.0,
-        }  # the schema asks for the last
+        sensor = {**(stated if whose == "receiver" else {}), "CollectionStartTime": 0.0}  # the schema asks for it
         leaves |= {f"{side}/RadarSensor/{key}": value for key, value in sensor.items()}
     nothing = all(
         added.get(f"{whose}.{kind}") for whose in ("transmitter", "receiver") for kind in ("position", "velocity")

@@ -214,17 +214,6 @@ def figure_text(value: Any) -> str:
     return str(value)
 
 
-def read_part(file: str) -> Part:
-    """Read the file of a part.
-
-    Raises
-    ------
-    PartError
-        It cannot be read, or is no part.
-    """
-    return _read(file)[0]
-
-
 def read_entry(file: str) -> Entry:
     """Read a file, `-` for standard input, as a mission does that names it; hold its name to what one can name.
 

@@ -25,7 +25,6 @@ from bisar_budget.mission.parts import (
     folders,
     part_schema,
     read_entry,
-    read_part,
 )
 from bisar_budget.mission.tree import MAX_BYTES
 from tests.acceptance.test_missions import _Core
@@ -457,4 +456,4 @@ class TestCheck:
 
 
 def test_a_part_whose_source_ends_in_a_colon_has_one(tmp_path: Path) -> None:
-    assert read_part(str(written(tmp_path, IMU.replace("source: y", "source: 'see: '")))).source == "see: "
+    assert read_entry(str(written(tmp_path, IMU.replace("source: y", "source: 'see: '")))).part.source == "see: "
