@@ -25,10 +25,21 @@ from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.faults import SetValue
 from bisar_budget.findings.requirement import Override
 from bisar_budget.findings.status import STATUS
-from bisar_budget.mission.bounds import DIRECTION, ELEVATION, LATITUDE
 from bisar_budget.mission.model import MISSION, SHARES, Mission
 from bisar_budget.mission.parts import taken_figures
-from bisar_budget.mission.readers import INVALID, Choice, ListOf, Quantity, Reader, Triple, Version, Whole
+from bisar_budget.mission.readers import (
+    DIRECTION,
+    ELEVATION,
+    INVALID,
+    LATITUDE,
+    Choice,
+    ListOf,
+    Quantity,
+    Reader,
+    Triple,
+    Version,
+    Whole,
+)
 from bisar_budget.workers import Progress, unseen
 
 LITTLE = 1e-4  # of a utilization: less of a change is not shown

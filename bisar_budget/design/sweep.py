@@ -18,9 +18,8 @@ from bisar_budget.design.quantities import Choices, Number, QuestionError
 from bisar_budget.design.table import GEOMETRY, IN_UNIT, REASON, VERDICT, Column, Part, Question, Swept, Table
 from bisar_budget.faults import Fault, MissionError, SetValue, fault_words, shown
 from bisar_budget.findings.row import Row, unknown_id
-from bisar_budget.mission.load import mission_of
+from bisar_budget.mission.load import mission_of, named_by
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.named import named_by
 from bisar_budget.mission.tree import read_tree
 from bisar_budget.workers import MapBlocks, worker_pool
 

@@ -27,9 +27,8 @@ from bisar_budget.findings.row import unknown_id
 from bisar_budget.findings.status import RANK, STATUS
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.changes import parts_of
-from bisar_budget.mission.load import mission_of
+from bisar_budget.mission.load import Named, mission_of
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.named import Named
 from bisar_budget.mission.tree import Tree, read_tree
 from bisar_budget.ranges.exact_ranges import nodes_for
 from bisar_budget.workers import Progress, unseen

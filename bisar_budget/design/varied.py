@@ -40,7 +40,7 @@ from bisar_budget.mission.platforms import (
     Platform,
     least_baseline,
 )
-from bisar_budget.mission.readers import Late, ListOf, OneOf, Quantity, Reader, Section, Triple
+from bisar_budget.mission.readers import ListOf, OneOf, Quantity, Reader, Section, Triple
 from bisar_budget.ranges.exact_ranges import Floats
 from bisar_budget.units import Dimension, parse_quantity
 
@@ -364,14 +364,8 @@ def _scaled(value: Any, reader: Reader, factor: Any, is_clock: bool) -> tuple[An
 
 def _form(reader: Reader, value: Any) -> Reader:
     """The form of a reader that gave a value that was read."""
-    while isinstance(reader, Late | OneOf):
-        if isinstance(reader, Late):
-            reader = reader.load()
-            continue
-        forms = [form.load() if isinstance(form, Late) else form for form in reader.forms]
+    if isinstance(reader, OneOf):
         kind = Triple if isinstance(value, tuple) and not hasattr(value, "_fields") else Quantity
-        matching = [form for form in forms if isinstance(form, Section) and type(value) is form.kind]
-        reader = next(iter([*matching, *(form for form in forms if isinstance(form, kind))]), forms[0])
-        if isinstance(reader, OneOf):
-            break
+        matching = [form for form in reader.forms if isinstance(form, Section) and type(value) is form.kind]
+        return next(iter([*matching, *(form for form in reader.forms if isinstance(form, kind))]), reader.forms[0])
     return reader
