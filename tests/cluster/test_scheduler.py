@@ -32,14 +32,17 @@ from bisar_budget.verify.limits import verify_mission
 from tests.cluster.conftest import Cluster, free_port, wait_until
 from tests.conftest import APART, ROOT, heed_signals
 
-MISSION = str(ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml")
-AZIMUTH, TIME = "platforms.receiver.azimuth", "collection.aperture_time"
-# No array holds this column: each case is checked by itself, so that a part takes a tenth of a second.
-ASKED = (
-    *("sweep", MISSION, "--vary", f"{AZIMUTH}=40:60deg:40", "--vary", f"{TIME}=1:2s:32"),
-    *("--column", "receiver.velocity.x.islr_db", "--date", "2026-01-01"),
+SECTION_V, ORBIT = (
+    str(ROOT / "specs" / "missions" / f"{name}.yaml")
+    for name in ("rigling_moses_section_v", "sentinel1_elements_besancon")
 )
-PARTS = 20
+HEIGHT, TIME = "scene.height", "collection.aperture_time"
+# The place of the scene decides the path of a satellite: each case is read, and a part takes a tenth of a second.
+ASKED = (
+    *("sweep", ORBIT, "--vary", f"{HEIGHT}=350:420m:60", "--vary", f"{TIME}=0.4:0.6s:32"),
+    *("--column", "transmitter.velocity.radial.allowable", "--date", "2026-01-01"),
+)
+PARTS = 30
 
 
 @pytest.fixture(scope="module")
@@ -242,7 +245,7 @@ class Client:
 
 
 def asked() -> Asked:
-    mission = load_mission(MISSION)
+    mission = load_mission(SECTION_V)
     return Asked(mission, grid(tree_of(mission), [f"{TIME}=1:2s:1000"]), today=date(2026, 1, 1))
 
 
@@ -303,7 +306,8 @@ def test_a_scheduler_without_workers_is_given_up(run, tmp_path: Path) -> None:
         address = empty.scheduler_address
         more = ("--scheduler", address, "--scheduler-timeout", "1")
         began = time.monotonic()
-        for arguments in ((*ASKED, "-o", str(output)), ("check", MISSION, "--monte-carlo", "9"), ("verify", MISSION)):
+        commands = (*ASKED, "-o", str(output)), ("check", SECTION_V, "--monte-carlo", "9"), ("verify", SECTION_V)
+        for arguments in commands:
             found = run(*arguments, *more)
             assert (found.exit_code, found.stdout) == (2, "")
             said.append(found.stderr)
@@ -356,7 +360,7 @@ def test_workers_that_all_went_away_are_given_up(cluster: Cluster, tmp_path: Pat
 
 
 def test_images_are_formed_on_workers(cluster: Cluster, run) -> None:
-    asked = ("verify", MISSION, "--only", "receiver.velocity.?")
+    asked = ("verify", SECTION_V, "--only", "receiver.velocity.?")
     alone, shared = run(*asked, "--jobs", "1"), run(*asked, "--scheduler", cluster.address)
     assert (shared.exit_code, shared.stderr) == (alone.exit_code, "")
     assert shared.stdout == alone.stdout
@@ -365,4 +369,4 @@ def test_images_are_formed_on_workers(cluster: Cluster, run) -> None:
 def test_which_row_failed_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     mapped = Workers(Client(ValueError("a matrix")), "tcp://a:0", 30, pytest.fail).mapped
     with pytest.raises(RuntimeError, match=r"^timing.quadratic of .*Section V.*, on a worker: ValueError: a matrix$"):
-        verify_mission(load_mission(MISSION), "timing.quadratic", mapped=mapped)
+        verify_mission(load_mission(SECTION_V), "timing.quadratic", mapped=mapped)
