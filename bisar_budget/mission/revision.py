@@ -66,7 +66,7 @@ class Revision:
         self._listed: dict[str, list[str]] = {}
 
     def content(self, file: str, most: int, called: str | None = None) -> bytes:
-        """Content of a file then; arguments and `UnreadableError` are those of `resources.content`."""
+        """Content of a file then; arguments and `UnreadableError` are those of `resources.Files`."""
         called = file if called is None else called
         inside = self._inside(file)
         if inside is None:
