@@ -8,8 +8,9 @@ entities and references, and looked up so that a fault says where it stands.
 import math
 import os
 import stat
+from dataclasses import dataclass
 from importlib import import_module
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -222,7 +223,8 @@ _MOST_VECTORS = 1 << 30  # bytes of parameters
 _ROOTS = {"CPHD": "CPHD", "CRSDsar": "CRSD", "CRSDtx": "CRSD", "CRSDrcv": "CRSD", "SICD": "SICD"}
 
 
-class Container(NamedTuple):
+@dataclass(frozen=True)
+class Container:
     """Parts of a file that are read: its format, its XML with the byte at which that begins, and each block's length.
 
     `blocks` are (byte, length) by name; empty where the file is XML alone.

@@ -4,6 +4,7 @@ import hashlib
 import math
 import os
 from collections.abc import Callable
+from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, NamedTuple
 
@@ -36,7 +37,8 @@ _FARTHEST_M = 4.1e8  # from the Earth's centre: what is farther is no place
 _COVERED = 0.02  # of the aperture, that pulses may lack at its ends
 
 
-class _Pulses(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class _Pulses:
     """Vectors of a channel: times of transmission and of reception [s], places then, Earth-fixed [m]."""
 
     sent: Floats

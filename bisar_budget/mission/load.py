@@ -6,7 +6,8 @@ A text gives a `Mission` or a `MissionError`, nothing else.
 import os
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import BinaryIO, NamedTuple, cast
+from dataclasses import dataclass
+from typing import BinaryIO, cast
 
 from bisar_budget.faults import Fault, MissionError, SetValue, changes_words, file_fault, sentences
 from bisar_budget.mission.model import MISSION, Mission, PartFile, flies_on_earth, names_files, names_parts
@@ -176,7 +177,8 @@ def _with_changes(fault: Fault, changes: Sequence[SetValue]) -> Fault:
 
 
 # ---------------------------------------------------------------------- files that a mission names
-class Named(NamedTuple):
+@dataclass(frozen=True)
+class Named:
     """Files that a mission names, to take along to machines that do not have them: orbits and logs by name, parts."""
 
     paths: tuple[tuple[str, bytes], ...] = ()

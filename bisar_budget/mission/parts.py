@@ -556,7 +556,8 @@ def _own_key(error: MotionError, own: MotionError | Imu, figure: str) -> str:
     return f"motion_error.imu.{figure}" if isinstance(own, Imu) else f"motion_error.{figure}"
 
 
-class TakenFigure(NamedTuple):
+@dataclass(frozen=True)
+class TakenFigure:
     """A figure that a mission takes from a part: the key that could state it, what the part says, the part's name."""
 
     key: str

@@ -2,9 +2,9 @@
 
 import os
 from collections.abc import Sequence
+from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from subprocess import run
-from typing import NamedTuple
 
 from bisar_budget.faults import printable
 from bisar_budget.mission.load import folder_of, parse_mission
@@ -178,7 +178,8 @@ def _top(folder: str) -> tuple[str, str]:
     return (os.fsdecode(top).rstrip("\r\n") if is_found else ""), said
 
 
-class _Object(NamedTuple):
+@dataclass(frozen=True)
+class _Object:
     """An object of git: its kind, its content, its hash, and the folder of its repository."""
 
     kind: bytes

@@ -10,6 +10,7 @@ whole path, and bends nothing.
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -39,7 +40,8 @@ class Geodetic(NamedTuple):
     height: float
 
 
-class SceneAxes(NamedTuple):
+@dataclass(frozen=True)
+class SceneAxes:
     """East, north and up at a place, and the place itself, in Earth-fixed axes."""
 
     origin: Vector
