@@ -90,15 +90,7 @@ def report_files(root: Any, read: Beside, report: Report) -> None:
     """Say which orbits and logs cannot be read, of a file that is no mission for other reasons.
 
     What they say is looked at where the rest of the mission is there: a path depends on its scene, time and aperture.
-
-    Parameters
-    ----------
-    root : dict
-        What the file says.
-    read : callable
-        Content of a file that the mission names; raises `PathFileError`.
-    report : callable
-        Takes what is wrong, and where.
+    The parameters are those of `with_paths`, `root` is what the file says.
     """
     platforms = root.get("platforms")
     for name in Platforms._fields:
