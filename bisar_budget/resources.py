@@ -19,7 +19,7 @@ def resource(*parts: str) -> "Path":
     return installed if installed.exists() else package.parent.joinpath(*parts)
 
 
-# Device and inode of the files that `content` gave since a command began: no result may replace one.
+# Device and inode of the files that were read since a command began: no result may replace one.
 FILES_READ: set[tuple[int, int]] = set()
 
 
@@ -89,26 +89,6 @@ class UnreadableError(Exception):
         self.is_missing = is_missing
 
 
-def content(file: str, most: int, called: str | None = None) -> bytes:
-    """Content of a regular file; of a larger one than `most` bytes so many and one more.
-
-    Parameters
-    ----------
-    file : str
-        Where it is.
-    most : int
-        Bytes. What is larger is for the caller to refuse.
-    called : str, optional
-        What messages call it, instead of `file`.
-
-    Raises
-    ------
-    UnreadableError
-        It cannot be read, or is no regular file: a pipe would be waited for, and a device never ends.
-    """
-    return held(file, most, lambda: _read(file, most, file if called is None else called))
-
-
 def _read(file: str, most: int, called: str) -> bytes:
     try:
         found = os.stat(file)
@@ -135,23 +115,38 @@ class Files(Protocol):
     """Where the files of a project are read: on the disk, or in a git revision (`mission.revision`)."""
 
     def content(self, file: str, most: int, called: str | None = None) -> bytes:
-        """Content of a file; see `content`."""
+        """Content of a regular file; of a larger one than `most` bytes so many and one more.
+
+        Parameters
+        ----------
+        file : str
+            Where it is.
+        most : int
+            Bytes. What is larger is for the caller to refuse.
+        called : str, optional
+            What messages call it, instead of `file`.
+
+        Raises
+        ------
+        UnreadableError
+            It cannot be read, or is no regular file: a pipe would be waited for, and a device never ends.
+        """
 
     def names(self, folder: str) -> list[str]:
         """Names of the files in a folder, sorted; raises `OSError` where it cannot be listed."""
 
 
 class Disk:
-    """The files as they stand."""
+    """The files as they stand, or as this command read them first."""
 
     @staticmethod
     def content(file: str, most: int, called: str | None = None) -> bytes:
-        """Content of a file; see `content`."""
-        return content(file, most, called)
+        """Content of a file; see `Files`."""
+        return held(file, most, lambda: _read(file, most, file if called is None else called))
 
     @staticmethod
     def names(folder: str) -> list[str]:
-        """Names of the files in a folder, sorted; raises `OSError` where it cannot be listed."""
+        """Names of the files in a folder; see `Files`."""
         return sorted(os.listdir(folder))
 
 

@@ -3,7 +3,8 @@
 import os
 import re
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 from bisar_budget.faults import fault_words, shown
 from bisar_budget.resources import DISK, Files, UnreadableError
@@ -31,7 +32,8 @@ class SettingsError(Exception):
     """A table that cannot be used; the message names file and key."""
 
 
-class Settings(NamedTuple):
+@dataclass(frozen=True)
+class Settings:
     """The keys and values of the table; `file` is where it stands, for messages."""
 
     file: str

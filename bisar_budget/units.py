@@ -135,29 +135,7 @@ PHASE_NOISE = Dimension("a phase noise L(f)", "dBc/Hz", {"dBc/Hz": 1.0}, usual=(
 TONE = Dimension("the level of a tone", "dBc", {"dBc": 1.0}, usual=("dBc",))
 MEMORY = Dimension("an amount of memory", "B", _scaled("B", "kMGT") | {"KB": 1e3, "MiB": 2.0**20, "GiB": 2.0**30})
 
-DIMENSIONS = (
-    FREQUENCY,
-    TIME,
-    LENGTH,
-    SPEED,
-    ACCELERATION,
-    JERK,
-    SNAP,
-    ANGLE,
-    RATIO,
-    RATE,
-    RATE_SQUARED,
-    POWER_RATIO,
-    POSITION_VARIANCE,
-    POSITION_VELOCITY,
-    VELOCITY_VARIANCE,
-    ANGULAR_RATE,
-    VELOCITY_RANDOM_WALK,
-    ANGLE_RANDOM_WALK,
-    PHASE_NOISE,
-    TONE,
-    MEMORY,
-)
+DIMENSIONS = tuple(found for found in globals().values() if isinstance(found, Dimension))
 
 # Spellings of data sheets, one after the other, as the tables of units have them: °/√hr is deg/sqrt(h).
 _SPELLINGS = (

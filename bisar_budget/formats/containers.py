@@ -8,15 +8,17 @@ entities and references, and looked up so that a fault says where it stands.
 import math
 import os
 import stat
-from collections.abc import Iterator
+from dataclasses import dataclass
 from importlib import import_module
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.faults import printable, shown
 from bisar_budget.geometry import Vector
+
+Floats = NDArray[np.float64]
 
 _HIGHEST_POWER = 30  # of a polynomial; more is no polynomial that anybody fitted
 _INCLUDE = "{http://www.w3.org/2001/XInclude}"
@@ -122,29 +124,25 @@ class Element:
         node = self.one(path) if path else self
         return (node.number("X"), node.number("Y"), node.number("Z"))
 
-    def polynomial(self, path: str = "") -> NDArray[np.float64]:
-        """Coefficients of a polynomial of one variable, (order + 1,)."""
+    def polynomial(self, path: str = "", variables: int = 1) -> Floats:
+        """Coefficients of a polynomial of some variables, (order1 + 1, …)."""
         node = self.one(path) if path else self
-        found = np.zeros(node._order("order1") + 1)
-        for power, value in node._coefficients("exponent1"):
-            found[power] = value
+        numbers = range(1, variables + 1)
+        found = np.zeros([node._attribute(f"order{number}", _HIGHEST_POWER) + 1 for number in numbers])
+        for coefficient in node.all("Coef"):
+            powers = tuple(coefficient._attribute(f"exponent{number}", _HIGHEST_POWER) for number in numbers)
+            if any(power >= size for power, size in zip(powers, found.shape, strict=True)):
+                raise coefficient.fault("is of a higher power than the polynomial's order")
+            found[powers] = coefficient.number()
         return found
 
-    def polynomial_2d(self, path: str = "") -> NDArray[np.float64]:
-        """Coefficients of a polynomial of two variables, (order1 + 1, order2 + 1)."""
-        node = self.one(path) if path else self
-        found = np.zeros((node._order("order1") + 1, node._order("order2") + 1))
-        for *powers, value in node._coefficients("exponent1", "exponent2"):
-            found[tuple(powers)] = value
-        return found
-
-    def path_polynomial(self, path: str) -> NDArray[np.float64]:
+    def path_polynomial(self, path: str) -> Floats:
         """Coefficients of a place over time, (order + 1, 3)."""
         axes = [self.one(path).polynomial(axis) for axis in "XYZ"]
         most = max(axis.size for axis in axes)
         return np.stack([np.pad(axis, (0, most - axis.size)) for axis in axes], axis=1)
 
-    def matrix(self, path: str, size: int) -> NDArray[np.float64]:
+    def matrix(self, path: str, size: int) -> Floats:
         """Symmetric matrix of `Entry` elements; what is not given is zero, of a pair one may be given."""
         found = np.full((size, size), np.nan)
         for entry in self.one(path).all("Entry"):
@@ -153,25 +151,14 @@ class Element:
                 raise entry.fault("counts its indices from 1")
             found[row, column] = entry.number()
         filled = np.where(np.isnan(found), found.T, found)
-        symmetric: NDArray[np.float64] = np.nan_to_num((filled + filled.T) / 2)
+        symmetric: Floats = np.nan_to_num((filled + filled.T) / 2)
         return symmetric
-
-    def _order(self, name: str) -> int:
-        return self._attribute(name, _HIGHEST_POWER)
 
     def _attribute(self, name: str, most: int) -> int:
         text = self.node.get(name, "")
         if not (text.isascii() and text.isdigit() and int(text[:9]) <= most):
             raise self.fault(f"must have {name} from 0 to {most} (got {shown(text)!r})")
         return int(text)
-
-    def _coefficients(self, *names: str) -> Iterator[Any]:
-        for node in self.all("Coef"):
-            powers = [node._attribute(name, _HIGHEST_POWER) for name in names]
-            most = [self._order(name.replace("exponent", "order")) for name in names]
-            if any(power > order for power, order in zip(powers, most, strict=True)):
-                raise node.fault("is of a higher power than the polynomial's order")
-            yield (*powers, node.number())
 
 
 def _any_namespace(path: str) -> str:
@@ -236,7 +223,8 @@ _MOST_VECTORS = 1 << 30  # bytes of parameters
 _ROOTS = {"CPHD": "CPHD", "CRSDsar": "CRSD", "CRSDtx": "CRSD", "CRSDrcv": "CRSD", "SICD": "SICD"}
 
 
-class Container(NamedTuple):
+@dataclass(frozen=True)
+class Container:
     """Parts of a file that are read: its format, its XML with the byte at which that begins, and each block's length.
 
     `blocks` are (byte, length) by name; empty where the file is XML alone.

@@ -102,8 +102,8 @@ def declared(
 def _axes_of(name: str, state: PlatformState, axes: SceneAxes) -> Axes:
     """Axes of a file's frame, in the scene's."""
     if name == "ECF":
-        x, y, z = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-        return axes.turned(x), axes.turned(y), axes.turned(z)
+        x, y, z = zip(*axes.axes, strict=True)
+        return x, y, z
     if name == "RIC_ECI":
         return axes.radial(state.position, state.velocity)
     radial = unit(axes.turned(axes.earth_fixed(state.position)))

@@ -4,6 +4,7 @@ import hashlib
 import math
 import os
 from collections.abc import Callable
+from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, NamedTuple
 
@@ -36,7 +37,8 @@ _FARTHEST_M = 4.1e8  # from the Earth's centre: what is farther is no place
 _COVERED = 0.02  # of the aperture, that pulses may lack at its ends
 
 
-class _Pulses(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class _Pulses:
     """Vectors of a channel: times of transmission and of reception [s], places then, Earth-fixed [m]."""
 
     sent: Floats
@@ -201,7 +203,7 @@ def _dwell(xml: Element, dwell: Element | None, used: Element, point: Vector) ->
         polynomial = dwell.with_child(name, "Identifier", used.text(key))
         if polynomial is None:
             raise used.fault(f"names no {name} of {dwell.path}", key)
-        found.append(_at(polynomial.polynomial_2d(f"{name}Poly"), x, y))
+        found.append(_at(polynomial.polynomial(f"{name}Poly", 2), x, y))
     if not found[1] > 0:
         raise used.fault(f"gives a dwell time of {found[1]:g} s at the scene point")
     return _Aperture(*found)
@@ -322,10 +324,9 @@ def _sicd(container: Container, channel: str | None) -> Imported:
     xml = container.xml
     if channel is not None:
         raise FormatError(container.file, f"a SICD is one image and has no channel {shown(channel)!r}")
-    if (xml.maybe("RadarCollection/RefFreqIndex") or xml).tag == "RefFreqIndex" and xml.whole(
-        "RadarCollection/RefFreqIndex"
-    ):
-        raise xml.fault("counts frequencies from one that the file keeps to itself", "RadarCollection/RefFreqIndex")
+    index = xml.maybe("RadarCollection/RefFreqIndex")
+    if index is not None and index.whole():
+        raise index.fault("counts frequencies from one that the file keeps to itself")
     band = xml.one("ImageFormation/TxFrequencyProc")
     low, high = band.number("MinProc"), band.number("MaxProc")
     is_monostatic = xml.text("CollectionInfo/CollectType") == "MONOSTATIC"

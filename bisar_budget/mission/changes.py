@@ -14,7 +14,7 @@ import yaml
 from bisar_budget.faults import Changed, InvalidValueError, KeyPath, SetNumber, SetValue, shown
 from bisar_budget.mission.model import MISSION
 from bisar_budget.mission.readers import INVALID, ListOf, OneOf, Reader, Section, did_you_mean, is_place
-from bisar_budget.mission.tree import MAX_BYTES, Tree, UnusableError, events
+from bisar_budget.mission.tree import MAX_BYTES, Tree
 
 _ACCEPTED = "accepted: KEY=VALUE, such as radar.bandwidth=150MHz"
 _MAX_KEY = 500  # characters; a path of the schema has a tenth
@@ -127,28 +127,19 @@ def _value(tree: Tree, change: SetValue, path: KeyPath) -> Any:
     if isinstance(change, SetNumber):
         return change.number
     try:
-        next_event = events(change.text)
-        while type(event := next_event()) is not yaml.DocumentStartEvent:
-            if type(event) is yaml.StreamEndEvent:
-                tree.fault(None, path, "has no value", hint="Give it one")
-                return INVALID
         _forget(tree, path)
-        value = tree.node(next_event, next_event(), path)
-        while type(event := next_event()) is not yaml.StreamEndEvent:
-            if type(event) is yaml.DocumentStartEvent:
-                tree.fault(None, path, "has a second YAML document", accepted="accepted: one value")
-                raise UnusableError
+        value = tree.document(change.text, path, "one value")
+        if value is INVALID and path not in tree.values:
+            tree.fault(None, path, "has no value", hint="Give it one")
+        return value
     except yaml.MarkedYAMLError as error:
         said = ", ".join(filter(None, (error.context, error.problem)))
         tree.fault(None, path, f"is not valid YAML: {said}", given=shown(change.text))
-        return INVALID
     except yaml.reader.ReaderError as error:
         tree.fault(None, path, f"is not text: {error.reason}")
-        return INVALID
     except UnicodeEncodeError:  # an argument of other bytes, which Python keeps as surrogates
         tree.fault(None, path, "is not text: its bytes are not UTF-8", given=shown(change.text))
-        return INVALID
-    return value
+    return INVALID
 
 
 def _forget(tree: Tree, path: KeyPath) -> None:

@@ -70,23 +70,19 @@ def _problems(correlation: _Matrix) -> Iterator[Problem]:
         )
 
 
-def _square(value: Any, path: KeyPath, report: Report, otherwise: str) -> bool:
-    """Whether a value is a list of six lists of six."""
+def _rows(value: Any, readers: Sequence[Sequence[Reader]], path: KeyPath, report: Report, otherwise: str) -> Any:
+    """Read six lists of six; `INVALID` after a report."""
     if not isinstance(value, list) or len(value) != SIZE:
         given = f", {len(value)} given" if isinstance(value, list) else ""
         accepted = f"accepted: x, y, z of position, then of velocity, or {otherwise}"
         report(path, Problem(f"must be 6 rows of 6 numbers{given}", accepted))
-        return False
-    is_square = True
-    for index, row in enumerate(value):
-        if not isinstance(row, list) or len(row) != SIZE:
-            given = f", {len(row)} given" if isinstance(row, list) else ""
-            report((*path, index), Problem(f"must be a row of 6 numbers{given}"))
-            is_square = False
-    return is_square
-
-
-def _elements(value: Any, readers: Sequence[Sequence[Reader]], path: KeyPath, report: Report) -> Any:
+        return INVALID
+    broken = [index for index, row in enumerate(value) if not isinstance(row, list) or len(row) != SIZE]
+    for index in broken:
+        given = f", {len(value[index])} given" if isinstance(value[index], list) else ""
+        report((*path, index), Problem(f"must be a row of 6 numbers{given}"))
+    if broken:
+        return INVALID
     rows = [
         [
             item if item is INVALID else reader.read(item, (*path, i, j), report)
@@ -95,6 +91,13 @@ def _elements(value: Any, readers: Sequence[Sequence[Reader]], path: KeyPath, re
         for i, (row, of_row) in enumerate(zip(value, readers, strict=True))
     ]
     return INVALID if any(item is INVALID for row in rows for item in row) else rows
+
+
+def _found(faults: Sequence[Problem], path: KeyPath, report: Report) -> bool:
+    """Report faults; whether there is one."""
+    for fault in faults:
+        report(path, fault)
+    return bool(faults)
 
 
 def _asymmetries(rows: Sequence[Sequence[float]], scales: Sequence[float]) -> Iterator[Problem]:
@@ -124,9 +127,7 @@ class _MatrixReader(Reader):
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
         """Read the elements and hold them to what a covariance is."""
-        if not _square(value, path, report, "a mapping with position, velocity and correlation"):
-            return INVALID
-        rows = _elements(value, _ELEMENTS, path, report)
+        rows = _rows(value, _ELEMENTS, path, report, "a mapping with position, velocity and correlation")
         if rows is INVALID:
             return INVALID
         faults = [Problem("is a negative variance", at=(i, i)) for i in range(SIZE) if rows[i][i] < 0]
@@ -140,9 +141,7 @@ class _MatrixReader(Reader):
             ]
             correlation = _symmetric(ratios)
             faults = list(_problems(correlation))
-        for fault in faults:
-            report(path, fault)
-        return INVALID if faults else Covariance(tuple(sigmas), correlation, is_matrix=True)
+        return INVALID if _found(faults, path, report) else Covariance(tuple(sigmas), correlation, is_matrix=True)
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Array of six arrays of six."""
@@ -186,23 +185,18 @@ class _CorrelationReader(Reader):
         if read is INVALID:
             return INVALID
         faults = list(_problems(read.matrix))
-        for fault in faults:
-            report(path, fault)
-        return INVALID if faults else read
+        return INVALID if _found(faults, path, report) else read
 
     def _matrix(self, value: Any, path: KeyPath, report: Report) -> Any:
-        if not _square(value, path, report, "pairs such as position.x-velocity.x: 0.3"):
-            return INVALID
-        rows = _elements(value, [[self._NUMBER] * SIZE] * SIZE, path, report)
+        readers = [[self._NUMBER] * SIZE] * SIZE
+        rows = _rows(value, readers, path, report, "pairs such as position.x-velocity.x: 0.3")
         if rows is INVALID:
             return INVALID
         faults = [
             Problem("an error's correlation with itself is 1", at=(i, i)) for i in range(SIZE) if rows[i][i] != 1
         ]
         faults += _asymmetries(rows, [1.0] * SIZE)
-        for fault in faults:
-            report(path, fault)
-        return INVALID if faults else _Correlations(_symmetric(rows))
+        return INVALID if _found(faults, path, report) else _Correlations(_symmetric(rows))
 
     def _pairs(self, value: dict[str, Any], path: KeyPath, report: Report) -> Any:
         rows = [[float(i == j) for j in range(SIZE)] for i in range(SIZE)]

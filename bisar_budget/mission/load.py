@@ -6,7 +6,8 @@ A text gives a `Mission` or a `MissionError`, nothing else.
 import os
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import BinaryIO, NamedTuple, cast
+from dataclasses import dataclass
+from typing import BinaryIO, cast
 
 from bisar_budget.faults import Fault, MissionError, SetValue, changes_words, file_fault, sentences
 from bisar_budget.mission.model import MISSION, Mission, PartFile, flies_on_earth, names_files, names_parts
@@ -176,17 +177,18 @@ def _with_changes(fault: Fault, changes: Sequence[SetValue]) -> Fault:
 
 
 # ---------------------------------------------------------------------- files that a mission names
-class Named(NamedTuple):
-    """Name and content of orbits and logs; name, file and content of parts."""
+@dataclass(frozen=True)
+class Named:
+    """Files that a mission names, to take along to machines that do not have them: orbits and logs by name, parts."""
 
     paths: tuple[tuple[str, bytes], ...] = ()
-    parts: tuple[tuple[str, str, bytes], ...] = ()
+    parts: tuple[PartFile, ...] = ()
 
     def parse(
         self, tree: Tree, data: bytes, file: str, model: str | None = None, *, changes: Sequence[SetValue] = ()
     ) -> Mission:
         """Read a mission that names nothing else; arguments and faults are those of `mission_of`."""
-        parts = {name: (of, content) for name, of, content in self.parts}
+        parts = {one.name: (one.file, one.data) for one in self.parts}
         return mission_of(tree, data, file, model, dict(self.paths).__getitem__, changes, parts.__getitem__)
 
     @property
@@ -194,8 +196,8 @@ class Named(NamedTuple):
         """Hash of all names and contents; empty where nothing is named."""
         from hashlib import sha256  # a check does without
 
-        parts = ((name, content) for name, _, content in self.parts)
-        each = [(name, sha256(content).hexdigest()) for name, content in (*self.paths, *parts)]
+        named = (*self.paths, *((one.name, one.data) for one in self.parts))
+        each = [(name, sha256(content).hexdigest()) for name, content in named]
         return sha256(ascii(each).encode()).hexdigest() if each else ""
 
 
@@ -211,21 +213,18 @@ def named_by(mission: Mission, also: Sequence[SetValue] = ()) -> Named:
     from bisar_budget.mission.paths import reader_of
 
     folder = folder_of(mission.file)
-    read, found = reader_of(folder), finder_of(folder)
+    read = reader_of(folder)
     paths: dict[str, bytes] = {}
-    parts: dict[str, tuple[str, bytes]] = {}
+    parts: dict[str, PartFile] = {}
+    find = _noted(finder_of(folder), parts)
 
     def beside(name: str) -> bytes:
         paths[name] = read(name)
         return paths[name]
-
-    def find(name: str) -> tuple[str, bytes]:
-        parts[name] = found(name)
-        return parts[name]
 
     model = mission.allocation.model  # --model may stand in for one of the file that is none
     parse_mission(mission.data, mission.file, model, beside, mission.changes, find)
     for change in also:
         with suppress(MissionError):  # there is none with it, which is said where it is asked for
             parse_mission(mission.data, mission.file, model, beside, (*mission.changes, change), find)
-    return Named(tuple(sorted(paths.items())), tuple((name, *of) for name, of in sorted(parts.items())))
+    return Named(tuple(sorted(paths.items())), tuple(sorted(parts.values())))

@@ -2,12 +2,12 @@
 
 One YAML file for each part, in `specs/sensors/`, in the folders that a project names, or anywhere by its path. A
 mission names parts, and what the mission says itself overrides single figures.
-`_parsed` reads every part, whoever asks for it.
 """
 
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
 
 from bisar_budget.faults import (
@@ -135,7 +135,6 @@ class OscillatorPart(NamedTuple):
 
 
 Part = ImuPart | GnssPart | OscillatorPart
-_Read = tuple[Part, Mapping[str, Any]]  # a part, and what its file says as text
 SECTIONS: dict[str, Section] = {
     "imu": Section(ImuPart),
     "gnss": Section(GnssPart),
@@ -178,13 +177,23 @@ def evidence(part: Part, figure: str) -> str:
     return f"{part.name}: {source}"
 
 
-class Entry(NamedTuple):
-    """A part of the catalogue: the name that a mission asks for, its file, and its figures as written there."""
+@dataclass(frozen=True)
+class Entry:
+    """A part as its file has it; `written` is what the file says, as text, in lists and mappings."""
 
-    id: str
     file: str
     part: Part
-    figures: Mapping[str, str]
+    written: Mapping[str, Any]
+
+    @property
+    def id(self) -> str:
+        """The name that a mission asks for."""
+        return os.path.splitext(os.path.basename(self.file))[0]
+
+    @property
+    def figures(self) -> Mapping[str, str]:
+        """Its figures as written there."""
+        return {key: figure_text(self.written[key]) for key in FIGURES[self.part.kind] if key in self.written}
 
 
 def entries(places: Sequence[str]) -> Iterator[Entry]:
@@ -195,14 +204,8 @@ def entries(places: Sequence[str]) -> Iterator[Entry]:
     PartError
         One of them is no part.
     """
-    found = [_entry(name, file, _read(file)) for name, file in catalogue(places).items()]
+    found = [_entry(file, _content(file, DISK)) for file in catalogue(places).values()]
     yield from sorted(found, key=lambda one: (list(SECTIONS).index(one.part.kind), one.id))
-
-
-def _entry(name: str, file: str, read: _Read) -> Entry:
-    part, written = read
-    figures = {key: figure_text(written[key]) for key in FIGURES[part.kind] if key in written}
-    return Entry(name, file, part, figures)
 
 
 def figure_text(value: Any) -> str:
@@ -225,12 +228,12 @@ def read_entry(file: str) -> Entry:
     data = _standard_input() if file == "-" else _content(file, DISK)
     faults = () if file == "-" else tuple(_name_faults(file))
     try:
-        read = _parsed(file, data)
+        read = _entry(file, data)
     except PartError as error:
         raise PartError.of(file, (*faults, *error.faults)) from None
     if faults:
         raise PartError.of(file, faults)
-    return _entry(os.path.splitext(os.path.basename(file))[0], file, read)
+    return read
 
 
 def _name_faults(file: str) -> Iterator[Fault]:
@@ -242,10 +245,6 @@ def _name_faults(file: str) -> Iterator[Fault]:
         Reference().leaf(name)
     except InvalidValueError as error:
         yield file_fault(f"has a name that no mission can say: it {error}")
-
-
-def _read(file: str) -> _Read:
-    return _parsed(file, _content(file, DISK))
 
 
 def _content(file: str, files: Files) -> bytes:
@@ -264,7 +263,8 @@ def _standard_input() -> bytes:
         raise PartError.of("-", [file_fault(f"cannot be read: {reason}")]) from None
 
 
-def _parsed(file: str, data: bytes) -> _Read:
+def _entry(file: str, data: bytes) -> Entry:
+    """Read a part, whoever asks for it."""
     part: Any = INVALID
     try:
         tree = read_tree(data, file, "part")
@@ -274,7 +274,7 @@ def _parsed(file: str, data: bytes) -> _Read:
         part = _part_of(tree)
     if tree.faults:
         raise PartError.of(file, tree.in_order())
-    return part, tree.root
+    return Entry(file, part, tree.root)
 
 
 def _part_of(tree: Tree) -> Any:
@@ -393,7 +393,7 @@ def find_part(name: str, beside: str) -> Part:
     PartError
         There is none, or it is no part.
     """
-    return _parsed(*finder_of(beside)(name))[0]
+    return _entry(*finder_of(beside)(name)).part
 
 
 def _file_of(name: str, beside: str, files: Files) -> str:
@@ -424,12 +424,11 @@ def with_parts(mission: Mission, find: Find, report: Report) -> Any:
     """
     is_valid = True
     platforms = mission.platforms
-    sources = _Sources(find, report)
     for name in platforms._fields:
         platform = getattr(platforms, name)
-        error = _with_sensors(platform.motion_error, ("platforms", name, "motion_error"), sources)
+        error = _with_sensors(platform.motion_error, ("platforms", name, "motion_error"), find, report)
         oscillator = platform.oscillator and _with_sensor(
-            platform.oscillator, ("platforms", name, "oscillator"), sources
+            platform.oscillator, ("platforms", name, "oscillator"), find, report
         )
         if INVALID in (error, oscillator):
             is_valid = False
@@ -444,7 +443,6 @@ def report_parts(root: Any, find: Find, report: Report) -> None:
     A section whose values are right is held to its parts as that of a mission is; of another one the names are looked
     at. The parameters are those of `with_parts`, `root` is what the file says.
     """
-    sources = _Sources(find, report)
     platforms = root.get("platforms")
     for name in Platforms._fields:
         platform = platforms.get(name) if isinstance(platforms, dict) else None
@@ -452,9 +450,9 @@ def report_parts(root: Any, find: Find, report: Report) -> None:
             continue
         path: KeyPath = ("platforms", name)
         if motion := _stand_in(MOTION_ERROR, platform.get("motion_error")):
-            _with_sensors(MotionError(**motion), (*path, "motion_error"), sources)
+            _with_sensors(MotionError(**motion), (*path, "motion_error"), find, report)
         if oscillator := _stand_in(OSCILLATOR, platform.get("oscillator")):
-            _with_sensor(Oscillator(**oscillator), (*path, "oscillator"), sources)
+            _with_sensor(Oscillator(**oscillator), (*path, "oscillator"), find, report)
 
 
 def _stand_in(section: Section, value: Any) -> dict[str, Any]:
@@ -465,45 +463,40 @@ def _stand_in(section: Section, value: Any) -> dict[str, Any]:
     return {key: found for key, found in values.items() if key == "sensor" and found is not INVALID}
 
 
-class _Sources(NamedTuple):
-    """Functions that find the parts of a mission, and take their faults."""
-
-    find: Find
-    report: Report
-
-
-def _with_sensors(error: MotionError, path: KeyPath, sources: _Sources) -> Any:
+def _with_sensors(error: MotionError, path: KeyPath, find: Find, report: Report) -> Any:
     """A motion error with the figures of its parts; `INVALID` after a report."""
     path = (*path, "sensor")
-    parts = _parts_of(error.sensor, path, ("imu", "gnss"), sources)
-    return INVALID if parts is INVALID else _motion_of(error, parts, path, sources.report)
+    parts = _parts_of(error.sensor, path, ("imu", "gnss"), find, report)
+    return INVALID if parts is INVALID else _motion_of(error, parts, path, report)
 
 
-def _with_sensor(oscillator: Oscillator, path: KeyPath, sources: _Sources) -> Any:
+def _with_sensor(oscillator: Oscillator, path: KeyPath, find: Find, report: Report) -> Any:
     """An oscillator with the figures of its part; `INVALID` after a report."""
     if oscillator.sensor is None:
         return oscillator
-    parts = _parts_of(oscillator.sensor, (*path, "sensor"), ("oscillator",), sources)
-    found = INVALID if parts is INVALID else _oscillator_of(oscillator, parts[0], path, sources.report)
+    parts = _parts_of(oscillator.sensor, (*path, "sensor"), ("oscillator",), find, report)
+    found = INVALID if parts is INVALID else _oscillator_of(oscillator, parts[0], path, report)
     if found is not INVALID and found.needs_frequency and found.frequency is None:
-        problem = f"{shown(parts[0][0].name)} states no frequency, at which the mask or the tones are stated"
-        sources.report(path, Problem(problem, "accepted: oscillator.frequency", at=("frequency",)))
+        problem = f"{shown(parts[0].part.name)} states no frequency, at which the mask or the tones are stated"
+        report(path, Problem(problem, "accepted: oscillator.frequency", at=("frequency",)))
         return INVALID
     return found
 
 
-def _parts_of(names: str | tuple[str, ...] | None, path: KeyPath, kinds: Sequence[str], sources: _Sources) -> Any:
-    """Parts, and what the file of each says; `INVALID` after a report."""
-    find, report = sources
+def _parts_of(
+    names: str | tuple[str, ...] | None, path: KeyPath, kinds: Sequence[str], find: Find, report: Report
+) -> Any:
+    """Entries of parts; `INVALID` after a report."""
     is_list = isinstance(names, tuple)
-    found: list[_Read] = []
+    found: list[Entry] = []
     is_valid = True
     for index, name in enumerate(names if isinstance(names, tuple) else [names] if names else []):
         here = (*path, index) if is_list else path
         try:
-            part, written = _parsed(*find(name))
-            if part.kind not in kinds:
-                raise PartError(f"is an {part.kind}" if part.kind != "gnss" else "is a GNSS receiver")
+            entry = _entry(*find(name))
+            kind = entry.part.kind
+            if kind not in kinds:
+                raise PartError(f"is an {kind}" if kind != "gnss" else "is a GNSS receiver")
         except UnknownPartError as error:
             report(here, Problem(str(error), f"accepted: parts of the kind {' or '.join(kinds)}", error.hint))
             is_valid = False
@@ -515,27 +508,26 @@ def _parts_of(names: str | tuple[str, ...] | None, path: KeyPath, kinds: Sequenc
                 report(here, Problem(said, accepted, names_value=bool(error.faults)))
             is_valid = False
             continue
-        if any(part.kind == other.kind for other, _ in found):
-            report(here, Problem(f"is a second {part.kind}", "accepted: one part of each kind"))
+        if any(kind == other.part.kind for other in found):
+            report(here, Problem(f"is a second {kind}", "accepted: one part of each kind"))
             is_valid = False
-        found.append((part, written))
+        found.append(entry)
     return found if is_valid else INVALID
 
 
-def _motion_of(error: MotionError, parts: Sequence[_Read], path: KeyPath, report: Report) -> Any:
+def _motion_of(error: MotionError, parts: Sequence[Entry], path: KeyPath, report: Report) -> Any:
     """Put figures of parts where the file has none; what it has overrides exactly that figure, and says so."""
     of_parts = dict(error.of_parts)  # an accuracy file may have been before
     overridden = list(error.overridden)
-    for part, written in parts:
+    for entry in parts:
+        part = entry.part
         imu = error.imu or Imu()
         own = imu if isinstance(part, ImuPart) else error
         taken = {}
-        for figure in FIGURES[part.kind]:
-            if figure not in written:
-                continue
+        for figure, text in entry.figures.items():
             key = _own_key(error, own, figure)
             if key:
-                overridden.append(Overridden(figure, key, part.name, figure_text(written[figure])))
+                overridden.append(Overridden(figure, key, part.name, text))
             else:
                 taken[figure] = getattr(part, figure)
         if isinstance(part, ImuPart):
@@ -564,7 +556,8 @@ def _own_key(error: MotionError, own: MotionError | Imu, figure: str) -> str:
     return f"motion_error.imu.{figure}" if isinstance(own, Imu) else f"motion_error.{figure}"
 
 
-class TakenFigure(NamedTuple):
+@dataclass(frozen=True)
+class TakenFigure:
     """A figure that a mission takes from a part: the key that could state it, what the part says, the part's name."""
 
     key: str
@@ -577,33 +570,34 @@ def taken_figures(mission: Mission) -> Iterator[TakenFigure]:
 
     Values are text, or mappings and lists of text, as the file of the part has them.
     """
-    read = {one.name: _parsed(one.file, one.data) for one in mission.parts}
+    read = {one.name: _entry(one.file, one.data) for one in mission.parts}
     for name, platform in zip(mission.platforms._fields, mission.platforms, strict=True):
         error, oscillator = platform.motion_error, platform.oscillator
         names = error.sensor if isinstance(error.sensor, tuple) else (error.sensor,) if error.sensor else ()
         for each in names:
-            part, written = read[each]
-            inner = "imu." if part.kind == "imu" else ""
-            for figure in FIGURES[part.kind]:
-                if figure in written and dict(error.of_parts).get(figure) == evidence(part, figure):
-                    yield TakenFigure(f"platforms.{name}.motion_error.{inner}{figure}", written[figure], each)
+            entry = read[each]
+            inner = "imu." if entry.part.kind == "imu" else ""
+            for figure in entry.figures:
+                if dict(error.of_parts).get(figure) == evidence(entry.part, figure):
+                    yield TakenFigure(f"platforms.{name}.motion_error.{inner}{figure}", entry.written[figure], each)
         if oscillator is not None and oscillator.sensor:
-            part, written = read[oscillator.sensor]
+            entry = read[oscillator.sensor]
             path = ("platforms", name, "oscillator", "frequency")
             is_own = {"frequency": path in mission.places}
-            is_own |= {form: oscillator.source != evidence(part, form) for form in FORMS}
-            for figure in FIGURES["oscillator"]:
-                if figure in written and not is_own[figure]:
-                    yield TakenFigure(f"platforms.{name}.oscillator.{figure}", written[figure], oscillator.sensor)
+            is_own |= {form: oscillator.source != evidence(entry.part, form) for form in FORMS}
+            for figure in entry.figures:
+                if not is_own[figure]:
+                    key = f"platforms.{name}.oscillator.{figure}"
+                    yield TakenFigure(key, entry.written[figure], oscillator.sensor)
 
 
-def _oscillator_of(oscillator: Oscillator, read: _Read, path: KeyPath, report: Report) -> Any:
+def _oscillator_of(oscillator: Oscillator, entry: Entry, path: KeyPath, report: Report) -> Any:
     """An oscillator with the figures of a part; what the file states overrides exactly that figure, and says so.
 
     A mask holds at the frequency it was measured at: with another one beside it, the same decibels would be those of
     a better or a worse oscillator. The file has to state both, or neither.
     """
-    part, written = read
+    part, figures = entry.part, entry.figures
     own = next((form for form in FORMS if getattr(oscillator, form) is not None), None)
     (form,) = [form for form in FORMS if getattr(part, form) is not None]
     stated, overridden = getattr(part, "frequency", None), []
@@ -611,11 +605,11 @@ def _oscillator_of(oscillator: Oscillator, read: _Read, path: KeyPath, report: R
     if own is None:
         taken = {form: getattr(part, form), "source": evidence(part, form)}
     else:
-        overridden.append(Overridden(own, f"oscillator.{own}", part.name, f"{form} {figure_text(written[form])}"))
+        overridden.append(Overridden(own, f"oscillator.{own}", part.name, f"{form} {figures[form]}"))
     if oscillator.frequency is None:
         taken["frequency"] = stated
     elif stated is not None and oscillator.frequency != stated:
-        at = figure_text(written["frequency"])
+        at = figures["frequency"]
         if own is None and form == "phase_noise":
             problem = f"the phase noise of {shown(part.name)} is stated at its own frequency, {at}"
             report(path, Problem(problem, "accepted: no frequency, or phase_noise beside it", at=("frequency",)))

@@ -7,6 +7,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from bisar_budget.faults import Problem
 from bisar_budget.geometry import STRAIGHT, PlatformState
 from bisar_budget.mission.instruments import Overridden
@@ -88,15 +90,7 @@ def report_files(root: Any, read: Beside, report: Report) -> None:
     """Say which orbits and logs cannot be read, of a file that is no mission for other reasons.
 
     What they say is looked at where the rest of the mission is there: a path depends on its scene, time and aperture.
-
-    Parameters
-    ----------
-    root : dict
-        What the file says.
-    read : callable
-        Content of a file that the mission names; raises `PathFileError`.
-    report : callable
-        Takes what is wrong, and where.
+    The parameters are those of `with_paths`, `root` is what the file says.
     """
     platforms = root.get("platforms")
     for name in Platforms._fields:
@@ -216,7 +210,11 @@ def _of_orbit(mission: Mission, route: OrbitSource, axes: earth.SceneAxes, read:
                 f"{name}: is {far:.4g} m from the Earth's centre, farther than the Moon; are its units km?"
             )
         half = mission.collection.aperture_time / 2
-        fitted = interpolated(lambda tau: axes.place(orbit.place(center.after(tau))), 2 * half, widest)
+
+        def places(times: earth.Floats) -> earth.Floats:
+            return axes.places(np.array([orbit.place(center.after(time)) for time in times.tolist()]))
+
+        fitted = interpolated(places, 2 * half, widest)
         # An interpolation is worst between the places of a file.
         instants = [center.after(part * half) for part in (0.0, -0.5, 0.5, -1.0, 1.0)]
         of_orbit = max((orbit.doubts(instant) for instant in instants), key=len)
@@ -323,7 +321,9 @@ def _of_place(platform: Platform, axes: earth.SceneAxes, aperture_time_s: float)
         return FlownPath(
             PlatformState(position=axes.place(earth.earth_fixed(place)), velocity=STRAIGHT), "geodetic place"
         )
-    fitted = interpolated(lambda tau: axes.place(earth.flown(place, heading, speed, climb, tau)), aperture_time_s)
+    fitted = interpolated(
+        lambda times: axes.places(earth.flown(place, heading, speed, climb, times)), aperture_time_s
+    )
     return _flown(fitted, "geodetic place, flight along the geodesic")
 
 

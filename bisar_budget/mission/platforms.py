@@ -1,6 +1,7 @@
 """Platforms of a mission file: where they fly, in one of five ways, and how wrong their motion is measured."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -281,7 +282,8 @@ class TrajectorySource(NamedTuple):
 ORBIT, TRAJECTORY, INSTANT = Section(OrbitSource), Section(TrajectorySource), _Instant()
 
 
-class Way(NamedTuple):
+@dataclass(frozen=True)
+class Way:
     """A way to state the path of a platform: keys that it needs, and others that it may have.
 
     `direction` is the key that a platform which does not move has no use for.

@@ -2,9 +2,9 @@
 
 import os
 from collections.abc import Sequence
+from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from subprocess import run
-from typing import NamedTuple
 
 from bisar_budget.faults import printable
 from bisar_budget.mission.load import folder_of, parse_mission
@@ -66,7 +66,7 @@ class Revision:
         self._listed: dict[str, list[str]] = {}
 
     def content(self, file: str, most: int, called: str | None = None) -> bytes:
-        """Content of a file then; arguments and `UnreadableError` are those of `resources.content`."""
+        """Content of a file then; arguments and `UnreadableError` are those of `resources.Files`."""
         called = file if called is None else called
         inside = self._inside(file)
         if inside is None:
@@ -178,7 +178,8 @@ def _top(folder: str) -> tuple[str, str]:
     return (os.fsdecode(top).rstrip("\r\n") if is_found else ""), said
 
 
-class _Object(NamedTuple):
+@dataclass(frozen=True)
+class _Object:
     """An object of git: its kind, its content, its hash, and the folder of its repository."""
 
     kind: bytes

@@ -24,12 +24,6 @@ _PARSER = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
 _NULLS = ("", "~", "null", "Null", "NULL")
 
 
-def events(text: str) -> Callable[[], Any]:
-    """Give the parser's events of a text, one at each call; raises `yaml.YAMLError`."""
-    next_event: Callable[[], Any] = _PARSER(text).get_event
-    return next_event
-
-
 def _decoded(data: bytes | str, file: str, what: str) -> str:
     if len(data) > MAX_BYTES:
         raise MissionError(file, (file_fault(f"is larger than {MAX_BYTES // 1024} KiB, so no {what} file"),))
@@ -116,17 +110,21 @@ class Tree:
         given = shown(value) if isinstance(value, str) and not is_key and not problem.names_value else ""
         self.fault(mark, path, problem.problem, given=given, accepted=problem.accepted, hint=problem.hint)
 
-    def read_document(self, next_event: Callable[[], Any]) -> None:
-        """Read the one document of a file."""
+    def document(self, text: str, path: KeyPath, one: str) -> Any:
+        """Read the one document of a text, which stands at a path; `INVALID` where there is none.
+
+        `one` says what is accepted. Raises `yaml.YAMLError` too.
+        """
+        next_event: Callable[[], Any] = _PARSER(text).get_event
         while type(event := next_event()) is not yaml.DocumentStartEvent:
             if type(event) is yaml.StreamEndEvent:
-                return
-        self.root = self.node(next_event, next_event(), ())
+                return INVALID
+        value = self.node(next_event, next_event(), path)
         while type(event := next_event()) is not yaml.StreamEndEvent:
             if type(event) is yaml.DocumentStartEvent:
-                one = f"accepted: one {self.what} in a file"
-                self.fault(event.start_mark, (), "has a second YAML document", accepted=one)
+                self.fault(event.start_mark, path, "has a second YAML document", accepted=f"accepted: {one}")
                 raise UnusableError
+        return value
 
     def node(self, next_event: Callable[[], Any], event: Any, path: KeyPath) -> Any:
         """Read one value; the depth of the recursion is bounded by `MAX_DEPTH`."""
@@ -227,8 +225,7 @@ def read_tree(data: bytes | str, file: str, what: str = "mission") -> Tree:
     text = _decoded(data, file, what)
     tree = Tree(what)
     try:
-        next_event = events(text)
-        tree.read_document(next_event)
+        tree.root = tree.document(text, (), f"one {what} in a file")
         if not isinstance(tree.root, dict) and not tree.faults:
             problem = "is empty" if tree.root is INVALID else "is not a mapping of keys to values"
             tree.faults.append(file_fault(problem, _STARTS[what]))

@@ -10,12 +10,13 @@ whole path, and bends nothing.
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.geometry import STRAIGHT, Axes, Vector, cross, dot, unit
+from bisar_budget.geometry import Axes, Vector, cross, dot, unit
 from bisar_budget.paths.flight import PathFileError
 from bisar_budget.paths.instant import DAY, TAI_LESS, Instant, tai
 
@@ -39,7 +40,8 @@ class Geodetic(NamedTuple):
     height: float
 
 
-class SceneAxes(NamedTuple):
+@dataclass(frozen=True)
+class SceneAxes:
     """East, north and up at a place, and the place itself, in Earth-fixed axes."""
 
     origin: Vector
@@ -106,42 +108,55 @@ def curvature_radii(sine: Any) -> tuple[Any, Any]:
     return across**3 * (1 - _ECCENTRICITY_SQUARED) / EQUATORIAL_RADIUS**2, across
 
 
-def geodetic(point: Vector) -> Geodetic:
-    """Geodetic place of Earth-fixed coordinates, more than a few kilometres from the Earth's centre.
+def geodetic_places(points: Floats) -> tuple[Any, Any, Any]:
+    """Latitude and longitude [rad] and height [m] of Earth-fixed coordinates (..., 3), each (...).
 
-    Bowring's iteration, on the reduced latitude.
+    Bowring's iteration, on the reduced latitude; for places more than a few kilometres from the Earth's centre.
     """
-    x, y, z = point
-    level = math.hypot(x, y)
-    if not level:
-        return Geodetic(math.copysign(math.pi / 2, z), 0.0, abs(z) - _POLAR_RADIUS)
-    tangent = z / (level * (1 - FLATTENING))
-    latitude = math.atan2(z, level)
+    x, y, z = np.moveaxis(points, -1, 0)
+    level = np.hypot(x, y)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        tangent = np.where(level > 0, z / (level * (1 - FLATTENING)), np.copysign(np.inf, z))
+    latitude = np.arctan2(z, level)
     for _ in range(10):
-        reduced = math.atan(tangent)
-        up = z + _ECCENTRICITY_SQUARED / (1 - FLATTENING) * EQUATORIAL_RADIUS * math.sin(reduced) ** 3
-        out = level - _ECCENTRICITY_SQUARED * EQUATORIAL_RADIUS * math.cos(reduced) ** 3
-        before, latitude = latitude, math.atan2(up, out)
-        if abs(latitude - before) < _SETTLED:
+        reduced = np.arctan(tangent)
+        up = z + _ECCENTRICITY_SQUARED / (1 - FLATTENING) * EQUATORIAL_RADIUS * np.sin(reduced) ** 3
+        out = level - _ECCENTRICITY_SQUARED * EQUATORIAL_RADIUS * np.cos(reduced) ** 3
+        before, latitude = latitude, np.arctan2(up, out)
+        if np.max(np.abs(latitude - before)) < _SETTLED:
             break
-        tangent = (1 - FLATTENING) * math.tan(latitude)
-    sine, cosine = math.sin(latitude), math.cos(latitude)
-    height = level * cosine + z * sine - EQUATORIAL_RADIUS * math.sqrt(1 - _ECCENTRICITY_SQUARED * sine * sine)
-    return Geodetic(latitude, math.atan2(y, x), height)
+        tangent = (1 - FLATTENING) * np.tan(latitude)
+    sine = np.sin(latitude)
+    height = (
+        level * np.cos(latitude) + z * sine - EQUATORIAL_RADIUS * np.sqrt(1 - _ECCENTRICITY_SQUARED * sine * sine)
+    )
+    return latitude, np.arctan2(y, x), height
+
+
+def geodetic(point: Vector) -> Geodetic:
+    """Geodetic place of Earth-fixed coordinates."""
+    latitude, longitude, height = map(float, geodetic_places(np.array(point)))
+    return Geodetic(latitude, longitude, height)
+
+
+def _directions(latitude: Any, longitude: Any) -> Floats:
+    """East, north and up (3, ..., 3) at places, each (...)."""
+    sine, cosine, zero = np.sin(latitude), np.cos(latitude), np.zeros_like(longitude)
+    sine_l, cosine_l = np.sin(longitude), np.cos(longitude)
+    east = (-sine_l, cosine_l, zero)
+    north = (-sine * cosine_l, -sine * sine_l, cosine)
+    up = (cosine * cosine_l, cosine * sine_l, sine)
+    return np.stack([np.stack(one, axis=-1) for one in (east, north, up)])
 
 
 def axes_at(place: Geodetic) -> SceneAxes:
     """East, north and up at a place."""
-    sine, cosine = math.sin(place.latitude), math.cos(place.latitude)
-    sine_l, cosine_l = math.sin(place.longitude), math.cos(place.longitude)
-    east = (-sine_l, cosine_l, 0.0)
-    north = (-sine * cosine_l, -sine * sine_l, cosine)
-    up = (cosine * cosine_l, cosine * sine_l, sine)
+    east, north, up = map(tuple, _directions(place.latitude, place.longitude).tolist())
     return SceneAxes(earth_fixed(place), (east, north, up))
 
 
-def flown(place: Geodetic, heading: float, speed: float, climb: float, time_s: float) -> Vector:
-    """Earth-fixed place after a flight along the geodesic, at a height that `climb` changes. [m]
+def flown(place: Geodetic, heading: float, speed: float, climb: float, times_s: Any) -> Floats:
+    """Earth-fixed places (..., 3) after flights along the geodesic, at a height that `climb` changes. [m]
 
     Parameters
     ----------
@@ -151,7 +166,7 @@ def flown(place: Geodetic, heading: float, speed: float, climb: float, time_s: f
         There, from north, clockwise. [rad]
     speed, climb : float
         Level, at the height that is flown, and vertical; both constant. [m/s]
-    time_s : float
+    times_s : (...) array_like
         May be negative.
 
     Notes
@@ -160,27 +175,30 @@ def flown(place: Geodetic, heading: float, speed: float, climb: float, time_s: f
     Euler's formula. Runge and Kutta's fourth order, in Earth-fixed axes: there a pole is a place like others.
     """
     axes = axes_at(place)
-    step = time_s / _STEPS
     start = np.array(axes.origin)
+    step = np.asarray(times_s, dtype=float)[..., None] / _STEPS
 
     def rates(state: Floats) -> Floats:
-        """Rates of the way from the start and of the direction, (2, 3)."""
-        at = geodetic(tuple((start + state[0]).tolist()))
-        east, north, up = np.array(axes_at(at).axes)
-        along, across = curvature_radii(math.sin(at.latitude))
-        radius = 1 / ((state[1] @ north) ** 2 / along + (state[1] @ east) ** 2 / across) + at.height
-        return np.array([speed * state[1] + climb * up, -speed / radius * up])
+        """Rates of the way from the start and of the direction, (2, ..., 3)."""
+        way, direction = state
+        latitude, longitude, height = geodetic_places(start + way)
+        east, north, up = _directions(latitude, longitude)
+        along, across = curvature_radii(np.sin(latitude))
+        to_east, to_north = np.sum(direction * east, axis=-1), np.sum(direction * north, axis=-1)
+        radius = 1 / (to_north**2 / along + to_east**2 / across) + height
+        return np.stack([speed * direction + climb * up, -speed / radius[..., None] * up])
 
-    # From the start on, so that rounding is that of the way and not of the Earth's radius.
-    state: Floats = np.array([STRAIGHT, axes.turned_back((math.sin(heading), math.cos(heading), 0.0))])
+    # The way counts from the start, so that it is rounded as what it is and not as the Earth's radius.
+    way = np.zeros((*step.shape[:-1], 3))
+    state = np.stack([way, way + axes.turned_back((math.sin(heading), math.cos(heading), 0.0))])
     for _ in range(_STEPS):
         a = rates(state)
         b = rates(state + step / 2 * a)
         c = rates(state + step / 2 * b)
         d = rates(state + step * c)
         state = state + step / 6 * (a + 2 * b + 2 * c + d)
-    x, y, z = (start + state[0]).tolist()
-    return (x, y, z)
+    places: Floats = start + state[0]
+    return places
 
 
 # ---------------------------------------------------------------------- below the stars

@@ -8,8 +8,8 @@ import math
 import re
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
 
 from bisar_budget.faults import shown
 from bisar_budget.geometry import Vector
@@ -47,7 +47,8 @@ _VECTOR = ("X", "Y", "Z", "X_DOT", "Y_DOT", "Z_DOT")
 _GAUSS = ((0.5 - math.sqrt(0.15), 5 / 18), (0.5, 8 / 18), (0.5 + math.sqrt(0.15), 5 / 18))
 
 
-class _EphemerisBlock(NamedTuple):
+@dataclass(frozen=True)
+class _EphemerisBlock:
     """Metadata of a segment: keyword to line and value; and its ephemeris: line, epoch and numbers of each sample."""
 
     line: int
@@ -55,7 +56,8 @@ class _EphemerisBlock(NamedTuple):
     rows: Sequence[tuple[int, str, Sequence[str]]]
 
 
-class _Segment(NamedTuple):
+@dataclass(frozen=True)
+class _Segment:
     """A segment, ready to interpolate; `first` and `last` are its useable times, of TAI."""
 
     object: str

@@ -100,13 +100,13 @@ class Fitted:
     doubts: tuple[str, ...] = ()
 
 
-def interpolated(place: Callable[[float], Vector], aperture_time_s: float, widest_s: float = math.inf) -> Fitted:
+def interpolated(places: Callable[[Floats], Floats], aperture_time_s: float, widest_s: float = math.inf) -> Fitted:
     """Path through places of the scene at Chebyshev points around the aperture.
 
     Parameters
     ----------
-    place : callable
-        From slow time [s] to a place in the scene's axes [m].
+    places : callable
+        From slow times (n,) [s] to places (n, 3) in the scene's axes [m].
     aperture_time_s : float
         What the path is needed for.
     widest_s : float
@@ -114,19 +114,17 @@ def interpolated(place: Callable[[float], Vector], aperture_time_s: float, wides
     """
     half = min(max(aperture_time_s, _LEAST_WINDOW), widest_s) / 2
     nodes = chebyshev.chebpts1(_NODES)
-    places = np.array([place(half * node) for node in nodes.tolist()])
-    series: Floats = np.linalg.solve(chebyshev.chebvander(nodes, _NODES - 1), places)
+    basis = chebyshev.chebvander(nodes, _NODES - 1)
+    series: Floats = np.asarray(np.linalg.solve(basis, places(half * nodes)), dtype=float)
     series[np.abs(series) <= _UNSEEN_M] = 0.0  # what is below rounding would be divided by high powers of the window
     state = path_of(powers_of(series, half, chebyshev.cheb2poly))
-    apart = []
-    for n in range(_NODES + 1):
-        tau = aperture_time_s / 2 * math.cos(math.pi * n / _NODES)
-        apart.append(math.dist(state.at(tau)[0], place(tau)))
-    rms = math.sqrt(math.fsum(one * one for one in apart) / len(apart))
+    times = aperture_time_s / 2 * np.cos(math.pi * np.arange(_NODES + 1) / _NODES)
+    apart = np.linalg.norm(np.stack(state.place(times), axis=1) - places(times), axis=1)
+    farthest, rms = float(apart.max()), math.sqrt(float(np.mean(apart**2)))
     doubts: tuple[str, ...] = ()
-    if max(apart) > _ROUGH_M:
-        doubts = (f"the polynomial that is flown is up to {max(apart):.3g} m from the path",)
-    return Fitted(state, len(state.bends) + 2, max(apart), rms, doubts=doubts)
+    if farthest > _ROUGH_M:
+        doubts = (f"the polynomial that is flown is up to {farthest:.3g} m from the path",)
+    return Fitted(state, len(state.bends) + 2, farthest, rms, doubts=doubts)
 
 
 def smoothed(times: Floats, places: Floats, aperture_time_s: float) -> Fitted:

@@ -13,6 +13,7 @@ import csv
 import math
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple, NoReturn
 
@@ -41,7 +42,8 @@ _SECONDS = re.compile(r"[0-5]\d(?:[.,]\d{1,12})?(?:Z|\+00:00)", re.ASCII).fullma
 _EXAMPLE = "2026-06-01T05:20:31.250Z"
 
 
-class _Column(NamedTuple):
+@dataclass(frozen=True)
+class _Column:
     """A column that is read: its name, place in a row, unit as written and factor to SI. UTC has no unit."""
 
     name: str
@@ -50,7 +52,8 @@ class _Column(NamedTuple):
     scale: float = 1.0
 
 
-class _Header(NamedTuple):
+@dataclass(frozen=True)
+class _Header:
     """Line of the header, what parts its cells and how many there are, and the columns of time and place."""
 
     line: int

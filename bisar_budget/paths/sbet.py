@@ -11,7 +11,8 @@ heading, which is true when the wander angle is taken off: x is the wander angle
 """
 
 import math
-from typing import NamedTuple, NoReturn
+from dataclasses import dataclass
+from typing import NoReturn
 
 import numpy as np
 
@@ -48,7 +49,8 @@ _SIGMAS = (
 )
 
 
-class Accuracy(NamedTuple):
+@dataclass(frozen=True)
+class Accuracy:
     """One-sigma errors of position [m] and velocity [m/s], east, north and up: the worst of so many records."""
 
     position: Vector

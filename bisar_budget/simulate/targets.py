@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from bisar_budget import units
 from bisar_budget.faults import InvalidValueError
-from bisar_budget.resources import UnreadableError, content
+from bisar_budget.resources import DISK, UnreadableError
 from bisar_budget.units import parse_quantity
 
 _MOST_POINTS = 100
@@ -107,7 +107,7 @@ def read_list(file: str) -> list[Target]:
         The file and line of what is no list of points.
     """
     try:
-        data = content(file, _MOST_BYTES)
+        data = DISK.content(file, _MOST_BYTES)
     except UnreadableError as error:
         raise ValueError(str(error)) from None
     if len(data) > _MOST_BYTES:

@@ -3,10 +3,10 @@
 A report typesets the formulas it uses without SymPy. Emission is deterministic, as that of the evaluators is.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from sympy import Expr, MatrixBase
+from sympy import Expr
 
 from bisar_budget.theory import differential_range as dr
 from bisar_budget.theory import equations as paper
@@ -45,16 +45,16 @@ def _is_shown(equation: Equation) -> bool:
 
 def named() -> Iterator[tuple[str, Expr]]:
     """Expressions that an explanation asks for by name."""
-    tables: tuple[Table, ...] = (
-        published.table_1(),
-        published.table_2(),
-        published.vibration(),
-        random_errors.table(),
+    columns: tuple[tuple[Table, Sequence[int]], ...] = (
+        (published.table_1(), range(4)),
+        (published.table_2(), [0]),
+        (published.vibration(), [0, 1]),
+        (random_errors.table(), range(3)),
     )
-    for table in tables:
+    for table, shown in columns:
         for row in table.rows:
             for column, cell in enumerate(row.cells):
-                if cell != 0:
+                if cell != 0 and column in shown:
                     yield f"{table.number} {as_text(row.error)} {column}", cell
     yield "autofocus gain", published.pull_in_factor()
     yield "edge phase", published.edge_phase(real("beta_2tilde"), 2)
@@ -69,14 +69,11 @@ def named() -> Iterator[tuple[str, Expr]]:
 
 
 def formulas() -> Iterator[Expr]:
-    """Every expression of the catalogue: the named ones, both sides of the equations, parts of some."""
+    """Every expression of the catalogue: the named ones, and both sides of the equations."""
     yield from (formula for _, formula in named())
-    yield from (cell for row in full.table().rows for cell in row.cells if cell != 0)
     for equation in equations():
         yield equation.left
         yield equation.right
-        # Numbers go into the components one by one.
-        yield from equation.right if isinstance(equation.right, MatrixBase) else ()
 
 
 def source() -> str:

@@ -262,6 +262,8 @@ def _form(reader: readers.Reader) -> str:
         return f"{'one, or ' if reader.or_scalar else ''}`[a, b, c]`, each: {_range(reader.component)}"
     if isinstance(reader, readers.Choice):
         return ", ".join(f"`{name}`" for name in reader.names)
+    if isinstance(reader, readers.TextList):
+        return "list of texts"
     if isinstance(reader, readers.Words):
         return "some of " + ", ".join(f"`{name}`" for name in reader.word.names)
     if isinstance(reader, readers.Whole):
@@ -270,7 +272,6 @@ def _form(reader: readers.Reader) -> str:
         return "list, each a section"
     words = {
         readers.Section: "section",
-        readers.TextList: "list of texts",
         readers.Version: "`1`",
         readers.Day: "date, such as `2027-03-31`",
         readers.Label: "text or number",

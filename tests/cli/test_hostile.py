@@ -1004,12 +1004,12 @@ class TestFilesThatChange:
         path.write_bytes(b"one")
         resources.hold_files()
         try:
-            assert resources.content(str(path), 100) == b"one"
+            assert resources.DISK.content(str(path), 100) == b"one"
             path.write_bytes(b"two")
-            assert resources.content(str(path), 100) == b"one"
+            assert resources.DISK.content(str(path), 100) == b"one"
         finally:
             resources.release_files()
-        assert resources.content(str(path), 100) == b"two"
+        assert resources.DISK.content(str(path), 100) == b"two"
 
     def test_one_too_large_to_be_kept_is_refused(self, tmp_path, monkeypatch) -> None:
         monkeypatch.setattr(resources, "_MOST_HELD", 2)
@@ -1017,11 +1017,11 @@ class TestFilesThatChange:
         path.write_bytes(b"one")
         resources.hold_files()
         try:
-            assert resources.content(str(path), 100) == b"one"
-            assert resources.content(str(path), 100) == b"one"
+            assert resources.DISK.content(str(path), 100) == b"one"
+            assert resources.DISK.content(str(path), 100) == b"one"
             path.write_bytes(b"two")
             with pytest.raises(resources.UnreadableError, match="changed while this command was reading it"):
-                resources.content(str(path), 100)
+                resources.DISK.content(str(path), 100)
         finally:
             resources.release_files()
 

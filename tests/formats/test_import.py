@@ -330,6 +330,15 @@ class TestSicd:
         assert found.center_frequency == pytest.approx(10e9)
         assert found.bandwidth == pytest.approx(337.4976e6, rel=1e-6)
 
+    def test_a_band_at_zero_is_refused(self, tmp_path) -> None:
+        """It used to end as a fault of the tool itself, by a division by zero."""
+        tree = sample("example-sicd-1.4.0.xml")
+        for name in ("MinProc", "MaxProc"):
+            tree.find(f"{{*}}ImageFormation/{{*}}TxFrequencyProc/{{*}}{name}").text = "0"
+        tree.write(str(tmp_path / "zero.xml"))
+        with pytest.raises(FormatError, match=r"zero\.xml: its centre frequency is 0 Hz$"):
+            import_collection(str(tmp_path / "zero.xml"))
+
     def with_errors(self, tmp_path, inner: str, kind: str = "BISTATIC"):
         tree = sample("example-sicd-1.4.0.xml")
         tree.find("{*}CollectionInfo/{*}CollectType").text = kind

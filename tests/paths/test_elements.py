@@ -131,7 +131,7 @@ def test_an_aperture_of_a_second_is_smooth_to_a_micrometre(days: int) -> None:
     def place(tau: float) -> Vector:
         return axes.place(orbit.place(center.after(tau)))
 
-    path = interpolated(place, 1.0)
+    path = interpolated(lambda times: np.array([place(tau) for tau in times.tolist()]), 1.0)
     assert path.farthest < 1e-6
     off = np.array([np.subtract(place(tau), path.state.at(tau)[0]) for tau in np.linspace(-0.5, 0.5, 201)])
     assert np.abs(off).max() < 1e-6
