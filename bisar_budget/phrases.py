@@ -68,43 +68,43 @@ def _level(db: float, rounding: str = "nearest") -> str:
 # ---------------------------------------------------------------------- how a row stands
 @phrase
 def over_the_limit_without_autofocus(times: float) -> str:
-    """Of a row that passes with autofocus."""
+    """Said of a row that passes with autofocus."""
     return f"{times:.3g} times the limit without autofocus"
 
 
 @phrase
 def near_the_limit_with_autofocus(utilization: float) -> str:
-    """Of a row that passes with autofocus."""
+    """Said of a row that passes with autofocus."""
     return f"uses {100 * utilization:.3g} % of the limit with autofocus"
 
 
 @phrase
 def above_warn_above(warn_above: float) -> str:
-    """Of a row that passes."""
+    """Said of a row that passes."""
     return f"above {100 * warn_above:g} % of the limit"
 
 
 @phrase
 def aggregate_decides(combine: str) -> str:
-    """Of a single error under a sum."""
+    """Said of a single error under a sum."""
     return f"combine is {combine}: the aggregate decides"
 
 
 @phrase
 def stated_along_other_axes(axes: Sequence[str]) -> str:
-    """Of rows along the scene's axes."""
+    """Said of rows along the scene's axes."""
     return f"the file states this error along other axes ({', '.join(axes)}): those rows decide"
 
 
 @phrase
 def no_requirement() -> str:
-    """Of an aggregate that nothing is asked of."""
+    """Said of an aggregate that nothing is asked of."""
     return "no requirement in the file: computed, not judged"
 
 
 @phrase
 def no_requirement_of(metric: str) -> str:
-    """Of a vibration, or a tone."""
+    """Said of a vibration, or a tone."""
     return f"no requirements.{metric} to hold it to"
 
 
@@ -128,7 +128,7 @@ def _effect(kind: str, size: float) -> str:
 
 @phrase
 def effect_is_not_judged(kind: str, size: float, total: float, lines: Sequence[str]) -> str:
-    """Of a row with an effect that no requirement takes."""
+    """Said of a row with an effect that no requirement takes."""
     alone = f", {total:.3g} rad with the others" if total > 1.005 * size else ""
     added = " or ".join(f"`{line}`" for line in lines)
     return f"{_effect(kind, size)}{alone}, which no requirement judges: add {added} to requirements"
@@ -136,7 +136,7 @@ def effect_is_not_judged(kind: str, size: float, total: float, lines: Sequence[s
 
 @phrase
 def effect_is_negligible(kind: str, total: float, keys: Sequence[str]) -> str:
-    """Of a mission with a small effect that no requirement takes."""
+    """Said of a mission with a small effect that no requirement takes."""
     return (
         f"negligible: {_effect(kind, total)} in all, which no requirement judges ({' or '.join(keys)} would): "
         "below a tenth of the quadratic requirement and below 0.08 rad"
@@ -145,25 +145,25 @@ def effect_is_negligible(kind: str, total: float, keys: Sequence[str]) -> str:
 
 @phrase
 def nothing_judges(key: str) -> str:
-    """Of a requirement without a row that judges it."""
+    """Said of a requirement without a row that judges it."""
     return f"nothing declared that {_NEEDED_DECLARATIONS[key]}"
 
 
 @phrase
 def place_is_not_known(row_ids: Sequence[str], cause: str) -> str:
-    """Of the location, beside errors that vary at random, or slowly."""
+    """Said of the location, beside errors that vary at random, or slowly."""
     return f"{', '.join(row_ids)}: {cause} the image too, and this version does not compute by how much"
 
 
 @phrase
 def not_declared_as_required(key: str) -> str:
-    """Of an error that the file should declare."""
+    """Said of an error that the file should declare."""
     return f"the file has no {key}, which requirements.declare asks for"
 
 
 @phrase
 def declarations_are_missing(keys: Sequence[str]) -> str:
-    """Of all errors that the file should declare."""
+    """Said of all errors that the file should declare."""
     *others, last = keys
     said = f"{', no '.join(others)} and no {last}" if others else last
     return f"the file has no {said}, which requirements.declare asks for"
@@ -171,7 +171,7 @@ def declarations_are_missing(keys: Sequence[str]) -> str:
 
 @phrase
 def input_in_doubt(doubt: float, words: str, declared: float | None, key: str) -> str:
-    """Of a position error that is less than the doubt of the platform's path. [m]"""
+    """Said of a position error that is less than the doubt of the platform's path. [m]"""
     stated = "no position error is declared" if declared is None else f"{_size(declared, 'm')} is declared"
     return f"the path may be {_size(doubt, 'm')} off ({words}), {stated}: state it in {key}"
 
@@ -179,34 +179,34 @@ def input_in_doubt(doubt: float, words: str, declared: float | None, key: str) -
 # ---------------------------------------------------------------------- over the limit
 @phrase
 def quadratic_phase_over(phase: float, limit: float, equation: str = "") -> str:
-    """Of one error. [rad]"""
+    """Said of one error. [rad]"""
     text = f"QPE {_size(phase, 'rad')}, {format_limit(limit, 'rad')} allowed"
     return f"{text} ({equation})" if equation else text
 
 
 @phrase
 def cubic_phase_over(phase: float, limit: float, equation: str = "") -> str:
-    """Of one error. [rad]"""
+    """Said of one error. [rad]"""
     text = f"cubic phase {_size(phase, 'rad')}, {format_limit(limit, 'rad')} allowed"
     return f"{text} ({equation}); {_NO_GAIN}" if equation else f"{text}; {_NO_GAIN}"
 
 
 @phrase
 def no_gain() -> str:
-    """Of a cubic phase."""
+    """Said of a cubic phase."""
     return _NO_GAIN
 
 
 @phrase
 def location_over(moved: float | None, limit: float, equation: str) -> str:
-    """Of one error; None: there is no image of it. [m]"""
+    """Said of one error; None: there is no image of it. [m]"""
     where = "out of sight" if moved is None else f"by {format_quantity(moved, 'm')}"
     return f"moves the image {where}, {format_limit(limit, 'm')} allowed ({equation})"
 
 
 @phrase
 def beyond_the_image(end: float, unit: str) -> str:
-    """Of one error that is larger than any with an image."""
+    """Said of one error that is larger than any with an image."""
     return f"the image ends at {format_limit(end, unit)}: no ground point has the range history of a larger error"
 
 
@@ -214,7 +214,7 @@ def beyond_the_image(end: float, unit: str) -> str:
 def aggregate_over(
     what: str, size: float, limit: float, unit: str, row_id: str, largest: float, extrapolated: str = ""
 ) -> str:
-    """Of errors together: how large, what is allowed, and which is the largest, with what that rests on."""
+    """Said of errors together: how large, what is allowed, and which is the largest, with what that rests on."""
     text = (
         f"{what} {_size(size, unit)}, {format_limit(limit, unit)} allowed; largest: {row_id}, "
         f"{_size(abs(largest), unit)}"
@@ -224,13 +224,13 @@ def aggregate_over(
 
 @phrase
 def one_total() -> str:
-    """Of a sum beyond the pull-in range."""
+    """Said of a sum beyond the pull-in range."""
     return "autofocus corrects one total, not each error separately"
 
 
 @phrase
 def all_together_over(what: str, size: float, limit: float, unit: str) -> str:
-    """Of errors that are judged one by one."""
+    """Said of errors that are judged one by one."""
     return (
         f"each error alone is judged. All declared errors together have a root-sum-square {what} of "
         f"{_size(size, unit)}, {format_limit(limit, unit)} allowed: combine: rss judges that"
@@ -239,26 +239,26 @@ def all_together_over(what: str, size: float, limit: float, unit: str) -> str:
 
 @phrase
 def edge_over() -> str:
-    """Of the scene's edge."""
+    """Said of the scene's edge."""
     return "quadratic phase at the scene's edge and at its centre differ by more than the total budget"
 
 
 @phrase
 def passes_from(n_pull: float) -> str:
-    """Of an error that autofocus could correct."""
+    """Said of an error that autofocus could correct."""
     return f"passes with autofocus from n_pull {n_pull:g}"
 
 
 @phrase
 def beyond_autofocus(n_pull: str, allowed: str) -> str:
-    """Of an error that no autofocus corrects; rounded numbers, what allows so much before its own."""
+    """Said of an error that no autofocus corrects; rounded numbers, what allows so much before its own."""
     return f"no autofocus corrects this: N_pull would have to be {n_pull}, {allowed}"
 
 
 # ---------------------------------------------------------------------- what the other model says
 @phrase
 def other_model_fails(model: str, size: float, limit: float, unit: str, what: str = "", equation: str = "") -> str:
-    """Of a row, or an aggregate, that the gating model passes."""
+    """Said of a row, or an aggregate, that the gating model passes."""
     text = f"the {model} model says fail: {what}".rstrip()
     text = f"{text} {_size(size, unit)}, {format_limit(limit, unit)} allowed"
     return f"{text} ({equation})" if equation else text
@@ -266,19 +266,19 @@ def other_model_fails(model: str, size: float, limit: float, unit: str, what: st
 
 @phrase
 def other_model_is_beyond(model: str, phase: float, limit: float, unit: str) -> str:
-    """Of the pull-in range."""
+    """Said of the pull-in range."""
     return f"the {model} model says beyond it: QPE {_size(phase, unit)}, {format_limit(limit, unit)} allowed"
 
 
 @phrase
 def other_model_allows(model: str, limit: float, unit: str) -> str:
-    """Of a vibration, a tone, or a power."""
+    """Said of a vibration, a tone, or a power."""
     return f"the {model} model says fail: {format_quantity(limit, unit, 3, 'down')} allowed"
 
 
 @phrase
 def other_model_spreads(model: str, level_db: float) -> str:
-    """Of noise."""
+    """Said of noise."""
     return f"the {model} model says fail: it spreads {_level(level_db)}"
 
 
@@ -286,7 +286,7 @@ def other_model_spreads(model: str, level_db: float) -> str:
 def published_model_does_not_hold(
     row_id: str, published: float | None, full: float | None, unit: str, others: int
 ) -> str:
-    """Of a mission that the published model judges; None: no limit. How many other errors it does not hold of."""
+    """Said of a mission that the published model judges; None: no limit. How many other errors it does not hold of."""
     by_published, by_full = (
         "without limit" if size is None else format_limit(size, unit) for size in (published, full)
     )
@@ -324,109 +324,109 @@ def turning_defocuses() -> str:
 # ---------------------------------------------------------------------- no limit, no value
 @phrase
 def no_quadratic_term_of_position() -> str:
-    """Of a position, by the published model."""
+    """Said of a position, by the published model."""
     return "no quadratic term: a position error moves the image (Table I)"
 
 
 @phrase
 def no_component(cause: str, axis: str) -> str:
-    """Of a velocity or an acceleration, by the published model."""
+    """Said of a velocity or an acceleration, by the published model."""
     return f"no quadratic term: the platform's {cause} has no component along {axis}"
 
 
 @phrase
 def no_common_component(cause: str, axis: str) -> str:
-    """Of an error that both platforms share, by the published model."""
+    """Said of an error that both platforms share, by the published model."""
     return f"no quadratic term: the platforms' {cause} have no component along {axis}, or cancel"
 
 
 @phrase
 def no_quadratic_term_of_clock(term: str) -> str:
-    """Of a clock, by the published model."""
+    """Said of a clock, by the published model."""
     return f"no quadratic term: the clock's {term} term has another order (Table I row 1)"
 
 
 @phrase
 def no_quadratic_term_of_height() -> str:
-    """Of the terrain, by the published model."""
+    """Said of the terrain, by the published model."""
     return "no quadratic term: to the published model a height error moves the image"
 
 
 @phrase
 def no_size_reaches_the_limit() -> str:
-    """Of a motion error, by the full model."""
+    """Said of a motion error, by the full model."""
     return "no error up to a tenth of the slant range reaches the limit"
 
 
 @phrase
 def no_quadratic_phase() -> str:
-    """Of a clock, by the full model."""
+    """Said of a clock, by the full model."""
     return "no quadratic phase"
 
 
 @phrase
 def clock_is_heard() -> str:
-    """Of a clock under a direct path."""
+    """Said of a clock under a direct path."""
     return "the direct path is the clock: a timing error has no effect"
 
 
 @phrase
 def oscillators_drop_out() -> str:
-    """Of an oscillator under a direct path."""
+    """Said of an oscillator under a direct path."""
     return "the direct path is the receiver's clock: oscillators drop out"
 
 
 @phrase
 def no_phase_noise() -> str:
-    """Of an oscillator without any."""
+    """Said of an oscillator without any."""
     return "no phase noise"
 
 
 @phrase
 def across_the_line_of_sight() -> str:
-    """Of a sensor."""
+    """Said of a sensor."""
     return "the line of sight has no part in it: no phase"
 
 
 @phrase
 def nothing_spreads() -> str:
-    """Of a clock's error that does nothing."""
+    """Said of a clock's error that does nothing."""
     return "no quadratic phase, no cubic phase and nothing that spreads"
 
 
 @phrase
 def no_requirement_limits(effects: Sequence[str]) -> str:
-    """Of a sensor or a clock whose effects are not required."""
+    """Said of a sensor or a clock whose effects are not required."""
     return f"no requirement limits its {' and '.join(effects)}"
 
 
 @phrase
 def same_all_over_the_scene() -> str:
-    """Of the scene's edge, by the published model."""
+    """Said of the scene's edge, by the published model."""
     return "to the published model an error is the same all over the scene"
 
 
 @phrase
 def no_ground_point() -> str:
-    """Of an aggregate that has no value."""
+    """Said of an aggregate that has no value."""
     return "a declared error leaves no ground point with its range history"
 
 
 @phrase
 def no_image() -> str:
-    """Of the scene's edge."""
+    """Said of the scene's edge."""
     return "a declared error leaves no ground point with its range history: there is no image"
 
 
 @phrase
 def no_image_to_place() -> str:
-    """Of the location."""
+    """Said of the location."""
     return "with a declared error no ground point has the recorded range history: there is no image"
 
 
 @phrase
 def no_displacement(degrees: float) -> str:
-    """Of an image plane whose gradients are nearly parallel. [deg]"""
+    """Said of an image plane whose gradients are nearly parallel. [deg]"""
     return (
         f"(25) has no displacement here: with the range held constant, range and Doppler gradients are "
         f"{degrees:.2g} deg from parallel"
@@ -435,26 +435,26 @@ def no_displacement(degrees: float) -> str:
 
 @phrase
 def no_image_at_the_edge(azimuth_deg: float, why: str) -> str:
-    """Of a place of the scene's edge."""
+    """Said of a place of the scene's edge."""
     return f"no image at the scene's edge, azimuth {azimuth_deg:.0f} deg: {why}"
 
 
 @phrase
 def platform_at_the_edge(distance: float) -> str:
-    """Of a place of the scene's edge. [m]"""
+    """Said of a place of the scene's edge. [m]"""
     return f"a platform is within {distance:g} m of it"
 
 
 @phrase
 def gradients_become_parallel() -> str:
-    """Of a place of the scene's edge."""
+    """Said of a place of the scene's edge."""
     return "on the way there range and Doppler gradients become parallel"
 
 
 # ---------------------------------------------------------------------- the scene
 @phrase
 def same_at_the_edge() -> str:
-    """Of a scene over which nothing changes."""
+    """Said of a scene over which nothing changes."""
     return "the declared errors have the same quadratic phase at the edge and at the centre"
 
 
@@ -472,87 +472,87 @@ def one_correction_serves(how_far: str, total: float) -> str:
 
 @phrase
 def over_at_the_edge(row_id: str, phase: float, limit: float) -> str:
-    """Of an error that is inside its limit at the centre. [rad]"""
+    """Said of an error that is inside its limit at the centre. [rad]"""
     return f"{row_id} is {phase:.3g} rad at the scene's edge, {format_limit(limit, 'rad')} allowed"
 
 
 # ---------------------------------------------------------------------- what a value rests on
 @phrase
 def held_to_the_total(owners: str) -> str:
-    """Of an error of both platforms, or of none."""
+    """Said of an error of both platforms, or of none."""
     return f"held to the total budget: it belongs to {owners}"
 
 
 @phrase
 def counted_as_one(group: str) -> str:
-    """Of a covariance in a root-sum-square."""
+    """Said of a covariance in a root-sum-square."""
     return f"the errors of {group} count as one, the root of gᵀCg"
 
 
 @phrase
 def correlations_unused(group: str) -> str:
-    """Of a covariance in a sum."""
+    """Said of a covariance in a sum."""
     return f"a sum uses no correlations: each error of {group} counts with its own sigma, all at their worst"
 
 
 @phrase
 def one_point_of_allan_deviation() -> str:
-    """Of an oscillator."""
+    """Said of an oscillator."""
     return "one point of an Allan deviation tells no kind of noise: it is the worst for this aperture"
 
 
 @phrase
 def flicker_is_assumed() -> str:
-    """Of an oscillator."""
+    """Said of an oscillator."""
     return "an Allan deviation does not tell white from flicker phase noise: flicker is assumed"
 
 
 @phrase
 def allan_deviation_begins(time: float) -> str:
-    """Of an oscillator. [s]"""
+    """Said of an oscillator. [s]"""
     return f"the Allan deviation begins at {time:g} s; down to the aperture time its power law continues"
 
 
 @phrase
 def allan_deviation_ends(time: float) -> str:
-    """Of an oscillator. [s]"""
+    """Said of an oscillator. [s]"""
     return f"the Allan deviation ends at {time:g} s; up to the aperture time its power law continues"
 
 
 @phrase
 def mask_begins(frequency: float, slope: float) -> str:
-    """Of an oscillator. [Hz]"""
+    """Said of an oscillator. [Hz]"""
     return f"the mask begins at {frequency:g} Hz; below, it continues as f^-{slope:.3g}"
 
 
 @phrase
 def power_law_fits(misfit: float) -> str:
-    """Of an oscillator."""
+    """Said of an oscillator."""
     return f"the power law fits the Allan deviation to {100 * misfit:.2g} %"
 
 
 @phrase
 def left_by_exchanges(interval: float) -> str:
-    """Of an oscillator. [s]"""
+    """Said of an oscillator. [s]"""
     return f"only what synchronisation every {format_quantity(interval, 's')} leaves of it counts"
 
 
 @phrase
 def another_for_each_pulse() -> str:
-    """Of the error of a link."""
+    """Said of the error of a link."""
     return "the error is another one for each pulse: all of it spreads"
 
 
 # ---------------------------------------------------------------------- noise and tones
 @phrase
 def spreads_too_much(level_db: float, limit_db: float) -> str:
-    """Of noise."""
+    """Said of noise."""
     return f"spreads {_level(level_db)}, {_level(limit_db, 'down')} allowed"
 
 
 @phrase
 def noise_spreads_too_much(level_db: float, limit_db: float, row_id: str, largest_db: float) -> str:
-    """Of all noise together."""
+    """Said of all noise together."""
     return (
         f"noise spreads {_level(level_db)}, {_level(limit_db, 'down')} allowed; largest: {row_id}, "
         f"{_level(largest_db)}"
@@ -561,52 +561,52 @@ def noise_spreads_too_much(level_db: float, limit_db: float, row_id: str, larges
 
 @phrase
 def echoes_over(level_db: float, limit_db: float) -> str:
-    """Of a tone."""
+    """Said of a tone."""
     return f"paired echoes of {_level(level_db)}, {_level(limit_db, 'down')} allowed"
 
 
 @phrase
 def echoes_together_over(level_db: float, limit_db: float, row_id: str, count: int) -> str:
-    """Of all tones."""
+    """Said of all tones."""
     others = f", with {count - 1} near it" if count > 1 else ""
     return f"echoes of {_level(level_db)}, {_level(limit_db)} allowed; largest: {row_id}{others}"
 
 
 @phrase
 def echoes_on_the_mainlobe(cycles: float, least: float) -> str:
-    """Of a slow tone."""
+    """Said of a slow tone."""
     return f"{cycles:.3g} cycles per aperture: below {least:g} its echoes lie on the mainlobe"
 
 
 @phrase
 def tone_lies(frequency: float, cells: float) -> str:
-    """Of a tone. [Hz]"""
+    """Said of a tone. [Hz]"""
     return f"at {format_quantity(frequency, 'Hz')}, {cells:.3g} cells from the response"
 
 
 # ---------------------------------------------------------------------- vibration
 @phrase
 def share_of_power_over(metric: str, rule: str) -> str:
-    """Of a vibration."""
+    """Said of a vibration."""
     what = "paired echoes" if metric == "pslr" else "power spread"
     return f"{what} above the platform's share of {metric.upper()} ({rule})"
 
 
 @phrase
 def slow_quadratic_phase_over(phase: float, limit: float) -> str:
-    """Of a vibration below a cycle per aperture. [rad]"""
+    """Said of a vibration below a cycle per aperture. [rad]"""
     return f"QPE {phase:.3g} rad in the worst phase, {format_limit(limit, 'rad')} allowed"
 
 
 @phrase
 def slow_cubic_phase_over(phase: float, limit: float) -> str:
-    """Of a vibration below a cycle per aperture. [rad]"""
+    """Said of a vibration below a cycle per aperture. [rad]"""
     return f"cubic phase {phase:.3g} rad in the worst phase, {format_limit(limit, 'rad')} allowed; {_NO_GAIN}"
 
 
 @phrase
 def slower_than_a_cycle(cycles: float, quadratic: float, cubic: float) -> str:
-    """Of a vibration. [rad]"""
+    """Said of a vibration. [rad]"""
     return (
         f"{cycles:.2g} cycles per aperture: below one a vibration makes no echoes but, in its worst phase, a "
         f"quadratic phase of {quadratic:.3g} rad or a cubic phase of {cubic:.3g} rad"
@@ -625,7 +625,7 @@ def _in_the_worst_phase(quadratic: float, limit: float, cubic: float, cubic_limi
 def slower_than_three_cycles(
     cycles: float, quadratic: float, limit: float, cubic: float, cubic_limit: float | None
 ) -> str:
-    """Of a vibration. [rad]"""
+    """Said of a vibration. [rad]"""
     return (
         f"{cycles:.3g} cycles per aperture: below three it also is "
         f"{_in_the_worst_phase(quadratic, limit, cubic, cubic_limit)}; it is the same motion, so no sum counts it"
@@ -634,13 +634,13 @@ def slower_than_three_cycles(
 
 @phrase
 def phase_of_vibration_over(quadratic: float, limit: float, cubic: float, cubic_limit: float | None) -> str:
-    """Of a vibration below three cycles per aperture. [rad]"""
+    """Said of a vibration below three cycles per aperture. [rad]"""
     return f"also {_in_the_worst_phase(quadratic, limit, cubic, cubic_limit)}"
 
 
 @phrase
 def lines_together(entries: str, band: str, apart: float, amplitude: float) -> str:
-    """Of lines of one platform whose echoes add. [m]"""
+    """Said of lines of one platform whose echoes add. [m]"""
     return (
         f"entries {entries}, at {band}, are at most {apart:g} cycles per aperture apart: in the worst phases their "
         f"echoes together are as high as that of one vibration of {format_quantity(amplitude, 'm')}"
@@ -649,7 +649,7 @@ def lines_together(entries: str, band: str, apart: float, amplitude: float) -> s
 
 @phrase
 def both_platforms_vibrate(other: str, apart: float, level_db: float, is_more: bool, required_db: float) -> str:
-    """Of lines of both platforms whose echoes add."""
+    """Said of lines of both platforms whose echoes add."""
     return (
         f"the {other} vibrates at most {apart:g} cycles per aperture from this frequency too: in the worst phases "
         f"echoes of both together are {'above ' if is_more else ''}{level_db:.1f} dB, {required_db:g} dB required"
@@ -658,14 +658,14 @@ def both_platforms_vibrate(other: str, apart: float, level_db: float, is_more: b
 
 @phrase
 def published_rule_is_off(margin_db: float) -> str:
-    """Of a limit of a vibration."""
+    """Said of a limit of a vibration."""
     side = "inside" if margin_db >= 0 else "beyond"
     return f"the published rule is {abs(margin_db):.2f} dB {side} first principles"
 
 
 @phrase
 def seen_of_vibration(stated: str, along: float, has_direct_path: bool) -> str:
-    """Of a vibration that the line of sight sees a part of. [m]"""
+    """Said of a vibration that the line of sight sees a part of. [m]"""
     where = "in the range less the direct path" if has_direct_path else "along the line of sight"
     return f"{stated}: {format_quantity(along, 'm')} of it {where}"
 
@@ -673,50 +673,50 @@ def seen_of_vibration(stated: str, along: float, has_direct_path: bool) -> str:
 # ---------------------------------------------------------------------- images
 @phrase
 def autofocus_refuted(shown: str) -> str:
-    """Of a row that passes with autofocus."""
+    """Said of a row that passes with autofocus."""
     return f"passes only with autofocus, which the image at that limit refutes: {shown}"
 
 
 @phrase
 def limit_refuted(limit: str, shown: str) -> str:
-    """Of a declared row, or a requirement's, whose limit an image refutes."""
+    """Said of a declared row, or a requirement's, whose limit an image refutes."""
     return f"inside its limit of {limit}, which images refute: {shown}"
 
 
 @phrase
 def optimistic_limit(shown: str) -> str:
-    """Of a limit that an image refutes."""
+    """Said of a limit that an image refutes."""
     return f"optimistic limit: {shown}"
 
 
 @phrase
 def optimistic_limit_with_autofocus(shown: str) -> str:
-    """Of a limit with autofocus that an image refutes."""
+    """Said of a limit with autofocus that an image refutes."""
     return f"optimistic limit with autofocus: {shown}"
 
 
 @phrase
 def images_formed(conditions: str) -> str:
-    """Of a mission with images."""
+    """Said of a mission with images."""
     return f"images: {conditions}"
 
 
 @phrase
 def overrides_a_part(key: str, text: str, part: str) -> str:
-    """Of a figure of a part that the file replaces; of its rows and of a mission."""
+    """Said of a figure of a part that the file replaces; of its rows and of a mission."""
     return f"{key} stands in place of {text} of {part}"
 
 
 # ---------------------------------------------------------------------- the collection
 @phrase
 def path_curves(platform: str) -> str:
-    """Of a collection."""
+    """Said of a collection."""
     return f"the {platform}'s path curves: the published model takes it for straight, the full model does not"
 
 
 @phrase
 def sight_turns(platform: str, half_turn: float) -> str:
-    """Of a collection. [rad]"""
+    """Said of a collection. [rad]"""
     return (
         f"the {platform}'s line of sight turns by ±{half_turn:.2g} rad: the published model takes the phase for a "
         "quadratic, the full model does not"
@@ -725,7 +725,7 @@ def sight_turns(platform: str, half_turn: float) -> str:
 
 @phrase
 def direct_path_is_the_clock() -> str:
-    """Of a collection."""
+    """Said of a collection."""
     return (
         "the direct path is the clock: the full model takes ranges less the distance of the platforms, and "
         "timing errors have no effect; values of the published model are those without it"
@@ -734,7 +734,7 @@ def direct_path_is_the_clock() -> str:
 
 @phrase
 def range_cells_are_coarse(phase: float, shown_percent: float) -> str:
-    """Of a collection. [rad]"""
+    """Said of a collection. [rad]"""
     return (
         f"points a range cell apart differ by {phase:.3g} rad of quadratic phase: a defocused response spreads "
         f"over range cells instead. An image shows about {shown_percent:.2g} % of the phase: the limits are "
@@ -744,64 +744,64 @@ def range_cells_are_coarse(phase: float, shown_percent: float) -> str:
 
 @phrase
 def keys_not_used(keys: Sequence[str]) -> str:
-    """Of a mission file."""
+    """Said of a mission file."""
     return f"not used by this check: {', '.join(keys)}"
 
 
 # ---------------------------------------------------------------------- draws
 @phrase
 def drawn_through_exact_ranges() -> str:
-    """Of Monte Carlo."""
+    """Said of Monte Carlo."""
     return "every draw goes through exact ranges: the declared errors are too large for sums of their effects"
 
 
 @phrase
 def drawn_by_the_full_model(model: str) -> str:
-    """Of Monte Carlo."""
+    """Said of Monte Carlo."""
     return f"drawn by the full model; the rows are judged by allocation.model, {model}"
 
 
 @phrase
 def drawn_all_at_once() -> str:
-    """Of Monte Carlo."""
+    """Said of Monte Carlo."""
     return "a draw is the sum of all errors at once; the rows are judged one by one, allocation.combine being each"
 
 
 @phrase
 def drawn_as_bounds(row_ids: Sequence[str]) -> str:
-    """Of Monte Carlo."""
+    """Said of Monte Carlo."""
     return f"{', '.join(row_ids)}: drawn as plus or minus the declared value, which has no distribution"
 
 
 @phrase
 def vibration_is_not_drawn() -> str:
-    """Of Monte Carlo."""
+    """Said of Monte Carlo."""
     return "vibration is not drawn; the phase of a slow vibration is not included"
 
 
 @phrase
 def mean_power_is_not_drawn() -> str:
-    """Of Monte Carlo."""
+    """Said of Monte Carlo."""
     return "what sensors and clocks spread is a mean power: ISLR is not drawn"
 
 
 @phrase
 def drawn_without_coverage() -> str:
-    """Of Monte Carlo."""
+    """Said of Monte Carlo."""
     return "the coverage factor is in sum and rss, not in the draws"
 
 
 # ---------------------------------------------------------------------- waivers
 @phrase
 def waived(line: int | None, until: date, reason: str, is_expired: bool) -> str:
-    """Of a row that fails."""
+    """Said of a row that fails."""
     place = "--set" if line is None else f"line {line}"
     return f"{'expired ' if is_expired else ''}waiver of {place}, until {until}: {reason}"
 
 
 @phrase
 def nothing_verified(rows: int) -> str:
-    """Of a mission of whose limits no image gave a verdict."""
+    """Said of a mission of whose limits no image gave a verdict."""
     return (
         f"nothing was verified: {rows} row{'s' if rows != 1 else ''} with a limit, and no image gave a verdict on any"
     )

@@ -85,25 +85,25 @@ def _nothing_declared(rows: Sequence[Row]) -> Iterator[_Warned]:
 
 @phrase
 def another_mission(changes: str) -> str:
-    """Of a mission that options changed."""
+    """Said of a mission that options changed."""
     return f"checked is not the mission of the file: {changes}"
 
 
 @phrase
 def id_of_no_row(row_id: str) -> str:
-    """Of a key of `requirement_ids`."""
+    """Said of a key of `requirement_ids`."""
     return f"requirement_ids: {row_id} is the id of no row"
 
 
 @phrase
 def full_model_gates(model: str) -> str:
-    """Of a mission with a direct path, which asks for another model."""
+    """Said of a mission with a direct path, which asks for another model."""
     return f"allocation.model {model}: the published model does not know the direct path; the full model gates"
 
 
 @phrase
 def nothing_declared() -> str:
-    """Of a mission that states no error."""
+    """Said of a mission that states no error."""
     return "no error is declared: nothing was judged"
 
 
@@ -123,7 +123,7 @@ def _doubtful_paths(mission: Mission) -> Iterator[_Warned]:
 
 @phrase
 def path_is_doubtful(platform: str, doubt: str) -> str:
-    """Of a path by an orbit or a log."""
+    """Said of a path by an orbit or a log."""
     return f"platforms.{platform}: {doubt}"
 
 
@@ -190,7 +190,7 @@ def straight_orbits(mission: Mission) -> Iterator[_Warned]:
 
 @phrase
 def satellite_flies_straight(platform: str, speed: float, acceleration: Sequence[float], has_axes: bool) -> str:
-    """Of a satellite's path without the acceleration of its orbit. [m/s, m/s²]"""
+    """Said of a satellite's path without the acceleration of its orbit. [m/s, m/s²]"""
     parts = ", ".join(f"{part + 0.0:.3f} m/s^2" for part in acceleration)
     if has_axes:
         how = "(gravity of a point mass, less what the Earth's rotation adds)"
@@ -207,7 +207,7 @@ def satellite_flies_straight(platform: str, speed: float, acceleration: Sequence
 
 # ---------------------------------------------------------------------- how errors are stated
 def _of_instruments(analysis: Analysis) -> Iterator[_Warned]:
-    """What sensors and clocks are stated by, and what is stated twice."""
+    """Find how sensors and clocks are stated, and errors that are stated twice."""
     mission, sync = analysis.mission, analysis.mission.synchronization
     T = mission.collection.aperture_time
     if sync is not None and not sync.is_direct_path and (sync.interval or 0.0) > T:
@@ -231,13 +231,13 @@ def _unused_correlations(mission: Mission) -> Iterator[_Warned]:
 
 @phrase
 def stated_twice(platform: str) -> str:
-    """Of a platform with an acceleration error and an accelerometer bias."""
+    """Said of a platform with an acceleration error and an accelerometer bias."""
     return f"platforms.{platform}.motion_error: acceleration and the accelerometer bias are both stated; they add"
 
 
 @phrase
 def correlations_not_used(platform: str) -> str:
-    """Of a covariance where each error is judged alone."""
+    """Said of a covariance where each error is judged alone."""
     return (
         f"platforms.{platform}.motion_error.covariance: correlations are not used where each error is judged alone; "
         "combine: rss uses them"
@@ -246,13 +246,13 @@ def correlations_not_used(platform: str) -> str:
 
 @phrase
 def no_power_law_fits(key: str, misfit: float) -> str:
-    """Of an oscillator's Allan deviation."""
+    """Said of an oscillator's Allan deviation."""
     return f"{key}: no power law fits the Allan deviation; the fit is off by {100 * misfit:.3g} %"
 
 
 @phrase
 def exchanges_are_rare(aperture_time: float) -> str:
-    """Of clocks that are synchronised less than once in an aperture. [s]"""
+    """Said of clocks that are synchronised less than once in an aperture. [s]"""
     return (
         f"synchronization.interval: pulses are exchanged less than once in an aperture of {aperture_time:g} s; "
         "straight lines between them may make the phase worse than it is without"
@@ -276,7 +276,7 @@ def _of_autofocus(mission: Mission, resolution: Resolution) -> Iterator[_Warned]
 
 @phrase
 def walks_over_range_cells(n_pull: float, cells: float, cap: str) -> str:
-    """Of a pull-in range that range walk does not leave; `cap` is the `n_pull` of half a cell, rounded down."""
+    """Said of a pull-in range that range walk does not leave; `cap` is the `n_pull` of half a cell, rounded down."""
     return (
         f"autofocus.n_pull: {n_pull:g} counts as {cap}, f0/B, where an error walks half a range cell; one of "
         f"{n_pull:g}π rad walks {cells:.3g} cells, which correction along one dimension does not take out"
@@ -287,7 +287,7 @@ def walks_over_range_cells(n_pull: float, cells: float, cap: str) -> str:
 def smears_beyond_the_scene(
     n_pull: float, smear: float, algorithm: str, room: float, radius: float, held: str
 ) -> str:
-    """Of a pull-in range that the scene's size does not leave. [m]"""
+    """Said of a pull-in range that the scene's size does not leave. [m]"""
     return (
         f"autofocus.n_pull: an error of {n_pull:g}π rad smears a point over {format_quantity(smear, 'm')}; "
         f"{algorithm} needs {room:g} times that. A scene of {format_quantity(2 * radius, 'm')} across holds "
@@ -298,24 +298,24 @@ def smears_beyond_the_scene(
 # ---------------------------------------------------------------------- waivers
 @phrase
 def waiver_matches_nothing(row_id: str) -> str:
-    """Of a waiver."""
+    """Said of a waiver."""
     return f"waiver {row_id}: matches no row"
 
 
 @phrase
 def waiver_matches_everything(row_id: str) -> str:
-    """Of a waiver."""
+    """Said of a waiver."""
     return f"waiver {row_id}: names every row and would hide any new failure"
 
 
 @phrase
 def waiver_not_used(row_id: str) -> str:
-    """Of a waiver."""
+    """Said of a waiver."""
     return f"waiver {row_id}: not used: no row that it names fails"
 
 
 # ---------------------------------------------------------------------- images
 @phrase
 def limit_is_optimistic(row_id: str, shown: str) -> str:
-    """Of a limit of no row of the check that an image refutes."""
+    """Said of a limit of no row of the check that an image refutes."""
     return f"{row_id}: optimistic limit: {shown}"

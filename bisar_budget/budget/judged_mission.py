@@ -301,7 +301,7 @@ class RowStatuses:
         self.why = np.where(these, np.int8(why), self.why)
 
     def require_declarations(self, geometry: BistaticGeometry) -> None:
-        """What the file should declare and does not is not evaluated; the first row says whether all is there."""
+        """Errors that the file should declare and does not are not evaluated; the first row says whether all are there."""
         if not self.mission.requirements.declare:
             return
         still = np.array([np.broadcast_to(path.is_still, self.status.shape[1:]) for path in geometry.both])
@@ -321,7 +321,7 @@ class RowStatuses:
                 self._settle(owed, is_doubtful & (self.status != CODE["fail"]), Why.INPUT_IN_DOUBT)
 
     def judge_effects(self, untaken: Sequence[UntakenEffect]) -> None:
-        """What makes up an effect that no requirement takes is not evaluated, and what does a little of it `info`."""
+        """Rows that make up an effect that no requirement takes are not evaluated; those that add little are `info`."""
         for place, row in enumerate(self.rows):
             row_id = row.subject.id
             of_row = [one for one in untaken if row_id in one.parts]
@@ -340,7 +340,7 @@ class RowStatuses:
             self._settle(which, is_misplaced & self._is_open, Why.NO_PLACE)
 
     def judge_spread(self, has_noise: Truths) -> None:
-        """Of a cubic phase alone ISLR is not evaluated."""
+        """ISLR is not evaluated where nothing but a cubic phase makes it."""
         if not has_noise.all():
             which = [what.kind == "islr" for what in self.subjects]
             self._settle(which, ~has_noise & self._is_open, Why.NOTHING_SPREADS)

@@ -146,7 +146,7 @@ _OF_ONE = tuple(f"{name}.{kind}" for name in Platforms._fields for kind in OF_PL
 
 
 class Requirements(NamedTuple):
-    """What the image has to hold, and what the file has to say for it."""
+    """Requirements: limits that the image has to keep, and errors that the file has to declare."""
 
     quadratic_phase_error: Annotated[
         float, Key(PHASE_REQUIREMENT, "Total for any one error, at the aperture edge; default π/4.")
@@ -252,7 +252,7 @@ class AllocationRules(NamedTuple):
 
 
 class Autofocus(NamedTuple):
-    """What autofocus can correct."""
+    """Autofocus: the algorithm, and how far it can correct."""
 
     algorithm: Annotated[str, Key(Choice("pga", "map_drift"))] = "pga"
     n_pull: Annotated[

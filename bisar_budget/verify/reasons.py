@@ -10,135 +10,135 @@ from bisar_budget.units import format_limit, format_quantity
 # ---------------------------------------------------------------------- no verdict
 @phrase
 def no_image_formed(why: str) -> str:
-    """Of a limit, that no image could be formed or read there."""
+    """Said of a limit, that no image could be formed or read there."""
     return f"no image: {why}"
 
 
 @phrase
 def no_image_of_a_time_series(why: str) -> str:
-    """Of a random error's limit."""
+    """Said of a random error's limit."""
     return f"no image of a time series: {why}"
 
 
 @phrase
 def no_image_at_the_limit() -> str:
-    """Of a limit of the published model that leaves the point no image."""
+    """Said of a limit of the published model that leaves the point no image."""
     return "at the limit no ground point has the recorded range history: the point has no image"
 
 
 @phrase
 def nothing_moves_the_image() -> str:
-    """Of the location requirement."""
+    """Said of the location requirement."""
     return "no error that moves the image is declared"
 
 
 @phrase
 def displacement_degenerates(why: str) -> str:
-    """Of the location requirement, where gradients are parallel."""
+    """Said of the location requirement, where gradients are parallel."""
     return why
 
 
 @phrase
 def errors_move_nothing(rule: str) -> str:
-    """Of the location requirement."""
+    """Said of the location requirement."""
     return f"the declared errors move nothing by {rule}"
 
 
 @phrase
 def no_motion_declared() -> str:
-    """Of the cubic phase requirement."""
+    """Said of the cubic phase requirement."""
     return "no error with a motion is declared"
 
 
 @phrase
 def no_cubic_phase_declared(model: str) -> str:
-    """Of the cubic phase requirement."""
+    """Said of the cubic phase requirement."""
     return f"no declared error has a cubic phase by the {model} model"
 
 
 @phrase
 def no_quadratic_phase_declared() -> str:
-    """Of a worst-case sum."""
+    """Said of a worst-case sum."""
     return "no declared error has a quadratic phase"
 
 
 @phrase
 def root_sum_square_is_of_many_flights() -> str:
-    """Of a root-sum-square."""
+    """Said of a root-sum-square."""
     return "a root-sum-square speaks of many flights, an image shows one"
 
 
 @phrase
 def phase_without_motion() -> str:
-    """Of an error that is stated as a phase."""
+    """Said of an error that is stated as a phase."""
     return "stated as a phase: there is no motion to form an image of"
 
 
 @phrase
 def images_are_of_the_centre() -> str:
-    """Of the row of the scene's edge."""
+    """Said of the row of the scene's edge."""
     return "the difference of two places of the scene: images are formed of its centre"
 
 
 @phrase
 def no_spread_declared() -> str:
-    """Of an ISLR row."""
+    """Said of an ISLR row."""
     return "nothing that spreads is declared"
 
 
 @phrase
 def no_tone_declared() -> str:
-    """Of the requirement of PSLR."""
+    """Said of the requirement of PSLR."""
     return "nothing that echoes is declared"
 
 
 @phrase
 def lines_without_amplitude() -> str:
-    """Of lines that share a frequency."""
+    """Said of lines that share a frequency."""
     return "the lines have no amplitude"
 
 
 @phrase
 def echoes_on_the_peak(cycles: float) -> str:
-    """Of a vibration below three cycles per aperture."""
+    """Said of a vibration below three cycles per aperture."""
     return f"{cycles:.3g} cycles per aperture: below three the echoes lie on the mainlobe"
 
 
 @phrase
 def no_image_of_a_vibration(cycles: float, why: str) -> str:
-    """Of a vibration whose image cannot be formed."""
+    """Said of a vibration whose image cannot be formed."""
     return f"{cycles:.3g} cycles per aperture: {why}"
 
 
 # ---------------------------------------------------------------------- what a verdict rests on
 @phrase
 def in_its_worst_phase() -> str:
-    """Of a vibration below one cycle per aperture."""
+    """Said of a vibration below one cycle per aperture."""
     return "in the worst phase of the vibration"
 
 
 @phrase
 def bound_by_the_cubic_phase() -> str:
-    """Of a limit that the cubic phase sets."""
+    """Said of a limit that the cubic phase sets."""
     return "bound by the cubic phase"
 
 
 @phrase
 def image_moves(moved: float, allowed: float) -> str:
-    """Of a limit that the location requirement sets. [m]"""
+    """Said of a limit that the location requirement sets. [m]"""
     sizes = [format_quantity(size, "m", 4) for size in (moved, allowed)]
     return f"bound by the location: the image moves by {sizes[0]}, {sizes[1]} allowed"
 
 
 @phrase
 def places_differ(rule: str, along: float, across: float) -> str:
-    """Of a displacement by a rule and in the image. [pixels]"""
+    """Said of a displacement by a rule and in the image. [pixels]"""
     return f"{rule} and the image differ by {along:.2g} and {across:.2g} pixels along x' and y'"
 
 
 @phrase
 def rule_misplaces(who: str, rule: str, by_rule: Sequence[float], is_at: Sequence[float]) -> str:
-    """Of the errors that a rule places farthest from where they go. [m]"""
+    """Said of the errors that a rule places farthest from where they go. [m]"""
     return (
         f"{who}: {_placed(by_rule)} by {rule}, {_placed(is_at)} by exact ranges and image: "
         f"{rule} does not say where the image goes"
@@ -152,20 +152,20 @@ def _placed(place: Sequence[float]) -> str:
 
 @phrase
 def phase_does_not_grow(phases: Sequence[tuple[float, str]]) -> str:
-    """Of a limit around which images show a phase that falls; each with its place. [rad]"""
+    """Said of a limit around which images show a phase that falls; each with its place. [rad]"""
     shown = ", ".join(f"{phase:.4g} rad{where}" for phase, where in phases)
     return f"the phase of the image does not grow with the error: {shown}"
 
 
 @phrase
 def smear_leaves_the_patch(part: float) -> str:
-    """Of an image that holds a part of the aperture."""
+    """Said of an image that holds a part of the aperture."""
     return f"the smear leaves the patch, which holds {100 * part:.0f} % of the aperture"
 
 
 @phrase
 def range_cells_absorb_phase(phase: float) -> str:
-    """Of a collection whose points differ by a phase from one range cell to the next. [rad]"""
+    """Said of a collection whose points differ by a phase from one range cell to the next. [rad]"""
     return (
         f"range cells are coarse: points a cell apart differ by {phase:.3g} rad, so that the response also moves "
         "along range. The phase is that at the displaced point"
@@ -174,7 +174,7 @@ def range_cells_absorb_phase(phase: float) -> str:
 
 @phrase
 def echoes_measured(who: str, cycles: float, smear_cells: float | None, is_assumed: bool) -> str:
-    """Of a vibration: whose echoes, where, and how far they are smeared."""
+    """Said of a vibration: whose echoes, where, and how far they are smeared."""
     smeared = "" if smear_cells is None else f", smeared over {smear_cells:.2g} range cells"
     assumed = ", a frequency assumed: the file declares no vibration" if is_assumed else ""
     return f"echoes of {who}, at {cycles:.3g} cells from the peak{smeared}{assumed}"
@@ -182,19 +182,19 @@ def echoes_measured(who: str, cycles: float, smear_cells: float | None, is_assum
 
 @phrase
 def power_of_one_platform() -> str:
-    """Of a wideband vibration."""
+    """Said of a wideband vibration."""
     return "power added by one platform alone"
 
 
 @phrase
 def power_of_both_platforms(common_db: float) -> str:
-    """Of wideband vibrations, with what the same motion of both adds. [dB]"""
+    """Said of wideband vibrations, with what the same motion of both adds. [dB]"""
     return f"power added by both platforms, independent; the same motion of both adds {common_db:.1f} dB"
 
 
 @phrase
 def sigma_of_time_series(draws: int, factor: float, images: int, is_cubic: bool) -> str:
-    """Of a random error's limit."""
+    """Said of a random error's limit."""
     times = "" if factor == 1 else f" times the coverage factor {factor:g}"
     bound = ", bound by the cubic phase" if is_cubic else ""
     known = 196 / math.sqrt(2 * draws)  # of a standard deviation of normal draws
@@ -203,36 +203,36 @@ def sigma_of_time_series(draws: int, factor: float, images: int, is_cubic: bool)
 
 @phrase
 def power_of_time_series() -> str:
-    """Of what spreads."""
+    """Said of what spreads."""
     return "ISLR that time series add to the mean of their images"
 
 
 @phrase
 def draws_decide(draws: int, low: float, high: float) -> str:
-    """Of noise, how many draws its verdict took, and the interval of what images show. [dB]"""
+    """Said of noise, how many draws its verdict took, and the interval of what images show. [dB]"""
     return f"{low:.2f} to {high:.2f} dB at 95 %, by {draws} draws"
 
 
 @phrase
 def draws_do_not_decide(draws: int, low: float, high: float) -> str:
-    """Of noise so near the border of two verdicts that as many draws as are made do not tell them apart. [dB]"""
+    """Said of noise so near the border of two verdicts that as many draws as are made do not tell them apart. [dB]"""
     return f"{low:.2f} to {high:.2f} dB at 95 %, by {draws} draws, which is too near the border of two verdicts"
 
 
 # ---------------------------------------------------------------------- autofocus
 @phrase
 def range_walk(cells: float, n_pull: float) -> str:
-    """Of the pull-in range: how far an error of that size walks, and up to which it stays within half a cell."""
+    """Said of the pull-in range: how far an error of that size walks, and up to which it stays within half a cell."""
     return f"range walk of {cells:.2g} cells; it stays within half a cell up to n_pull {n_pull:.3g}, f0/B"
 
 
 @phrase
 def patch_too_large(cells: float, most: int) -> str:
-    """Of an image that autofocus would need."""
+    """Said of an image that autofocus would need."""
     return f"autofocus needs a patch of {cells:.0f} cells, at most {most} are formed"
 
 
 @phrase
 def autofocus_leaves(phase: float, allowed: float) -> str:
-    """Of an image that was refocused. [rad]"""
+    """Said of an image that was refocused. [rad]"""
     return f"autofocus leaves {phase:.3g} rad, {format_limit(allowed, 'rad')} allowed"

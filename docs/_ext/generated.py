@@ -424,7 +424,7 @@ def symbols(directive: Generated) -> str:
 def note_codes(_: Generated) -> str:
     """Codes of what findings, warnings and verdicts say, with what each is said of."""
     return table(
-        ("code", "said"), [(f"`{code}`", said[0].lower() + said[1:]) for code, said in sorted(CODES.items())]
+        ("code", "said"), [(f"`{code}`", about.removeprefix("Said ")) for code, about in sorted(CODES.items())]
     )
 
 
