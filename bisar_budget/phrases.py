@@ -286,7 +286,7 @@ def other_model_spreads(model: str, level_db: float) -> str:
 def published_model_does_not_hold(
     row_id: str, published: float | None, full: float | None, unit: str, others: int
 ) -> str:
-    """Said of a mission that the published model judges; None: no limit. How many other errors it does not hold of."""
+    """Said of a mission that the published model judges. None: no limit; with how many other errors it fails for."""
     by_published, by_full = (
         "without limit" if size is None else format_limit(size, unit) for size in (published, full)
     )

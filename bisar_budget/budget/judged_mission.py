@@ -301,7 +301,7 @@ class RowStatuses:
         self.why = np.where(these, np.int8(why), self.why)
 
     def require_declarations(self, geometry: BistaticGeometry) -> None:
-        """Errors that the file should declare and does not are not evaluated; the first row says whether all are there."""
+        """Errors that should be declared and are not are not evaluated; the first row says whether all are there."""
         if not self.mission.requirements.declare:
             return
         still = np.array([np.broadcast_to(path.is_still, self.status.shape[1:]) for path in geometry.both])
@@ -321,7 +321,7 @@ class RowStatuses:
                 self._settle(owed, is_doubtful & (self.status != CODE["fail"]), Why.INPUT_IN_DOUBT)
 
     def judge_effects(self, untaken: Sequence[UntakenEffect]) -> None:
-        """Rows that make up an effect that no requirement takes are not evaluated; those that add little are `info`."""
+        """Rows that make up an effect that none takes are not evaluated; those that add little are `info`."""
         for place, row in enumerate(self.rows):
             row_id = row.subject.id
             of_row = [one for one in untaken if row_id in one.parts]
