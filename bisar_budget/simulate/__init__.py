@@ -4,7 +4,6 @@
 __all__ = [
     "autofocus",
     "collection",
-    "exact",
     "image_formation",
     "impulse_response",
     "phase_history",

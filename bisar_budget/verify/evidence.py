@@ -13,7 +13,7 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.simulate.collection import OVERSAMPLING, Chip
 from bisar_budget.simulate.impulse_response import upsampled
 from bisar_budget.simulate.phase_history import Floats
-from bisar_budget.verify.study import Study
+from bisar_budget.verify.study import Responses, Study
 
 _FINE = 4  # interpolation of a cut, so that its nulls look like nulls
 _AROUND = 10  # resolution cells of a cut each way, beyond the smear
@@ -45,24 +45,20 @@ def form_image_evidence(mission: Mission, findings: MissionFindings) -> tuple[Im
 
 
 def _evidence(study: Study, file: str, subject: Subject, verdict: Verdict) -> ImageEvidence:
-    chip, reference, errors, effect = study.images(subject, verdict.boundary_error)
     found = ImageEvidence(
         file=file,
         verdict=verdict,
         look_azimuth_rad=study.geometry.look_azimuth,
-        at_limit=_point_image(chip, reference, study.spread(errors, effect).smear),
+        at_limit=_shown(study.at_limit(subject, verdict.boundary_error)),
     )
     if verdict.boundary_autofocus is None or verdict.measured_residual_qpe_rad is None:
         return found
-    chip, reference, errors, effect = study.images(
-        subject, verdict.boundary_autofocus, ROOM[study.mission.autofocus.algorithm]
-    )
-    return found._replace(
-        before_autofocus=_point_image(chip, reference, study.spread(errors, effect).smear),
-        after_autofocus=_point_image(
-            study.focused(errors, effect, chip), reference, study.spread(errors, effect).smear
-        ),
-    )
+    images = study.at_limit(subject, verdict.boundary_autofocus, ROOM[study.mission.autofocus.algorithm])
+    return found._replace(before_autofocus=_shown(images), after_autofocus=_shown(study.focused(images)))
+
+
+def _shown(images: Responses) -> PointImage:
+    return _point_image(images.chip, images.reference, images.spread.smear)
 
 
 def _point_image(chip: Chip, reference: Chip, smear_cells: float) -> PointImage:

@@ -1,13 +1,16 @@
 """Form images with each error set exactly at its limit, and measure whether the limit is true."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import nullcontext
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import nullcontext, suppress
 from fnmatch import fnmatchcase
 from functools import partial
 
 from bisar_budget.analysis.vibration_limits import tone_limits
 from bisar_budget.budget.aggregates import aggregate_rows
+from bisar_budget.budget.random_rows import islr_rows
+from bisar_budget.effects.clocks import spurs_of
 from bisar_budget.effects.declared import QUADRATIC
 from bisar_budget.effects.echoes import SLOWEST
 from bisar_budget.effects.effect import PLATFORMS
@@ -17,15 +20,29 @@ from bisar_budget.faults import printable
 from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.model import Mission, Simulation
-from bisar_budget.verify import duration, phase_cases
-from bisar_budget.verify import vibration_cases as vibration
-from bisar_budget.verify.location_case import location
-from bisar_budget.verify.study import Study
+from bisar_budget.simulate.collection import CELLS, RANGE_CELLS, Chip, PointCollection, pulses_for
+from bisar_budget.simulate.phase_history import Errors, Floats
+from bisar_budget.verify import phase_cases
+from bisar_budget.verify.spread_cases import (
+    UNDECLARED_CYCLES,
+    Case,
+    limits_of,
+    verify_islr,
+    verify_pslr,
+    verify_random,
+    verify_spread_tone,
+    verify_spur,
+    vibration_cases,
+)
+from bisar_budget.verify.study import Responses, Study
 from bisar_budget.workers import MapBlocks, Progress, unseen, worker_pool
 
 __all__ = ["Study", "rows_to_verify", "seconds_to_verify", "verify_mission"]
 
-Case = Callable[[], Verdict]
+_LONG = 60.0  # s; far below it nothing is measured
+_SLOWEST = 1.0  # s that the smallest image takes on a slow and busy machine
+_LARGER = 8  # times the cells of the smallest image: 32 times its pixels and pulses
+_BESIDE = 1.25  # images at a limit and on both sides of it, over those at it
 
 
 def verify_mission(
@@ -85,13 +102,6 @@ def rows_to_verify(mission: Mission, only: str = "*") -> list[str]:
     return [row_id for row_id in cases(Study(mission)) if fnmatchcase(row_id, only)]
 
 
-def seconds_to_verify(mission: Mission, only: str = "*", jobs: int = 1) -> float:
-    """About how long `verify_mission` will take; 0 where it is far below a minute. [s]"""
-    mission = mission._replace(places={})
-    wanted = rows_to_verify(mission, only)
-    return duration.seconds_to_verify(mission, cases, wanted) / max(1, min(jobs, len(wanted)))
-
-
 def cases(study: Study) -> dict[str, Case]:
     """Row ids in the order of `check`, with the call that verifies each."""
     return dict(_cases(study))
@@ -122,12 +132,10 @@ def _order(one: Subject) -> tuple[int, int]:
 
 def _of_tones_by_islr(study: Study) -> Iterator[tuple[Subject, Case]]:
     """Lines of vibration where ISLR holds their power."""
-    from bisar_budget.verify.random_cases import verify_spread_tone
-
     metric, limits = tone_limits(study.mission, study.allocation)
     for name, limit in limits.items() if metric == "islr" else ():
         T, size = study.collection.aperture_time, limit.by(study.model)
-        cycles = [line.frequency * T for line in lines_of(study.mission, name)] or [vibration.UNDECLARED_CYCLES]
+        cycles = [line.frequency * T for line in lines_of(study.mission, name)] or [UNDECLARED_CYCLES]
         for index, turns in enumerate(cycles):
             if turns >= SLOWEST:
                 one = subject(name, "vibration", "sinusoidal", entry=index)
@@ -137,17 +145,6 @@ def _of_tones_by_islr(study: Study) -> Iterator[tuple[Subject, Case]]:
 
 def _of_instruments(study: Study) -> Iterator[tuple[str, Case]]:
     """Sensors and clocks that have a limit, and what all noise spreads together."""
-    from bisar_budget.budget.random_rows import islr_rows
-    from bisar_budget.effects.clocks import spurs_of
-    from bisar_budget.verify.random_cases import (
-        limits_of,
-        verify_islr,
-        verify_pslr,
-        verify_random,
-        verify_spread_tone,
-        verify_spur,
-    )
-
     for error in study.analysis.random:
         if limits_of(study, error):
             yield error.id, partial(verify_random, study, error)
@@ -183,7 +180,7 @@ def _cases(study: Study) -> Iterator[tuple[str, Case]]:
             if line.frequency * study.collection.aperture_time < SLOWEST:
                 one = subject(name, "vibration", "sinusoidal", entry=index)
                 slow[one] = partial(phase_cases.slow_vibration, study, one.id, name, line)
-    swaying = slow | dict(_of_tones_by_islr(study)) | dict(vibration.cases(mission, allocation, study.collection))
+    swaying = slow | dict(_of_tones_by_islr(study)) | dict(vibration_cases(study))
     for owner in (*PLATFORMS, "mission"):
         for one in sorted((one for one in swaying if one.owner == owner), key=_order):
             yield one.id, swaying[one]
@@ -204,8 +201,84 @@ def _cases(study: Study) -> Iterator[tuple[str, Case]]:
     if requirements.cubic_phase_error is not None:
         yield "mission.cubic_phase_error", partial(phase_cases.cubic, study, requirements.cubic_phase_error)
     if requirements.location_error is not None:
-        yield "mission.location_error", partial(location, study, requirements.location_error)
+        yield "mission.location_error", partial(phase_cases.location, study, requirements.location_error)
     if allocation.n_pull is not None:
         yield "mission.autofocus_pull_in", partial(phase_cases.pull_in, study, allocation.n_pull)
     if mission.scene.radius is not None and study.model != "published":
         yield "mission.spatial_variance", partial(phase_cases.edge, study)
+
+
+# ---------------------------------------------------------------------- how long it will take
+class _NotFormedError(ValueError):
+    """An image whose size is known, which is all that was asked."""
+
+
+class _Sizes(PointCollection):
+    """A collection that notes the size of every image it is asked for, and forms none."""
+
+    def __init__(self, mission: Mission, study: Study) -> None:
+        super().__init__(mission, study.geometry)
+        self.asked: list[float] = []  # sizes, see `_size`
+
+    def pair(
+        self, errors: Errors, place: tuple[float, float], cells: int = CELLS, range_cells: int = RANGE_CELLS
+    ) -> tuple[Chip, Chip]:
+        """Note two images."""
+        self._require_room(cells, range_cells)
+        self.asked.append(_size(cells, range_cells))
+        raise _NotFormedError("its size is known")
+
+    def window(self, count: int) -> Floats:
+        """Draw no noise: that takes seconds, however large the images."""
+        raise _NotFormedError(f"{count} weights are not needed")
+
+    def chip(self, centre: tuple[float, float], errors: Errors, *, cells: int = CELLS, **_: object) -> Chip:
+        """Note one of two images of a single line."""
+        self._require_room(cells, 0)
+        self.asked.append(_size(cells, 1))
+        raise _NotFormedError("its size is known")
+
+
+def seconds_to_verify(mission: Mission, only: str = "*", jobs: int = 1) -> float:
+    """About how long `verify_mission` will take; 0 where it is far below a minute. [s]
+
+    What one pixel and pulse take depends on the machine, on what else runs on it, and on whether kernels are
+    compiled. So it is measured, on a small and a larger image of the mission itself, where the size leaves any doubt.
+    """
+    mission = mission._replace(places={})
+    study = Study(mission)
+    study.collection = sizes = _Sizes(mission, study)
+    known = cases(study)
+    wanted = [row_id for row_id in known if fnmatchcase(row_id, only)]
+    for row_id in wanted:
+        with suppress(_NotFormedError):
+            known[row_id]()
+    asked = [max(1.0, size) for size in sizes.asked]
+    if _BESIDE * sum(asked) * _SLOWEST <= _LONG:
+        return 0.0
+    study = Study(mission)
+    try:
+        study.collection.chip((0.0, 0.0), Errors(), cells=2)  # compiled, imported
+        smallest = _seconds(study, CELLS)
+    except ValueError:
+        return 0.0  # where there is none of these, there is hardly any image
+    try:
+        grows = max(0.0, _seconds(study, _LARGER * CELLS) - smallest) / (_size(_LARGER * CELLS, RANGE_CELLS) - 1)
+    except ValueError:
+        grows = smallest  # no room for a larger one
+    seconds = _BESIDE * sum(smallest + grows * (size - 1) for size in asked)
+    return seconds / max(1, min(jobs, len(wanted)))
+
+
+def _size(cells: int, range_cells: int) -> float:
+    """Pixels times pulses of an image, over those of the smallest."""
+    return cells * range_cells * pulses_for(cells) / (CELLS * RANGE_CELLS * pulses_for(CELLS))
+
+
+def _seconds(study: Study, cells: int) -> float:
+    """Time that two images of no error and their reading take. [s]"""
+    errors, begun = Errors(), time.perf_counter()
+    effect = study.collection.effect(errors)
+    chips = study.collection.pair(errors, effect.displacement, cells)
+    study.read(Responses(errors, effect, study.spread(errors, effect), *chips))
+    return time.perf_counter() - begun
