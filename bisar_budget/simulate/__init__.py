@@ -9,6 +9,5 @@ __all__ = [
     "phase_history",
     "point",
     "realisations",
-    "resampling",
     "targets",
 ]

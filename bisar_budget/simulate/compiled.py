@@ -16,8 +16,7 @@ from numba import njit, prange
 from numpy.polynomial import Chebyshev, Polynomial
 
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.simulate.phase_history import Complexes, Floats, PhaseHistory
-from bisar_budget.simulate.range_profile import (
+from bisar_budget.simulate.image_formation import (
     PROFILE_BYTES,
     carrier_frequency,
     cells_per_metre,
@@ -28,6 +27,7 @@ from bisar_budget.simulate.range_profile import (
     profile_length,
     range_profiles,
 )
+from bisar_budget.simulate.phase_history import Complexes, Floats, PhaseHistory
 
 Spline = Literal["linear", "cubic"]
 

@@ -20,7 +20,7 @@ from bisar_budget.simulate.autofocus import ALGORITHMS
 from bisar_budget.simulate.collection import PointCollection, RangeLines
 from bisar_budget.simulate.former import IMAGE_FORMERS, ExactRangeFormer, Former, PlaneWaves
 from bisar_budget.simulate.image_formation import ground_grid
-from bisar_budget.simulate.impulse_response import ImpulseResponse, impulse_response
+from bisar_budget.simulate.impulse_response import ImpulseResponse, between, impulse_response
 from bisar_budget.simulate.phase_history import (
     Complexes,
     Errors,
@@ -34,7 +34,6 @@ from bisar_budget.simulate.phase_history import (
     phase_history,
 )
 from bisar_budget.simulate.realisations import drawn_errors
-from bisar_budget.simulate.resampling import between
 from bisar_budget.simulate.targets import Target, Targets
 from bisar_budget.workers import Progress, unseen
 

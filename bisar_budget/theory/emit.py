@@ -27,7 +27,6 @@ from bisar_budget.theory.symbols import (
     positive,
     pslr,
     share,
-    tau,
     total_qpe,
     wavelength,
 )
@@ -160,46 +159,6 @@ def evaluators() -> tuple[Evaluator, ...]:
             arguments=both_platforms_arguments(),
             rows=(tuple(adjugate[0, :]), tuple(adjugate[1, :]), (determinant,)),
             row_names=("adjugate, first row", "adjugate, second row", "determinant"),
-        ),
-        Evaluator(
-            name="full_motion",
-            summary="Range error of one unit of each motion error of one platform at one slow time. [m/unit]",
-            details=(
-                "−u·r̃(τ): the line of sight is that of the position then, nothing is held constant. Position and "
-                "slant range are those at the slow time. Derived here."
-            ),
-            arguments=(*platform_arguments(TRANSMITTER)[:3], (TRANSMITTER.slant_range, "slant_range"), (tau, "tau")),
-            rows=tuple(
-                tuple(published.sensitivity(full.range_error_at(TRANSMITTER), error) for error in motion[k : k + 3])
-                for k in (0, 3, 6)
-            ),
-            row_names=tuple(f"{kind} x, y, z" for kind in published.KINDS),
-            quotients=tuple(
-                (f"along_{axis}", component, TRANSMITTER.slant_range)
-                for axis, component in zip("xyz", TRANSMITTER.position, strict=True)
-            ),
-        ),
-        Evaluator(
-            name="direct_motion",
-            summary="As full_motion, where the receiver hears the transmitter and takes it as its clock. [m/unit]",
-            details=(
-                "−(u − b)·r̃(τ), b the unit vector from the other platform to this one. Position, slant range and b "
-                "are those at the slow time. Derived here."
-            ),
-            arguments=(
-                *platform_arguments(TRANSMITTER)[:3],
-                (TRANSMITTER.slant_range, "slant_range"),
-                *zip(full.DIRECT_PATH, ("b_x", "b_y", "b_z"), strict=True),
-                (tau, "tau"),
-            ),
-            rows=tuple(
-                tuple(
-                    published.sensitivity(full.direct_range_error_at(TRANSMITTER), error)
-                    for error in motion[k : k + 3]
-                )
-                for k in (0, 3, 6)
-            ),
-            row_names=tuple(f"{kind} x, y, z" for kind in published.KINDS),
         ),
         Evaluator(
             name="full_ground_inverse",

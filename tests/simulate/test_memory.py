@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bisar_budget.mission.load import load_mission, parse_mission
-from bisar_budget.simulate import far_field, image_formation, range_profile
+from bisar_budget.simulate import far_field, image_formation
 from bisar_budget.simulate.far_field import far_field_filter
 from bisar_budget.simulate.image_formation import backprojection, is_compiled, kernel_within, matched_filter
 from bisar_budget.simulate.point import SimulationError, simulate_point
@@ -90,7 +90,7 @@ class TestFarApart:
         backprojection(history, points)
         peak = traced(lambda: backprojection(history, points))
         assert peak < 40e6
-        all_at_once = 64 * range_profile.profile_length(history, 2) * range_profile.PROFILE_BYTES
+        all_at_once = 64 * image_formation.profile_length(history, 2) * image_formation.PROFILE_BYTES
         assert all_at_once > 90e6  # what it would have been
 
 
