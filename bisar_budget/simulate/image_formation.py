@@ -125,7 +125,8 @@ def backprojection(history: PhaseHistory, points: Floats, kernel: Kernel = "auto
         raise ImportError(f"kernel {kernel} needs Numba, which is missing: pip install 'bisar-budget[fast]'")
     from bisar_budget.simulate.compiled import backproject
 
-    return backproject(history, points, kernel)
+    image = backproject(history, points, kernel)
+    return _backprojection(history, points) if image is None else image
 
 
 def kernel_within(memory_limit: float) -> Kernel:
