@@ -117,17 +117,6 @@ def full_ground_inverse(
     )
 
 
-def allowable_error(
-    budget: float,
-    per_unit: float,
-) -> float:
-    """Size of an error at which an effect of so much per unit, without sign, reaches a budget. [unit]
-
-    The step from a quadratic phase error to its limit. Source: Rigling & Moses, Table II.
-    """
-    return budget/per_unit
-
-
 def autofocus_gain(
     n_pull: float,
     total_qpe: float,

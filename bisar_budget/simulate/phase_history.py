@@ -16,8 +16,7 @@ from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vectors
 from bisar_budget.ranges.exact_ranges import ExactRanges, Sampling, followed
 
-_FEW = 8  # scatterers are added one by one
-_HELD = 1 << 18  # complex numbers held at once, of many
+_HELD = 1 << 18  # complex numbers held at once
 _NO_SIGHT = 1e-20  # square of what a metre of a platform changes; less is rounding
 SMOOTH = 12  # order of what is smooth of a history
 _ORDER = 12  # of the fit to samples anywhere over the aperture
@@ -352,16 +351,23 @@ def phase_history(
     scatterers, amplitudes = np.atleast_2d(scatterers), np.atleast_1d(amplitudes)
     if len(scatterers) != len(amplitudes):
         raise ValueError(f"{len(scatterers)} scatterers have {len(amplitudes)} amplitudes")
-    if len(scatterers) > _FEW and is_even(frequency):
-        _add_many(
-            samples, scatterers, amplitudes, (transmitter.actual, receiver.actual), clock - reference, wavenumber
-        )
-    else:
-        for position, amplitude in zip(scatterers, amplitudes, strict=True):
-            actual = np.linalg.norm(transmitter.actual - position, axis=1)
-            actual += np.linalg.norm(receiver.actual - position, axis=1)
-            differential_range = actual - reference + clock  # (1)
-            samples += amplitude * np.exp(-1j * np.outer(differential_range, wavenumber))  # (2), (3)
+    # (3) with the frequency split into coarse and fine steps: e^{-j(k + q)R} is a product, and the sum over
+    # scatterers one of matrices, so that 2√n exponentials do for n frequencies.
+    coarse, fine = split(wavenumber) if is_even(frequency) else (wavenumber, np.zeros(1))
+    many = max(1, _HELD // (coarse.size + fine.size))
+    together = max(1, min(many, len(scatterers)))
+    pulses = max(1, min(many // together, _HELD // (coarse.size * fine.size)))
+    for begin in range(0, slow_time.size, pulses):
+        some = slice(begin, begin + pulses)
+        total: Complexes = np.zeros((slow_time[some].size, coarse.size, fine.size), dtype=complex)
+        for start in range(0, len(scatterers), together):
+            part = slice(start, start + together)
+            ranges = np.linalg.norm(transmitter.actual[some, None] - scatterers[part], axis=-1)
+            ranges += np.linalg.norm(receiver.actual[some, None] - scatterers[part], axis=-1)
+            ranges = ranges - reference[some, None] + clock[some, None]  # (1)
+            by_coarse = np.exp(-1j * coarse[:, None] * ranges[:, None]) * amplitudes[part]  # (2), (3)
+            total += by_coarse @ np.exp(-1j * ranges[..., None] * fine)
+        samples[some] = total.reshape(len(total), -1)[:, : wavenumber.size]
     if noise_power:
         if rng is None:
             raise ValueError("noise needs a random generator")
@@ -374,32 +380,6 @@ def phase_history(
         transmitter=transmitter.measured,
         receiver=receiver.measured,
     )
-
-
-def _add_many(
-    samples: Complexes,
-    scatterers: Floats,
-    amplitudes: Complexes,
-    actual: tuple[Floats, Floats],
-    offset: Floats,
-    wavenumber: Floats,
-) -> None:
-    """Add the echoes of many scatterers: (3) with the frequency split into coarse and fine steps, two products less.
-
-    e^{-j(k + q)R} is a product, so the sum over scatterers is one of matrices. Frequencies are evenly spaced.
-    """
-    coarse, fine = split(wavenumber)
-    shape = (coarse.size, fine.size)
-    many = max(1, _HELD // sum(shape))
-    for pulse in range(samples.shape[0]):
-        total = np.zeros(shape, dtype=complex)
-        for start in range(0, len(scatterers), many):
-            part = slice(start, start + many)
-            ranges = sum(np.linalg.norm(one[pulse] - scatterers[part], axis=1) for one in actual) + offset[pulse]
-            by_coarse = np.exp(-1j * np.outer(coarse, ranges))
-            by_fine = np.exp(-1j * np.outer(ranges, fine))
-            total += (by_coarse * amplitudes[part]) @ by_fine
-        samples[pulse] += total.ravel()[: wavenumber.size]
 
 
 # ---------------------------------------------------------------------- by exact ranges

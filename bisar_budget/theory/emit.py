@@ -116,7 +116,6 @@ def evaluators() -> tuple[Evaluator, ...]:
     )
     adjugate, determinant = dr.ground_inverse()
     power, other, phase = positive("power"), positive("other"), positive("phase")
-    per_unit, budget = positive("perunit"), positive("budget")
     (vibration_row, _) = published.vibration().rows
     gradients, full_adjugate, full_determinant = full.gradient_inverse()
     phase_arguments = ((wavelength, "wavelength"), (T, "aperture_time"))
@@ -167,14 +166,6 @@ def evaluators() -> tuple[Evaluator, ...]:
             arguments=tuple(zip(gradients, ("s_x", "s_y", "rate_x", "rate_y"), strict=True)),
             rows=(tuple(full_adjugate[0, :]), tuple(full_adjugate[1, :]), (full_determinant,)),
             row_names=("adjugate, first row", "adjugate, second row", "determinant"),
-        ),
-        Evaluator(
-            name="allowable_error",
-            summary="Size of an error at which an effect of so much per unit, without sign, reaches a budget. [unit]",
-            details="The step from a quadratic phase error to its limit. Source: Rigling & Moses, Table II.",
-            arguments=((budget, "budget"), (per_unit, "per_unit")),
-            rows=((published.allowable(budget, per_unit),),),
-            row_names=("",),
         ),
         Evaluator(
             name="autofocus_gain",

@@ -108,12 +108,6 @@ def table_1(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Table:
     )
 
 
-def allowable(budget: Expr, per_unit: Expr) -> Expr:
-    """Size of an error at which a phase of so much per unit, without sign, reaches a budget: the step of Table II."""
-    error = Symbol("error", real=True)
-    return limit(per_unit * error, error, budget)
-
-
 def edge_phase(beta: Expr, order: int) -> Expr:
     """Phase of one term of the range error at the aperture edge, (2π/λ)·β·(T/2)ⁿ. Signed like β. [rad]"""
     return 2 * pi / wavelength * beta * (T / 2) ** order
