@@ -11,6 +11,7 @@ the draws.
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -113,7 +114,8 @@ class Tally(NamedTuple):
     all_hold: int
 
 
-class Counted(NamedTuple):
+@dataclass(frozen=True, slots=True, eq=False)
+class Counted:
     """Counts and mean squares of all draws.
 
     For each requirement the draws in which it held and the mean square, over draws that have an image; the draws in

@@ -12,8 +12,8 @@ Synthetic Aperture Radar, chapter 6.
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +43,8 @@ _DRIFT_SETTLED = 1e-3  # rad at the aperture edge
 _CORRELATED = 6.0  # standard deviations of the correlation of speckle, whose highest of many is about 4
 
 
-class Focused(NamedTuple):
+@dataclass(frozen=True, slots=True, eq=False)
+class Focused:
     """Image after autofocus, and the phase taken out of its spectrum along the second axis. [rad]
 
     `phase` is (ny,), in the order of `numpy.fft.fftfreq(ny)`, 0 outside the aperture's band and without constant

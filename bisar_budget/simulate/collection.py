@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -46,7 +47,8 @@ class MemoryLimitError(ValueError):
     """An image beyond `simulation.memory_limit`."""
 
 
-class RangeLines(NamedTuple):
+@dataclass(frozen=True, slots=True, eq=False)
+class RangeLines:
     """Ground pixels along lines of equal range and of equal Doppler, in which a response is a product.
 
     A straight grid leaves a response where a platform is near: its ridge follows an ellipse, and its sidelobes in

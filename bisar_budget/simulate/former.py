@@ -8,7 +8,8 @@ lines along the axes (x′, y′) of (10).
 import math
 import time
 from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -62,7 +63,8 @@ class Former(Protocol):
         """About how long an image of so many pulses takes, measured with some of them. [s]"""
 
 
-class ExactRangeFormer(NamedTuple):
+@dataclass(frozen=True, slots=True, eq=False)
+class ExactRangeFormer:
     """Matched filter (4) or backprojection, which equals it."""
 
     lines: RangeLines
@@ -130,7 +132,8 @@ class ExactRangeFormer(NamedTuple):
         return formed
 
 
-class PlaneWaves(NamedTuple):
+@dataclass(frozen=True, slots=True, eq=False)
+class PlaneWaves:
     """Far-field filter (12), or polar format (13) and (14).
 
     `sight` are the look vectors of both measured platforms, added, over slow time, (times, 2), an odd number of them

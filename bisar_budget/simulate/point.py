@@ -3,6 +3,7 @@
 import math
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -59,7 +60,8 @@ class SimulationError(Exception):
     """An image that cannot be formed as asked; the message says what to change."""
 
 
-class Response(NamedTuple):
+@dataclass(frozen=True, slots=True, eq=False)
+class Response:
     """One target as the images show it.
 
     `effect` is what the errors do to it by exact ranges, its displacement counted from the target; `shown` is where
@@ -119,7 +121,8 @@ class PointImages(NamedTuple):
     outside: str = ""
 
 
-class Patch(NamedTuple):
+@dataclass(frozen=True, slots=True, eq=False)
+class Patch:
     """Ground patch around the displaced point: pixels along both axes, and their spacing there. [m]"""
 
     shape: tuple[int, int]
@@ -136,7 +139,8 @@ class Patch(NamedTuple):
         return (self.shape[0] * self.spacing[0], self.shape[1] * self.spacing[1])
 
 
-class Plan(NamedTuple):
+@dataclass(frozen=True, slots=True, eq=False)
+class Plan:
     """Patches, samples and memory that the images of a mission take, known before any is formed."""
 
     rotated: Patch

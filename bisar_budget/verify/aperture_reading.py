@@ -10,6 +10,7 @@ response, formed and read by the same paths, takes out what is common to both.
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -241,7 +242,8 @@ def _taper(columns: int) -> Floats:
     return taper
 
 
-class _Refined(NamedTuple):
+@dataclass(frozen=True, slots=True, eq=False)
+class _Refined:
     """Polynomial of the phase, and what of the image it leaves over, of its norm."""
 
     fit: Floats
@@ -317,7 +319,8 @@ def _refined(fit: Floats, place: Floats, contribution: Complexes, seen: Complexe
 
 
 # ---------------------------------------------------------------------- displacement
-class Shift(NamedTuple):
+@dataclass(frozen=True, slots=True, eq=False)
+class Shift:
     """Displacement on the ground (east, north) [m], azimuth of the line of smear, 0 to π [rad].
 
     `pixels` is the displacement along x′ and y′ of the image.

@@ -9,8 +9,8 @@ repeat interval, so that by Parseval only the mainlobe has to be transformed. En
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
@@ -458,7 +458,8 @@ def _power(
 
 
 # ---------------------------------------------------------------------- ISLR that noise adds
-class AddedIslr(NamedTuple):
+@dataclass(frozen=True, slots=True, eq=False)
+class AddedIslr:
     """ISLR that noise adds, the ends of its interval at 95 %, and of how many draws it is the mean. [dB]"""
 
     level: float
