@@ -59,11 +59,6 @@ class ImpulseResponse2D:
     islr_db: float
 
 
-def loss_db(response: ImpulseResponse | ImpulseResponse2D, error_free: ImpulseResponse | ImpulseResponse2D) -> float:
-    """Peak of a response against the error-free one, negative for a loss. [dB]"""
-    return 20 * math.log10(response.peak / error_free.peak)
-
-
 def upsampled(cut: Complexes, factor: int) -> Complexes:
     """Interpolate cuts, (..., samples), by zero-padding their spectrum; the carrier may sit anywhere in the band."""
     count = cut.shape[-1]

@@ -21,7 +21,6 @@ from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.simulate.phase_history import Course, Errors, Floats, PathError
 
 _STEPS = 512  # from mid-aperture to the end of it, in which a walk is summed up
-_PER_TIME = 50  # steps in a correlation time
 _SLOW_TONES = 80  # over logarithms, below a tone per two apertures
 _SLOWEST = 1e-4  # of a tone per aperture; its quadratic phase is nothing
 _PERIODS = 4  # apertures in which phase noise repeats

@@ -7,9 +7,13 @@ from contextlib import nullcontext, suppress
 from fnmatch import fnmatchcase
 from functools import partial
 
+import numpy as np
+
 from bisar_budget.analysis.vibration_limits import tone_limits
 from bisar_budget.budget.aggregates import aggregate_rows
+from bisar_budget.budget.pull_in import ROOM
 from bisar_budget.budget.random_rows import islr_rows
+from bisar_budget.budget.verdicts import rows_worth_showing
 from bisar_budget.effects.clocks import spurs_of
 from bisar_budget.effects.declared import QUADRATIC
 from bisar_budget.effects.echoes import SLOWEST
@@ -17,10 +21,12 @@ from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.vibration import lines_of
 from bisar_budget.faults import printable
-from bisar_budget.findings.images import Verdict, VerifiedMission
+from bisar_budget.findings.images import FLOOR_DB, ImageEvidence, PointImage, Verdict, VerifiedMission
+from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.model import Mission, Simulation
-from bisar_budget.simulate.collection import CELLS, RANGE_CELLS, Chip, PointCollection, pulses_for
+from bisar_budget.simulate.collection import CELLS, OVERSAMPLING, RANGE_CELLS, Chip, PointCollection, pulses_for
+from bisar_budget.simulate.impulse_response import upsampled
 from bisar_budget.simulate.phase_history import Errors, Floats
 from bisar_budget.verify import phase_cases
 from bisar_budget.verify.spread_cases import (
@@ -37,8 +43,12 @@ from bisar_budget.verify.spread_cases import (
 from bisar_budget.verify.study import Responses, Study
 from bisar_budget.workers import MapBlocks, Progress, unseen, worker_pool
 
-__all__ = ["Study", "rows_to_verify", "seconds_to_verify", "verify_mission"]
+__all__ = ["Study", "form_image_evidence", "rows_to_verify", "seconds_to_verify", "verify_mission"]
 
+_FINE = 4  # interpolation of a cut, so that its nulls look like nulls
+_AROUND = 10  # resolution cells of a cut each way, beyond the smear
+_MAX_PIXELS = 96  # of a chip, each way
+_CUT_FLOOR_DB = -80.0  # a null is as deep as rounding leaves it; nobody sees more
 _LONG = 60.0  # s; far below it nothing is measured
 _SLOWEST = 1.0  # s that the smallest image takes on a slow and busy machine
 _LARGER = 8  # times the cells of the smallest image: 32 times its pixels and pulses
@@ -139,7 +149,7 @@ def _of_tones_by_islr(study: Study) -> Iterator[tuple[Subject, Case]]:
         for index, turns in enumerate(cycles):
             if turns >= SLOWEST:
                 one = subject(name, "vibration", "sinusoidal", entry=index)
-                blank = Verdict(id=one.id, model=study.model, boundary_error=size, unit="m")
+                blank = study.blank(one.id, size, "m")
                 yield one, partial(verify_spread_tone, study, blank, name, size, turns)
 
 
@@ -158,7 +168,7 @@ def _of_instruments(study: Study) -> Iterator[tuple[str, Case]]:
             yield row_id, partial(verify_spur, study, spur, row_id, size)
         else:
             level = 20 * math.log10(math.pi * size / study.collection.wavelength)
-            blank = Verdict(id=row_id, model=study.model, boundary_error=level, unit="dB")
+            blank = study.blank(row_id, level, "dB")
             cycles = spur.frequency * study.collection.aperture_time
             yield row_id, partial(verify_spread_tone, study, blank, spur.name, size, cycles)
     if study.mission.requirements.pslr is not None:
@@ -282,3 +292,79 @@ def _seconds(study: Study, cells: int) -> float:
     chips = study.collection.pair(errors, effect.displacement, cells)
     study.read(Responses(errors, effect, study.spread(errors, effect), *chips))
     return time.perf_counter() - begun
+
+
+# ---------------------------------------------------------------------- images that a report shows
+def form_image_evidence(mission: Mission, findings: MissionFindings) -> tuple[ImageEvidence, ...]:
+    """Form the images of the rows that decide most about a verified mission.
+
+    Parameters
+    ----------
+    mission : Mission
+        As loaded.
+    findings : MissionFindings
+        About it, with the verdicts of its images.
+
+    Returns
+    -------
+    tuple of ImageEvidence
+        The worst row first; empty where no row has an image.
+    """
+    verdicts = rows_worth_showing(findings)
+    if not verdicts:
+        return ()
+    study = Study(mission, findings.analysis)
+    subjects = {row.id: row.subject for row in findings.rows}
+    return tuple(_evidence(study, findings.file, subjects[verdict.id], verdict) for verdict in verdicts)
+
+
+def _evidence(study: Study, file: str, subject: Subject, verdict: Verdict) -> ImageEvidence:
+    found = ImageEvidence(
+        file=file,
+        verdict=verdict,
+        look_azimuth_rad=study.geometry.look_azimuth,
+        at_limit=_shown(study.at_limit(subject, verdict.boundary_error)),
+    )
+    if verdict.boundary_autofocus is None or verdict.measured_residual_qpe_rad is None:
+        return found
+    images = study.at_limit(subject, verdict.boundary_autofocus, ROOM[study.mission.autofocus.algorithm])
+    return found._replace(before_autofocus=_shown(images), after_autofocus=_shown(study.focused(images)))
+
+
+def _shown(images: Responses) -> PointImage:
+    return _point_image(images.chip, images.reference, images.spread.smear)
+
+
+def _point_image(chip: Chip, reference: Chip, smear_cells: float) -> PointImage:
+    """Reduce a chip to what is shown: as far as the response is smeared, and sidelobes."""
+    spacing, middle = chip.spacing, chip.cut.size // 2
+    reach = _AROUND + smear_cells / 2
+    half = min(math.ceil(reach * OVERSAMPLING), middle - 1)
+    stride = math.ceil(2 * half / _MAX_PIXELS)
+    half -= half % stride
+    cut, clean = (np.abs(upsampled(one.cut, _FINE)) for one in (chip, reference))
+    peak = float(clean.max())
+    fine = slice(_FINE * (middle - half), _FINE * (middle + half) + 1)
+    # A long smear fits into a chip by the brightest of each few samples.
+    shown = np.abs(chip.image[:, middle - half : middle + half]).reshape(chip.image.shape[0], -1, stride).max(axis=2)
+    grey = np.rint(255 * np.clip(1 - _decibel(shown, peak) / FLOOR_DB, 0, 1)).astype(np.uint8)
+    upright = grey.T[::-1]
+    return PointImage(
+        columns=upright.shape[1],
+        rows=upright.shape[0],
+        chip=upright.tobytes(),
+        pixel_m=(spacing[0], spacing[1] * stride),
+        thinned=stride,
+        step_m=spacing[1] / _FINE,
+        cut_db=_levels(cut[fine], peak),
+        error_free_db=_levels(clean[fine], peak),
+    )
+
+
+def _decibel(magnitude: Floats, peak: float) -> Floats:
+    level: Floats = 20 * np.log10(np.maximum(magnitude / peak, 10 ** (_CUT_FLOOR_DB / 20)))
+    return level
+
+
+def _levels(magnitude: Floats, peak: float) -> tuple[float, ...]:
+    return tuple(round(float(level), 2) for level in _decibel(magnitude, peak))

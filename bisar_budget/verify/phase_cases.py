@@ -35,7 +35,7 @@ def quadratic(study: Study, source: ErrorSource) -> Verdict:
     boundary = study.boundary(source, budget)
     if boundary is None:
         return _bound_elsewhere(study, source)
-    blank = Verdict(id=source.id, model=study.model, boundary_error=boundary, unit=source.unit, budget_rad=budget)
+    blank = study.blank(source.id, boundary, source.unit, budget_rad=budget)
     verdict = _judged(study, blank, [(source, boundary)])
     farther = study.boundary(source, gain * budget) if gain > 1 else None
     if farther is None:
@@ -48,7 +48,7 @@ def slow_vibration(study: Study, row_id: str, name: str, line: Line) -> Verdict:
     allocation, budget = study.allocation, study.allocation.qpe_limit(name)
     limits = slow_limits(study.mission, allocation, name, line.frequency * study.collection.aperture_time)
     size = limits.quadratic / allocation.autofocus_gain
-    blank = Verdict(id=row_id, model=study.model, boundary_error=size, unit="m", budget_rad=budget)
+    blank = study.blank(row_id, size, "m", budget_rad=budget)
     try:
         both = [
             Errors().of(name, PathError(sinusoids=(PathSinusoid(size, line.frequency, phase),)))
@@ -72,7 +72,7 @@ def _bound_elsewhere(study: Study, source: ErrorSource) -> Verdict:
     """Limit of an error that no quadratic phase bounds: by the cubic phase, or by the location."""
     allowed, binding = study.allowed(source)
     size = allowed or 0.0
-    blank = Verdict(id=source.id, model=study.model, boundary_error=size, unit=source.unit)
+    blank = study.blank(source.id, size, source.unit)
     requirements = study.mission.requirements
     try:
         images = study.images(study.together([(source, study.worse_sign([(source, size)], 1.0) * size)]))
@@ -103,7 +103,7 @@ def _bound_elsewhere(study: Study, source: ErrorSource) -> Verdict:
 def total(study: Study, row_id: str, owner: str) -> Verdict:
     """All declared errors of an owner at once, each with the sign that makes their phases add."""
     budget = study.allocation.qpe_limit(owner)
-    blank = Verdict(id=row_id, model=study.model, boundary_error=budget, unit="rad", budget_rad=budget)
+    blank = study.blank(row_id, budget, "rad", budget_rad=budget)
     if study.mission.allocation.combine != "sum":
         return blank._replace(reason=reasons.root_sum_square_is_of_many_flights())
     sizes = study.summed(study.members(owner), budget)
@@ -115,34 +115,19 @@ def total(study: Study, row_id: str, owner: str) -> Verdict:
 def other(study: Study, source: ErrorSource) -> Verdict:
     """Phase stated as such."""
     budget = study.allocation.qpe_limit(source.owner)
-    return Verdict(
-        id=source.id,
-        model=study.model,
-        boundary_error=budget,
-        unit=source.unit,
-        budget_rad=budget,
-        reason=reasons.phase_without_motion(),
-    )
+    return study.blank(source.id, budget, source.unit, budget_rad=budget, reason=reasons.phase_without_motion())
 
 
 def edge(study: Study) -> Verdict:
     """Difference between two places of the scene; what images and exact ranges say of it is in the tests."""
     budget = study.allocation.qpe_total
-    blank = Verdict(
-        id="mission.spatial_variance", model=study.model, boundary_error=budget, unit="rad", budget_rad=budget
-    )
+    blank = study.blank("mission.spatial_variance", budget, "rad", budget_rad=budget)
     return blank._replace(reason=reasons.images_are_of_the_centre())
 
 
 def cubic(study: Study, requirement: float) -> Verdict:
     """All declared errors scaled together until the gating model's cubic phase reaches the requirement."""
-    blank = Verdict(
-        id="mission.cubic_phase_error",
-        model=study.model,
-        boundary_error=requirement,
-        unit="rad",
-        budget_rad=requirement,
-    )
+    blank = study.blank("mission.cubic_phase_error", requirement, "rad", budget_rad=requirement)
     sizes = [(s, s.declared or 0.0) for s in study.declared]
     if not sizes:
         return blank._replace(reason=reasons.no_motion_declared())
@@ -166,9 +151,7 @@ def pull_in(study: Study, n_pull: float) -> Verdict:
     """A clock error of π·N_pull, which bends no geometry, refocused; no N_pull goes beyond the cap of range walk."""
     phase, budget, radar = math.pi * n_pull, study.allocation.qpe_total, study.mission.radar
     walk = n_pull * radar.bandwidth / radar.center_frequency / 2  # λN/2 over c/B
-    blank = Verdict(
-        id="mission.autofocus_pull_in", model=study.model, boundary_error=phase, unit="rad", budget_rad=budget
-    )
+    blank = study.blank("mission.autofocus_pull_in", phase, "rad", budget_rad=budget)
     clock = next(s for s in study.sources if s.id == "timing.quadratic")
     found = refocused(study, [(clock, phase / abs(clock.effect.qpe))], budget)
     reason = reasons.range_walk(walk, range_walk_cap(study.mission))
@@ -376,7 +359,7 @@ def location(study: Study, requirement: float) -> Verdict:
     Confirmed if the image, and by (25) each error alone by exact ranges, is within half a pixel of where the gating
     model puts it. A displacement that only is shorter is conservative; one that goes elsewhere is not.
     """
-    blank = Verdict(id="mission.location_error", model=study.model, boundary_error=requirement, unit="m")
+    blank = study.blank("mission.location_error", requirement, "m")
     sizes = [(s, s.declared or 0.0) for s in study.declared]
     if not sizes:
         return blank._replace(reason=reasons.nothing_moves_the_image())

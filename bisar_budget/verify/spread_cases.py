@@ -93,8 +93,7 @@ def vibration_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
 
     def blank(of: Subject, limits: Mapping[str, float], requirement_db: float) -> Verdict:
         # Both together: the larger of two limits stands for the row.
-        size = max(limits.values())
-        return Verdict(id=of.id, model=study.model, boundary_error=size, unit="m", requirement_db=requirement_db)
+        return study.blank(of.id, max(limits.values()), "m", requirement_db=requirement_db)
 
     for name in PLATFORMS:
         if pslr is not None:
@@ -245,13 +244,7 @@ def _model(study: Study, error: RandomError) -> str:
 def verify_spur(study: Study, spur: Spur, row_id: str, amplitude: float) -> Verdict:
     """A tone at its limit: the motion of the platform that makes the same phase. [m]"""
     level = 20 * math.log10(math.pi * amplitude / study.collection.wavelength)
-    blank = Verdict(
-        id=row_id,
-        model=study.model,
-        boundary_error=level,
-        unit="dB",
-        requirement_db=study.mission.requirements.pslr,
-    )
+    blank = study.blank(row_id, level, "dB", requirement_db=study.mission.requirements.pslr)
     sinusoids = {spur.name: (PathSinusoid(amplitude, spur.frequency),)}
     return echo(study, blank, sinusoids, "the tone alone")
 
@@ -266,7 +259,7 @@ def verify_pslr(study: Study) -> Verdict:
     """The tones that make the highest echo, in their worst phases, scaled together to what is required."""
     required = study.mission.requirements.pslr or 0.0
     row_id = subject("mission", "pslr").id
-    blank = Verdict(id=row_id, model=study.model, boundary_error=required, unit="dB", requirement_db=required)
+    blank = study.blank(row_id, required, "dB", requirement_db=required)
     found = tones(study.mission)
     highest = highest_echo(found)
     if highest is None or not highest.phase:
@@ -286,12 +279,7 @@ def verify_random(study: Study, error: RandomError) -> Verdict:
     binding = min(sizes, key=lambda name: sizes[name])
     size = sizes[binding]
     at_limit = error._replace(declared=size)
-    blank = Verdict(
-        id=error.id,
-        model=study.model,
-        boundary_error=20 * math.log10(size) if error.unit == "dB" else size,
-        unit=error.unit,
-    )
+    blank = study.blank(error.id, 20 * math.log10(size) if error.unit == "dB" else size, error.unit)
     if binding == ISLR:
         is_taken = study.mission.requirements.cubic_phase_error is not None
         return _power(study, blank, [at_limit], error.owner, order=_ORDER if is_taken else _ORDER - 1)
@@ -393,7 +381,7 @@ def verify_islr(study: Study, of: Subject) -> Verdict:
     mission, model = study.mission, study.models[-1].name
     limit = spread_limit(mission, study.allocation, of.owner, model) or 0.0
     level = islr_db(limit**2, model, mainlobe_energy(mission))
-    blank = Verdict(id=of.id, model=study.model, boundary_error=level, unit="dB")
+    blank = study.blank(of.id, level, "dB")
     powers = declared_powers(study.analysis, study.allocation, of.owner, model)
     total = math.fsum(one.variance for one in powers)
     if not total:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.declared import QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource
 from bisar_budget.effects.subject import Subject
+from bisar_budget.findings.images import Verdict
 from bisar_budget.mission.model import Mission
 from bisar_budget.ranges.exact_ranges import FINE, STILL, ExactRanges, followed
 from bisar_budget.simulate.autofocus import ALGORITHMS
@@ -52,6 +53,10 @@ class Study:
         self.allocation = self.analysis.allocation
         self.plane = self.analysis.published.plane  # (25)
         self.collection = PointCollection(mission, self.geometry)
+
+    def blank(self, row_id: str, limit: float, unit: str, **known: Any) -> Verdict:
+        """Verdict on a limit of the gating model before its image is formed."""
+        return Verdict(id=row_id, model=self.model, boundary_error=limit, unit=unit, **known)
 
     @property
     def is_full(self) -> bool:
