@@ -114,7 +114,7 @@ class Tally(NamedTuple):
     all_hold: int
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True)
 class Counted:
     """Counts and mean squares of all draws.
 

@@ -60,7 +60,7 @@ class SimulationError(Exception):
     """An image that cannot be formed as asked; the message says what to change."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True)
 class Response:
     """One target as the images show it.
 
@@ -121,7 +121,7 @@ class PointImages(NamedTuple):
     outside: str = ""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True)
 class Patch:
     """Ground patch around the displaced point: pixels along both axes, and their spacing there. [m]"""
 
@@ -139,7 +139,7 @@ class Patch:
         return (self.shape[0] * self.spacing[0], self.shape[1] * self.spacing[1])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True)
 class Plan:
     """Patches, samples and memory that the images of a mission take, known before any is formed."""
 

@@ -319,7 +319,7 @@ def _refined(fit: Floats, place: Floats, contribution: Complexes, seen: Complexe
 
 
 # ---------------------------------------------------------------------- displacement
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True)
 class Shift:
     """Displacement on the ground (east, north) [m], azimuth of the line of smear, 0 to π [rad].
 

@@ -446,7 +446,7 @@ def _power(
 
 
 # ---------------------------------------------------------------------- ISLR that noise adds
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True)
 class AddedIslr:
     """ISLR that noise adds, the ends of its interval at 95 %, and of how many draws it is the mean. [dB]"""
 
